@@ -10,7 +10,6 @@ use std::sync::{Arc, Mutex, Weak};
 
 use bytes::Bytes;
 use chefshat_proto::v1::{self, SpectatorServiceWatchRequest};
-use futures::future::BoxFuture;
 use futures::stream::unfold;
 use http::{HeaderMap, Response};
 use http_body_util::StreamBody;
@@ -88,7 +87,7 @@ impl Fanout {
         caller: Key,
         present: impl Future<Output = Option<v1::Room>>,
         open: impl Future<Output = Result<Response<Body>, E>>,
-        tell: impl FnOnce(watch::Receiver<u32>) -> BoxFuture<'static, ()>,
+        tell: impl FnOnce(watch::Receiver<u32>),
     ) -> Result<Response<Body>, E> {
         if let Some(reader) = self.join(&key)
             && let Some(place) = self.limits.share_stream(caller)
@@ -113,7 +112,7 @@ impl Fanout {
         let (parts, body) = answer.into_parts();
         opening.0.answered(parts.status, parts.headers);
         let receiving = Arc::clone(&opening.0);
-        tokio::spawn(tell(receiving.others()));
+        tell(receiving.others());
         tokio::spawn(async move { receiving.receive(body).await });
         let answer = response(own).await;
         Ok(answer.unwrap_or_else(|| room_gone().into_http()))

@@ -226,7 +226,10 @@ impl Gateway {
                         .map_or(address, |key: &Charged| key.0);
                     let present = self.room(&elsewhere.peer, key.room.clone());
                     let channel = self.peers().channel(&elsewhere.peer);
-                    let tell = tell_sharing(channel, key.room.clone());
+                    let room_id = key.room.clone();
+                    let tell = |others| {
+                        tokio::spawn(tell_sharing(channel, room_id, others));
+                    };
                     (self.layer.fanout.answer(key, caller, present, sent, tell)).await
                 }
                 None => sent.await,
@@ -270,24 +273,17 @@ impl Gateway {
 }
 
 /// Tells the node that has a room how many share a stream of it, until they have left.
-fn tell_sharing(
-    channel: Channel,
-    room_id: String,
-) -> impl FnOnce(watch::Receiver<u32>) -> BoxFuture<'static, ()> {
-    move |mut others| {
-        Box::pin(async move {
-            // Most streams have one spectator.
-            if others.wait_for(|others| *others > 0).await.is_err() {
-                return;
-            }
-            let counts = WatchStream::new(others).map(move |others| ShareRequest {
-                room_id: room_id.clone(),
-                others,
-            });
-            if let Err(error) = PeerServiceClient::new(channel).share(counts).await {
-                debug!(%error, "the spectators who share a stream are not counted");
-            }
-        })
+async fn tell_sharing(channel: Channel, room_id: String, mut others: watch::Receiver<u32>) {
+    // Most streams have one spectator.
+    if others.wait_for(|others| *others > 0).await.is_err() {
+        return;
+    }
+    let counts = WatchStream::new(others).map(move |others| ShareRequest {
+        room_id: room_id.clone(),
+        others,
+    });
+    if let Err(error) = PeerServiceClient::new(channel).share(counts).await {
+        debug!(%error, "the spectators who share a stream are not counted");
     }
 }
 

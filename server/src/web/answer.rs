@@ -52,8 +52,8 @@ pub(super) fn answer<B>(
     finished(chosen(find, request), request.method())
 }
 
-/// The answer with something that was made for this request; `None`: there is no such thing.
-pub(super) fn made(
+/// The answer with content generated for this request; `None`: not found.
+pub(super) fn generated(
     media_type: &'static str,
     bytes: Option<Bytes>,
     method: &Method,

@@ -17,7 +17,7 @@ use rust_embed::RustEmbed;
 use tonic::body::Body;
 use tower::{BoxError, Layer, Service};
 
-use answer::{DOCUMENT, File, answer, made};
+use answer::{DOCUMENT, File, answer, generated};
 pub use origin::{OriginLayer, Origins};
 use preview::Link;
 
@@ -116,26 +116,22 @@ where
     S: Service<Request<Body>, Response = Response<Body>>,
     S::Error: Into<BoxError>,
 {
-    let extensions = request.extensions().clone();
+    let lines = preview::record(services, link.game(), request.extensions().clone()).await;
     match link {
-        Link::Picture(game) => {
-            let picture = match preview::record(services, game, extensions).await {
+        Link::Picture(_) => {
+            let picture = match lines {
                 Some(lines) => preview::picture(lines).await,
                 None => None,
             };
-            made("image/png", picture, request.method())
+            generated("image/png", picture, request.method())
         }
-        Link::Replay(game) => {
-            let document = find(DOCUMENT).zip(preview::origin(request, tls));
-            let tagged = match document {
-                Some((document, origin)) => {
-                    let lines = preview::record(services, game, extensions).await;
-                    lines.and_then(|lines| preview::document(&document.bytes, &lines, &origin))
-                }
-                None => None,
-            };
+        Link::Replay(_) => {
+            let tagged = lines.and_then(|lines| {
+                let origin = preview::origin(request, tls)?;
+                preview::document(&find(DOCUMENT)?.bytes, &lines, &origin)
+            });
             match tagged {
-                Some(tagged) => made("text/html; charset=utf-8", Some(tagged), request.method()),
+                Some(_) => generated("text/html; charset=utf-8", tagged, request.method()),
                 None => answer(find, request),
             }
         }

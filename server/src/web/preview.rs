@@ -6,9 +6,8 @@
 use std::sync::LazyLock;
 
 use bytes::Bytes;
-use chefshat_proto::v1::{
-    self, game_event::Kind, record_line::Line, record_service_client::RecordServiceClient,
-};
+use chefshat_proto::v1::{self, record_line::Line, record_service_client::RecordServiceClient};
+use chefshat_record::outcome::outcome;
 use chefshat_render::{Painter, Perspective, last_scene};
 use chefshat_room::ids::Id;
 use http::uri::{Authority, Scheme};
@@ -51,6 +50,13 @@ impl<'a> Link<'a> {
         };
         Id::parse(game).map(|_| link)
     }
+
+    /// The game.
+    pub(super) fn game(self) -> &'a str {
+        match self {
+            Self::Replay(game) | Self::Picture(game) => game,
+        }
+    }
 }
 
 /// The record of a game, if everybody may read it and it is not too long.
@@ -85,15 +91,14 @@ where
 pub(super) fn document(document: &[u8], lines: &[v1::RecordLine], origin: &str) -> Option<Bytes> {
     let document = std::str::from_utf8(document).ok()?;
     let (head, rest) = document.split_once("</head>")?;
-    let header = lines.iter().find_map(|line| match &line.line {
-        Some(Line::Header(header)) => Some(header),
-        _ => None,
-    })?;
+    let Some(Line::Header(header)) = lines.first().and_then(|line| line.line.as_ref()) else {
+        return None;
+    };
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
     let tags = context! {
         room => header.room_name.as_str(),
-        result => result(header, lines),
+        result => result(lines),
         origin => Value::from_safe_string(origin.to_owned()),
         game => header.game_id.as_str(),
     };
@@ -102,25 +107,14 @@ pub(super) fn document(document: &[u8], lines: &[v1::RecordLine], origin: &str) 
 }
 
 /// The result of a game in words.
-fn result(header: &v1::RecordHeader, lines: &[v1::RecordLine]) -> String {
-    let standings = lines.iter().rev().find_map(|line| match &line.line {
-        Some(Line::Event(event)) => match &event.kind {
-            Some(Kind::GameEnded(ended)) => Some(&ended.standings),
-            _ => None,
-        },
-        _ => None,
-    });
-    let Some(standings) = standings else {
+fn result(lines: &[v1::RecordLine]) -> String {
+    let Ok(outcome) = outcome(lines) else {
         return "The game ended without a result.".into();
     };
-    let name = |seat: u32| {
-        let seat = usize::try_from(seat)
-            .ok()
-            .and_then(|seat| header.seats.get(seat));
-        seat.map_or("", |seat| seat.name.as_str())
-    };
-    let places: Vec<_> = (standings.iter())
-        .map(|it| format!("{}. {} ({} points)", it.place, name(it.seat), it.points))
+    let mut seats = outcome.seats;
+    seats.sort_by_key(|seat| seat.statistics.place);
+    let places: Vec<_> = (seats.iter().map(|seat| (&seat.name, &seat.statistics)))
+        .map(|(name, it)| format!("{}. {name} ({} points)", it.place, it.points))
         .collect();
     places.join(" · ")
 }
@@ -155,6 +149,8 @@ pub(super) fn origin<B>(request: &Request<B>, tls: bool) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use chefshat_proto::v1::game_event::Kind;
+
     use super::*;
 
     const GAME: &str = "0123456789abcdef0123456789abcdef";
@@ -174,9 +170,18 @@ mod tests {
             kind: Some(kind),
             ..v1::GameEvent::default()
         };
-        [Line::Header(header), Line::Event(event)]
-            .map(|line| v1::RecordLine { line: Some(line) })
-            .into()
+        let mut footer = v1::RecordFooter::default();
+        footer.set_state(match &event.kind {
+            Some(Kind::GameEnded(_)) => v1::RoomState::Finished,
+            _ => v1::RoomState::Aborted,
+        });
+        [
+            Line::Header(header),
+            Line::Event(event),
+            Line::Footer(footer),
+        ]
+        .map(|line| v1::RecordLine { line: Some(line) })
+        .into()
     }
 
     fn standing(seat: u32, points: u64, place: u32) -> v1::Standing {

@@ -55,7 +55,10 @@ class JoinOptions:
 
 
 def add_server_options(parser: argparse.ArgumentParser, *flags: str, required: bool = False, default: str | None = None) -> None:
-    """Adds --address (and other `flags` for the same), --token, --ca, --secret. Without --address the environment is asked."""
+    """Adds --address (and other `flags` for the same), --token, --ca, --secret.
+
+    An address that is required or has a default may be in the environment.
+    """
     what = "the server" if required or default else "a running server"
     unless = ""
     if required or default:

@@ -17,6 +17,7 @@ use tonic::body::Body;
 
 use super::message::{HEARTBEAT, Message, Messages};
 use crate::config;
+use crate::convert;
 use crate::grpc::status::{room_gone, spectator_too_slow};
 use crate::limits::{CallLimits, HISTORY_STEP, Held, Key};
 
@@ -191,8 +192,7 @@ impl SharedStream {
     }
 
     fn count(&self, log: &Log) {
-        let others = log.readers.len().saturating_sub(1);
-        let others = u32::try_from(others).unwrap_or(u32::MAX);
+        let others = convert::number(log.readers.len().saturating_sub(1));
         (self.others).send_if_modified(|known| std::mem::replace(known, others) != others);
     }
 

@@ -128,7 +128,7 @@ impl Room {
                     .filter(|it| !it.is_abandoned())
                     .count();
                 let room = v1::Room {
-                    spectators: u32::try_from(watching).unwrap_or(u32::MAX),
+                    spectators: convert::number(watching),
                     ..convert::describe_at(&self.core, self.now)
                 };
                 answer(reply, room);

@@ -19,8 +19,8 @@ const MIGRATIONS: [(i64, &str, &str); 2] = [
     (1, "games", include_str!("migrations/0001_games.sql")),
     (2, "studies", include_str!("migrations/0002_studies.sql")),
 ];
-/// The advisory lock of whoever creates or upgrades the schema: "chefshat" in ASCII.
-pub(super) const CREATING: i64 = 0x6368_6566_7368_6174;
+/// Key of the advisory lock that is held while the schema is created or upgraded: "chefshat" in ASCII.
+const SCHEMA_LOCK: i64 = 0x6368_6566_7368_6174;
 /// How long connecting may take.
 const CONNECT_LIMIT: Duration = Duration::from_secs(5);
 /// The settings of each session. Work that depends on nothing but `READ COMMITTED` and takes short;
@@ -129,8 +129,8 @@ impl Schema {
 }
 
 /// Waits until nobody else creates or upgrades the schema. The lock ends with the connection.
-async fn lock(connection: &mut PgConnection) -> sqlx::Result<()> {
-    let locking = sqlx::query("SELECT pg_advisory_lock($1)").bind(CREATING);
+pub(super) async fn lock(connection: &mut PgConnection) -> sqlx::Result<()> {
+    let locking = sqlx::query("SELECT pg_advisory_lock($1)").bind(SCHEMA_LOCK);
     locking.execute(connection).await.map(drop)
 }
 

@@ -136,8 +136,7 @@ async fn connections_are_encrypted_and_certificates_checked() {
 async fn who_finds_a_schema_that_another_node_is_creating_waits_for_it() {
     let database = chefshat_postgres::database();
     let mut creating = connected(&database).await;
-    let locking = sqlx::query("SELECT pg_advisory_lock($1)").bind(open::CREATING);
-    locking.execute(&mut creating).await.expect("free");
+    open::lock(&mut creating).await.expect("free");
     // As between two migrations, or in the middle of a look at the tables.
     database.run("CREATE TABLE half_a_schema (id bigint)");
     let address = open::address(database.url()).expect("an address");
