@@ -24,6 +24,7 @@ fn documents() -> Vec<PathBuf> {
         "clients/cpp/README.md",
         "clients/robot/README.md",
         "clients/web/README.md",
+        "docker/archive/README.md",
     ]
     .map(|path| root.join(path))
     .into();

@@ -137,8 +137,9 @@ impl Release<'_> {
         let name = format!("chefshat-{VERSION}-{PLATFORM}");
         let folder = self.stage.join(&name);
         copy(&self.binary(), &folder.join("chefshat"))?;
-        for document in ["README.md", "CHANGELOG.md", "LICENSE"] {
-            copy(&self.places.root.join(document), &folder.join(document))?;
+        for document in ["docker/archive/README.md", "CHANGELOG.md", "LICENSE"] {
+            let from = self.places.root.join(document);
+            copy(&from, &folder.join(file_name(&from)))?;
         }
         for unit in ["chefshat.service", "chefshat.socket"] {
             let from = self.places.root.join("docker/systemd").join(unit);

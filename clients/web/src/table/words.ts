@@ -63,12 +63,8 @@ export function moveWords(move: Move): string {
 /** Cards of any faces. */
 function giftWords(cards: readonly Card[], count: number): string {
   if (cards.length === 0) return t().common.cards(count);
-  return cards
-    .map((card) => {
-      if (card.kind === "joker") return t().table.card.joker;
-      return card.kind === "golden" ? `${card.face} (${t().common.golden})` : String(card.face);
-    })
-    .join(", ");
+  const faces = [...new Set(cards.map(faceOf))];
+  return faces.map((face) => playWords(cards.filter((card) => faceOf(card) === face))).join(", ");
 }
 
 /** The seat that a line is about, and the rest of the sentence. */

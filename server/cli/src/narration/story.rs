@@ -172,18 +172,13 @@ fn exchanged(view: &GameView, cards: &v1::CardsExchanged) -> String {
         let noun = if cards.count == 1 { "card" } else { "cards" };
         return format!("gives {} {noun} to {receiver}", cards.count);
     }
-    // Of several cards of the top face, only one is the Golden card.
-    let golden = (cards.cards.iter())
-        .rposition(|card| *card == top)
-        .filter(|_| cards.golden);
-    let named = cards.cards.iter().enumerate().map(|(index, card)| {
-        if *card > top {
-            "J".to_owned()
-        } else if golden == Some(index) {
-            format!("★{card}")
-        } else {
-            card.to_string()
-        }
+    let equal = cards.cards.chunk_by(|one, next| one == next);
+    let named = equal.map(|equal| match (equal.len(), equal[0]) {
+        (1, card) if card > top => "J".to_owned(),
+        (jokers, card) if card > top => format!("{jokers}J"),
+        // Only one of them is the Golden card.
+        (count, card) if card == top && cards.golden => format!("{count}×{card}★"),
+        (count, card) => format!("{count}×{card}"),
     });
     let named = named.collect::<Vec<_>>().join(", ");
     format!("gives {named} to {receiver}")
@@ -261,10 +256,11 @@ mod tests {
         for (gift, expected) in [
             (gift(1, &[], false), "1 card"),
             (gift(2, &[], false), "2 cards"),
-            (gift(2, &[3, 12], false), "3, J"),
-            (gift(2, &[11, 11], false), "11, 11"),
-            (gift(2, &[11, 11], true), "11, ★11"),
-            (gift(2, &[11, 12], true), "★11, J"),
+            (gift(2, &[3, 12], false), "1×3, J"),
+            (gift(2, &[11, 11], false), "2×11"),
+            (gift(2, &[11, 11], true), "2×11★"),
+            (gift(2, &[11, 12], true), "1×11★, J"),
+            (gift(2, &[12, 12], false), "2J"),
         ] {
             let words = exchanged(&view, &gift);
             assert_eq!(words, format!("gives {expected} to {receiver}"));

@@ -155,15 +155,8 @@ pub(super) fn play(cards: &[Card]) -> String {
 
 /// Cards of any faces.
 fn gift(cards: &[Card]) -> String {
-    let words: Vec<String> = cards
-        .iter()
-        .map(|card| match card {
-            Card::Face(face) => face.to_string(),
-            Card::Golden(_) => "Golden".to_owned(),
-            Card::Joker => "joker".to_owned(),
-        })
-        .collect();
-    words.join(", ")
+    let words = cards.chunk_by(|one, next| one.face() == next.face());
+    words.map(play).collect::<Vec<_>>().join(", ")
 }
 
 /// A log line: seat and text.

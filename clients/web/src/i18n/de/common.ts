@@ -77,7 +77,6 @@ export const common: Texts["common"] = {
     "Mozzarella",
   ],
   joker: "Joker",
-  golden: "golden",
   cards: (count) => plural(count, { one: "# Karte", other: "# Karten" }),
   points: (count) => plural(count, { one: "# Punkt", other: "# Punkte" }),
   place: ordinals("de", { other: "." }),

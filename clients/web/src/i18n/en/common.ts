@@ -68,7 +68,6 @@ export const common = {
     "mozzarella",
   ],
   joker: "joker",
-  golden: "Golden",
   cards: (count: number) => plural(count, { one: "# card", other: "# cards" }),
   points: (count: number) => plural(count, { one: "# point", other: "# points" }),
   place: ordinals("en", { one: "st", two: "nd", few: "rd", other: "th" }),

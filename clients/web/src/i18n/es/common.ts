@@ -78,7 +78,6 @@ export const common: Texts["common"] = {
     "mozzarella",
   ],
   joker: "comodín",
-  golden: "dorado",
   cards: (count) => plural(count, { one: "# carta", other: "# cartas" }),
   points: (count) => plural(count, { one: "# punto", other: "# puntos" }),
   place: ordinals("es", { other: ".º" }),

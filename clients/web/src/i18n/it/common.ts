@@ -75,7 +75,6 @@ export const common: Texts["common"] = {
     "mozzarella",
   ],
   joker: "jolly",
-  golden: "d’oro",
   cards: (count) => plural(count, { one: "# carta", other: "# carte" }),
   points: (count) => plural(count, { one: "# punto", other: "# punti" }),
   place: ordinals("it", { other: "º" }),

@@ -17,8 +17,10 @@ use crate::{CommandError, say};
 
 /// Commands to suggest.
 pub(super) struct Hints {
-    /// Downloads the record of a game.
+    /// Downloads the record of a game, or shows it.
     pub(super) record: Box<dyn Fn(&str) -> String + Send>,
+    /// Where the pages of games are, if a server goes on.
+    pub(super) page: Option<String>,
     /// Shows a tournament's results; its ID is added.
     pub(super) results: String,
     /// Resumes, if that is possible.
@@ -78,8 +80,11 @@ fn finished(game: &App, standings: &[v1::Standing], hints: &Hints) -> Result<(),
             standings.len()
         ))?;
     }
-    let record = (hints.record)(&game.table.game_id);
-    say(format_args!("the record: {record}"))
+    let id = &game.table.game_id;
+    if let Some(page) = &hints.page {
+        say(format_args!("the replay: {page}/replay/{id}"))?;
+    }
+    say(format_args!("the record: {}", (hints.record)(id)))
 }
 
 fn of_tournament(part: &Part, lobby: &Lobby, hints: &Hints) -> Result<ExitCode, CommandError> {

@@ -128,6 +128,7 @@ impl Play {
                     taken.ticket
                 )),
                 results: format!("chefshat tournament results --server {server}"),
+                page: server.starts_with("http").then(|| server.clone()),
                 record: Box::new(move |game| {
                     format!("chefshat records get {game} --server {server}")
                 }),
@@ -142,6 +143,7 @@ impl Play {
             // The server has stopped.
             back: None,
             results: String::new(),
+            page: None,
             record: Box::new(move |game| {
                 format!(
                     "chefshat watch {}",
