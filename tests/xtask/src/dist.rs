@@ -49,6 +49,7 @@ pub(crate) fn run(
             .try_for_each(|folder| emptied(folder))
     })?;
 
+    steps.run("set up the target", || setup::target(TARGET))?;
     book::run(places, steps)?;
     // With the page, which the binary contains.
     wheels::run(places, steps, "dist", false)?;

@@ -70,6 +70,16 @@ pub(crate) fn tools(places: &Places) -> Result<(), Failure> {
     listed(places, "tests/xtask/tools.txt", &places.tools())
 }
 
+/// Rust's standard library for another target.
+pub(crate) fn target(name: &str) -> Result<(), Failure> {
+    let mut rustc = Command::new("rustc");
+    let folder = read(rustc.args(["--print", "target-libdir", "--target", name]))?;
+    match Path::new(folder.trim()).exists() {
+        true => Ok(()),
+        false => run(Command::new("rustup").args(["target", "add", name])),
+    }
+}
+
 /// The builders of wheels.txt, in their own environment.
 pub(crate) fn wheel_tools(places: &Places) -> Result<(), Failure> {
     listed(places, "tests/xtask/wheels.txt", &places.wheel_tools())
