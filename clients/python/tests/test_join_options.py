@@ -300,3 +300,24 @@ def test_contradicting_join_options_are_refused(
         command.main(["--address", "127.0.0.1:1", *arguments])
     assert exit_info.value.code == 2
     assert output in capsys.readouterr().err
+
+
+@pytest.mark.server
+def test_a_name_keeps_its_key(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    key, fingerprints = tmp_path / "ada.key", []
+    joining = ["--address", real_address, "--name", "Ada"]
+    with chefshat.Client(real_address) as client:
+        for file in (key, key, tmp_path / "other.key"):
+            made = client.create_room(seats=["random", None, "random", "random"], rules=pb.RuleSet(target_shifts=1))
+            assert command.main([*joining, "--code", made.join_code, "--name-key", str(file)]) == 0
+            fingerprints.append(client.get_room(made.room.room_id).seats[1].name_fingerprint)
+    first, again, other = fingerprints
+    assert re.fullmatch("[0-9a-f]{16}", first)
+    assert first == again != other
+    assert stat.S_IMODE(key.stat().st_mode) == 0o600
+    capsys.readouterr()
+    key.write_text("nonsense")
+    for way, why in (("--code", "contains no key: 64 hexadecimal digits"), ("--ticket", "--name-key is for joining")):
+        with pytest.raises(SystemExit, match="2"):
+            command.main([*joining, way, "BCDF2345", "--name-key", str(key)])
+        assert why in capsys.readouterr().err

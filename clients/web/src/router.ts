@@ -22,7 +22,7 @@ export type Route =
   | { page: "newStudy" }
   | { page: "ownStudy"; studyId: string }
   | { page: "leaderboard" }
-  | { page: "person"; name: string }
+  | { page: "person"; name: string; fingerprint: string }
   | { page: "tutorial" }
   | { page: "rules" }
   | { page: "unknown" };
@@ -34,6 +34,7 @@ export function routeOf(path: string): Route {
   if (parts.length === 3 && first === "rooms" && third === "table") return { page: "attend", roomId: second ?? "" };
   if (parts.length === 3 && first === "tournaments" && third === "results")
     return { page: "results", tournamentId: second ?? "" };
+  if (parts.length === 3 && first === "people") return personOf(second ?? "", third ?? "");
   if (parts.length > 2) return { page: "unknown" };
   if (second === undefined) {
     switch (first) {
@@ -73,10 +74,14 @@ export function routeOf(path: string): Route {
     case "studies":
       return second === "new" ? { page: "newStudy" } : { page: "ownStudy", studyId: second };
     case "people":
-      return { page: "person", name: second === ". " || second === ".. " ? second.trim() : second };
+      return personOf(second, "");
     default:
       return { page: "unknown" };
   }
+}
+
+function personOf(name: string, fingerprint: string): Route {
+  return { page: "person", name: name === ". " || name === ".. " ? name.trim() : name, fingerprint };
 }
 
 /** Formats the path of a route; the inverse of `routeOf`. */
@@ -102,7 +107,7 @@ export function pathOf(route: Route): string {
       return `/tournaments/${encodeURIComponent(route.tournamentId)}/results`;
     case "person":
       // Browsers resolve the parts "." and "..", however they are encoded. Names never end with a space.
-      return `/people/${encodeURIComponent(route.name)}${/^\.{1,2}$/.test(route.name) ? "%20" : ""}`;
+      return `/people/${encodeURIComponent(route.name)}${/^\.{1,2}$/.test(route.name) ? "%20" : ""}${route.fingerprint && `/${encodeURIComponent(route.fingerprint)}`}`;
     case "study":
       return `/study/${encodeURIComponent(route.link)}`;
     case "newStudy":

@@ -22,18 +22,18 @@ const PER_PAGE = 50;
 
 afterEach(() => vi.restoreAllMocks());
 
-const line = (name: string, kind = ParticipantKind.HUMAN) =>
-  create(RatedSchema, { name, kind, place: 3, rating: { mean: 30, deviation: 2.5, games: 12 } });
+const line = (name: string, kind = ParticipantKind.HUMAN, nameFingerprint = "") =>
+  create(RatedSchema, { name, kind, nameFingerprint, place: 3, rating: { mean: 30, deviation: 2.5, games: 12 } });
 
 /** The result of a game: place 2 of four, or none. */
-function record(number: number, state = RoomState.FINISHED) {
+function record(number: number, state = RoomState.FINISHED, nameFingerprint = "") {
   return create(RecordSummarySchema, {
     gameId: `game-${number}`,
     roomName: `Room ${number}`,
     state,
     origin: GameOrigin.DEALT,
     seats: [
-      { seat: 0, name: NAME, kind: ParticipantKind.HUMAN },
+      { seat: 0, name: NAME, kind: ParticipantKind.HUMAN, nameFingerprint },
       { seat: 1, name: "Greta", builtInAgent: "greedy", kind: ParticipantKind.AGENT },
       { seat: 2, name: "Ben", kind: ParticipantKind.HUMAN },
       { seat: 3, name: "..", kind: ParticipantKind.AGENT },
@@ -46,7 +46,7 @@ function record(number: number, state = RoomState.FINISHED) {
 }
 
 /** A server with these games, newest first, and these rows of the leaderboard. */
-async function show(records: ReturnType<typeof record>[], rated: Rated[]) {
+async function show(records: ReturnType<typeof record>[], rated: Rated[], fingerprint = "") {
   const list = vi.spyOn(recordApi, "listRecords").mockImplementation(async ({ pageSize = 0, pageToken }) => {
     const from = Number(pageToken || 0);
     const to = from + pageSize;
@@ -54,7 +54,7 @@ async function show(records: ReturnType<typeof record>[], rated: Rated[]) {
     return create(ListRecordsResponseSchema, { records: records.slice(from, to), nextPageToken });
   });
   vi.spyOn(tournamentApi, "getLeaderboard").mockResolvedValue(create(GetLeaderboardResponseSchema, { rated }));
-  await act(() => render(<PersonPage route={{ page: "person", name: NAME }} />, root));
+  await act(() => render(<PersonPage route={{ page: "person", name: NAME, fingerprint }} />, root));
   await settle();
   return list;
 }
@@ -101,6 +101,24 @@ test("more games are shown on request, and the totals are of the games shown", a
   expect(root.querySelector("button")).toBeNull();
 });
 
+test("with a fingerprint, a name is one participant; without, everybody who chose it", async () => {
+  const [own, other] = ["0123456789abcdef", "fedcba9876543210"];
+  const records = [record(1, RoomState.FINISHED, own), record(2, RoomState.FINISHED, other)];
+  const rated = [line(NAME, ParticipantKind.HUMAN, own), line(NAME, ParticipantKind.HUMAN, other)];
+  await show(records, rated, own);
+  expect(rows()).toHaveLength(1);
+  expect(facts().map(([label]) => label)).toEqual(["Rating person #0123", "Finished games", "Won", "Mean place"]);
+  expect(root.textContent).not.toContain("several people");
+  await show(records, rated);
+  expect(rows()).toHaveLength(2);
+  expect(
+    facts()
+      .map(([label]) => label)
+      ?.slice(0, 2),
+  ).toEqual(["Rating person #0123", "Rating person #fedc"]);
+  expect(root.textContent).toContain("several people");
+});
+
 test("a rating is shown without games that the reader may see", async () => {
   await show([], [line(NAME), line(NAME, ParticipantKind.AGENT)]);
   expect(facts().map(([label]) => label)).toEqual(["Rating person", "Rating agent"]);
@@ -128,7 +146,7 @@ test("it says that it is loading, and why it failed", async () => {
   });
   vi.spyOn(recordApi, "listRecords").mockReturnValue(response);
   vi.spyOn(tournamentApi, "getLeaderboard").mockReturnValue(response);
-  await act(() => render(<PersonPage route={{ page: "person", name: NAME }} />, root));
+  await act(() => render(<PersonPage route={{ page: "person", name: NAME, fingerprint: "" }} />, root));
   expect(root.textContent).toContain("Loading…");
   fail(new ConnectError("no such server", Code.Unavailable));
   await settle();

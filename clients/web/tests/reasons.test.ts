@@ -33,6 +33,7 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "FILTER_REFUSED",
     "KIND_REFUSED",
     "MAX_GAMES_REFUSED",
+    "NAME_KEY_REFUSED",
     "PAGE_TOKEN_REFUSED",
     "REPORT_ID_USED",
     "REQUEST_ID_REFUSED",

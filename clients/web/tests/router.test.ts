@@ -21,11 +21,12 @@ const ROUTES: [string, Route][] = [
   ["/studies/new", { page: "newStudy" }],
   ["/studies/0123", { page: "ownStudy", studyId: "0123" }],
   ["/leaderboard", { page: "leaderboard" }],
-  ["/people/Dr.%20R%C3%B6sa%2FII", { page: "person", name: "Dr. Rösa/II" }],
-  ["/people/%3F%23%25%20%22%3Cb%3E", { page: "person", name: '?#% "<b>' }],
-  ["/people/.%20", { page: "person", name: "." }],
-  ["/people/..%20", { page: "person", name: ".." }],
-  ["/people/...", { page: "person", name: "..." }],
+  ["/people/Dr.%20R%C3%B6sa%2FII", { page: "person", name: "Dr. Rösa/II", fingerprint: "" }],
+  ["/people/%3F%23%25%20%22%3Cb%3E", { page: "person", name: '?#% "<b>', fingerprint: "" }],
+  ["/people/.%20", { page: "person", name: ".", fingerprint: "" }],
+  ["/people/..%20", { page: "person", name: "..", fingerprint: "" }],
+  ["/people/Ada/0123456789abcdef", { page: "person", name: "Ada", fingerprint: "0123456789abcdef" }],
+  ["/people/...", { page: "person", name: "...", fingerprint: "" }],
   ["/tutorial", { page: "tutorial" }],
   ["/rules", { page: "rules" }],
 ];
@@ -41,5 +42,5 @@ test.each(["/nowhere", "/rooms/1/2", "/lobby/x"])("%s is unknown", (path) => {
 });
 
 test("a badly encoded part is kept as it is", () => {
-  expect(routeOf("/people/%E0%A4%A")).toEqual({ page: "person", name: "%E0%A4%A" });
+  expect(routeOf("/people/%E0%A4%A")).toEqual({ page: "person", name: "%E0%A4%A", fingerprint: "" });
 });

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use crate::kind::KindArg;
+use crate::name_key::NameKeyArg;
 use chefshat_agents::{BuiltInAgent, RecordedPlayer};
 use chefshat_client::{Client, Outcome, PlayError, v1};
 use chefshat_record::jsonl;
@@ -58,6 +59,8 @@ pub(super) struct AgentCommand {
     /// Display name. Default: the agent's or model's.
     #[arg(long)]
     name: Option<String>,
+    #[command(flatten)]
+    name_key: NameKeyArg,
     /// Kind of participant. Default: agent, and model for llm.
     #[arg(long, value_enum)]
     kind_of: Option<KindArg>,
@@ -146,6 +149,7 @@ impl AgentCommand {
                 join_code: code.clone(),
                 name: name.clone(),
                 kind: v1::ParticipantKind::from(kind).into(),
+                name_key: self.name_key.key()?,
                 ..v1::JoinRoomRequest::default()
             })
             .await?;

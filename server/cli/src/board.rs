@@ -12,6 +12,8 @@ use crate::narration::clean;
 
 /// Maximum columns of a name.
 const NAME_COLUMNS: usize = 24;
+/// Digits shown of a fingerprint.
+const SHOWN_DIGITS: usize = 4;
 /// Half the width of a 95 % interval of the normal distribution, in deviations.
 const Z95: f64 = 1.96;
 /// Names of the places.
@@ -38,7 +40,7 @@ pub(super) fn add_table(text: &mut String, board: &v1::GetLeaderboardResponse) {
         let [mean, uncertainty] = rating_in_words(&rating);
         let mut row = vec![
             line.place.to_string(),
-            clean(&line.name, NAME_COLUMNS),
+            marked_name(line),
             rated_kind(line).to_owned(),
             mean,
             uncertainty,
@@ -57,6 +59,7 @@ pub(super) fn as_json(board: &v1::GetLeaderboardResponse) -> Vec<Value> {
         json!({
             "place": line.place,
             "name": line.name,
+            "name_fingerprint": line.name_fingerprint,
             "kind": rated_kind(line),
             "mean": rating.mean,
             "deviation": rating.deviation,
@@ -74,6 +77,7 @@ pub(super) fn as_csv(board: &v1::GetLeaderboardResponse) -> Result<Vec<u8>, Comm
         .map(str::to_owned)
         .into();
     header.extend((1..=MAX_SEATS).map(|place| format!("place_{place}")));
+    header.push("name_fingerprint".to_owned());
     sheet.write_record(&header)?;
     for line in &board.rated {
         let rating = line.rating.unwrap_or_default();
@@ -86,9 +90,19 @@ pub(super) fn as_csv(board: &v1::GetLeaderboardResponse) -> Result<Vec<u8>, Comm
             rating.games.to_string(),
         ];
         row.extend(times(line, MAX_SEATS));
+        row.push(line.name_fingerprint.clone());
         sheet.write_record(&row)?;
     }
     Ok(sheet.into_inner()?)
+}
+
+/// The name, with the beginning of its fingerprint if it has a key.
+fn marked_name(line: &v1::Rated) -> String {
+    let name = clean(&line.name, NAME_COLUMNS);
+    match line.name_fingerprint.get(..SHOWN_DIGITS) {
+        Some(digits) => format!("{name} #{digits}"),
+        None => name,
+    }
 }
 
 /// How often the participant took each of the first places.
@@ -120,9 +134,16 @@ mod tests {
             }),
             place,
             places: vec![4, 3],
+            name_fingerprint: String::new(),
         };
         let mut board = v1::GetLeaderboardResponse {
-            rated: vec![rated(1, "greedy", true), rated(2, "A\u{1b}da", false)],
+            rated: vec![
+                rated(1, "greedy", true),
+                v1::Rated {
+                    name_fingerprint: "0123456789abcdef".into(),
+                    ..rated(2, "A\u{1b}da", false)
+                },
+            ],
             games: 7,
         };
         let mut text = String::new();
@@ -132,11 +153,13 @@ mod tests {
         let words: Vec<&str> = lines[3].split_whitespace().collect();
         assert_eq!(
             words,
-            ["2", "Ada", "human", "25.50", "±", "3.92", "7", "4", "3"]
+            [
+                "2", "Ada", "#0123", "human", "25.50", "±", "3.92", "7", "4", "3"
+            ]
         );
         let csv = String::from_utf8(as_csv(&board).expect("written")).expect("text");
         let csv: Vec<&str> = csv.lines().collect();
-        assert_eq!(csv[1], "1,greedy,built-in,25.5,2,7,4,3,0,0,0,0");
+        assert_eq!(csv[1], "1,greedy,built-in,25.5,2,7,4,3,0,0,0,0,");
         assert_eq!(as_json(&board)[1]["kind"], "human");
         board.rated.clear();
         text.clear();

@@ -29,6 +29,7 @@ mod listen;
 mod llm;
 mod mcp;
 mod migrate;
+mod name_key;
 mod narration;
 mod numbers;
 mod output;

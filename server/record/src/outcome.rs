@@ -49,6 +49,8 @@ impl Outcome {
 pub struct SeatOutcome {
     /// Displayed name.
     pub name: String,
+    /// The fingerprint of the name and its key; empty without a key.
+    pub name_fingerprint: String,
     /// Kind of participant; built-in agents are agents.
     pub kind: ParticipantKind,
     /// Name of the built-in agent; `None` for other participants.
@@ -67,6 +69,8 @@ pub struct Identity {
     pub kind: ParticipantKind,
     /// Whether this is a built-in agent.
     pub built_in: bool,
+    /// The fingerprint of the name and its key; empty without a key.
+    pub name_fingerprint: String,
 }
 
 impl Identity {
@@ -81,6 +85,7 @@ impl Identity {
             name: name.clone(),
             kind,
             built_in,
+            name_fingerprint: seat.name_fingerprint.clone(),
         }
     }
 }
@@ -96,6 +101,7 @@ impl SeatOutcome {
             name: name.clone(),
             kind,
             built_in: self.built_in.is_some(),
+            name_fingerprint: self.name_fingerprint.clone(),
         }
     }
 }
@@ -208,6 +214,7 @@ impl SeatOutcome {
         let built_in = &participant.built_in_agent;
         Self {
             name: participant.name.clone(),
+            name_fingerprint: participant.name_fingerprint.clone(),
             kind: participant.kind(),
             built_in: (!built_in.is_empty()).then(|| built_in.clone()),
             statistics: SeatStatistics {

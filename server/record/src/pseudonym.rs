@@ -173,6 +173,7 @@ impl Pseudonym {
         for seat in seats {
             if seat.built_in_agent.is_empty() && seat.name == self.name {
                 seat.name.clone_from(&self.pseudonym);
+                seat.name_fingerprint.clear();
                 found += 1;
             }
         }

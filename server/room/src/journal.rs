@@ -342,6 +342,8 @@ pub enum ReportSource {
 pub struct SeatedParticipant {
     /// Display name.
     pub name: String,
+    /// The fingerprint of its name and key; empty if it has no key.
+    pub name_fingerprint: String,
     /// Its kind.
     pub kind: ParticipantKind,
     /// Its ticket, hashed.

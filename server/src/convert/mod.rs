@@ -32,7 +32,7 @@ pub use decision::{answer_from_proto, answer_result, express_refused, expression
 pub use event::{event_to_proto, game_started};
 pub use kind::{kind_from_proto, kind_to_proto};
 pub use marker::marker_to_proto;
-pub use name::checked_name;
+pub use name::{checked_name, name_fingerprint};
 pub use players::recorded_player;
 pub use policy::{
     millis, policy_from_proto, policy_to_proto, requested_policy, set_default_clock_of_models,

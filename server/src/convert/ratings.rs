@@ -30,6 +30,7 @@ pub fn leaderboard(
         .take(limit)
         .map(|((who, rated), place)| v1::Rated {
             name: who.name.clone(),
+            name_fingerprint: who.name_fingerprint.clone(),
             kind: who.kind.into(),
             built_in: who.built_in,
             rating: Some(rating_to_proto(rated)),

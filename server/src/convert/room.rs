@@ -285,6 +285,9 @@ pub fn participants(core: &Core) -> Vec<v1::Participant> {
                 },
                 at_table,
                 shown_kind: v1::ParticipantKind::Unspecified.into(),
+                name_fingerprint: participant.map_or_else(String::new, |participant| {
+                    participant.name_fingerprint.clone()
+                }),
             }
         })
         .collect()

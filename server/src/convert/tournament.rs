@@ -272,6 +272,7 @@ pub fn tournament_participants(tournament: &Tournament) -> Vec<v1::TournamentPar
             max_games: number(entrant.max_games),
             connected: tournament.is_present(index) && !tournament.is_withdrawn(index),
             at_table: entrant.at_table,
+            name_fingerprint: entrant.name_fingerprint.clone(),
             withdrawn: tournament.is_withdrawn(index),
             former: (tournament.former(index).iter())
                 .map(|former| v1::FormerParticipant {

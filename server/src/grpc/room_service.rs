@@ -18,7 +18,7 @@ use super::new_room::new_room;
 use super::pages;
 use super::reach::Reach;
 use super::recorded::Recorded;
-use super::status::{self, Refusal, field, request_id, ticket_unknown};
+use super::status::{self, Refusal, field, name_fingerprint, request_id, ticket_unknown};
 use crate::access::Caller;
 use crate::convert;
 use crate::limits::{COST_OF_BUILT_IN_GAME, COST_OF_ROOM, CallLimits, Key};
@@ -295,9 +295,11 @@ impl RoomService for RoomCalls {
         let name = convert::checked_name("name", &request.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
         let request_id = request_id(&request.request_id)?;
+        let name_fingerprint = name_fingerprint(&name, &request.name_key)?;
         let joined = handle
             .join(JoinRequest {
                 name,
+                name_fingerprint,
                 kind,
                 seat: request.seat,
                 request_id,

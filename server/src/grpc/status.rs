@@ -168,6 +168,18 @@ pub fn request_id(bytes: &[u8]) -> Result<Option<[u8; 32]>, Status> {
     })
 }
 
+/// The fingerprint of a name and its key; empty without a key.
+pub fn name_fingerprint(name: &str, key: &[u8]) -> Result<String, Status> {
+    if key.is_empty() {
+        return Ok(String::new());
+    }
+    let key = key.try_into().map_err(|_| {
+        let message = format!("{} bytes; give 32 random ones, or none", key.len());
+        field("NAME_KEY_REFUSED", &FieldProblem::new("name_key", message))
+    })?;
+    Ok(convert::name_fingerprint(name, key))
+}
+
 /// A request id was reused with other content.
 pub fn request_id_used(message: &str) -> Status {
     status(

@@ -29,8 +29,8 @@ use super::new_room::{supported_policy, too_long};
 use super::pages;
 use super::recorded::Recorded;
 use super::status::{
-    Refusal, disk_nearly_full, field, request_id, request_id_used, shutting_down, status,
-    store_failed,
+    Refusal, disk_nearly_full, field, name_fingerprint, request_id, request_id_used, shutting_down,
+    status, store_failed,
 };
 use crate::access::Caller;
 use crate::config::{
@@ -317,6 +317,7 @@ impl TournamentService for TournamentCalls {
             return Err(kind_not_admitted());
         }
         let entry = Entry {
+            name_fingerprint: name_fingerprint(&name, &request.name_key)?,
             name,
             kind,
             max_games: usize::try_from(request.max_games.max(1)).unwrap_or(usize::MAX),
@@ -351,6 +352,7 @@ impl TournamentService for TournamentCalls {
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
         let entry = Entry {
             name,
+            name_fingerprint: String::new(),
             kind,
             max_games: 1,
             stateless: false,

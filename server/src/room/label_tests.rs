@@ -54,6 +54,7 @@ fn playing(labels: SeatLabels) -> Table {
     ] {
         let participant = SeatedParticipant {
             name: name.into(),
+            name_fingerprint: String::new(),
             kind,
             ticket: SecretHash::of(name.as_bytes()),
         };

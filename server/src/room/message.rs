@@ -26,6 +26,8 @@ use chefshat_room::{
 pub struct JoinRequest {
     /// Display name.
     pub name: String,
+    /// The fingerprint of its name and key; empty if it has no key.
+    pub name_fingerprint: String,
     /// The kind of the participant.
     pub kind: ParticipantKind,
     /// The requested seat; `None` for any.

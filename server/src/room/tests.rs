@@ -152,6 +152,7 @@ async fn take_seat(room: &Handle) -> AttachedSeat {
         .join(JoinRequest {
             request_id: None,
             name: "somebody".into(),
+            name_fingerprint: String::new(),
             kind: ParticipantKind::Agent,
             seat: None,
             client: None,
@@ -661,6 +662,7 @@ async fn a_client_takes_one_seat_if_the_policy_says_so() {
     let request = |client: u8| JoinRequest {
         request_id: None,
         name: "somebody".into(),
+        name_fingerprint: String::new(),
         kind: ParticipantKind::Agent,
         seat: None,
         client: Some(Key::Address([10, 0, 0, client].into())),

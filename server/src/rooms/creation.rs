@@ -195,6 +195,7 @@ fn at_table(header: &GameHeader) -> impl Iterator<Item = (Seat, SeatedParticipan
         };
         let participant = SeatedParticipant {
             name: header.display_names.get(&seat).cloned().unwrap_or_default(),
+            name_fingerprint: String::new(),
             kind,
             // Nobody has it: nobody connects to this seat.
             ticket: Token::random(header.room_id).hash(),

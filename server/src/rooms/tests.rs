@@ -19,6 +19,7 @@ async fn participants_of_a_tournament_are_committed_with_their_room() {
     };
     let seated = |name: &str| SeatedParticipant {
         name: name.into(),
+        name_fingerprint: String::new(),
         kind: ParticipantKind::Agent,
         ticket: SecretHash::of(name.as_bytes()),
     };

@@ -249,6 +249,7 @@ fn forget_entries(
             own.seated(seat_number(*seat), is_own);
             if is_own {
                 participant.name.clone_from(&who.pseudonym);
+                participant.name_fingerprint.clear();
                 out.names += 1;
             }
             true
@@ -288,6 +289,7 @@ fn forget_entrant(entries: &mut [TournamentEntry], who: &Pseudonym) -> bool {
             && entrant.name == who.name
         {
             entrant.name.clone_from(&who.pseudonym);
+            entrant.name_fingerprint.clear();
             changed = true;
         }
     }

@@ -164,6 +164,7 @@ impl Task {
         });
         let seated = SeatedParticipant {
             name: participant.pseudonym.clone(),
+            name_fingerprint: String::new(),
             kind: PARTICIPANT_KIND,
             ticket: self.handle.ticket_of(room).hash(),
         };

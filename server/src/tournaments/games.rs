@@ -227,8 +227,13 @@ impl Task {
                     return Fill::AtTable(kind);
                 }
                 if let Some(ticket) = state.tickets.get(participant) {
-                    let (name, ticket) = (entrant.name.clone(), *ticket);
-                    participants.insert(seat, SeatedParticipant { name, kind, ticket });
+                    let seated = SeatedParticipant {
+                        name: entrant.name.clone(),
+                        name_fingerprint: entrant.name_fingerprint.clone(),
+                        kind,
+                        ticket: *ticket,
+                    };
+                    participants.insert(seat, seated);
                 }
                 Fill::Open {
                     reserved_for: Some(kind),

@@ -55,6 +55,8 @@ impl Connection {
 pub struct Entry {
     /// Display name.
     pub name: String,
+    /// The fingerprint of its name and key; empty if it has no key.
+    pub name_fingerprint: String,
     /// Kind of participant.
     pub kind: ParticipantKind,
     /// Most games it can play at a time.
@@ -71,6 +73,7 @@ impl Entry {
     pub(super) fn entrant(&self) -> Entrant {
         Entrant {
             name: self.name.clone(),
+            name_fingerprint: self.name_fingerprint.clone(),
             kind: self.kind,
             built_in: None,
             filler: false,
@@ -183,6 +186,7 @@ impl Newcomer {
         match self {
             Newcomer::BuiltIn { agent, name, .. } => Entrant {
                 name: name.clone(),
+                name_fingerprint: String::new(),
                 kind: ParticipantKind::Agent,
                 built_in: Some(*agent),
                 filler: false,
@@ -198,6 +202,7 @@ impl Newcomer {
                 ..
             } => Entrant {
                 name: name.clone(),
+                name_fingerprint: String::new(),
                 kind: kind.unwrap_or(former.kind),
                 built_in: None,
                 filler: false,

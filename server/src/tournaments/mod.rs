@@ -473,6 +473,7 @@ fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
                 true => format!("{kind} {}", before + 1),
                 false => kind.name(),
             },
+            name_fingerprint: String::new(),
             kind: ParticipantKind::Agent,
             built_in: Some(*kind),
             filler: false,

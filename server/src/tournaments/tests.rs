@@ -69,6 +69,7 @@ fn built_in(name: &str) -> chefshat_proto::v1::TournamentSettings {
 fn entrant(name: &str) -> Entry {
     Entry {
         name: name.into(),
+        name_fingerprint: String::new(),
         kind: chefshat_room::journal::ParticipantKind::Agent,
         max_games: 1,
         stateless: true,

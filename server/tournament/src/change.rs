@@ -9,6 +9,8 @@ use chefshat_engine::SeatStatistics;
 pub struct Entrant {
     /// Display name, unique in the tournament.
     pub name: String,
+    /// The fingerprint of its name and key; empty if it has no key.
+    pub name_fingerprint: String,
     /// The kind.
     pub kind: ParticipantKind,
     /// The built-in agent that plays. It is always present and plays any number of games at a time.

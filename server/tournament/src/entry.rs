@@ -164,6 +164,7 @@ impl Tournament {
             .expect("there are more numbers than participants");
         Entrant {
             name,
+            name_fingerprint: String::new(),
             kind: ParticipantKind::Agent,
             built_in: Some(self.state.settings.filler),
             filler: true,

@@ -25,7 +25,7 @@
 //! })?;
 //! for name in ["Ada", "Bo", "Cem", "Dia", "Eve"] {
 //!     let kind = Some(AgentKind::Greedy.into());
-//!     let joined = tournament.join(Entrant { name: name.to_owned(), kind: ParticipantKind::Agent, built_in: kind, filler: false, stateless: true, max_games: 1, at_table: false })?;
+//!     let joined = tournament.join(Entrant { name: name.to_owned(), name_fingerprint: String::new(), kind: ParticipantKind::Agent, built_in: kind, filler: false, stateless: true, max_games: 1, at_table: false })?;
 //!     tournament.fold(&joined);
 //! }
 //! for change in tournament.begin()? {

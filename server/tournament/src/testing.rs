@@ -33,6 +33,7 @@ pub fn settings(format: Format) -> Settings {
 pub fn entrant(name: &str) -> Entrant {
     Entrant {
         name: name.to_owned(),
+        name_fingerprint: String::new(),
         kind: ParticipantKind::Agent,
         built_in: None,
         filler: false,

@@ -22,6 +22,7 @@ mod llm;
 mod mcp;
 mod mcp_http;
 mod mcp_raw;
+mod names;
 mod nodes;
 mod nodes_guarded;
 mod nodes_play;

@@ -6,6 +6,8 @@ file of a ticket in `ticket_file`.
 
 import argparse
 import os
+import re
+import secrets
 import sys
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -27,6 +29,8 @@ from chefshat.ticket_file import TicketFile
 SERVER = "CHEFSHAT_SERVER"
 #: Environment variable that may contain a ticket.
 TICKET = "CHEFSHAT_TICKET"
+#: Length of the key of a name.
+NAME_KEY_BYTES = 32
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,7 @@ class JoinOptions:
         ticket: the ticket of a place to resume.
         ticket_file: stores the ticket until the game or tournament is over. An existing one names the place to resume.
         name: display name, for joining.
+        name_key: the key of the name, 32 bytes; empty: none.
         seat: the seat of the room; None: the first free one.
         games: games of the tournament to play at a time.
         stateless: declares that the agent remembers nothing from one game of the tournament to the next.
@@ -49,6 +54,7 @@ class JoinOptions:
     ticket: str | None = None
     ticket_file: Path | None = None
     name: str = ""
+    name_key: bytes = b""
     seat: int | None = None
     games: int = 1
     stateless: bool = False
@@ -121,6 +127,13 @@ def add_options(parser: argparse.ArgumentParser, *, several_codes: bool = False)
         help="store the ticket in this file, readable only by you, until the game or tournament is over; an existing "
         "file is resumed from, so run the same command again after its process died",
     )
+    parser.add_argument(
+        "--name-key",
+        type=Path,
+        metavar="FILE",
+        help="file with the key that tells this name from the same name of others, in leaderboards and standings; it is created "
+        "if it does not exist: keep it secret, and use it again",
+    )
     parser.add_argument("--seat", type=int, help="the seat of the room, from 0 (default: the first free one)")
     parser.add_argument(
         "--games",
@@ -130,6 +143,23 @@ def add_options(parser: argparse.ArgumentParser, *, several_codes: bool = False)
     parser.add_argument(
         "--stateless", action="store_true", help="declare that the agent remembers nothing from game to game (tournaments)"
     )
+
+
+def _name_key(file: Path | None) -> bytes:
+    """Returns the key in a file, which is created, readable only by its owner, if it does not exist; empty without a file."""
+    if file is None:
+        return b""
+    try:
+        text = file.read_text(encoding="ascii").strip()
+    except FileNotFoundError:
+        text = secrets.token_hex(NAME_KEY_BYTES)
+        descriptor = os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        with open(descriptor, "w", encoding="ascii") as created:
+            created.write(f"{text}\n")
+    if not re.fullmatch(rf"[0-9a-fA-F]{{{2 * NAME_KEY_BYTES}}}", text):
+        digits = 2 * NAME_KEY_BYTES
+        raise ValueError(f"{file} contains no key: {digits} hexadecimal digits; name a file that does not exist to create one")
+    return bytes.fromhex(text)
 
 
 def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_name: bool = True) -> list[JoinOptions]:
@@ -155,6 +185,12 @@ def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_
         parser.error("--games and --stateless are for tournaments: give --tournament CODE instead of --code CODE")
     if options.seat is not None and not codes:
         parser.error("--seat is for joining a room: give it with --code. A tournament draws the seats, and a ticket has its seat")
+    if options.name_key is not None and ticket:
+        parser.error("--name-key is for joining: a ticket is of a place that is already taken")
+    try:
+        name_key = _name_key(options.name_key)
+    except (OSError, ValueError) as error:
+        parser.error(f"--name-key: {error}")
     if options.stateless and options.tournament is None:
         parser.error("--stateless is for joining: give it with --tournament. A ticket is of a place that is already taken")
     if options.seat is not None and not 0 <= options.seat < MAX_SEATS:
@@ -166,6 +202,7 @@ def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_
         ticket=ticket,
         ticket_file=options.ticket_file,
         name=options.name or "",
+        name_key=name_key,
         seat=options.seat,
         games=options.games or 1,
         stateless=options.stateless,
@@ -266,12 +303,14 @@ def _stored(way: JoinOptions, file: TicketFile | None) -> str | None:
 def _join(client: Client, way: JoinOptions, file: TicketFile | None, check_rules: Callable[[pb.RuleSet], None]) -> str:
     """Joins, and stores or prints the ticket, so that it survives this process."""
     if way.tournament is not None:
-        entrant = client.join_tournament(way.tournament, way.name, max_games=way.games, stateless=way.stateless)
+        entrant = client.join_tournament(
+            way.tournament, way.name, max_games=way.games, stateless=way.stateless, name_key=way.name_key
+        )
         ticket, rules = entrant.ticket, entrant.tournament.settings.rules
         what = "the tournament"
         left = "the tournament will be played without it"
     else:
-        joined = client.join_room(way.code or "", way.name, seat=way.seat)
+        joined = client.join_room(way.code or "", way.name, seat=way.seat, name_key=way.name_key)
         ticket, rules = joined.ticket, joined.room.rules
         what = "the game"
         # An unattached seat does not start a game.

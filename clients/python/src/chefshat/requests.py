@@ -139,12 +139,19 @@ def join_tournament(
     kind: pb.ParticipantKind.ValueType,
     max_games: int,
     stateless: bool,
+    name_key: bytes,
 ) -> pb.JoinTournamentRequest:
     """Builds the request to join a tournament."""
     if max_games < 1:
         raise ValueError(f"max_games is {max_games}: a participant plays at least one game at a time")
     return pb.JoinTournamentRequest(
-        tournament_id=tournament_id, join_code=join_code, name=name, kind=kind, max_games=max_games, stateless=stateless
+        tournament_id=tournament_id,
+        join_code=join_code,
+        name=name,
+        kind=kind,
+        max_games=max_games,
+        stateless=stateless,
+        name_key=name_key,
     )
 
 

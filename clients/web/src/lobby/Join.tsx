@@ -11,6 +11,7 @@ import { StudyJoin } from "../experiment/StudyJoin";
 import { finishedBy, holderOf, languageOf, type Study, studyOf } from "../experiment/study";
 import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
+import { NO_KEY } from "../name-key";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { TextField } from "../parts/Field";
@@ -111,7 +112,7 @@ function StudyWay(props: { study: Study; code: string; arrive: (roomId: string) 
       }
       await giveBackSeat(roomId);
     }
-    return (await takeSeat(code, name, study.seat)).roomId;
+    return (await takeSeat(code, name, study.seat, ParticipantKind.HUMAN, NO_KEY)).roomId;
   };
   const isTaken = (name: string) => seats.some((seat) => sameName(nameOf(seat), name));
   return <StudyJoin study={study} what="room" take={take} isTaken={isTaken} arrive={arrive} />;
@@ -268,8 +269,9 @@ function sameName(one: string, other: string): boolean {
  */
 async function comeIn(code: string, name: string, asRobot: boolean): Promise<Route> {
   try {
-    const kind = asRobot ? ParticipantKind.ROBOT : ParticipantKind.HUMAN;
-    const { roomId } = await takeSeat(code, name, undefined, kind);
+    const { roomId } = asRobot
+      ? await takeSeat(code, name, undefined, ParticipantKind.ROBOT, NO_KEY)
+      : await takeSeat(code, name);
     return { page: "room", roomId };
   } catch (thrown) {
     if (faultOf(thrown).reason !== "JOIN_CODE_WRONG") throw thrown;

@@ -9,6 +9,7 @@ import { keepTableTicket } from "../attend/ticket";
 import { rememberFinished } from "../experiment/study";
 import { ParticipantKind, type Room } from "../gen/chefshat/v1/room_pb";
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
+import { nameKey } from "../name-key";
 import { recall, recallObject, remember, remembered } from "../store";
 
 /** A seat of this device. */
@@ -69,19 +70,21 @@ export function roomOfCode(code: string): string | null {
 
 /**
  * Takes a seat for a person, or for one who plays as another kind; the first free one without a
- * number. Returns the room.
+ * number. Returns the room. `key` is that of the name: by default this device's.
  */
 export async function takeSeat(
   code: string,
   name: string,
   seat?: number,
   kind: ParticipantKind = ParticipantKind.HUMAN,
+  key = nameKey(),
 ): Promise<Room> {
   const joined = await roomApi.joinRoom(
     {
       joinCode: canonical(code),
       name: name.trim(),
       kind,
+      nameKey: key,
       ...(seat === undefined ? {} : { seat }),
     },
     { timeoutMs: CALL_LIMIT_MS },

@@ -3,6 +3,7 @@
 
 import { useState } from "preact/hooks";
 import { language, languages, setLanguage, t } from "../i18n";
+import { isNameKey, nameKeyText, setNameKey } from "../name-key";
 import { isOn, type Preference, setPreference } from "../preferences";
 import { forgetAll } from "../store";
 import { askToNotify, canNotify } from "../table/attention";
@@ -10,7 +11,7 @@ import { setTheme, type Theme, theme } from "../theme";
 import { Button } from "./Button";
 import { ConfirmButton } from "./ConfirmButton";
 import { Dialog } from "./Dialog";
-import { CheckField, SelectField } from "./Field";
+import { CheckField, SelectField, TextField } from "./Field";
 import css from "./Layout.module.css";
 
 /** The dialog of settings. */
@@ -33,6 +34,7 @@ export function Settings({ onClose }: { onClose: () => void }) {
           onPick={setTheme}
         />
         <AtTheTable />
+        <OwnNames />
         <FullScreen onClose={onClose} />
         <Forget />
       </div>
@@ -85,6 +87,28 @@ function Notifications() {
       fault={refused ? words.notAllowed : undefined}
       checked={isOn("notification") && Notification.permission === "granted"}
       onCheck={(on) => void change(on)}
+    />
+  );
+}
+
+/** The key of this device's names, to copy to another device or from there. */
+function OwnNames() {
+  const words = t().common.settings.names;
+  const [text, setText] = useState(nameKeyText() ?? "");
+  const change = (typed: string) => {
+    const key = typed.trim();
+    setText(key);
+    if (isNameKey(key)) setNameKey(key);
+  };
+  return (
+    <TextField
+      label={words.key}
+      hint={words.hint}
+      fault={text === "" || isNameKey(text) ? undefined : words.notAKey}
+      value={text}
+      onText={change}
+      autoCapitalize="none"
+      autoComplete="off"
     />
   );
 }

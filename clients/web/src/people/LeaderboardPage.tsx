@@ -13,7 +13,7 @@ import { SelectField } from "../parts/Field";
 import { KindBadge } from "../parts/KindBadge";
 import { Notice } from "../parts/Notice";
 import css from "./People.module.css";
-import { PersonName } from "./PersonName";
+import { Fingerprint, PersonName } from "./PersonName";
 import { ratingRange, ratingWords } from "./rating";
 import { WhichAreRated } from "./WhichAreRated";
 
@@ -120,10 +120,12 @@ function Lines({ board }: { board: GetLeaderboardResponse }) {
           {board.rated.map((line) => {
             const range = line.rating && ratingRange(line.rating);
             return (
-              <tr key={`${line.kind} ${line.builtIn} ${line.name}`}>
+              <tr key={`${line.kind} ${line.builtIn} ${line.name} ${line.nameFingerprint}`}>
                 <td class="number">{line.place}</td>
                 <th scope="row" class={css.leaderboardName}>
-                  <PersonName name={line.name} /> <KindBadge kind={line.kind} builtIn={line.builtIn ? line.name : ""} />
+                  <PersonName name={line.name} fingerprint={line.nameFingerprint} />{" "}
+                  <Fingerprint of={line.nameFingerprint} />{" "}
+                  <KindBadge kind={line.kind} builtIn={line.builtIn ? line.name : ""} />
                 </th>
                 <td class={`number ${css.leaderboardRating}`}>{line.rating && ratingWords(line.rating)}</td>
                 <td class={css.leaderboardRange} aria-hidden="true">

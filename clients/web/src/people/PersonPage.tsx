@@ -15,7 +15,7 @@ import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
 import { gamesOf, MAX_LINES, type OwnGame, type Ratings, ratedAs, sum, unratedBecause } from "./games";
 import css from "./People.module.css";
-import { PersonName } from "./PersonName";
+import { Fingerprint, PersonName } from "./PersonName";
 import { ratingRange, ratingWords } from "./rating";
 import { WhichAreRated } from "./WhichAreRated";
 
@@ -26,10 +26,11 @@ const AT_A_TIME = 50;
 
 /** The page. */
 export function PersonPage({ route }: PageProps<"person">) {
-  const { name } = route;
+  const { name, fingerprint } = route;
   const words = t().people.person;
-  const shown = useShown(gamesOf(name), AT_A_TIME, EVERY_MS, name);
-  const rated = usePolled((signal) => ratedAs(name, signal), EVERY_MS, name);
+  const who = `${name} ${fingerprint}`;
+  const shown = useShown(gamesOf(name, fingerprint), AT_A_TIME, EVERY_MS, who);
+  const rated = usePolled((signal) => ratedAs(name, fingerprint, signal), EVERY_MS, who);
   const { list } = shown;
   const fault = shown.fault ?? rated.fault;
   const games = list?.items ?? [];
@@ -38,6 +39,7 @@ export function PersonPage({ route }: PageProps<"person">) {
     <div class={css.people}>
       <header class={css.personHead}>
         <h1>{name}</h1>
+        <Fingerprint of={fingerprint} />
         {self && <KindBadge kind={self.kind} builtIn={self.builtInAgent} />}
       </header>
       {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
@@ -52,7 +54,7 @@ export function PersonPage({ route }: PageProps<"person">) {
             <Games games={games} />
             <MoreButton shown={shown} what={words.played} />
           </section>
-          {self?.builtInAgent === "" && <p class="soft small">{words.sameName}</p>}
+          {self?.builtInAgent === "" && fingerprint === "" && <p class="soft small">{words.sameName}</p>}
         </>
       )}
       <p>
@@ -71,7 +73,7 @@ function Facts({ rated, games }: { rated: Ratings | null; games: readonly OwnGam
   return (
     <dl class={css.personFacts}>
       {lines.map((line) => (
-        <Rating key={`${line.kind} ${line.builtIn}`} line={line} />
+        <Rating key={`${line.kind} ${line.builtIn} ${line.nameFingerprint}`} line={line} />
       ))}
       {rated && lines.length === 0 && (
         <Fact label={words.rating} value="–" text={rated.complete ? words.unrated : words.notListed(MAX_LINES)} wide />
@@ -95,7 +97,8 @@ function Rating({ line }: { line: Rated }) {
   const place = `${words.person.rated(line.place)}, ${words.ratedGames(line.rating.games)}.`;
   const label = (
     <>
-      {words.person.rating} <KindBadge kind={line.kind} builtIn={line.builtIn ? line.name : ""} />
+      {words.person.rating} <KindBadge kind={line.kind} builtIn={line.builtIn ? line.name : ""} />{" "}
+      <Fingerprint of={line.nameFingerprint} />
     </>
   );
   const range = words.person.ratingRange(decimal(from, 1), decimal(to, 1));
@@ -158,7 +161,11 @@ function Games({ games }: { games: readonly OwnGame[] }) {
                   {others.map((other, index) => (
                     <span key={other.seat}>
                       {index > 0 && ", "}
-                      <PersonName name={nameOf(other)} builtIn={other.builtInAgent} />
+                      <PersonName
+                        name={nameOf(other)}
+                        builtIn={other.builtInAgent}
+                        fingerprint={other.nameFingerprint}
+                      />
                     </span>
                   ))}
                 </p>

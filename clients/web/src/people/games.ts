@@ -34,26 +34,30 @@ export interface Sum {
   readonly meanPlace: number;
 }
 
-/** Requests a participant's games, newest first. */
-export function gamesOf(name: string): AskPage<OwnGame> {
+/**
+ * Requests a participant's games, newest first; with a fingerprint those under the name with this
+ * key only.
+ */
+export function gamesOf(name: string, fingerprint: string): AskPage<OwnGame> {
   return async (page, signal) => {
     const asked = { filter: { participant: name }, newestFirst: true, ...page };
     const { records, nextPageToken } = await recordApi.listRecords(asked, { signal, timeoutMs: CALL_LIMIT_MS });
-    return { items: records.flatMap((record) => ownGame(record, name) ?? []), nextPageToken };
+    return { items: records.flatMap((record) => ownGame(record, name, fingerprint) ?? []), nextPageToken };
   };
 }
 
-/** Requests a participant's lines of the leaderboard. */
-export async function ratedAs(name: string, signal: AbortSignal): Promise<Ratings> {
+/** Requests a participant's lines of the leaderboard; with a fingerprint one line. */
+export async function ratedAs(name: string, fingerprint: string, signal: AbortSignal): Promise<Ratings> {
   const { rated } = await tournamentApi.getLeaderboard({ limit: MAX_LINES }, { signal, timeoutMs: CALL_LIMIT_MS });
-  return { lines: rated.filter((line) => line.name === name), complete: rated.length < MAX_LINES };
+  const own = (line: Rated) => line.name === name && [line.nameFingerprint, ""].includes(fingerprint);
+  return { lines: rated.filter(own), complete: rated.length < MAX_LINES };
 }
 
 /** The result of a participant in a game; at its first seat if it has several. */
-export function ownGame(record: RecordSummary, name: string): OwnGame | undefined {
-  const own =
-    record.seats.find((seat) => seat.name === name && seat.builtInAgent === "") ??
-    record.seats.find((seat) => seat.builtInAgent === name);
+export function ownGame(record: RecordSummary, name: string, fingerprint = ""): OwnGame | undefined {
+  const isOwn = (seat: Participant) =>
+    seat.name === name && seat.builtInAgent === "" && [seat.nameFingerprint, ""].includes(fingerprint);
+  const own = record.seats.find(isOwn) ?? record.seats.find((seat) => seat.builtInAgent === name);
   if (!own) return undefined;
   const standing =
     record.state === RoomState.FINISHED ? record.standings.find(({ seat }) => seat === own.seat) : undefined;
@@ -77,8 +81,8 @@ export function unratedBecause(record: RecordSummary): Unrated | null {
   if (record.seats.some(({ replay }) => replay !== undefined)) return "recorded";
   if (record.substituted) return "substituted";
   if (record.hinted) return "hinted";
-  const participants = record.seats.map(({ kind, name, builtInAgent }) => {
-    return builtInAgent ? `built-in ${builtInAgent}` : `${kind} ${name}`;
+  const participants = record.seats.map(({ kind, name, builtInAgent, nameFingerprint }) => {
+    return builtInAgent ? `built-in ${builtInAgent}` : `${kind} ${name} ${nameFingerprint}`;
   });
   return new Set(participants).size < participants.length ? "twice" : null;
 }

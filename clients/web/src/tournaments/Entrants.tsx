@@ -28,9 +28,14 @@ export function Entrants({ tournament, mine, large = false }: EntrantsProps) {
   const shown = large ? participants.slice(-ON_WALL) : participants;
   return (
     <ul class={css.entrants} data-part="entrants">
-      {shown.map(({ participant, kind, builtInAgent, connected, atTable }) => (
+      {shown.map(({ participant, kind, builtInAgent, connected, atTable, nameFingerprint }) => (
         <li key={participant} aria-current={participant === mine || undefined}>
-          <PersonName name={nameOf(tournament, participant)} builtIn={builtInAgent} linked={!large} />
+          <PersonName
+            name={nameOf(tournament, participant)}
+            builtIn={builtInAgent}
+            fingerprint={nameFingerprint}
+            linked={!large}
+          />
           <KindBadge kind={kind} builtIn={builtInAgent} />
           {atTable && <span class="soft small">{t().attend.seats.atTable}</span>}
           {!connected && <span class="soft small">{words.away}</span>}

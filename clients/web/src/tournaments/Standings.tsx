@@ -116,7 +116,12 @@ function Who(props: { tournament: Tournament; standing: TournamentStanding; larg
   ].filter(Boolean);
   return (
     <>
-      <PersonName name={nameOf(tournament, standing.participant)} builtIn={participant.builtInAgent} linked={!large} />{" "}
+      <PersonName
+        name={nameOf(tournament, standing.participant)}
+        builtIn={participant.builtInAgent}
+        fingerprint={participant.nameFingerprint}
+        linked={!large}
+      />{" "}
       {large && gone ? (
         <span class="soft" data-part="standings-gone">
           {gone}

@@ -11,6 +11,7 @@ import { holderOf, languageOf, type Study, studyOf } from "../experiment/study";
 import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import joinCss from "../lobby/Join.module.css";
+import { NO_KEY } from "../name-key";
 import { Button, ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
@@ -117,7 +118,7 @@ function Visited({ live }: { live: LiveTournament }) {
     return <Whose name={held.name} as={invited?.study?.name ?? ""} onSame={arrive} onOther={onOther} />;
   }
   if (open && invited?.study) {
-    const take = (name: string) => takePlace(tournamentId, invited.code, name);
+    const take = (name: string) => takePlace(tournamentId, invited.code, name, NO_KEY);
     return <StudyJoin study={invited.study} what="tournament" take={take} arrive={arrive} />;
   }
   return (

@@ -5,6 +5,7 @@ import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
 import { keepSecret } from "../api/secrets";
 import { ParticipantKind, Visibility } from "../gen/chefshat/v1/room_pb";
 import { canonical } from "../lobby/seat";
+import { nameKey } from "../name-key";
 import { pathOf } from "../router";
 import { recallObject, remember } from "../store";
 
@@ -92,10 +93,10 @@ function parsed(text: string): HeldPlace | null {
   }
 }
 
-/** Joins as a person. Returns the tournament's id. */
-export async function takePlace(tournamentId: string, code: string, name: string): Promise<string> {
+/** Joins as a person; `key` is that of the name. Returns the tournament's id. */
+export async function takePlace(tournamentId: string, code: string, name: string, key = nameKey()): Promise<string> {
   const joined = await tournamentApi.joinTournament(
-    { tournamentId, joinCode: canonical(code), name: name.trim(), kind: ParticipantKind.HUMAN },
+    { tournamentId, joinCode: canonical(code), name: name.trim(), kind: ParticipantKind.HUMAN, nameKey: key },
     { timeoutMs: CALL_LIMIT_MS },
   );
   const id = joined.tournament?.tournamentId ?? tournamentId;

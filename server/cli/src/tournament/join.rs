@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use crate::kind::KindArg;
+use crate::name_key::NameKeyArg;
 use chefshat_client::{ActionId, Agent, Client, Outcome, v1};
 use clap::Args;
 
@@ -38,6 +39,8 @@ pub(super) struct Join {
     /// Display name, unique in the tournament. Default: the agent's.
     #[arg(long)]
     name: Option<String>,
+    #[command(flatten)]
+    name_key: NameKeyArg,
     /// Kind of participant. Default: agent, and model for llm.
     #[arg(long, value_enum)]
     kind_of: Option<KindArg>,
@@ -117,6 +120,7 @@ impl Join {
                 max_games: self.games,
                 // Each game has its own agent.
                 stateless: true,
+                name_key: self.name_key.key()?,
                 ..v1::JoinTournamentRequest::default()
             })
             .await?;

@@ -159,6 +159,7 @@ impl Simulate {
                 1 => kind.name(),
                 _ => format!("{} {}", kind.name(), of_kind(&kinds[..=index], kind)),
             },
+            name_fingerprint: String::new(),
             kind: ParticipantKind::Agent,
             built_in: Some(kind),
             filler: false,

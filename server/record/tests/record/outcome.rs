@@ -97,6 +97,7 @@ fn outcomes_agree_with_a_count_of_the_file() {
                 name,
                 kind,
                 built_in,
+                name_fingerprint: String::new(),
             },
             place,
         )

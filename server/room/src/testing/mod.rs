@@ -87,6 +87,7 @@ impl Table {
                     seat,
                     SeatedParticipant {
                         name: format!("player {seat}"),
+                        name_fingerprint: String::new(),
                         kind,
                         ticket: SecretHash::of(b"nobody"),
                     },
@@ -148,6 +149,7 @@ impl Table {
             None,
             SeatedParticipant {
                 name: "somebody".into(),
+                name_fingerprint: String::new(),
                 kind,
                 ticket: SecretHash::of(b"ticket"),
             },

@@ -46,6 +46,7 @@ fn step(table: &mut Table, input: &Input) {
                 seat,
                 SeatedParticipant {
                     name: "somebody".into(),
+                    name_fingerprint: String::new(),
                     kind: ParticipantKind::Agent,
                     ticket: SecretHash::of(b"ticket"),
                 },

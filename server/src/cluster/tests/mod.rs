@@ -146,6 +146,7 @@ async fn soon<T>(future: impl Future<Output = T>) -> T {
 async fn join(room: &Handle, name: &str) -> Result<(), RoomGone> {
     let request = JoinRequest {
         name: name.into(),
+        name_fingerprint: String::new(),
         kind: ParticipantKind::Agent,
         seat: None,
         request_id: None,
@@ -500,6 +501,7 @@ async fn a_tournament_changes_hands_with_its_rooms() {
     for name in ["Ada", "Bo", "Cy", "Di"] {
         let entry = Entry {
             name: name.into(),
+            name_fingerprint: String::new(),
             kind: ParticipantKind::Human,
             max_games: 1,
             stateless: false,

@@ -63,6 +63,7 @@ impl Server {
         let room = created.await.expect("a room").handle;
         let joined = room.join(JoinRequest {
             name: "Ada".into(),
+            name_fingerprint: String::new(),
             kind: ParticipantKind::Agent,
             seat: None,
             request_id: None,
@@ -83,6 +84,7 @@ impl Server {
         let (tournament, _owner) = created.await.expect("a tournament");
         let entry = Entry {
             name: "Ada".into(),
+            name_fingerprint: String::new(),
             kind: ParticipantKind::Agent,
             max_games: 1,
             stateless: true,

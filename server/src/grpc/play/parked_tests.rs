@@ -99,6 +99,7 @@ impl Node {
         let header = former.rooms.header(ticket.room).expect("it had the room");
         let participant = SeatedParticipant {
             name: "Ada".into(),
+            name_fingerprint: String::new(),
             kind: ParticipantKind::Agent,
             ticket: ticket.hash(),
         };
@@ -133,6 +134,7 @@ impl Node {
         let room = created.await.expect("a room").handle;
         let joined = room.join(JoinRequest {
             name: "Ada".into(),
+            name_fingerprint: String::new(),
             kind: ParticipantKind::Agent,
             seat: None,
             request_id: None,

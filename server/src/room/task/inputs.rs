@@ -113,6 +113,7 @@ impl Room {
             request.seat,
             SeatedParticipant {
                 name: request.name,
+                name_fingerprint: request.name_fingerprint,
                 kind: request.kind,
                 ticket: ticket.hash(),
             },
@@ -135,6 +136,7 @@ impl Room {
         let room = Box::new(convert::describe(&self.core));
         let seated = &room.seats[seat.index()];
         let is_same = seated.name == request.name
+            && seated.name_fingerprint == request.name_fingerprint
             && seated.kind == convert::kind_to_proto(Some(request.kind))
             && request.seat.is_none_or(|wanted| wanted == seated.seat);
         match is_same {

@@ -79,6 +79,8 @@ struct SeatedForm {
     kind: u32,
     #[prost(bytes = "vec", tag = "4")]
     ticket: Vec<u8>,
+    #[prost(string, tag = "5")]
+    name_fingerprint: String,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -200,6 +202,7 @@ pub(in crate::store) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
             name: participant.name.clone(),
             kind: number_of(&KINDS, &participant.kind),
             ticket: participant.ticket.bytes().to_vec(),
+            name_fingerprint: participant.name_fingerprint.clone(),
         }),
         Change::Vacated(seat) => ChangeForm::Vacated(seat_number(*seat)),
         Change::Started { entropy } => ChangeForm::Started(StartedForm {
@@ -277,6 +280,7 @@ fn change_from(form: ChangeForm) -> Result<Change, Unreadable> {
             seat: seat(form.seat)?,
             participant: Box::new(SeatedParticipant {
                 name: form.name,
+                name_fingerprint: form.name_fingerprint,
                 kind: value_of(&KINDS, form.kind, "kind of participant")?,
                 ticket: SecretHash::from_bytes(array(&form.ticket, "a ticket's hash")?),
             }),

@@ -110,6 +110,8 @@ struct EntrantForm {
     max_games: u64,
     #[prost(bool, tag = "7")]
     at_table: bool,
+    #[prost(string, tag = "8")]
+    name_fingerprint: String,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -428,6 +430,7 @@ fn entrant_to_form(entrant: &Entrant) -> EntrantForm {
         stateless: entrant.stateless,
         max_games: wide(entrant.max_games),
         at_table: entrant.at_table,
+        name_fingerprint: entrant.name_fingerprint.clone(),
     }
 }
 
@@ -443,6 +446,7 @@ fn entrant_from_form(form: EntrantForm) -> Result<Entrant, Unreadable> {
         stateless: form.stateless,
         max_games: narrow(form.max_games)?,
         at_table: form.at_table,
+        name_fingerprint: form.name_fingerprint,
     })
 }
 

@@ -93,15 +93,17 @@ fn header(game: u8, durability: Durability) -> GameHeader {
 /// One entry of every kind.
 fn entries() -> Vec<Entry> {
     let seat = Seat::new(1);
+    let seated = |name_fingerprint: &str| Change::Seated {
+        seat,
+        participant: Box::new(SeatedParticipant {
+            name: "Ada".into(),
+            name_fingerprint: name_fingerprint.into(),
+            kind: ParticipantKind::Human,
+            ticket: SecretHash::of(b"ticket"),
+        }),
+    };
     let changes = [
-        Change::Seated {
-            seat,
-            participant: Box::new(SeatedParticipant {
-                name: "Ada".into(),
-                kind: ParticipantKind::Human,
-                ticket: SecretHash::of(b"ticket"),
-            }),
-        },
+        seated(""),
         Change::Vacated(seat),
         Change::Started {
             entropy: vec![vec![], vec![1, 2, 3], vec![0; 32], vec![7]],
@@ -134,6 +136,7 @@ fn entries() -> Vec<Entry> {
             label: "EEG on".into(),
             moment: Duration::from_micros(1_234_567),
         })),
+        seated("0123456789abcdef"),
     ];
     (1..)
         .zip(changes)

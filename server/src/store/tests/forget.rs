@@ -24,11 +24,20 @@ fn at_once(change: Change) -> Entry {
     }
 }
 
+/// The fingerprint of a name; a pseudonym has none.
+fn fingerprint_of(name: &str) -> String {
+    match name {
+        "deleted 1" => String::new(),
+        name => format!("key of {name}"),
+    }
+}
+
 fn seated(seat: usize, name: &str) -> Entry {
     at_once(Change::Seated {
         seat: Seat::new(seat),
         participant: Box::new(SeatedParticipant {
             name: name.into(),
+            name_fingerprint: fingerprint_of(name),
             kind: ParticipantKind::Human,
             ticket: SecretHash::of(b"ticket"),
         }),
@@ -88,6 +97,7 @@ fn summary_of(header: &GameHeader) -> Box<v1::RecordSummary> {
     let seat = |number: u32, name: &str, agent: &str| v1::Participant {
         seat: number,
         name: name.into(),
+        name_fingerprint: fingerprint_of(name),
         built_in_agent: agent.into(),
         ..v1::Participant::default()
     };
@@ -225,6 +235,7 @@ async fn what_is_not_over_prevents_it() {
 
         let entrant = Entrant {
             name: "Ana".into(),
+            name_fingerprint: fingerprint_of("Ana"),
             kind: chefshat_tournament::ParticipantKind::Human,
             built_in: None,
             filler: false,

@@ -47,6 +47,7 @@ impl TournamentHandle {
             let long = "🍕".repeat(MAX_NAME_CHARS - digits.len());
             core.fold(&Change::Joined(Entrant {
                 name: digits + &long,
+                name_fingerprint: "0123456789abcdef".into(),
                 kind: ParticipantKind::Agent,
                 built_in: Some(AgentKind::Random.into()),
                 filler: false,

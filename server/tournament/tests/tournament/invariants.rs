@@ -35,6 +35,7 @@ fn entrants() -> impl Strategy<Value = Vec<Entrant>> {
             let numbered = kinds.into_iter().enumerate();
             let entrant = |(number, (max_games, place)): (usize, (usize, u8))| Entrant {
                 name: format!("entrant {number}"),
+                name_fingerprint: String::new(),
                 kind: ParticipantKind::Robot,
                 built_in: (place == 0).then_some(AgentKind::Greedy.into()),
                 filler: false,
@@ -381,6 +382,7 @@ fn it_resumes_after_any_interruption() {
             entrants: (0..9)
                 .map(|number| Entrant {
                     name: format!("entrant {number}"),
+                    name_fingerprint: String::new(),
                     kind: ParticipantKind::Human,
                     built_in: Some(AgentKind::Random.into()),
                     filler: false,

@@ -131,9 +131,13 @@ class Calls(ABC):
         room_id: str = "",
         kind: pb.ParticipantKind.ValueType = pb.PARTICIPANT_KIND_AGENT,
         seat: int | None = None,
+        name_key: bytes = b"",
     ) -> pb.JoinRoomResponse:
-        """Takes `seat`, or the first free seat that admits `kind`. Returns the room, the seat and its ticket."""
-        request = pb.JoinRoomRequest(room_id=room_id, join_code=join_code, name=name, kind=kind, seat=seat)
+        """Takes `seat`, or the first free seat that admits `kind`. Returns the room, the seat and its ticket.
+
+        `name_key` is empty, or 32 secret bytes that tell this name from the same name of others in ratings.
+        """
+        request = pb.JoinRoomRequest(room_id=room_id, join_code=join_code, name=name, kind=kind, seat=seat, name_key=name_key)
         return called(self._rooms.JoinRoom, request)
 
     def get_room(self, room_id: str = "", *, join_code: str = "") -> pb.Room:
@@ -348,6 +352,7 @@ class Calls(ABC):
         kind: pb.ParticipantKind.ValueType = pb.PARTICIPANT_KIND_AGENT,
         max_games: int = 1,
         stateless: bool = False,
+        name_key: bytes = b"",
     ) -> pb.JoinTournamentResponse:
         """Joins a tournament. The join code identifies it.
 
@@ -358,11 +363,12 @@ class Calls(ABC):
             kind: kind of the participant.
             max_games: games it can play at a time, 1..=64.
             stateless: declares that it remembers nothing from one game to the next.
+            name_key: empty, or 32 secret bytes that tell this name from the same name of others in ratings.
 
         Returns:
             The tournament, the participant's number in it, and the ticket to play with.
         """
-        request = requests.join_tournament(join_code, name, tournament_id, kind, max_games, stateless)
+        request = requests.join_tournament(join_code, name, tournament_id, kind, max_games, stateless, name_key)
         return called(self._tournaments.JoinTournament, request)
 
     def add_table_participant(

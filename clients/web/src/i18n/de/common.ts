@@ -47,6 +47,11 @@ export const common: Texts["common"] = {
       notAllowed:
         "Dein Browser erlaubt dieser Seite keine Benachrichtigungen. Das kannst du in den Einstellungen des Browsers ändern.",
     },
+    names: {
+      key: "Schlüssel deiner Namen",
+      hint: "Andere können deinen Namen wählen, aber nicht seinen Schlüssel: Ranglisten führen euch getrennt. Der Schlüssel entsteht, wenn du zum ersten Mal an einem Spiel teilnimmst. Gib ihn auf einem anderen Gerät ein, um dort dieselbe Person zu sein; verrate ihn sonst niemandem.",
+      notAKey: "Ein Schlüssel hat 64 Ziffern von 0 bis 9 und a bis f.",
+    },
     fullScreen: "Vollbild",
     fullScreenOff: "Vollbild beenden",
     forget: "Alles auf diesem Gerät vergessen",

@@ -47,6 +47,7 @@ export const people: Texts["people"] = {
     substituted: "ein Ersatz traf Entscheidungen",
     twice: "jemand spielte auf zwei Plätzen",
   },
+  fingerprint: (fingerprint) => `Schlüssel des Namens: ${fingerprint}`,
   person: {
     unrated: "Noch keine gewerteten Partien.",
     notListed: (lines) => `Nicht unter den ersten ${lines} der Bestenliste.`,
@@ -57,7 +58,7 @@ export const people: Texts["people"] = {
     wins: "Gewonnen",
     meanPlace: "Mittlerer Platz",
     sameName:
-      "Namen sind nicht geschützt: Das können Partien mehrerer Personen sein, die denselben Namen gewählt haben.",
+      "Ein Name kann mehrere Schlüssel haben: Das können Spiele mehrerer Personen sein, die denselben Namen gewählt haben.",
     played: "Gespielte Partien",
     none: "Es gibt keine Aufzeichnung einer Partie mit diesem Namen, die du sehen darfst.",
     ofShown: (count) => plural(count, { one: "von # gezeigten Partie", other: "von # gezeigten Partien" }),

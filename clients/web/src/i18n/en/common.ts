@@ -45,6 +45,11 @@ export const common = {
       notAllowed:
         "Your browser does not allow notifications from this page. You can change that in the browser’s settings.",
     },
+    names: {
+      key: "Key of your names",
+      hint: "Others may choose your name, but not its key: leaderboards list you apart. The key is made when you first join a game. To be the same on another device, enter it there; tell it nobody else.",
+      notAKey: "A key has 64 digits from 0 to 9 and a to f.",
+    },
     fullScreen: "Full screen",
     fullScreenOff: "Leave full screen",
     forget: "Forget everything on this device",

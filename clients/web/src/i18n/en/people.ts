@@ -43,6 +43,7 @@ export const people = {
     substituted: "a substitute took decisions",
     twice: "someone played in two seats",
   },
+  fingerprint: (fingerprint: string) => `Key of the name: ${fingerprint}`,
   person: {
     unrated: "No rated games yet.",
     notListed: (lines: number) => `Not among the first ${lines} of the leaderboard.`,
@@ -52,7 +53,7 @@ export const people = {
     games: "Finished games",
     wins: "Won",
     meanPlace: "Mean place",
-    sameName: "Names are not protected: these may be games of several people who chose the same name.",
+    sameName: "A name can have several keys: these may be games of several people who chose the same name.",
     played: "Games played",
     none: "There is no record of a game with this name that you may see.",
     ofShown: (count: number) => plural(count, { one: "of # game shown", other: "of # games shown" }),

@@ -54,6 +54,7 @@ export const people: Texts["people"] = {
     substituted: "un sustituto tomó decisiones",
     twice: "alguien jugó en dos asientos",
   },
+  fingerprint: (fingerprint) => `Clave del nombre: ${fingerprint}`,
   person: {
     unrated: "Todavía no hay partidas puntuables.",
     notListed: (lines) => `No está entre los primeros ${lines} de la clasificación.`,
@@ -63,7 +64,8 @@ export const people: Texts["people"] = {
     games: "Partidas terminadas",
     wins: "Ganadas",
     meanPlace: "Puesto medio",
-    sameName: "Los nombres no están protegidos: pueden ser partidas de varias personas que eligieron el mismo nombre.",
+    sameName:
+      "Un nombre puede tener varias claves: pueden ser partidas de varias personas que eligieron el mismo nombre.",
     played: "Partidas jugadas",
     none: "No hay registro de ninguna partida con este nombre que puedas ver.",
     ofShown: (count) => plural(count, { one: "de # partida mostrada", other: "de # partidas mostradas" }),

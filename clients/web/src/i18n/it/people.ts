@@ -51,6 +51,7 @@ export const people: Texts["people"] = {
     substituted: "un sostituto ha preso decisioni",
     twice: "qualcuno occupava due posti",
   },
+  fingerprint: (fingerprint) => `Chiave del nome: ${fingerprint}`,
   person: {
     unrated: "Ancora nessuna partita valutata.",
     notListed: (lines) => `Non è tra i primi ${lines} della classifica.`,
@@ -60,7 +61,8 @@ export const people: Texts["people"] = {
     games: "Partite concluse",
     wins: "Vinte",
     meanPlace: "Piazzamento medio",
-    sameName: "I nomi non sono protetti: queste partite possono essere di più persone che hanno scelto lo stesso nome.",
+    sameName:
+      "Un nome può avere più chiavi: queste partite possono essere di più persone che hanno scelto lo stesso nome.",
     played: "Partite giocate",
     none: "Non c’è nessuna partita registrata con questo nome che tu possa vedere.",
     ofShown: (count) => plural(count, { one: "su # partita mostrata", other: "su # partite mostrate" }),

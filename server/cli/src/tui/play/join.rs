@@ -15,8 +15,13 @@ const OWN_DECISION_MS: u32 = 3_600_000;
 ///
 /// # Errors
 /// The server's refusal.
-pub(super) async fn by_code(client: Client, code: &str, name: &str) -> Result<Taken, CommandError> {
-    match join_room(client.clone(), code, name).await {
+pub(super) async fn by_code(
+    client: Client,
+    code: &str,
+    name: &str,
+    name_key: Vec<u8>,
+) -> Result<Taken, CommandError> {
+    match join_room(client.clone(), code, name, name_key.clone()).await {
         Ok(taken) => Ok(taken),
         Err(error) if error.reason() == Some("JOIN_CODE_WRONG") => {
             let joined = client
@@ -25,6 +30,7 @@ pub(super) async fn by_code(client: Client, code: &str, name: &str) -> Result<Ta
                     name: name.to_owned(),
                     kind: v1::ParticipantKind::Human.into(),
                     max_games: 1,
+                    name_key,
                     ..v1::JoinTournamentRequest::default()
                 })
                 .await
@@ -64,16 +70,22 @@ pub(super) async fn own_table(
             ..v1::CreateRoomRequest::default()
         })
         .await?;
-    let taken = join_room(client, &made.join_code, name).await;
+    let taken = join_room(client, &made.join_code, name, Vec::new()).await;
     taken.map_err(|error| refused(&error))
 }
 
-async fn join_room(client: Client, code: &str, name: &str) -> Result<Taken, Error> {
+async fn join_room(
+    client: Client,
+    code: &str,
+    name: &str,
+    name_key: Vec<u8>,
+) -> Result<Taken, Error> {
     let joined = client
         .join(v1::JoinRoomRequest {
             join_code: code.to_owned(),
             name: name.to_owned(),
             kind: v1::ParticipantKind::Human.into(),
+            name_key,
             ..v1::JoinRoomRequest::default()
         })
         .await?;

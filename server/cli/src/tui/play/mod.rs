@@ -37,6 +37,7 @@ use clap::Args;
 use crate::CommandError;
 use crate::connect::ServerArg;
 use crate::data_dir;
+use crate::name_key::NameKeyArg;
 use crate::remote::named_agent;
 use crate::rules_args::{RulesArgs, rules_of};
 use crate::tui::screen::missing;
@@ -69,6 +70,8 @@ pub(crate) struct Play {
         conflicts_with = "ticket"
     )]
     name: String,
+    #[command(flatten)]
+    name_key: NameKeyArg,
     /// With --local: the built-in agents, in turn: random, greedy, trained.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = named_agent,
           default_values = ["trained", "greedy", "random"])]
@@ -162,7 +165,10 @@ impl Play {
                 ticket: ticket.clone(),
                 game: None,
             }),
-            (None, code) => join::by_code(client, code.as_deref().unwrap_or(""), &self.name).await,
+            (None, code) => {
+                let code = code.as_deref().unwrap_or("");
+                join::by_code(client, code, &self.name, self.name_key.key()?).await
+            }
         }
     }
 

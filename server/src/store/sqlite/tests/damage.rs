@@ -75,6 +75,7 @@ fn tournament() -> (Vec<u8>, Vec<u8>) {
     let joined = |number| {
         TournamentEntry::Change(Change::Joined(Entrant {
             name: format!("agent {number}"),
+            name_fingerprint: String::new(),
             kind: chefshat_tournament::ParticipantKind::Agent,
             built_in: None,
             filler: false,

@@ -28,6 +28,7 @@ pub(in crate::store) fn cup(number: u8) -> TournamentHeader {
 pub(in crate::store) fn every_entry() -> Vec<TournamentEntry> {
     let entrant = Entrant {
         name: "Bruna".into(),
+        name_fingerprint: String::new(),
         kind: ParticipantKind::Robot,
         built_in: None,
         filler: false,
@@ -35,8 +36,13 @@ pub(in crate::store) fn every_entry() -> Vec<TournamentEntry> {
         max_games: 3,
         at_table: false,
     };
+    let with_key = Entrant {
+        name_fingerprint: "0123456789abcdef".into(),
+        ..entrant.clone()
+    };
     let filler = Entrant {
         name: "random 1".into(),
+        name_fingerprint: String::new(),
         kind: ParticipantKind::Agent,
         built_in: Some(AgentKind::Random.into()),
         filler: true,
@@ -46,6 +52,7 @@ pub(in crate::store) fn every_entry() -> Vec<TournamentEntry> {
     };
     let at_table = Entrant {
         name: "Ada".into(),
+        name_fingerprint: String::new(),
         kind: ParticipantKind::Human,
         built_in: None,
         filler: false,
@@ -154,6 +161,7 @@ pub(in crate::store) fn every_entry() -> Vec<TournamentEntry> {
             missing: vec![],
             never_started: true,
         }),
+        change(Change::Joined(with_key)),
     ]
 }
 

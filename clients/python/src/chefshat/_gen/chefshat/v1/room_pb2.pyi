@@ -679,6 +679,7 @@ class Participant(_message.Message):
     REPLAY_FIELD_NUMBER: _builtins.int
     AT_TABLE_FIELD_NUMBER: _builtins.int
     SHOWN_KIND_FIELD_NUMBER: _builtins.int
+    NAME_FINGERPRINT_FIELD_NUMBER: _builtins.int
     seat: _builtins.int
     """Seat number, from 0."""
     name: _builtins.str
@@ -702,6 +703,11 @@ class Participant(_message.Message):
     """Only in records and their lists: as what the participant was shown, if a person played the seat
     as another kind (`SeatConfig.wizard`). `kind` is then HUMAN. UNSPECIFIED: as what it was.
     """
+    name_fingerprint: _builtins.str
+    """16 hexadecimal digits if the participant joined with a key of its name, else empty: a hash of
+    name and key. Two participants of one name with different fingerprints are different ones, and
+    are rated apart. It does not show which names have the same key.
+    """
     @_builtins.property
     def replay(self) -> Global___RecordedPlayer:
         """The recorded player that the built-in agent "replay" imitates; unset for all others."""
@@ -719,10 +725,11 @@ class Participant(_message.Message):
         replay: Global___RecordedPlayer | None = ...,
         at_table: _builtins.bool = ...,
         shown_kind: Global___ParticipantKind.ValueType = ...,
+        name_fingerprint: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["replay", b"replay"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "connected", b"connected", "kind", b"kind", "name", b"name", "replay", b"replay", "reserved_for", b"reserved_for", "seat", b"seat", "shown_kind", b"shown_kind", "substituted", b"substituted"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "connected", b"connected", "kind", b"kind", "name", b"name", "name_fingerprint", b"name_fingerprint", "replay", b"replay", "reserved_for", b"reserved_for", "seat", b"seat", "shown_kind", b"shown_kind", "substituted", b"substituted"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -257,6 +257,7 @@ class JoinRoomRequest(_message.Message):
     KIND_FIELD_NUMBER: _builtins.int
     SEAT_FIELD_NUMBER: _builtins.int
     REQUEST_ID_FIELD_NUMBER: _builtins.int
+    NAME_KEY_FIELD_NUMBER: _builtins.int
     room_id: _builtins.str
     """Identifies the room. May be empty: the join code alone identifies it."""
     join_code: _builtins.str
@@ -273,6 +274,11 @@ class JoinRoomRequest(_message.Message):
     after the start of the game or a restart of the server. The same id with another name, kind or
     seat: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT (REQUEST_ID_REFUSED).
     """
+    name_key: _builtins.bytes
+    """Empty, or 32 random bytes that the participant keeps secret: the key that tells this name from
+    the same name of others (`Participant.name_fingerprint`). Another length: INVALID_ARGUMENT
+    (NAME_KEY_REFUSED).
+    """
     def __init__(
         self,
         *,
@@ -282,10 +288,11 @@ class JoinRoomRequest(_message.Message):
         kind: _room_pb2.ParticipantKind.ValueType = ...,
         seat: _builtins.int | None = ...,
         request_id: _builtins.bytes = ...,
+        name_key: _builtins.bytes = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "seat", b"seat"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "join_code", b"join_code", "kind", b"kind", "name", b"name", "request_id", b"request_id", "room_id", b"room_id", "seat", b"seat"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "join_code", b"join_code", "kind", b"kind", "name", b"name", "name_key", b"name_key", "request_id", b"request_id", "room_id", b"room_id", "seat", b"seat"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__seat: _TypeAlias = _typing.Literal["seat"]  # noqa: Y015
     _WhichOneofArgType__seat: _TypeAlias = _typing.Literal["_seat", b"_seat"]  # noqa: Y015

@@ -353,6 +353,7 @@ class TournamentParticipant(_message.Message):
     AT_TABLE_FIELD_NUMBER: _builtins.int
     WITHDRAWN_FIELD_NUMBER: _builtins.int
     FORMER_FIELD_NUMBER: _builtins.int
+    NAME_FINGERPRINT_FIELD_NUMBER: _builtins.int
     participant: _builtins.int
     """Number in the tournament, from 0, in the order of joining. The number of a participant who left
     before the start is not used again.
@@ -377,6 +378,8 @@ class TournamentParticipant(_message.Message):
     """Whether it withdrew or was removed. Before the start its name is free again, and somebody else
     can join instead of it; after that it forfeits its games without being waited for.
     """
+    name_fingerprint: _builtins.str
+    """As in Participant."""
     @_builtins.property
     def former(self) -> _containers.RepeatedCompositeFieldContainer[Global___FormerParticipant]:
         """Who had its place before, in order. Their results count for the place."""
@@ -395,10 +398,11 @@ class TournamentParticipant(_message.Message):
         at_table: _builtins.bool = ...,
         withdrawn: _builtins.bool = ...,
         former: _abc.Iterable[Global___FormerParticipant] | None = ...,
+        name_fingerprint: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "connected", b"connected", "filler", b"filler", "former", b"former", "kind", b"kind", "max_games", b"max_games", "name", b"name", "participant", b"participant", "stateless", b"stateless", "withdrawn", b"withdrawn"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["at_table", b"at_table", "built_in_agent", b"built_in_agent", "connected", b"connected", "filler", b"filler", "former", b"former", "kind", b"kind", "max_games", b"max_games", "name", b"name", "name_fingerprint", b"name_fingerprint", "participant", b"participant", "stateless", b"stateless", "withdrawn", b"withdrawn"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -741,6 +745,7 @@ class Rated(_message.Message):
     RATING_FIELD_NUMBER: _builtins.int
     PLACE_FIELD_NUMBER: _builtins.int
     PLACES_FIELD_NUMBER: _builtins.int
+    NAME_FINGERPRINT_FIELD_NUMBER: _builtins.int
     name: _builtins.str
     """Name of the participant or of the built-in agent."""
     kind: _room_pb2.ParticipantKind.ValueType
@@ -749,6 +754,8 @@ class Rated(_message.Message):
     """Whether it is a built-in agent."""
     place: _builtins.int
     """Place among the rows shown, from 1, by the rating's mean minus two deviations."""
+    name_fingerprint: _builtins.str
+    """As in Participant."""
     @_builtins.property
     def rating(self) -> Global___Rating:
         """Its rating."""
@@ -766,10 +773,11 @@ class Rated(_message.Message):
         rating: Global___Rating | None = ...,
         place: _builtins.int = ...,
         places: _abc.Iterable[_builtins.int] | None = ...,
+        name_fingerprint: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["rating", b"rating"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in", b"built_in", "kind", b"kind", "name", b"name", "place", b"place", "places", b"places", "rating", b"rating"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["built_in", b"built_in", "kind", b"kind", "name", b"name", "name_fingerprint", b"name_fingerprint", "place", b"place", "places", b"places", "rating", b"rating"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

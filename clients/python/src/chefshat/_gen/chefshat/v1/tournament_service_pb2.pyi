@@ -206,6 +206,7 @@ class JoinTournamentRequest(_message.Message):
     MAX_GAMES_FIELD_NUMBER: _builtins.int
     STATELESS_FIELD_NUMBER: _builtins.int
     REQUEST_ID_FIELD_NUMBER: _builtins.int
+    NAME_KEY_FIELD_NUMBER: _builtins.int
     tournament_id: _builtins.str
     """Identifies the tournament. May be empty: the join code alone identifies it."""
     join_code: _builtins.str
@@ -225,6 +226,8 @@ class JoinTournamentRequest(_message.Message):
     kind, number of games or `stateless`: ALREADY_EXISTS (REQUEST_ID_USED). Another length:
     INVALID_ARGUMENT (REQUEST_ID_REFUSED).
     """
+    name_key: _builtins.bytes
+    """The key of the name, as in JoinRoomRequest. Another length: INVALID_ARGUMENT (NAME_KEY_REFUSED)."""
     def __init__(
         self,
         *,
@@ -235,10 +238,11 @@ class JoinTournamentRequest(_message.Message):
         max_games: _builtins.int = ...,
         stateless: _builtins.bool = ...,
         request_id: _builtins.bytes = ...,
+        name_key: _builtins.bytes = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["join_code", b"join_code", "kind", b"kind", "max_games", b"max_games", "name", b"name", "request_id", b"request_id", "stateless", b"stateless", "tournament_id", b"tournament_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["join_code", b"join_code", "kind", b"kind", "max_games", b"max_games", "name", b"name", "name_key", b"name_key", "request_id", b"request_id", "stateless", b"stateless", "tournament_id", b"tournament_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -1,0 +1,85 @@
+//! `--name-key`: the file with the key of a participant's name.
+
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::os::unix::fs::OpenOptionsExt as _;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use crate::CommandError;
+
+/// The flag for the key of a name.
+#[derive(Debug, Args)]
+pub(crate) struct NameKeyArg {
+    /// File with the key that tells this name from the same name of others, in leaderboards and
+    /// standings. It is created if it does not exist; keep it secret, and use it again.
+    #[arg(long, value_name = "FILE", conflicts_with = "ticket")]
+    name_key: Option<PathBuf>,
+}
+
+impl NameKeyArg {
+    /// The key, 32 bytes; empty without the flag.
+    ///
+    /// # Errors
+    /// The file contains no key, or cannot be read or created.
+    pub(crate) fn key(&self) -> Result<Vec<u8>, CommandError> {
+        let Some(file) = &self.name_key else {
+            return Ok(Vec::new());
+        };
+        let failed = |error: io::Error| format!("--name-key: {}: {error}", file.display());
+        let key = match fs::read_to_string(file) {
+            Ok(text) => hex::decode(text.trim()).ok().filter(|key| key.len() == 32),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                Some(create(file).map_err(failed)?)
+            }
+            Err(error) => return Err(failed(error).into()),
+        };
+        key.ok_or_else(|| {
+            let file = file.display();
+            format!("--name-key: {file} contains no key: 64 hexadecimal digits; name a file that does not exist to create one").into()
+        })
+    }
+}
+
+/// Creates a file with a new key, readable only by its owner.
+fn create(file: &Path) -> io::Result<Vec<u8>> {
+    let key = rand::random::<[u8; 32]>();
+    let mut options = File::options();
+    let mut created = options
+        .write(true)
+        .create_new(true)
+        .mode(0o600)
+        .open(file)?;
+    writeln!(created, "{}", hex::encode(key))?;
+    Ok(key.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    use crate::name_key::*;
+
+    #[test]
+    fn a_key_is_created_once_and_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("name.key");
+        let arg = |file: &Path| NameKeyArg {
+            name_key: Some(file.to_owned()),
+        };
+        let key = arg(&file).key().unwrap();
+        assert_eq!(key.len(), 32);
+        assert_eq!(arg(&file).key().unwrap(), key);
+        let mode = fs::metadata(&file).unwrap().permissions().mode();
+        assert_eq!(mode & 0o777, 0o600);
+        assert_ne!(arg(&folder.path().join("other.key")).key().unwrap(), key);
+        assert!(NameKeyArg { name_key: None }.key().unwrap().is_empty());
+
+        fs::write(&file, "0123").unwrap();
+        let refused = arg(&file).key().unwrap_err().to_string();
+        assert!(refused.contains("contains no key"), "{refused}");
+        let refused = arg(folder.path()).key().unwrap_err().to_string();
+        assert!(refused.starts_with("--name-key: "), "{refused}");
+    }
+}
