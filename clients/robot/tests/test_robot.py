@@ -162,7 +162,13 @@ def test_the_command_plays_and_draws_a_game(server_address: str, tmp_path: Path,
         async with aio.Client(server_address) as client:
             return await room(client)
 
-    arguments = ["--address", server_address, "--room", run(code()), "--seed", "3", "--json", "--language", "it"]
+    async def fingerprints() -> list[str]:
+        async with aio.Client(server_address) as client:
+            wanted = pb.RecordFilter(participant="Keyed")
+            return [seat.name_fingerprint async for game in client.records(wanted) for seat in game.seats if seat.name == "Keyed"]
+
+    key = ["--name", "Keyed", "--name-key", str(tmp_path / "robot.key")]
+    arguments = ["--address", server_address, "--room", run(code()), "--seed", "3", "--json", "--language", "it", *key]
     driver = f"simulated:frames={tmp_path / 'frames'},speed=0,clumsy=true"
     assert cli.main(["robot", *arguments, "--driver", driver]) == 0
     out, err = capsys.readouterr()
@@ -174,6 +180,7 @@ def test_the_command_plays_and_draws_a_game(server_address: str, tmp_path: Path,
     frames = sorted((tmp_path / "frames").glob("*.svg"))
     assert len(frames) > 20
     assert any("Passo." in frame.read_text() or "Gioco" in frame.read_text() for frame in frames)
+    assert [len(fingerprint) for fingerprint in run(fingerprints())] == [16]
 
 
 @pytest.mark.parametrize(
@@ -184,6 +191,7 @@ def test_the_command_plays_and_draws_a_game(server_address: str, tmp_path: Path,
         (["--room", "X", "--agent", "nonsense"], "--agent nonsense: give 'random' or module:Class"),
         (["--room", "X", "--agent", "missing.safetensors"], "--agent missing.safetensors"),
         (["--room", "X", "--address", "127.0.0.1:1"], "no server answers"),
+        (["--room", "X", "--name-key", "."], "--name-key: "),
     ],
 )
 def test_wrong_arguments_are_explained(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,7 +1,8 @@
 // The key of the names used on this device, which tells them from the same names of others
-// (`JoinRoomRequest.name_key`). Made when somebody first joins; the settings show it, so that
+// (`JoinRoomRequest.name_key`). It is made when a person first joins; the settings show it, so that
 // another device can have it too.
 
+import { fromHex, hex } from "./hex";
 import { recall, remember } from "./store";
 
 const STORED = "nameKey";
@@ -26,11 +27,9 @@ export function setNameKey(text: string): void {
 /** The key, which is made and stored the first time. */
 export function nameKey(): Uint8Array<ArrayBuffer> {
   const text = nameKeyText();
-  if (text !== null) {
-    return Uint8Array.from({ length: BYTES }, (_, index) => Number.parseInt(text.slice(2 * index, 2 * index + 2), 16));
-  }
+  if (text !== null) return fromHex(text);
   const key = crypto.getRandomValues(new Uint8Array(BYTES));
-  setNameKey(Array.from(key, (byte) => byte.toString(16).padStart(2, "0")).join(""));
+  setNameKey(hex(key));
   return key;
 }
 

@@ -117,6 +117,7 @@ test("with a fingerprint, a name is one participant; without, everybody who chos
       ?.slice(0, 2),
   ).toEqual(["Rating person #0123", "Rating person #fedc"]);
   expect(root.textContent).toContain("several people");
+  expect(new URL(link("#fedc")?.href ?? "").pathname).toMatch(/\/fedcba9876543210$/);
 });
 
 test("a rating is shown without games that the reader may see", async () => {

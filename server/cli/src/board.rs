@@ -100,7 +100,7 @@ pub(super) fn as_csv(board: &v1::GetLeaderboardResponse) -> Result<Vec<u8>, Comm
 fn marked_name(line: &v1::Rated) -> String {
     let name = clean(&line.name, NAME_COLUMNS);
     match line.name_fingerprint.get(..SHOWN_DIGITS) {
-        Some(digits) => format!("{name} #{digits}"),
+        Some(digits) => format!("{name} #{}", clean(digits, SHOWN_DIGITS)),
         None => name,
     }
 }

@@ -91,7 +91,7 @@ fn arguments(words: &[String]) -> Option<&[String]> {
         let begins = words.len() >= prefix.len() && words.iter().zip(prefix).all(|(a, b)| a == b);
         begins.then(|| &words[prefix.len()..])
     };
-    let direct = ["chefshat", "target/release/chefshat"];
+    let direct = ["chefshat", "./chefshat", "target/release/chefshat"];
     if let Some(rest) = direct.iter().find_map(|program| starts(&[program])) {
         return Some(rest);
     }

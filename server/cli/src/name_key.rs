@@ -13,7 +13,7 @@ use crate::CommandError;
 #[derive(Debug, Args)]
 pub(crate) struct NameKeyArg {
     /// File with the key that tells this name from the same name of others, in leaderboards and
-    /// standings. It is created if it does not exist; keep it secret, and use it again.
+    /// records. It is created if it does not exist; keep it secret, and use it again.
     #[arg(long, value_name = "FILE", conflicts_with = "ticket")]
     name_key: Option<PathBuf>,
 }

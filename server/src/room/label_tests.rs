@@ -54,7 +54,7 @@ fn playing(labels: SeatLabels) -> Table {
     ] {
         let participant = SeatedParticipant {
             name: name.into(),
-            name_fingerprint: String::new(),
+            name_fingerprint: format!("key of {name}"),
             kind,
             ticket: SecretHash::of(name.as_bytes()),
         };

@@ -146,6 +146,7 @@ impl Tournament {
         let mut any = false;
         for entrant in participants.filter(|it| it.built_in.is_none() && it.name == name) {
             to.clone_into(&mut entrant.name);
+            entrant.name_fingerprint.clear();
             any = true;
         }
         any

@@ -213,22 +213,30 @@ async fn a_seat_of_a_game_that_has_not_begun_is_given_back() {
         .await
         .expect("a new room");
     let room_id = made.room.expect("a room").room_id;
-    let taken = async || {
+    let fingerprints = async || {
         let room = client.get_room(&room_id).await.expect("a room");
-        room.seats
-            .iter()
-            .filter(|seat| !seat.name.is_empty())
-            .count()
+        let taken = room.seats.into_iter().filter(|seat| !seat.name.is_empty());
+        taken
+            .map(|seat| seat.name_fingerprint)
+            .collect::<Vec<String>>()
     };
-    let mut raw = Raw::start(program(
-        &server,
-        &["--code", &made.join_code, "--name", "Ada"],
-        None,
-    ));
+    let taken = async || fingerprints().await.len();
+    let folder = tempfile::tempdir().expect("a folder");
+    let key = folder.path().join("ada.key");
+    let arguments = [
+        "--code",
+        &made.join_code,
+        "--name",
+        "Ada",
+        "--name-key",
+        key.to_str().expect("a path in UTF-8"),
+    ];
+    let mut raw = Raw::start(program(&server, &arguments, None));
     raw.initialize("2025-06-18").await;
     let (joined, _) = raw.tool("join_room", json!({})).await;
     assert!(joined.contains("seats Ada, free, free, free"), "{joined}");
-    assert_eq!(taken().await, 1);
+    let of_key = fingerprints().await;
+    assert!(of_key.len() == 1 && of_key[0].len() == 16, "{of_key:?}");
     // The call returns before clients give up on it, although nothing happens.
     let (text, error) = raw.tool("wait_for_turn", json!({})).await;
     assert!(!error && text.contains("free seats: 3"), "{text}");
@@ -237,7 +245,7 @@ async fn a_seat_of_a_game_that_has_not_begun_is_given_back() {
     assert_eq!(taken().await, 0);
     // So is one that a client leaves by ending the program.
     raw.tool("join_room", json!({})).await;
-    assert_eq!(taken().await, 1);
+    assert_eq!(fingerprints().await, of_key);
     raw.stop().await;
     assert_eq!(taken().await, 0);
 }

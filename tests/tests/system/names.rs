@@ -1,4 +1,4 @@
-//! Keys of names: who has the same name with another key, or none, is somebody else.
+//! Keys of names: the same name with another key, or with none, is another participant.
 
 use std::collections::BTreeMap;
 
@@ -122,7 +122,18 @@ async fn a_key_is_part_of_the_request_and_has_its_length() {
         refused.expect_err("too long").reason(),
         Some("NAME_KEY_REFUSED")
     );
+    let ask = |key: &[u8]| v1::JoinTournamentRequest {
+        request_id: vec![2; 32],
+        ..ask(key)
+    };
     let entered = client.join_tournament(ask(&KEY)).await.expect("a place");
+    let again = client.join_tournament(ask(&KEY)).await;
+    assert_eq!(again.expect("the same place").ticket, entered.ticket);
+    let refused = client.join_tournament(ask(&OTHER)).await;
+    assert_eq!(
+        refused.expect_err("somebody else").reason(),
+        Some("REQUEST_ID_USED")
+    );
     let entered = entered.tournament.expect("a tournament").participants;
     let seat = &joined.room.expect("a room").seats[0];
     assert_eq!(entered[0].name_fingerprint, seat.name_fingerprint);

@@ -127,13 +127,7 @@ def add_options(parser: argparse.ArgumentParser, *, several_codes: bool = False)
         help="store the ticket in this file, readable only by you, until the game or tournament is over; an existing "
         "file is resumed from, so run the same command again after its process died",
     )
-    parser.add_argument(
-        "--name-key",
-        type=Path,
-        metavar="FILE",
-        help="file with the key that tells this name from the same name of others, in leaderboards and standings; it is created "
-        "if it does not exist: keep it secret, and use it again",
-    )
+    add_name_key_option(parser)
     parser.add_argument("--seat", type=int, help="the seat of the room, from 0 (default: the first free one)")
     parser.add_argument(
         "--games",
@@ -145,8 +139,24 @@ def add_options(parser: argparse.ArgumentParser, *, several_codes: bool = False)
     )
 
 
-def _name_key(file: Path | None) -> bytes:
-    """Returns the key in a file, which is created, readable only by its owner, if it does not exist; empty without a file."""
+def add_name_key_option(parser: argparse.ArgumentParser) -> None:
+    """Adds the option that `name_key` reads."""
+    parser.add_argument(
+        "--name-key",
+        type=Path,
+        metavar="FILE",
+        help="file with the key that tells this name from the same name of others, in leaderboards and records; it is created "
+        "if it does not exist: keep it secret, and use it again",
+    )
+
+
+def name_key(file: Path | None) -> bytes:
+    """Returns the key in a file, which is created, readable only by its owner, if it does not exist; empty without a file.
+
+    Raises:
+        ValueError: the file contains no key.
+        OSError: it cannot be read or created.
+    """
     if file is None:
         return b""
     try:
@@ -187,22 +197,22 @@ def ways(parser: argparse.ArgumentParser, options: argparse.Namespace, *, needs_
         parser.error("--seat is for joining a room: give it with --code. A tournament draws the seats, and a ticket has its seat")
     if options.name_key is not None and ticket:
         parser.error("--name-key is for joining: a ticket is of a place that is already taken")
-    try:
-        name_key = _name_key(options.name_key)
-    except (OSError, ValueError) as error:
-        parser.error(f"--name-key: {error}")
     if options.stateless and options.tournament is None:
         parser.error("--stateless is for joining: give it with --tournament. A ticket is of a place that is already taken")
     if options.seat is not None and not 0 <= options.seat < MAX_SEATS:
         parser.error(f"--seat: seats are numbered from 0, and a table has at most {MAX_SEATS}")
     if options.games is not None and not 1 <= options.games <= MAX_GAMES:
         parser.error(f"--games: a participant plays 1 to {MAX_GAMES} games at a time")
+    try:
+        key = name_key(options.name_key)
+    except (OSError, ValueError) as error:
+        parser.error(f"--name-key: {error}")
     way = JoinOptions(
         tournament=options.tournament,
         ticket=ticket,
         ticket_file=options.ticket_file,
         name=options.name or "",
-        name_key=name_key,
+        name_key=key,
         seat=options.seat,
         games=options.games or 1,
         stateless=options.stateless,

@@ -102,7 +102,7 @@ def report_printer(as_json: bool) -> Callable[[pb.TableReport, pb.ReportResponse
             text = f"{kind} {list(report.laid.cards.cards)} {verdict}"
         elif kind == "question":
             text = f"{kind} {verdict}: {report.question.text}"
-        detail = f": {response.detail}" if response.detail else ""
+        detail = f": {response.detail}" if response.detail and verdict != "known" else ""
         say(as_json, values, f"{text}{detail} — {response.state.waiting_for}")
 
     return print_report

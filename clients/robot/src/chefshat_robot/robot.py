@@ -15,7 +15,7 @@ from contextlib import nullcontext
 
 from chefshat import Agent, ChefsHatError, PlayOptions, SeatResult, aio, pb
 from chefshat.agent import make_agent
-from chefshat.join_options import TICKET, add_server_options, server_of
+from chefshat.join_options import TICKET, add_name_key_option, add_server_options, name_key, server_of
 from chefshat.outcome import Played
 from chefshat.outcome import report as report_result
 
@@ -52,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seat", type=int, help="the seat, from 0 (default: the first free one)")
     parser.add_argument("--name", default="Robot", help="the robot's name, 1 to 64 characters (default: %(default)s)")
+    add_name_key_option(parser)
     parser.add_argument(
         "--agent",
         default="random",
@@ -243,7 +244,13 @@ def print_drivers() -> int:
 
 
 async def _join(client: aio.Client, arguments: argparse.Namespace) -> str:
-    joined = await client.join_room(arguments.room, arguments.name, kind=pb.PARTICIPANT_KIND_ROBOT, seat=arguments.seat)
+    try:
+        key = name_key(arguments.name_key)
+    except (OSError, ValueError) as error:
+        raise CommandError(f"--name-key: {error}") from error
+    joined = await client.join_room(
+        arguments.room, arguments.name, kind=pb.PARTICIPANT_KIND_ROBOT, seat=arguments.seat, name_key=key
+    )
     print(f"if this process ends before the game, resume with --ticket {joined.ticket}", file=sys.stderr)
     return joined.ticket
 

@@ -14,6 +14,7 @@ import {
   TableStage,
   type TableState,
 } from "../gen/chefshat/v1/table_service_pb";
+import { hex } from "../hex";
 
 /** What happened, as it is reported. */
 export type ReportKind = NonNullable<MessageInitShape<typeof TableReportSchema>["kind"]> & { case: string };
@@ -92,6 +93,5 @@ function outcomeOf({ verdict, voidReports }: ReportResponse): Outcome {
 }
 
 function newId(): string {
-  const bytes = crypto.getRandomValues(new Uint8Array(REPORT_ID_BYTES));
-  return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+  return hex(crypto.getRandomValues(new Uint8Array(REPORT_ID_BYTES)));
 }

@@ -104,7 +104,7 @@ function OwnNames() {
     <TextField
       label={words.key}
       hint={words.hint}
-      fault={text === "" || isNameKey(text) ? undefined : words.notAKey}
+      fault={isNameKey(text) || (text === "" && nameKeyText() === null) ? undefined : words.notAKey}
       value={text}
       onText={change}
       autoCapitalize="none"

@@ -31,12 +31,12 @@ export function PersonName({ name, builtIn = "", fingerprint = "", linked = true
   );
 }
 
-/** The beginning of a name's fingerprint, with all of it for who points at it. */
-export function Fingerprint({ of }: { of: string }) {
+/** The beginning of a name's fingerprint, or all of it. */
+export function Fingerprint({ of, whole = false }: { of: string; whole?: boolean }) {
   if (of === "") return null;
   return (
     <span class="soft small number" title={t().people.fingerprint(of)}>
-      #{of.slice(0, DIGITS)}
+      #{whole ? of : of.slice(0, DIGITS)}
     </span>
   );
 }

@@ -39,7 +39,7 @@ export function PersonPage({ route }: PageProps<"person">) {
     <div class={css.people}>
       <header class={css.personHead}>
         <h1>{name}</h1>
-        <Fingerprint of={fingerprint} />
+        <Fingerprint of={fingerprint} whole />
         {self && <KindBadge kind={self.kind} builtIn={self.builtInAgent} />}
       </header>
       {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
@@ -98,7 +98,11 @@ function Rating({ line }: { line: Rated }) {
   const label = (
     <>
       {words.person.rating} <KindBadge kind={line.kind} builtIn={line.builtIn ? line.name : ""} />{" "}
-      <Fingerprint of={line.nameFingerprint} />
+      {line.nameFingerprint && (
+        <a href={pathOf({ page: "person", name: line.name, fingerprint: line.nameFingerprint })}>
+          <Fingerprint of={line.nameFingerprint} />
+        </a>
+      )}
     </>
   );
   const range = words.person.ratingRange(decimal(from, 1), decimal(to, 1));

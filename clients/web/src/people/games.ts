@@ -21,7 +21,7 @@ export interface OwnGame {
 
 /** A participant's ratings. */
 export interface Ratings {
-  /** One per kind. */
+  /** One per kind and key of the name. */
   readonly lines: readonly Rated[];
   /** Whether the leaderboard was searched to its end. */
   readonly complete: boolean;
@@ -57,7 +57,7 @@ export async function ratedAs(name: string, fingerprint: string, signal: AbortSi
 export function ownGame(record: RecordSummary, name: string, fingerprint = ""): OwnGame | undefined {
   const isOwn = (seat: Participant) =>
     seat.name === name && seat.builtInAgent === "" && [seat.nameFingerprint, ""].includes(fingerprint);
-  const own = record.seats.find(isOwn) ?? record.seats.find((seat) => seat.builtInAgent === name);
+  const own = record.seats.find(isOwn) ?? record.seats.find((seat) => seat.builtInAgent === name && fingerprint === "");
   if (!own) return undefined;
   const standing =
     record.state === RoomState.FINISHED ? record.standings.find(({ seat }) => seat === own.seat) : undefined;

@@ -9,6 +9,7 @@ import type { PageProps } from "../app";
 import { LinkList } from "../experiment/LinkList";
 import { participantsIn } from "../experiment/participants";
 import { type Study, type StudyLink, type StudyParticipant, StudyParticipantState } from "../gen/chefshat/v1/study_pb";
+import { hex } from "../hex";
 import { dateLocale, t } from "../i18n";
 import { CopyLine, QrCode } from "../lobby/Invite";
 import { MAX_NAME } from "../lobby/room-form";
@@ -172,10 +173,6 @@ function Delete({ study }: { study: Study }) {
       )}
     </>
   );
-}
-
-function hex(bytes: Uint8Array): string {
-  return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
 function Counts({ study, participants }: FollowedStudy) {

@@ -5,6 +5,7 @@
 import { fromJson, type JsonValue } from "@bufbuild/protobuf";
 import { base64Encode } from "@bufbuild/protobuf/wire";
 import { type StudySettings, StudySettingsSchema } from "../gen/chefshat/v1/study_pb";
+import { fromHex } from "../hex";
 
 /** Reads settings; throws an error that says what is wrong with the text. */
 export async function settingsFrom(text: string, name: string): Promise<StudySettings> {
@@ -34,10 +35,6 @@ function inProtocolForm(value: JsonValue, field = ""): JsonValue {
   if (typeof value !== "string") return value;
   const prefix = ENUMS[field];
   if (prefix !== undefined && !value.startsWith(prefix)) return prefix + value.toUpperCase().replaceAll("-", "_");
-  if (SEEDS.includes(field) && /^[0-9a-f]{64}$/i.test(value)) return base64Encode(bytesOf(value));
+  if (SEEDS.includes(field) && /^[0-9a-f]{64}$/i.test(value)) return base64Encode(fromHex(value));
   return value;
-}
-
-function bytesOf(hex: string): Uint8Array {
-  return Uint8Array.from(hex.match(/../g) ?? [], (pair) => Number.parseInt(pair, 16));
 }

@@ -4,6 +4,7 @@
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { TournamentDeals, TournamentFormat, type TournamentSettingsSchema } from "../gen/chefshat/v1/tournament_pb";
+import { fromHex } from "../hex";
 import {
   GAME_FIELDS,
   type GameForm,
@@ -193,8 +194,8 @@ export function settingsOf(form: TournamentForm): MessageInitShape<typeof Tourna
     maxCalls: Number(form.maxCalls),
     maxParallelGames: Number(form.maxParallel),
     filler: form.filler,
-    drawSeed: seedOf(form.drawSeed),
-    dealSeed: seedOf(form.dealSeed),
+    drawSeed: fromHex(form.drawSeed.trim()),
+    dealSeed: fromHex(form.dealSeed.trim()),
   };
 }
 
@@ -241,8 +242,4 @@ function kindsOf(form: TournamentForm): ParticipantKind[] {
     ...(robots ? [ParticipantKind.ROBOT] : []),
     ...(models ? [ParticipantKind.MODEL] : []),
   ];
-}
-
-function seedOf(typed: string): Uint8Array {
-  return Uint8Array.from(typed.trim().match(/../g) ?? [], (byte) => Number.parseInt(byte, 16));
 }

@@ -135,6 +135,7 @@ export function firstTable(you: string): TableState {
   const seat = (number: number, name: string, kind: ParticipantKind): SeatState => ({
     seat: number,
     name,
+    nameFingerprint: "",
     kind,
     reservedFor: kind,
     builtIn: "",

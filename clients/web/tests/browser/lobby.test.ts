@@ -1,6 +1,7 @@
 // The lobby in a real browser: creating a room, joining by invitation, form errors, leaving,
 // settings.
 
+import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { sitDown } from "./play";
 import { clientsOf, newRoom } from "./rooms";
@@ -244,4 +245,39 @@ test("a private game is found and replayed by the one who created it alone", asy
     await stranger.page.goto(address);
     await stranger.page.getByText(words).waitFor();
   }
+});
+
+test("the key of a person's names is taken to another device", async () => {
+  const devices = [await person(browser), await person(browser), await person(browser)];
+  const [first, second, third] = devices.map(({ page }) => page) as [Page, Page, Page];
+  // In rooms of their own: the page asks for another name where one is taken.
+  const sit = async (page: Page) => {
+    const { roomId, code } = await newRoom(server, { seats: ["person", "person", "greedy", "greedy"] });
+    await sitDown(page, server, code, "Rosa");
+    const { room } = await clientsOf(server).rooms.getRoom({ roomId });
+    return room?.seats[0]?.nameFingerprint;
+  };
+  const keyField = async (page: Page) => {
+    await page.goto(server.url);
+    await page.getByRole("button", { name: "Settings" }).click();
+    return page.getByLabel("Key of your names");
+  };
+  const own = await sit(first);
+  expect(own).toMatch(/^[0-9a-f]{16}$/);
+  const key = await (await keyField(first)).inputValue();
+  expect(key).toMatch(/^[0-9a-f]{64}$/);
+
+  const field = await keyField(second);
+  expect(await field.inputValue()).toBe("");
+  await field.fill(key.slice(1));
+  const fault = second.getByText("A key has 64 digits from 0 to 9 and a to f.");
+  await fault.waitFor();
+  await field.fill(` ${key.toUpperCase()} `);
+  await fault.waitFor({ state: "detached" });
+  expect(await sit(second)).toBe(own);
+
+  const other = await sit(third);
+  expect(other).toMatch(/^[0-9a-f]{16}$/);
+  expect(other).not.toBe(own);
+  for (const { faults } of devices) expect(faults).toEqual([]);
 });

@@ -112,5 +112,12 @@ test("the organiser creates links, which participants use in turn on one device"
   await page.goto((links[0] ?? "").replace("name=P01&", ""));
   await page.getByRole("button", { name: "Continue as P02" }).click();
   await page.locator('[data-part~="entrants"] [aria-current]').filter({ hasText: "P02" }).waitFor();
+  const tournamentId = new URL(page.url()).pathname.split("/").at(-1) ?? "";
+  const { tournament } = await clientsOf(server).tournaments.getTournament({ tournamentId });
+  const fingerprints = tournament?.participants.map(({ name, nameFingerprint }) => [name, nameFingerprint]);
+  expect(fingerprints).toEqual([
+    ["P01", ""],
+    ["P02", ""],
+  ]);
   expect(faults).toEqual([]);
 });

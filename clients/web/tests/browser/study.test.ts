@@ -86,6 +86,8 @@ test("a participant's link leads from the consent to the table, and then to the 
   const lines = (await recordOf(server, await gameOf(server, roomId))).map(({ line }) => line);
   const header = lines.flatMap((line) => (line.case === "header" ? line.value : []))[0];
   expect(header?.seats[2]?.name).toBe("P07");
+  // The key of the device would tell which participants used it.
+  expect(header?.seats[2]?.nameFingerprint).toBe("");
   const own = lines.flatMap((line) => (line.case === "decision" && line.value.seat === 2 ? line.value : []));
   expect(own.length).toBe(taken);
   for (const { annotations } of own) expect(annotations?.extra[PERSON_TIME_KEY]).toMatch(/^\d+$/);

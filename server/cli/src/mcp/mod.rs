@@ -20,6 +20,7 @@ use tokio::signal::unix::{SignalKind, signal};
 
 use super::CommandError;
 use super::connect::ServerArg;
+use super::name_key::NameKeyArg;
 use seats::{Handles, Seats};
 use server::{Server, Settings};
 
@@ -40,6 +41,8 @@ pub(super) struct Mcp {
     /// Display name for `join_room`, if the model gives none.
     #[arg(long, env = "CHEFSHAT_NAME")]
     name: Option<String>,
+    #[command(flatten)]
+    name_key: NameKeyArg,
     /// Ticket of a seat to resume.
     #[arg(
         long,
@@ -71,6 +74,7 @@ impl Mcp {
             seats: Seats::new(self.server, handles),
             join_code: self.code,
             name: self.name,
+            name_key: self.name_key.key()?,
         });
         match self.listen {
             None => {

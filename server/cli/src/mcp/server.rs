@@ -38,6 +38,8 @@ pub(super) struct Settings {
     pub(super) join_code: Option<String>,
     /// The name for a client that gives none.
     pub(super) name: Option<String>,
+    /// The key of the name, 32 bytes; empty without one.
+    pub(super) name_key: Vec<u8>,
 }
 
 /// One connection; in the current revision of the protocol, one request.
@@ -97,6 +99,7 @@ impl Server {
             name: name.unwrap_or_else(|| DEFAULT_NAME.to_owned()),
             kind: v1::ParticipantKind::Model.into(),
             seat: join.seat,
+            name_key: self.settings.name_key.clone(),
             ..v1::JoinRoomRequest::default()
         };
         let handle = self.seats().join(request).await.map_err(in_words)?;

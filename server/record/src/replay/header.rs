@@ -137,6 +137,16 @@ fn check_seats(seats: &[v1::Participant], players: usize) -> Result<(), String> 
                 ));
             }
         }
+        let fingerprint = seat.name_fingerprint.as_str();
+        let field = format!("seats[{index}].nameFingerprint");
+        if !seat.built_in_agent.is_empty() && !fingerprint.is_empty() {
+            return Err(must_be(&field, fingerprint, "empty for a built-in agent"));
+        }
+        let is_digit = |digit: u8| matches!(digit, b'0'..=b'9' | b'a'..=b'f');
+        if ![0, 16].contains(&fingerprint.len()) || !fingerprint.bytes().all(is_digit) {
+            let what = "empty or 16 hexadecimal digits (0-9, a-f)";
+            return Err(must_be(&field, fingerprint, what));
+        }
     }
     Ok(())
 }

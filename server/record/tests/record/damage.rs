@@ -109,6 +109,8 @@ fn damages() -> Vec<(&'static str, Damage, usize, &'static str)> {
         ("the policy", Set(1, "/header/policy/bankMs", json!(90_000_000)), 1, "policy.bankMs is 90000000"),
         ("a seat's number", Set(1, "/header/seats/1/seat", json!(2)), 1, "seats[1].seat is 2 and must be 1"),
         ("a name", Set(1, "/header/seats/2/name", json!("Ralf")), 4, "\"Ralf\" on seat 2, but the events have \"Rolf\""),
+        ("a name's fingerprint", Set(1, "/header/seats/3/nameFingerprint", json!("0123456789ABCDEF")), 1, "seats[3].nameFingerprint is \"0123456789ABCDEF\" and must be \"empty or 16"),
+        ("a built-in agent's fingerprint", Set(1, "/header/seats/1/nameFingerprint", json!("0123456789abcdef")), 1, "seats[1].nameFingerprint is \"0123456789abcdef\" and must be \"empty for a built-in"),
         ("the origin", Set(1, "/header/origin", json!("GAME_ORIGIN_FIXED_SEED")), 1, "seedCommitment has 32 bytes; for GAME_ORIGIN_FIXED_SEED it must be absent"),
         ("no commitment", Unset(1, "/header", "seedCommitment"), 1, "seedCommitment has 0 bytes"),
         ("the commitment", Set(1, "/header/seedCommitment", json!("AAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAAA=")), 4, "gameStarted.seedCommitment"),

@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
+use chefshat_record::convert::seat_number;
 use chefshat_room::ids::Token;
 use chefshat_room::journal::{AbortReason, SeatedParticipant};
 use chefshat_room::{ConnectionId, JoinError, ReportOutcome};
@@ -133,14 +134,20 @@ impl Room {
         ticket: Token,
         request: &JoinRequest,
     ) -> Result<Joined, JoinError> {
-        let room = Box::new(convert::describe(&self.core));
-        let seated = &room.seats[seat.index()];
-        let is_same = seated.name == request.name
-            && seated.name_fingerprint == request.name_fingerprint
-            && seated.kind == convert::kind_to_proto(Some(request.kind))
-            && request.seat.is_none_or(|wanted| wanted == seated.seat);
-        match is_same {
-            true => Ok(Joined { seat, ticket, room }),
+        let standing = self.core.standing(seat);
+        let is_same = standing.participant.is_some_and(|seated| {
+            seated.name == request.name
+                && seated.name_fingerprint == request.name_fingerprint
+                && seated.kind == request.kind
+        });
+        let own = seat_number(seat);
+        let asked_for = request.seat.is_none_or(|wanted| wanted == own);
+        match is_same && asked_for {
+            true => Ok(Joined {
+                seat,
+                ticket,
+                room: Box::new(convert::describe(&self.core)),
+            }),
             false => Err(JoinError::RequestIdUsed),
         }
     }

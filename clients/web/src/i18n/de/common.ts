@@ -49,14 +49,14 @@ export const common: Texts["common"] = {
     },
     names: {
       key: "Schlüssel deiner Namen",
-      hint: "Andere können deinen Namen wählen, aber nicht seinen Schlüssel: Ranglisten führen euch getrennt. Der Schlüssel entsteht, wenn du zum ersten Mal an einem Spiel teilnimmst. Gib ihn auf einem anderen Gerät ein, um dort dieselbe Person zu sein; verrate ihn sonst niemandem.",
+      hint: "Andere können deinen Namen wählen, aber nicht seinen Schlüssel: Ranglisten führen euch getrennt. Der Schlüssel entsteht, wenn du zum ersten Mal an einer Partie teilnimmst. Gib ihn auf einem anderen Gerät ein, um dort dieselbe Person zu sein; verrate ihn sonst niemandem.",
       notAKey: "Ein Schlüssel hat 64 Ziffern von 0 bis 9 und a bis f.",
     },
     fullScreen: "Vollbild",
     fullScreenOff: "Vollbild beenden",
     forget: "Alles auf diesem Gerät vergessen",
     forgetSure:
-      "Damit verschwinden von diesem Gerät deine Plätze an Tischen und in Turnieren, die Räume und Turniere, die du erstellt hast, dein Name und deine Einstellungen. Du kannst sie nicht zurückholen.",
+      "Damit verschwinden von diesem Gerät deine Plätze an Tischen und in Turnieren, die Räume und Turniere, die du erstellt hast, dein Name mit seinem Schlüssel und deine Einstellungen. Du kannst sie nicht zurückholen.",
     forgetDo: "Alles vergessen",
   },
   kinds: {

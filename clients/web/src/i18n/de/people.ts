@@ -7,7 +7,7 @@ const plural = plurals("de");
 
 export const people: Texts["people"] = {
   title: "Bestenliste",
-  text: "Alle, die auf diesem Server eine gewertete Partie gespielt haben. Namen sind frei gewählt und nicht geschützt.",
+  text: "Alle, die auf diesem Server eine gewertete Partie gespielt haben. Namen sind frei gewählt; gleiche unterscheidet ein Schlüssel.",
   ratedGames: (games) => plural(games, { one: "# gewertete Partie", other: "# gewertete Partien" }),
   kinds: { label: "Wer", all: "Alle", human: "Personen", robot: "Roboter", agent: "Agenten", model: "Sprachmodelle" },
   minGames: {
@@ -33,7 +33,7 @@ export const people: Texts["people"] = {
     conditions: [
       "sie bis zum Ende gespielt wurde;",
       "der Server die Karten nach einem eigenen Seed ausgeteilt hat: kein fester Seed, keine vorgegebenen Blätter, keine Abzweigung einer anderen Partie, keine anderswo gespielte Partie;",
-      "auf jedem Platz ein anderer Teilnehmer saß, nach Name und Art: nicht zweimal derselbe eingebaute Agent und nicht zwei Personen mit demselben Namen;",
+      "auf jedem Platz ein anderer Teilnehmer saß, nach Name, Schlüssel und Art: nicht zweimal derselbe eingebaute Agent oder dieselbe Person;",
       "kein Ersatz für jemanden entschieden hat und niemand einen Tipp bekam.",
     ],
     toSee: "In der Liste der Partien eines Teilnehmers steht, warum eine Partie nicht gewertet wird.",
@@ -58,7 +58,7 @@ export const people: Texts["people"] = {
     wins: "Gewonnen",
     meanPlace: "Mittlerer Platz",
     sameName:
-      "Ein Name kann mehrere Schlüssel haben: Das können Spiele mehrerer Personen sein, die denselben Namen gewählt haben.",
+      "Ein Name kann mehrere Schlüssel haben: Das können Partien mehrerer Personen sein, die denselben Namen gewählt haben.",
     played: "Gespielte Partien",
     none: "Es gibt keine Aufzeichnung einer Partie mit diesem Namen, die du sehen darfst.",
     ofShown: (count) => plural(count, { one: "von # gezeigten Partie", other: "von # gezeigten Partien" }),

@@ -47,14 +47,14 @@ export const common = {
     },
     names: {
       key: "Key of your names",
-      hint: "Others may choose your name, but not its key: leaderboards list you apart. The key is made when you first join a game. To be the same on another device, enter it there; tell it nobody else.",
+      hint: "Others can choose your name, but they do not have its key, so leaderboards list you separately. The key is created when you first join a game. Enter it on another device to be the same person there, and show it to nobody else.",
       notAKey: "A key has 64 digits from 0 to 9 and a to f.",
     },
     fullScreen: "Full screen",
     fullScreenOff: "Leave full screen",
     forget: "Forget everything on this device",
     forgetSure:
-      "This removes your seats, your places in tournaments, the rooms and tournaments you created, your name and your settings from this device. You cannot get them back.",
+      "This removes your seats, your places in tournaments, the rooms and tournaments you created, your name with its key, and your settings from this device. You cannot get them back.",
     forgetDo: "Forget everything",
   },
   kinds: { agent: "agent", human: "person", robot: "robot", model: "model", builtIn: "built-in agent", open: "free" },

@@ -6,7 +6,7 @@ const plural = plurals("en");
 
 export const people = {
   title: "Leaderboard",
-  text: "Everyone who has played a rated game on this server. Players choose their own names; names are not protected.",
+  text: "Everyone who has played a rated game on this server. Players choose their own names; a key tells the same names apart.",
   ratedGames: (games: number) => plural(games, { one: "# rated game", other: "# rated games" }),
   kinds: { label: "Who", all: "Everyone", human: "People", robot: "Robots", agent: "Agents", model: "Language models" },
   minGames: { label: "With at least", games: (games: number) => plural(games, { one: "# game", other: "# games" }) },
@@ -29,7 +29,7 @@ export const people = {
     conditions: [
       "it was played to the end;",
       "the server dealt it from its own seed: no fixed seed, no prescribed hands, no branch of another game, no game played elsewhere;",
-      "every seat had a different participant, by name and kind: not the same built-in agent twice, nor two people with the same name;",
+      "every seat had a different participant, by name, key and kind: not the same built-in agent twice, nor the same person;",
       "no substitute decided for anyone, and nobody was given a hint.",
     ],
     toSee: "A participant’s list of games says why a game is not rated.",

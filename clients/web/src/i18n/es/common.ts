@@ -57,7 +57,7 @@ export const common: Texts["common"] = {
     fullScreenOff: "Salir de la pantalla completa",
     forget: "Olvidar todo en este dispositivo",
     forgetSure:
-      "Se borran de este dispositivo tus asientos, tus plazas en torneos, las salas y los torneos que has creado, tu nombre y tus ajustes. No podrás recuperarlos.",
+      "Se borran de este dispositivo tus asientos, tus plazas en torneos, las salas y los torneos que has creado, tu nombre con su clave y tus ajustes. No podrás recuperarlos.",
     forgetDo: "Olvidar todo",
   },
   kinds: {

@@ -7,7 +7,7 @@ const plural = plurals("es");
 
 export const people: Texts["people"] = {
   title: "Clasificación",
-  text: "Quienes han jugado una partida puntuable en este servidor. Cada cual elige su nombre; los nombres no están protegidos.",
+  text: "Quienes han jugado una partida puntuable en este servidor. Cada cual elige su nombre; una clave distingue los que son iguales.",
   ratedGames: (games) => plural(games, { one: "# partida puntuable", other: "# partidas puntuables" }),
   kinds: {
     label: "Quién",
@@ -40,7 +40,7 @@ export const people: Texts["people"] = {
     conditions: [
       "se jugó hasta el final;",
       "el servidor repartió las cartas con una semilla propia: sin semilla fija, sin manos fijadas de antemano, ni variante de otra partida, ni partida jugada en otro sitio;",
-      "cada asiento tenía un participante distinto, por nombre y tipo: ni dos veces el mismo agente integrado, ni dos personas con el mismo nombre;",
+      "cada asiento tenía un participante distinto, por nombre, clave y tipo: ni dos veces el mismo agente integrado, ni la misma persona;",
       "ningún sustituto decidió por nadie, y nadie recibió una pista.",
     ],
     toSee: "La lista de partidas de un participante dice por qué una partida no es puntuable.",

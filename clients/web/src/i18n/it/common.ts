@@ -54,7 +54,7 @@ export const common: Texts["common"] = {
     fullScreenOff: "Esci da schermo intero",
     forget: "Dimentica tutto su questo dispositivo",
     forgetSure:
-      "Da questo dispositivo vengono eliminati i tuoi posti, le iscrizioni ai tornei, le stanze e i tornei creati, il nome e le impostazioni. Non potrai recuperarli.",
+      "Da questo dispositivo vengono eliminati i tuoi posti, le iscrizioni ai tornei, le stanze e i tornei creati, il nome con la sua chiave e le impostazioni. Non potrai recuperarli.",
     forgetDo: "Dimentica tutto",
   },
   kinds: {

@@ -7,7 +7,7 @@ const plural = plurals("it");
 
 export const people: Texts["people"] = {
   title: "Classifica",
-  text: "Chiunque abbia giocato una partita valutata su questo server. Ognuno sceglie il proprio nome; i nomi non sono protetti.",
+  text: "Chiunque abbia giocato una partita valutata su questo server. Ognuno sceglie il proprio nome; una chiave distingue i nomi uguali.",
   ratedGames: (games) => plural(games, { one: "# partita valutata", other: "# partite valutate" }),
   kinds: {
     label: "Chi",
@@ -37,7 +37,7 @@ export const people: Texts["people"] = {
     conditions: [
       "è stata giocata fino alla fine;",
       "il server ha distribuito le carte con un proprio seme: nessun seme fissato, nessuna mano prestabilita, nessuna variante di un’altra partita, nessuna partita giocata altrove;",
-      "ogni posto aveva un partecipante diverso, per nome e tipo: non due volte lo stesso agente integrato, né due persone con lo stesso nome;",
+      "ogni posto aveva un partecipante diverso, per nome, chiave e tipo: non due volte lo stesso agente integrato, né la stessa persona;",
       "nessun sostituto ha deciso per qualcuno, e nessuno ha ricevuto suggerimenti.",
     ],
     toSee: "L’elenco delle partite di un partecipante dice perché una partita non è valutata.",

@@ -81,6 +81,8 @@ export interface SeatState {
   readonly seat: number;
   /** Empty while the seat is free. */
   readonly name: string;
+  /** Of the name and its key, where it is known; empty if it has none. */
+  readonly nameFingerprint: string;
   readonly kind: ParticipantKind;
   readonly reservedFor: ParticipantKind;
   /** Name of the built-in agent in the seat, or empty. */
@@ -186,6 +188,7 @@ export function seatFromParticipant(participant: Participant): SeatState {
   return {
     seat: participant.seat,
     name: participant.name,
+    nameFingerprint: participant.nameFingerprint,
     kind: participant.kind,
     reservedFor: participant.reservedFor,
     builtIn: participant.builtInAgent,

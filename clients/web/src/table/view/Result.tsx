@@ -143,7 +143,15 @@ function Row({ table, seat, place, profile = false, children }: RowProps) {
       <td>{t().common.place(place)}</td>
       <th scope="row">
         <SeatNumber seat={seat} />{" "}
-        {profile ? <PersonName name={name} builtIn={table.seats[seat]?.builtIn ?? ""} /> : name}
+        {profile ? (
+          <PersonName
+            name={name}
+            builtIn={table.seats[seat]?.builtIn ?? ""}
+            fingerprint={table.seats[seat]?.nameFingerprint ?? ""}
+          />
+        ) : (
+          name
+        )}
       </th>
       {children}
     </tr>

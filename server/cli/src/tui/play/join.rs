@@ -45,33 +45,24 @@ pub(super) async fn by_code(
     }
 }
 
-/// Creates a room for this person and built-in agents, and takes its seat.
-///
-/// # Errors
-/// The server's refusal.
-pub(super) async fn own_table(
-    client: Client,
+/// A room for this person and built-in agents.
+pub(super) fn own_room(
     rules: v1::RuleSet,
     seats: Vec<v1::SeatConfig>,
     pace_ms: u32,
-    name: &str,
-) -> Result<Taken, CommandError> {
-    let made = client
-        .create_room(v1::CreateRoomRequest {
-            name: "your table".into(),
-            rules: Some(rules),
-            seats,
-            policy: Some(v1::RoomPolicy {
-                decision_time_ms: Some(OWN_DECISION_MS),
-                pace_ms: Some(pace_ms),
-                hints: true,
-                ..v1::RoomPolicy::default()
-            }),
-            ..v1::CreateRoomRequest::default()
-        })
-        .await?;
-    let taken = join_room(client, &made.join_code, name, Vec::new()).await;
-    taken.map_err(|error| refused(&error))
+) -> v1::CreateRoomRequest {
+    v1::CreateRoomRequest {
+        name: "your table".into(),
+        rules: Some(rules),
+        seats,
+        policy: Some(v1::RoomPolicy {
+            decision_time_ms: Some(OWN_DECISION_MS),
+            pace_ms: Some(pace_ms),
+            hints: true,
+            ..v1::RoomPolicy::default()
+        }),
+        ..v1::CreateRoomRequest::default()
+    }
 }
 
 async fn join_room(

@@ -185,6 +185,8 @@ impl Play {
             filled_by: Some(filled_by),
             ..v1::SeatConfig::default()
         });
-        join::own_table(client, rules, seats.collect(), self.pace_ms, &self.name).await
+        let room = join::own_room(rules, seats.collect(), self.pace_ms);
+        let made = client.create_room(room).await?;
+        join::by_code(client, &made.join_code, &self.name, self.name_key.key()?).await
     }
 }

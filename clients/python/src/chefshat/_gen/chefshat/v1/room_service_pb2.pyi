@@ -271,8 +271,9 @@ class JoinRoomRequest(_message.Message):
     request_id: _builtins.bytes
     """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
     lost response, gets the same place with the same ticket while the participant has it, even
-    after the start of the game or a restart of the server. The same id with another name, kind or
-    seat: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT (REQUEST_ID_REFUSED).
+    after the start of the game or a restart of the server. The same id with another name, key,
+    kind or seat: ALREADY_EXISTS (REQUEST_ID_USED). Another length: INVALID_ARGUMENT
+    (REQUEST_ID_REFUSED).
     """
     name_key: _builtins.bytes
     """Empty, or 32 random bytes that the participant keeps secret: the key that tells this name from

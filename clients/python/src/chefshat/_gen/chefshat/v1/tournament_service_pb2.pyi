@@ -223,11 +223,13 @@ class JoinTournamentRequest(_message.Message):
     """Empty, or 32 random bytes, which must be kept secret. A repeated call with the same id, after a
     lost response, gets the same place with the same ticket while the participant has it, even
     after the start of the tournament or a restart of the server. The same id with another name,
-    kind, number of games or `stateless`: ALREADY_EXISTS (REQUEST_ID_USED). Another length:
+    key, kind, number of games or `stateless`: ALREADY_EXISTS (REQUEST_ID_USED). Another length:
     INVALID_ARGUMENT (REQUEST_ID_REFUSED).
     """
     name_key: _builtins.bytes
-    """The key of the name, as in JoinRoomRequest. Another length: INVALID_ARGUMENT (NAME_KEY_REFUSED)."""
+    """The key of the name, as in JoinRoomRequest. Another length: INVALID_ARGUMENT
+    (NAME_KEY_REFUSED).
+    """
     def __init__(
         self,
         *,

@@ -180,8 +180,9 @@ class TournamentServiceServicer(object):
         """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
         participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
         (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
-        of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED,
-        MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED,
+        NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
+        (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -336,8 +337,9 @@ class TournamentServiceServicer(object):
     def GetLeaderboard(self, request, context):
         """Returns all who have played a rated game on this server, best first. A game is rated if it
         finished, was public, was dealt by this server from its own seed, and different participants
-        played all seats without substitutes and without hints. Names are not protected: participants
-        choose them. The games of the last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
+        played all seats without substitutes and without hints. Participants choose their names; a key
+        (`JoinRoomRequest.name_key`) makes a name theirs. The games of the last seconds may be missing.
+        INVALID_ARGUMENT (KIND_REFUSED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

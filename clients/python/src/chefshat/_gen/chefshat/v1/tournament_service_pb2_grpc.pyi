@@ -60,8 +60,9 @@ class TournamentServiceStub:
     """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
     participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
     (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
-    of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED,
-    MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED,
+    NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
+    (SHUTTING_DOWN).
     """
     AddTableParticipant: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.AddTableParticipantRequest, _tournament_service_pb2.AddTableParticipantResponse]
     """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what
@@ -156,8 +157,9 @@ class TournamentServiceStub:
     GetLeaderboard: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetLeaderboardRequest, _tournament_service_pb2.GetLeaderboardResponse]
     """Returns all who have played a rated game on this server, best first. A game is rated if it
     finished, was public, was dealt by this server from its own seed, and different participants
-    played all seats without substitutes and without hints. Names are not protected: participants
-    choose them. The games of the last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
+    played all seats without substitutes and without hints. Participants choose their names; a key
+    (`JoinRoomRequest.name_key`) makes a name theirs. The games of the last seconds may be missing.
+    INVALID_ARGUMENT (KIND_REFUSED).
     """
 
 @_typing.type_check_only
@@ -192,8 +194,9 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
     participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
     (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
-    of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED,
-    MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED,
+    NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
+    (SHUTTING_DOWN).
     """
     AddTableParticipant: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.AddTableParticipantRequest, _tournament_service_pb2.AddTableParticipantResponse]  # type: ignore[assignment]
     """Adds a participant who plays at a physical table with real cards. Nobody connects for it: what
@@ -288,8 +291,9 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     GetLeaderboard: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetLeaderboardRequest, _tournament_service_pb2.GetLeaderboardResponse]  # type: ignore[assignment]
     """Returns all who have played a rated game on this server, best first. A game is rated if it
     finished, was public, was dealt by this server from its own seed, and different participants
-    played all seats without substitutes and without hints. Names are not protected: participants
-    choose them. The games of the last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
+    played all seats without substitutes and without hints. Participants choose their names; a key
+    (`JoinRoomRequest.name_key`) makes a name theirs. The games of the last seconds may be missing.
+    INVALID_ARGUMENT (KIND_REFUSED).
     """
 
 class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -345,8 +349,9 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         """Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
         participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
         (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
-        of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED,
-        MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED,
+        NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
+        (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
@@ -531,8 +536,9 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_tournament_service_pb2.GetLeaderboardResponse, _abc.Awaitable[_tournament_service_pb2.GetLeaderboardResponse]]:
         """Returns all who have played a rated game on this server, best first. A game is rated if it
         finished, was public, was dealt by this server from its own seed, and different participants
-        played all seats without substitutes and without hints. Names are not protected: participants
-        choose them. The games of the last seconds may be missing. INVALID_ARGUMENT (KIND_REFUSED).
+        played all seats without substitutes and without hints. Participants choose their names; a key
+        (`JoinRoomRequest.name_key`) makes a name theirs. The games of the last seconds may be missing.
+        INVALID_ARGUMENT (KIND_REFUSED).
         """
 
 def add_TournamentServiceServicer_to_server(servicer: TournamentServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...
