@@ -1,6 +1,8 @@
 //! The lists of rooms and of tournaments: newest first, page by page, by state; items created
 //! during paging do not appear. `records` tests the list of records.
 
+use std::time::Duration;
+
 use chefshat_client::Client;
 use chefshat_proto::v1::{self, tournament_service_client::TournamentServiceClient};
 use chefshat_tests::{TestServer, attach_all, one_shift, room_of_four};
@@ -66,6 +68,8 @@ async fn tournaments_are_listed_newest_first() {
     };
     let mut made = Vec::new();
     for number in 0..MADE {
+        // Those of one millisecond are in the order of their ids.
+        tokio::time::sleep(Duration::from_millis(2)).await;
         let created = create(&mut service, settings()).await;
         if number % 2 == 0 {
             let close = v1::CloseTournamentRequest {
