@@ -1,4 +1,4 @@
-// The key of this device's names: made once, and taken over from another device.
+// The key of this device's names: made once, or entered from another device.
 
 import { afterEach, expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
@@ -22,7 +22,7 @@ test("a key is made the first time, and kept", () => {
   expect(nameKey()).not.toEqual(key);
 });
 
-test("the key of another device is taken over; what is no key is replaced", () => {
+test("the key of another device can be entered; a stored text that is not a key is replaced", () => {
   setNameKey("0A".repeat(32));
   expect(nameKey()).toEqual(new Uint8Array(32).fill(10));
   for (const text of ["", "0a".repeat(31), "0g".repeat(32), "0a".repeat(33)]) expect(isNameKey(text)).toBe(false);

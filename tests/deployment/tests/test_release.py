@@ -175,7 +175,8 @@ def test_the_image_plays(tmp_path: Path) -> None:
         configuration = images.configuration(image)
         assert configuration["User"] == "65532:65532"
         # Some versions of Buildah add a PATH.
-        assert {"CHEFSHAT_DATA_DIR=/data", "CHEFSHAT_LISTEN=0.0.0.0:50051"} <= set(configuration["Env"])
+        own = [variable for variable in configuration["Env"] if not variable.startswith("PATH=")]
+        assert own == ["CHEFSHAT_DATA_DIR=/data", "CHEFSHAT_LISTEN=0.0.0.0:50051"]
         address = f"127.196.{(os.getpid() >> 8) & 255}.{os.getpid() & 255}:50051"
         environment = {"CHEFSHAT_LISTEN": address, "CHEFSHAT_SERVER": f"http://{address}"}
         container = images.container(image)
