@@ -49,7 +49,7 @@ export const common: Texts["common"] = {
     },
     names: {
       key: "Schlüssel deiner Namen",
-      hint: "Andere können deinen Namen wählen, aber nicht seinen Schlüssel: Ranglisten führen euch getrennt. Der Schlüssel entsteht, wenn du zum ersten Mal an einer Partie teilnimmst. Gib ihn auf einem anderen Gerät ein, um dort dieselbe Person zu sein; verrate ihn sonst niemandem.",
+      hint: "Andere können deinen Namen wählen, aber nicht seinen Schlüssel: Bestenlisten führen euch getrennt. Der Schlüssel entsteht, wenn du zum ersten Mal an einer Partie teilnimmst. Gib ihn auf einem anderen Gerät ein, um dort dieselbe Person zu sein; verrate ihn sonst niemandem.",
       notAKey: "Ein Schlüssel hat 64 Ziffern von 0 bis 9 und a bis f.",
     },
     fullScreen: "Vollbild",
