@@ -281,6 +281,7 @@ impl Client {
         let request = v1::AddSamplesRequest {
             ticket: ticket.into(),
             chunk: Some(chunk),
+            owned_seat: None,
         };
         Ok(service.add_samples(request).await?.into_inner().recorded)
     }

@@ -125,6 +125,18 @@ impl Samples {
         appended
     }
 
+    /// The files of a game's samples, one for each seat that has some.
+    pub fn files(&self, game: Id) -> Vec<PathBuf> {
+        let Some(data_dir) = &self.data_dir else {
+            return Vec::new();
+        };
+        let seats = 0..samples::MAX_SEATS;
+        seats
+            .map(|seat| samples::path_of(data_dir, &game.to_string(), seat))
+            .filter(|path| path.exists())
+            .collect()
+    }
+
     /// Deletes the samples of games.
     ///
     /// # Errors

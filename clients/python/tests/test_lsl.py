@@ -17,6 +17,8 @@ import pytest
 
 import chefshat
 from chefshat import RandomAgent, pb
+from chefshat._gen.chefshat.v1.study_service_pb2_grpc import ParticipationServiceStub, StudyServiceStub
+from chefshat.network import grpc
 
 pylsl = pytest.importorskip("pylsl")
 
@@ -168,3 +170,73 @@ def test_the_command_sends_a_room_by_its_join_code(real_address: str, processes:
         assert out == ""
         assert "the game is over" in err
         assert sent == list(range(1, len(sent) + 1))
+
+
+class Participant:
+    """A participant of a study, who does what the study shows."""
+
+    def __init__(self, address: str, link: str) -> None:
+        self.channel = grpc.insecure_channel(address.removeprefix("http://"))
+        self.service = ParticipationServiceStub(self.channel)
+        opened = self.service.OpenStudy(pb.OpenStudyRequest(link=link))
+        self.session, self.view = opened.session, opened.view
+
+    def game(self) -> pb.StudyShownGame:
+        """Waits for the room of the game that is due."""
+        for response in self.service.FollowParticipation(pb.FollowParticipationRequest(session=self.session)):
+            if response.HasField("view") and response.view.game.ticket:
+                self.view = response.view
+                return response.view.game
+        raise AssertionError("the study ended")
+
+    def go_on(self) -> None:
+        """Waits for the end of the game, and continues."""
+        for response in self.service.FollowParticipation(pb.FollowParticipationRequest(session=self.session)):
+            if response.HasField("view") and response.view.game.ended:
+                break
+        request = pb.ContinueStudyRequest(session=self.session, step=self.view.step)
+        self.view = self.service.ContinueStudy(request).view
+
+
+def test_the_command_sends_all_games_of_a_participant_of_a_study(
+    real_address: str, processes: list[Popen[str]], tmp_path: Path
+) -> None:
+    condition = pb.StudyCondition(
+        id="cold", rules=ONE_SHIFT, policy=pb.RoomPolicy(pace_ms=0), seats=[pb.SeatConfig(built_in_agent="random")] * 3
+    )
+    settings = pb.StudySettings(
+        name="warmth",
+        title="Cards",
+        participants=1,
+        conditions=[condition],
+        stages=[pb.StudyStage(games=pb.StudyGames(count=2))],
+    )
+    with chefshat.Client(real_address) as client:
+        channel = grpc.insecure_channel(real_address.removeprefix("http://"))
+        studies = StudyServiceStub(channel)
+        made = studies.CreateStudy(pb.CreateStudyRequest(settings=settings))
+        owned = {"study_id": made.study.study_id, "owner_token": made.owner_token}
+        added = studies.AddStudyParticipants(pb.AddStudyParticipantsRequest(count=1, **owned))
+        command = [sys.executable, "-m", "chefshat.lsl", "--address", real_address, "--study", made.study.study_id]
+        command += ["--participant", "1", "--secret", made.owner_token, "--wait"]
+        processes.append(Popen(command, text=True, stdout=PIPE, stderr=PIPE, cwd=tmp_path))
+        person = Participant(real_address, added.links[0].link)
+        stream: Any = None
+        for _ in range(2):
+            game = person.game()
+            stream = stream or inlet(f"chefshat {made.study.study_id} participant 1")
+            result = client.play(RandomAgent(1), game.ticket)
+            assert result.finished
+            sent = list(received(stream))
+            person.go_on()
+            with chefshat.Client(real_address, secrets=[made.owner_token]) as owner:
+                events = [line.event for line in owner.record(game.game_id) if line.HasField("event")]
+                assert [int(marker["sequence"]) for marker, _ in sent] == [event.sequence for event in events]
+                room = pb.Room(room_id=game.room_id, game_id=game.game_id)
+                clock = owner.clock(game.room_id, local=pylsl.local_clock)
+                check_times(owner, room, sent, max(clock.error, lsl.WANTED_ERROR_S))
+        studies.CloseStudy(pb.CloseStudyRequest(**owned))
+        _, said = processes[-1].communicate(timeout=WAIT_S)
+        assert processes[-1].returncode == 0, said
+        assert "the study is over" in said
+        channel.close()

@@ -8,6 +8,7 @@ use chefshat_engine::{Cards, Mask, Observation, RewardScheme};
 use super::column::{Column, ColumnInfo, Type, Value};
 use super::expressions::LatestExpression;
 use super::game::{GameInfo, SeatInfo};
+use chefshat_record::convert::PERSON_TIME_KEY;
 
 /// Name of the table.
 pub(super) const TABLE: &str = "decisions";
@@ -41,6 +42,7 @@ pub(super) struct DecisionRow {
     pub(super) source: &'static str,
     pub(super) hinted: bool,
     pub(super) decision_time_us: Option<u64>,
+    pub(super) person_decision_time_ms: Option<u64>,
     pub(super) elapsed_ms: u64,
     /// The latest expression of each seat, index = seat.
     pub(super) expressions: Vec<Option<LatestExpression>>,
@@ -208,6 +210,16 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
         |row| {
             row.player()
                 .and_then(|player| player.built_in.as_ref())
+                .into()
+        },
+    ),
+    Column::new(
+        "name_fingerprint",
+        Type::Text,
+        "Fingerprint of the player's name and its key, 16 hexadecimal digits: it tells players of one name apart; null without a key, and where `agent` is.",
+        |row| {
+            row.player()
+                .and_then(|player| player.name_fingerprint.as_ref())
                 .into()
         },
     ),
@@ -381,6 +393,12 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
         Type::Uint64,
         "Measured decision time, microseconds; null for built-in agents, substitutes and recorded decisions, and if not measured.",
         |row| row.decision_time_us.into(),
+    ),
+    Column::new(
+        PERSON_TIME_KEY,
+        Type::Uint64,
+        "Decision time measured by the person's device, milliseconds; null if it sent none.",
+        |row| row.person_decision_time_ms.into(),
     ),
     Column::new(
         "elapsed_ms",

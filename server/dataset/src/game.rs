@@ -42,6 +42,8 @@ pub(super) struct GameInfo {
 #[derive(Debug)]
 pub(super) struct SeatInfo {
     pub(super) name: String,
+    /// The fingerprint of the name and its key, if it has one.
+    pub(super) name_fingerprint: Option<String>,
     pub(super) kind: &'static str,
     /// As what it was shown, if a person played the seat as another kind.
     pub(super) shown_kind: Option<&'static str>,
@@ -54,6 +56,7 @@ impl SeatInfo {
         let built_in = Some(built_in).filter(|name| !name.is_empty());
         Self {
             name: name.to_owned(),
+            name_fingerprint: None,
             kind: built_in.map_or_else(|| kind_name(kind), |_| "built_in"),
             shown_kind: None,
             built_in: built_in.map(str::to_owned),
@@ -68,13 +71,23 @@ impl SeatInfo {
         }
     }
 
+    /// The same participant, whose name has a key with this fingerprint unless it is empty.
+    pub(super) fn with_fingerprint(self, fingerprint: &str) -> Self {
+        let given = Some(fingerprint).filter(|it| !it.is_empty());
+        Self {
+            name_fingerprint: given.map(str::to_owned),
+            ..self
+        }
+    }
+
     fn of(seat: &v1::Participant) -> Self {
-        match seat.shown_kind() {
+        let info = match seat.shown_kind() {
             v1::ParticipantKind::Unspecified => {
                 Self::new(&seat.name, seat.kind(), &seat.built_in_agent)
             }
             shown => Self::wizard(&seat.name, shown),
-        }
+        };
+        info.with_fingerprint(&seat.name_fingerprint)
     }
 }
 

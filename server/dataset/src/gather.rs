@@ -13,6 +13,7 @@ use super::decisions::{DecisionRow, RECORDED, Rewards};
 use super::expressions::{ExpressionRow, LatestExpression};
 use super::game::{GameInfo, IMPORTED, SeatInfo, checked_info};
 use super::markers::MarkerRow;
+use chefshat_record::convert::PERSON_TIME_KEY;
 use chefshat_record::replay::{Moment, ReplayError, walk};
 
 /// The rows of one game.
@@ -98,6 +99,7 @@ impl Gatherer {
                         Some(_) => SeatInfo::wizard(&seated.name, seated.kind()),
                         None => SeatInfo::new(&seated.name, seated.kind(), ""),
                     };
+                    let info = info.with_fingerprint(&seated.name_fingerprint);
                     self.set_participant(seated.seat, Some(info));
                 }
                 Some(Kind::Vacated(vacated)) => self.set_participant(vacated.seat, None),
@@ -207,6 +209,8 @@ impl Gatherer {
             source: source_name(record.source()),
             hinted: record.hints > 0,
             decision_time_us: measured.then_some(record.decision_time_us),
+            person_decision_time_ms: (record.annotations.as_ref())
+                .and_then(|it| it.extra.get(PERSON_TIME_KEY)?.parse().ok()),
             elapsed_ms: record.elapsed_ms,
             expressions: self.latest.clone(),
             rewards,

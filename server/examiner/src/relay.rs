@@ -225,6 +225,14 @@ impl RoomService for Rooms {
     ) -> Result<Response<v1::CloseRoomResponse>, Status> {
         self.server.clone().close_room(request.into_inner()).await
     }
+
+    async fn set_next_room(
+        &self,
+        request: Request<v1::SetNextRoomRequest>,
+    ) -> Result<Response<v1::SetNextRoomResponse>, Status> {
+        let mut server = self.server.clone();
+        server.set_next_room(request.into_inner()).await
+    }
 }
 
 struct Play {

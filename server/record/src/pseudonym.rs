@@ -8,11 +8,63 @@ use crate::convert::MAX_LABEL;
 /// The longest name of a room, characters.
 const MAX_ROOM_NAME: usize = 64;
 
+/// Whether a text is empty or could be the fingerprint of a name and its key: 16 hexadecimal digits
+/// in lower case.
+pub fn is_fingerprint(text: &str) -> bool {
+    let is_digit = |digit: u8| matches!(digit, b'0'..=b'9' | b'a'..=b'f');
+    [0, 16].contains(&text.len()) && text.bytes().all(is_digit)
+}
+
+/// Whom a name means in records.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Named {
+    /// The name.
+    pub name: String,
+    /// Of those who played under the name, the one with this fingerprint of its key; empty: those
+    /// without a key; `None`: all.
+    pub fingerprint: Option<String>,
+}
+
+impl Named {
+    /// Whether a participant of this name and fingerprint is meant.
+    pub fn is(&self, name: &str, fingerprint: &str) -> bool {
+        name == self.name
+            && self
+                .fingerprint
+                .as_deref()
+                .is_none_or(|it| it == fingerprint)
+    }
+
+    /// Whether the participant of a seat is meant; built-in agents of the same name are not.
+    pub fn is_at(&self, seat: &v1::Participant) -> bool {
+        seat.built_in_agent.is_empty() && self.is(&seat.name, &seat.name_fingerprint)
+    }
+
+    /// Whether the participant is in a record. If all of a name are meant, markers may name them in
+    /// any record.
+    fn may_be_in(&self, lines: &[v1::RecordLine]) -> bool {
+        let mut lines = lines.iter().filter_map(|line| line.line.as_ref());
+        self.fingerprint.is_none()
+            || lines.any(|line| match line {
+                Line::Header(header) => {
+                    let of_study = |study: &v1::StudyRecord| self.is(&study.participant, "");
+                    header.seats.iter().any(|seat| self.is_at(seat))
+                        || header.study.as_ref().is_some_and(of_study)
+                }
+                Line::Event(event) => match &event.kind {
+                    Some(Kind::Seated(seated)) => self.is(&seated.name, &seated.name_fingerprint),
+                    _ => false,
+                },
+                _ => false,
+            })
+    }
+}
+
 /// A participant and its pseudonym.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pseudonym {
-    /// The name to replace.
-    pub name: String,
+    /// Whose name to replace.
+    pub of: Named,
     /// The pseudonym, 1..=64 characters.
     pub pseudonym: String,
 }
@@ -42,14 +94,13 @@ pub struct ParticipantSeats(Vec<u32>);
 
 impl ParticipantSeats {
     /// The seats at the start of a record; in imported games no event seats a participant.
-    pub fn at_start(lines: &[v1::RecordLine], name: &str) -> Self {
+    pub fn at_start(lines: &[v1::RecordLine], who: &Named) -> Self {
         let mut own = Self::default();
         for line in lines.iter().filter_map(|line| line.line.as_ref()) {
             match line {
                 Line::Header(header) => {
                     for seat in &header.seats {
-                        let is_own = seat.built_in_agent.is_empty() && seat.name == name;
-                        own.seated(seat.seat, is_own);
+                        own.seated(seat.seat, who.is_at(seat));
                     }
                 }
                 Line::Event(event) => {
@@ -64,9 +115,12 @@ impl ParticipantSeats {
     }
 
     /// Applies an event.
-    pub fn follow(&mut self, event: &v1::GameEvent, name: &str) {
+    pub fn follow(&mut self, event: &v1::GameEvent, who: &Named) {
         match &event.kind {
-            Some(Kind::Seated(seated)) => self.seated(seated.seat, seated.name == name),
+            Some(Kind::Seated(seated)) => {
+                let is_own = who.is(&seated.name, &seated.name_fingerprint);
+                self.seated(seated.seat, is_own);
+            }
             Some(Kind::Vacated(vacated)) => self.vacated(vacated.seat),
             _ => {}
         }
@@ -96,14 +150,16 @@ impl Pseudonym {
     /// changes loses its signature: nobody can vouch for it any longer.
     pub fn redact(&self, lines: &mut Vec<v1::RecordLine>) -> Redactions {
         let mut out = Redactions::default();
-        let mut own = ParticipantSeats::at_start(lines, &self.name);
+        if !self.of.may_be_in(lines) {
+            return out;
+        }
+        let mut own = ParticipantSeats::at_start(lines, &self.of);
         let mut dropped_events = 0;
         lines.retain_mut(|line| match &mut line.line {
             Some(Line::Header(header)) => {
                 out.names += self.in_seats(&mut header.seats);
-                if let Some(study) =
-                    (header.study.as_mut()).filter(|it| it.participant == self.name)
-                {
+                let study = header.study.as_mut();
+                if let Some(study) = study.filter(|it| self.of.is(&it.participant, "")) {
                     study.participant.clone_from(&self.pseudonym);
                     out.names += 1;
                 }
@@ -124,10 +180,13 @@ impl Pseudonym {
                     return false;
                 }
                 event.sequence = event.sequence.saturating_sub(dropped_events);
-                own.follow(event, &self.name);
+                own.follow(event, &self.of);
                 match &mut event.kind {
-                    Some(Kind::Seated(seated)) if seated.name == self.name => {
+                    Some(Kind::Seated(seated))
+                        if self.of.is(&seated.name, &seated.name_fingerprint) =>
+                    {
                         seated.name.clone_from(&self.pseudonym);
+                        seated.name_fingerprint.clear();
                         out.names += 1;
                     }
                     Some(Kind::GameStarted(started)) => {
@@ -171,7 +230,7 @@ impl Pseudonym {
     pub fn in_seats(&self, seats: &mut [v1::Participant]) -> u64 {
         let mut found = 0;
         for seat in seats {
-            if seat.built_in_agent.is_empty() && seat.name == self.name {
+            if self.of.is_at(seat) {
                 seat.name.clone_from(&self.pseudonym);
                 seat.name_fingerprint.clear();
                 found += 1;
@@ -196,14 +255,15 @@ impl Pseudonym {
     fn in_words(&self, text: &mut String, max: usize) -> u64 {
         let is_part = |character: Option<char>| character.is_some_and(char::is_alphanumeric);
         let (mut replaced, mut rest, mut found) = (String::new(), text.as_str(), 0);
-        while !self.name.is_empty()
-            && let Some(at) = rest.find(&self.name)
+        let name = self.of.name.as_str();
+        while !name.is_empty()
+            && let Some(at) = rest.find(name)
         {
-            let (before, after) = (&rest[..at], &rest[at + self.name.len()..]);
+            let (before, after) = (&rest[..at], &rest[at + name.len()..]);
             let alone = !is_part(before.chars().next_back().or(replaced.chars().next_back()))
                 && !is_part(after.chars().next());
             replaced.push_str(before);
-            replaced.push_str(if alone { &self.pseudonym } else { &self.name });
+            replaced.push_str(if alone { &self.pseudonym } else { name });
             found += u64::from(alone);
             rest = after;
         }
@@ -222,7 +282,10 @@ mod tests {
     #[test]
     fn a_name_is_replaced_in_room_names_only_as_a_word() {
         let pseudonym = Pseudonym {
-            name: "Ana".into(),
+            of: Named {
+                name: "Ana".into(),
+                fingerprint: None,
+            },
             pseudonym: "X".into(),
         };
         for (text, expected, times) in [

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
-use chefshat_engine::MAX_SEATS;
+pub use chefshat_engine::MAX_SEATS;
 use chefshat_proto::v1::SampleChunk;
 use prost::Message as _;
 

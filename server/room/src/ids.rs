@@ -9,7 +9,8 @@ use subtle::ConstantTimeEq as _;
 
 /// Letters of a join code: no vowels, so that no words form, and no letters that look alike.
 const CODE_LETTERS: &[u8; 27] = b"23456789BCDFGHJKMNPQRSTVWXZ";
-const CODE_LENGTH: usize = 8;
+/// Letters in a join code.
+pub const CODE_LENGTH: usize = 8;
 
 /// Random bytes from the operating system.
 ///

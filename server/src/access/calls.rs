@@ -108,6 +108,7 @@ pub const CALLS: &[Call] = &[
     call("/chefshat.v1.RoomService/LeaveRoom", Player, Compared).forwarded(),
     call("/chefshat.v1.RoomService/CreateRoom", Host, Refused).forwarded(),
     call("/chefshat.v1.RoomService/CloseRoom", Host, Compared).forwarded(),
+    call("/chefshat.v1.RoomService/SetNextRoom", Host, Compared).forwarded(),
     call("/chefshat.v1.StudyService/CreateStudy", Host, Refused).forwarded(),
     call("/chefshat.v1.StudyService/GetStudy", Spectator, Refused).forwarded(),
     call("/chefshat.v1.StudyService/ListStudies", Spectator, Refused),

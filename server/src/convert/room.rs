@@ -198,6 +198,7 @@ pub fn describe(core: &Core) -> v1::Room {
         series_id: series_id(header),
         awaited: None,
         spectators: 0,
+        next_join_code: String::new(),
     }
 }
 

@@ -19,7 +19,7 @@ use super::agent::check_budget;
 use super::name::checked_name;
 use super::number;
 use super::policy::{policy_from_proto, policy_to_proto, requested_policy};
-use super::room::{display_names_from_proto, fills_from_proto};
+use super::room::{display_names_from_proto, fills_from_proto, wizards_from_proto};
 use crate::config::MAX_HOSTED_SHIFTS;
 
 /// How long a participant may be away by default, milliseconds.
@@ -51,6 +51,8 @@ pub struct ConditionPlan {
     pub fills: Vec<Fill>,
     /// Display names of built-in agents, by index in `fills`.
     pub names: BTreeMap<usize, String>,
+    /// Those that a person plays as another kind, by index in `fills`.
+    pub wizards: BTreeSet<usize>,
     /// Text for programs of the researcher.
     pub robot_behaviour: String,
     /// What is shown of the seats.
@@ -315,6 +317,7 @@ fn condition_of(
         policy,
         fills,
         names,
+        wizards: wizards_from_proto(&message.seats),
         robot_behaviour: message.robot_behaviour.clone(),
         labels: shown,
     };

@@ -8,6 +8,7 @@ use chefshat_proto::v1::{
     self, admin_service_server::AdminService, study_service_client::StudyServiceClient,
 };
 use chefshat_record::convert::FieldProblem;
+use chefshat_record::pseudonym::{Named, is_fingerprint};
 use futures::Stream;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
@@ -179,11 +180,12 @@ impl AdminService for AdminCalls {
         &self,
         request: Request<v1::ExportParticipantRequest>,
     ) -> Result<Response<Self::ExportParticipantStream>, Status> {
-        let name = given(request.into_inner().name)?;
+        let request = request.into_inner();
+        let who = given(request.name, request.name_fingerprint)?;
         let (sender, responses) = mpsc::channel(1);
         let (lines, mut exported) = mpsc::channel(1);
         let participants = Arc::clone(&self.participants);
-        let gathering = async move { participants.export(&name, &lines).await };
+        let gathering = async move { participants.export(&who, &lines).await };
         let forwarding = async move {
             let mut count = 0_u64;
             while let Some(line) = exported.recv().await {
@@ -225,10 +227,11 @@ impl AdminService for AdminCalls {
         request: Request<v1::DeleteParticipantRequest>,
     ) -> Result<Response<v1::DeleteParticipantResponse>, Status> {
         let elsewhere = OtherNodes(request.extensions().get::<Gateway>().cloned());
-        let name = given(request.into_inner().name)?;
+        let request = request.into_inner();
+        let who = given(request.name, request.name_fingerprint)?;
         let participants = Arc::clone(&self.participants);
         // Runs to completion even if the client goes.
-        let deleting = tokio::spawn(async move { participants.delete(&name, &elsewhere).await });
+        let deleting = tokio::spawn(async move { participants.delete(&who, &elsewhere).await });
         let deleted = deleting.await.map_err(|error| {
             tracing::error!(%error, "deleting a participant's data failed");
             store_failed()
@@ -267,12 +270,16 @@ impl StudiesElsewhere for OtherNodes {
 }
 
 /// A participant's name from a request. Empty seats have an empty one.
-fn given(name: String) -> Result<String, Status> {
+fn given(name: String, fingerprint: Option<String>) -> Result<Named, Status> {
+    let refused = |name, what| Err(field("NAME_REFUSED", &FieldProblem::new(name, what)));
     if name.is_empty() {
-        let problem = FieldProblem::new("name", "give the exact name the participant played under");
-        return Err(field("NAME_REFUSED", &problem));
+        return refused("name", "give the exact name the participant played under");
     }
-    Ok(name)
+    if !fingerprint.as_deref().is_none_or(is_fingerprint) {
+        let what = "give the 16 hexadecimal digits (0-9, a-f) of the participant's page, or none for those without a key";
+        return refused("name_fingerprint", what);
+    }
+    Ok(Named { name, fingerprint })
 }
 
 fn data_failed(error: DataError) -> Status {

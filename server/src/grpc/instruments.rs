@@ -4,6 +4,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 
+use chefshat_engine::Seat;
 use chefshat_proto::v1::{self, instrument_service_server::InstrumentService};
 use chefshat_record::convert::{FieldProblem, check_label};
 use chefshat_room::ids::Token;
@@ -37,7 +38,8 @@ impl Instruments {
         Self { reach }
     }
 
-    /// A room, and the secret of what may be its owner's token.
+    /// A room, and the secret of what may be its owner's token. The token of its study stands for
+    /// that of the room.
     async fn find(
         &self,
         caller: Caller,
@@ -46,8 +48,52 @@ impl Instruments {
     ) -> Result<(Handle, [u8; 32]), Status> {
         let caller = caller.showing(owner_token);
         let room = self.reach.room(&caller, room_id).await?;
-        let token = Token::parse(owner_token).filter(|token| token.room == room.id());
-        Ok((room, token.ok_or_else(owner_token_wrong)?.secret))
+        let header = self.reach.rooms().header(room.id());
+        let is_study =
+            |id| header.is_some_and(|it| it.study.as_ref().is_some_and(|of| of.study == id));
+        let token = match Token::parse(owner_token) {
+            Some(token) if token.room == room.id() => token,
+            Some(token) if is_study(token.room) => {
+                Token::of_tournament_room(room.id(), &token.hash())
+            }
+            _ => return Err(owner_token_wrong()),
+        };
+        Ok((room, token.secret))
+    }
+
+    /// The room and seat of a ticket, and whether its game has started.
+    async fn seat_of(&self, caller: &Caller, ticket: &str) -> Result<(Handle, Seat, bool), Status> {
+        let ticket = Token::parse(ticket).ok_or_else(ticket_unknown)?;
+        let finding = (self.reach).room_of_ticket(caller, ticket.room, ticket_unknown);
+        let room = finding.await?;
+        let seat = room.seat_of(ticket.secret).await.map_err(Refusal::from)?;
+        let (seat, has_started) = seat.ok_or_else(ticket_unknown)?;
+        Ok((room, seat, has_started))
+    }
+
+    /// The room and seat of an owner, and whether its game has started.
+    async fn owned_seat(
+        &self,
+        caller: &Caller,
+        owned: &v1::OwnedSeat,
+    ) -> Result<(Handle, Seat, bool), Status> {
+        let caller = caller.showing(&owned.owner_token);
+        let room = self.reach.room(&caller, &owned.room_id).await?;
+        let header = self.reach.rooms().header(room.id()).ok_or_else(room_gone)?;
+        if !self.reach.is_owner_token(&owned.owner_token, &header) {
+            return Err(owner_token_wrong());
+        }
+        let described = room.describe().await.map_err(Refusal::from)?;
+        let number = usize::try_from(owned.seat).ok();
+        let Some(number) = number.filter(|number| *number < described.seats.len()) else {
+            let words = format!("the room has {} seats, from 0", described.seats.len());
+            return Err(field(
+                "SAMPLES_REFUSED",
+                &FieldProblem::new("owned_seat.seat", words),
+            ));
+        };
+        let has_started = described.state() != v1::RoomState::Waiting;
+        Ok((room, Seat::new(number), has_started))
     }
 }
 
@@ -89,11 +135,10 @@ impl InstrumentService for Instruments {
     ) -> Result<Response<v1::AddSamplesResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let ticket = Token::parse(&request.ticket).ok_or_else(ticket_unknown)?;
-        let finding = (self.reach).room_of_ticket(&caller, ticket.room, ticket_unknown);
-        let room = finding.await?;
-        let seat = room.seat_of(ticket.secret).await.map_err(Refusal::from)?;
-        let (seat, has_started) = seat.ok_or_else(ticket_unknown)?;
+        let (room, seat, has_started) = match &request.owned_seat {
+            Some(owned) => self.owned_seat(&caller, owned).await?,
+            None => self.seat_of(&caller, &request.ticket).await?,
+        };
         let rooms = self.reach.rooms();
         let header = rooms.header(room.id()).ok_or_else(ticket_unknown)?;
         if !has_started {

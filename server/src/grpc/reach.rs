@@ -402,6 +402,26 @@ impl Reach {
         by_ticket.max().map_or(standing, |it| it.max(standing))
     }
 
+    /// Whether a caller is the owner of a room, as also the owner of its tournament or study is.
+    pub(super) fn is_owner(&self, caller: &Caller, header: &GameHeader) -> bool {
+        self.standing_by_header(caller, header) == Standing::Owner
+    }
+
+    /// Whether this is the owner token of a room, or of its tournament or study.
+    pub(super) fn is_owner_token(&self, token: &str, header: &GameHeader) -> bool {
+        self.is_owner(&Caller::default().showing(token), header)
+    }
+
+    /// Whether a caller has a seat in a room, or is its owner.
+    pub(super) async fn takes_part(&self, caller: &Caller, handle: &Handle) -> bool {
+        match self.rooms.header(handle.id()) {
+            None => false,
+            Some(header) => {
+                self.standing_in_room(caller, handle, &header).await > Standing::Stranger
+            }
+        }
+    }
+
     /// What a caller is to a game by its token, and by what is known before the game starts.
     fn standing_by_header(&self, caller: &Caller, header: &GameHeader) -> Standing {
         let by_token = match reaches(caller, header) {

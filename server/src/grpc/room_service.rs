@@ -25,7 +25,7 @@ use crate::limits::{COST_OF_BUILT_IN_GAME, COST_OF_ROOM, CallLimits, Key};
 use crate::room::{Handle, JoinRequest};
 use crate::rooms::{CreateError, Rooms};
 use crate::store::StoreError;
-use chefshat_room::ids::{Id, Token};
+use chefshat_room::ids::{CODE_LENGTH, Id, Token, normal_code};
 use chefshat_room::journal::ParticipantKind;
 
 /// Rooms examined for one page.
@@ -246,7 +246,11 @@ impl RoomService for RoomCalls {
             "" => self.reach().room(&caller, &request.room_id).await?,
             code => (self.find_by_code(&caller, &request.room_id, code, key)).await?,
         };
-        let room = handle.describe().await.map_err(Refusal::from)?;
+        let mut room = handle.describe().await.map_err(Refusal::from)?;
+        let next_join_code = handle.next_join_code();
+        if !next_join_code.is_empty() && self.reach().takes_part(&caller, &handle).await {
+            room.next_join_code = next_join_code;
+        }
         Ok(Response::new(v1::GetRoomResponse { room: Some(room) }))
     }
 
@@ -348,6 +352,27 @@ impl RoomService for RoomCalls {
             .map_err(Refusal::from)?
             .ok_or_else(status::owner_token_wrong)?;
         Ok(Response::new(v1::CloseRoomResponse { room: Some(room) }))
+    }
+
+    async fn set_next_room(
+        &self,
+        request: Request<v1::SetNextRoomRequest>,
+    ) -> Result<Response<v1::SetNextRoomResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let caller = caller.showing(&request.owner_token);
+        let handle = self.reach().room(&caller, &request.room_id).await?;
+        let header = self.rooms.header(handle.id());
+        let is_owner = |header| (self.reach()).is_owner_token(&request.owner_token, header);
+        if !header.as_deref().is_some_and(is_owner) {
+            return Err(status::owner_token_wrong());
+        }
+        let join_code = normal_code(&request.join_code);
+        if join_code.len() != CODE_LENGTH {
+            return Err(join_code_wrong());
+        }
+        handle.set_next_join_code(join_code);
+        Ok(Response::new(v1::SetNextRoomResponse {}))
     }
 }
 

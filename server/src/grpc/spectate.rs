@@ -45,12 +45,15 @@ impl SpectatorService for Spectate {
         let charged = Key::of_caller(&caller);
         let request = request.into_inner();
         let room = self.reach.room(&caller, &request.room_id).await?;
+        let header = self.reach.rooms().header(room.id());
+        let is_owner = header.is_some_and(|it| self.reach.is_owner(&caller, &it));
         let (outbox, messages) = Outbox::with_capacity(SPECTATOR_CAPACITY);
         let from = request.from_sequence.saturating_sub(1);
         room.spectate(SpectateRequest {
             outbox: Arc::clone(&outbox),
             from: usize::try_from(from).unwrap_or(usize::MAX),
             snapshot: request.snapshot,
+            is_owner,
             charged,
         })
         .await

@@ -6,7 +6,7 @@ use std::io;
 use std::path::PathBuf;
 
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
-use chefshat_record::pseudonym::{Pseudonym, Redactions};
+use chefshat_record::pseudonym::{Named, Pseudonym, Redactions};
 use chefshat_record::{atomic_file, jsonl, samples};
 use chefshat_room::ids::Id;
 
@@ -79,24 +79,24 @@ impl ParticipantData {
     /// # Errors
     /// A game, a tournament, or a study's game with the name is not over: nothing was changed. Or
     /// the store or the folder of records failed.
-    pub async fn delete(&self, name: &str) -> Result<Deleted, DataError> {
-        if self.plays_in_studies(name).await? {
-            return Err(ForgetError::GameRunning(name.to_owned()).into());
+    pub async fn delete(&self, who: &Named) -> Result<Deleted, DataError> {
+        if self.plays_in_studies(who).await? {
+            return Err(ForgetError::GameRunning(who.name.clone()).into());
         }
         // A server that was killed may have left a copy of the name in a file it was writing.
         if let Some(data_dir) = self.data_dir.clone() {
             blocking(move || jsonl::remove_unfinished(&data_dir)).await??;
         }
-        let mut deleted = self.delete_from_games(name).await?;
-        deleted.studies = self.delete_from_studies(name).await?;
+        let mut deleted = self.delete_from_games(who).await?;
+        deleted.studies = self.delete_from_studies(who).await?;
         Ok(deleted)
     }
 
     /// Deletes a participant's data from games, tournaments and files.
-    pub(super) async fn delete_from_games(&self, name: &str) -> Result<Deleted, DataError> {
+    pub(super) async fn delete_from_games(&self, of: &Named) -> Result<Deleted, DataError> {
         let letters = hex::encode(rand::random::<[u8; PSEUDONYM_BYTES]>());
         let who = Pseudonym {
-            name: name.to_owned(),
+            of: of.clone(),
             pseudonym: format!("{PSEUDONYM}{letters}"),
         };
         let forgotten = self.store.forget(&who).await?;
@@ -133,7 +133,7 @@ impl ParticipantData {
     /// Rewrites the files of records that contain the name, each atomically.
     async fn rewrite(&self, data_dir: PathBuf, who: &Pseudonym) -> Result<Files, DataError> {
         let mut files = Files::default();
-        let name = who.name.clone();
+        let name = who.of.name.clone();
         for candidate in blocking(move || records_with(&data_dir, &name)).await?? {
             let mut skipped = std::mem::take(&mut files.skipped);
             let (candidate, lines, skipped) = blocking(move || {
@@ -144,7 +144,7 @@ impl ParticipantData {
             files.skipped = skipped;
             let Some(lines) = lines else { continue };
             let mut who = who.clone();
-            if let Some(held) = self.held(&lines, &who.name).await?
+            if let Some(held) = self.held(&lines, &who.of).await?
                 && held != who.pseudonym
             {
                 who.pseudonym.clone_from(&held);
@@ -166,7 +166,7 @@ impl ParticipantData {
     async fn held(
         &self,
         lines: &[v1::RecordLine],
-        name: &str,
+        who: &Named,
     ) -> Result<Option<String>, StoreError> {
         let Some(game) = header_of(lines).and_then(|it| Id::parse(&it.game_id)) else {
             return Ok(None);
@@ -175,7 +175,7 @@ impl ParticipantData {
             return Ok(None);
         };
         let stored = blocking(move || convert::lines_of(&stored).into_owned()).await?;
-        Ok(pseudonym_of(name, lines, &stored).map(str::to_owned))
+        Ok(pseudonym_of(who, lines, &stored).map(str::to_owned))
     }
 }
 
@@ -186,7 +186,7 @@ fn redact(
     who: &Pseudonym,
 ) -> Result<Option<Redactions>, String> {
     // Before the name is gone from the record, so that running it again completes it.
-    remove_samples(candidate, &lines, &who.name).map_err(|error| error.to_string())?;
+    remove_samples(candidate, &lines, &who.of).map_err(|error| error.to_string())?;
     let redactions = who.redact(&mut lines);
     if redactions == Redactions::default() {
         return Ok(None);
@@ -198,13 +198,13 @@ fn redact(
 }
 
 /// Removes the samples of a participant's seats in a game.
-fn remove_samples(record: &Candidate, lines: &[v1::RecordLine], name: &str) -> io::Result<()> {
+fn remove_samples(record: &Candidate, lines: &[v1::RecordLine], who: &Named) -> io::Result<()> {
     let Some(header) = header_of(lines) else {
         return Ok(());
     };
     let mut seats = header.seats.iter().zip(0..);
     seats.try_for_each(|(seat, number)| {
-        if seat.name != name || !seat.built_in_agent.is_empty() {
+        if !who.is_at(seat) {
             return Ok(());
         }
         let path = samples::beside(&record.path, &header.game_id, number);
@@ -221,29 +221,31 @@ fn header_of(lines: &[v1::RecordLine]) -> Option<&v1::RecordHeader> {
 
 /// The pseudonym that a stored record has where another copy of it has the name.
 fn pseudonym_of<'s>(
-    name: &str,
+    who: &Named,
     lines: &[v1::RecordLine],
     stored: &'s [v1::RecordLine],
 ) -> Option<&'s str> {
     let both = names_in(lines).into_iter().zip(names_in(stored));
-    both.filter(|(here, _)| *here == name)
-        .map(|(_, there)| there)
+    both.filter(|((name, fingerprint), _)| who.is(name, fingerprint))
+        .map(|(_, (there, _))| there)
         .find(|there| there.starts_with(PSEUDONYM))
 }
 
-/// The names of a record: at the seats of its header, and then of those who sat down, in order. A
+/// The names of a record, with the fingerprints of their keys: at the seats of its header, and then of those who sat down, in order. A
 /// participant who left before the game has no seat in the header.
-fn names_in(lines: &[v1::RecordLine]) -> Vec<&str> {
+fn names_in(lines: &[v1::RecordLine]) -> Vec<(&str, &str)> {
     let seats = header_of(lines).map_or(&[][..], |header| header.seats.as_slice());
     let seats = seats
         .iter()
         .map(|seat| match seat.built_in_agent.is_empty() {
-            true => seat.name.as_str(),
-            false => "",
+            true => (seat.name.as_str(), seat.name_fingerprint.as_str()),
+            false => ("", ""),
         });
     let seated = lines.iter().filter_map(|line| match &line.line {
         Some(Line::Event(event)) => match &event.kind {
-            Some(Kind::Seated(seated)) => Some(seated.name.as_str()),
+            Some(Kind::Seated(seated)) => {
+                Some((seated.name.as_str(), seated.name_fingerprint.as_str()))
+            }
             _ => None,
         },
         _ => None,
@@ -283,7 +285,13 @@ mod tests {
         };
         let file = record(["Ana", "Bo", "Ana"]);
         let pseudonym = format!("{PSEUDONYM}a1b2c3");
-        let held = |name, stored| pseudonym_of(name, &file, &record(stored)).map(str::to_owned);
+        let held = |name: &str, stored| {
+            let who = Named {
+                name: name.into(),
+                fingerprint: None,
+            };
+            pseudonym_of(&who, &file, &record(stored)).map(str::to_owned)
+        };
         assert_eq!(
             held("Ana", [&pseudonym, "Bo", &pseudonym]),
             Some(pseudonym.clone())

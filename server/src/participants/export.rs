@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
-use chefshat_record::pseudonym::ParticipantSeats;
+use chefshat_record::pseudonym::{Named, ParticipantSeats};
 use chefshat_record::replay::replay;
 use chefshat_record::samples;
 use chefshat_record::summary::summary;
@@ -23,7 +23,7 @@ const AT_A_TIME: usize = 100;
 
 /// Lines on their way to a receiver, after one that says whose data they are.
 pub(super) struct Sheet<'s> {
-    name: &'s str,
+    who: &'s Named,
     sender: &'s mpsc::Sender<String>,
     has_begun: bool,
 }
@@ -38,7 +38,10 @@ impl Sheet<'_> {
             return Ok(());
         }
         let version = env!("CARGO_PKG_VERSION");
-        let head = json!({ "participant": { "format_version": 1, "name": self.name, "server_version": version } });
+        let mut head = json!({ "participant": { "formatVersion": 2, "name": self.who.name, "serverVersion": version } });
+        if let Some(fingerprint) = &self.who.fingerprint {
+            head["participant"]["nameFingerprint"] = json!(fingerprint);
+        }
         let head = (!std::mem::replace(&mut self.has_begun, true)).then_some(head);
         for line in head.into_iter().chain(lines) {
             let sent = self.sender.send(line.to_string()).await;
@@ -49,23 +52,23 @@ impl Sheet<'_> {
 }
 
 impl ParticipantData {
-    /// Sends all that is stored under a name: nothing if nothing is. Returns which files could not
-    /// be read.
+    /// Sends all that is stored about a participant: nothing if nothing is. Returns which files
+    /// could not be read.
     ///
     /// # Errors
     /// The store or the folder of records failed, or nobody receives the lines.
     pub async fn export(
         &self,
-        name: &str,
+        who: &Named,
         sender: &mpsc::Sender<String>,
     ) -> Result<Skipped, DataError> {
         let mut sheet = Sheet {
-            name,
+            who,
             sender,
             has_begun: false,
         };
-        let known = self.export_games(name, &mut sheet).await?;
-        let skipped = self.export_files(name, known, &mut sheet).await?;
+        let known = self.export_games(who, &mut sheet).await?;
+        let skipped = self.export_files(who, known, &mut sheet).await?;
         for tournament in self.store.tournaments(usize::MAX).await? {
             let mut lines = Vec::new();
             for entry in &tournament.entries {
@@ -73,31 +76,31 @@ impl ParticipantData {
                     Change::Joined(entrant) | Change::Replaced { by: entrant, .. },
                 ) = entry
                     && entrant.built_in.is_none()
-                    && entrant.name == name
+                    && who.is(&entrant.name, &entrant.name_fingerprint)
                 {
                     lines.push(json!({ "tournament": {
-                        "tournament_id": tournament.header.id.to_string(),
+                        "tournamentId": tournament.header.id.to_string(),
                         "name": tournament.header.settings.name,
-                        "created_at_ms": tournament.header.created_at_ms,
+                        "createdAtMs": tournament.header.created_at_ms,
                         "stateless": entrant.stateless,
                     } }));
                 }
             }
             sheet.send(lines).await?;
         }
-        self.export_studies(name, &mut sheet).await?;
+        self.export_studies(who, &mut sheet).await?;
         Ok(skipped)
     }
 
     /// Sends the games of the store. Returns their ids.
     async fn export_games(
         &self,
-        name: &str,
+        who: &Named,
         sheet: &mut Sheet<'_>,
     ) -> Result<BTreeSet<String>, DataError> {
         let mut known = BTreeSet::new();
         let filter = v1::RecordFilter {
-            participant: name.to_owned(),
+            participant: who.name.clone(),
             ..v1::RecordFilter::default()
         };
         let mut after = 0;
@@ -112,10 +115,10 @@ impl ParticipantData {
                 if let Some(game) = Id::parse(&summary.game_id)
                     && let Some(stored) = self.store.finished(game).await?
                 {
-                    let seats = seats_of(&summary, name).map(|seat| seat.seat).collect();
-                    let name = name.to_owned();
+                    let seats = seats_of(&summary, who).map(|seat| seat.seat).collect();
+                    let who = who.clone();
                     let reading = blocking(move || {
-                        lines_of_game(&summary, &convert::lines_of(&stored), &name)
+                        lines_of_game(&summary, &convert::lines_of(&stored), &who)
                     });
                     sheet.send(reading.await?).await?;
                     self.export_samples(game.to_string(), seats, sheet).await?;
@@ -143,9 +146,9 @@ impl ParticipantData {
                     let line = json!({ "samples": {
                         "stream": chunk.stream,
                         "channels": chunk.channels,
-                        "elapsed_us": chunk.elapsed_us,
+                        "elapsedUs": chunk.elapsed_us,
                         "values": chunk.values,
-                    }, "seat": seat, "game_id": game_id });
+                    }, "seat": seat, "gameId": game_id });
                     // That nobody receives them is noticed by what is sent next.
                     let _ = sender.blocking_send(line.to_string());
                 };
@@ -158,7 +161,7 @@ impl ParticipantData {
     /// Sends the games that are in files alone, such as imported ones.
     async fn export_files(
         &self,
-        name: &str,
+        who: &Named,
         mut known: BTreeSet<String>,
         sheet: &mut Sheet<'_>,
     ) -> Result<Skipped, DataError> {
@@ -166,9 +169,9 @@ impl ParticipantData {
         let Some(data_dir) = self.data_dir.clone() else {
             return Ok(skipped);
         };
-        let wanted = name.to_owned();
+        let wanted = who.name.clone();
         for candidate in blocking(move || records_with(&data_dir, &wanted)).await?? {
-            let name = name.to_owned();
+            let who = who.clone();
             let reading = blocking(move || {
                 let mut lines = Vec::new();
                 if let Some(record) = skipped.read(&candidate) {
@@ -177,7 +180,7 @@ impl ParticipantData {
                             if let Some(summary) = summary(&record, &replayed)
                                 && known.insert(summary.game_id.clone())
                             {
-                                lines = lines_of_game(&summary, &record, &name);
+                                lines = lines_of_game(&summary, &record, &who);
                             }
                         }
                         Err(error) => {
@@ -199,28 +202,27 @@ impl ParticipantData {
 /// The seats of the participant in a game.
 fn seats_of<'s>(
     summary: &'s v1::RecordSummary,
-    name: &'s str,
+    who: &'s Named,
 ) -> impl Iterator<Item = &'s v1::Participant> {
-    let seats = summary.seats.iter();
-    seats.filter(move |seat| seat.built_in_agent.is_empty() && seat.name == name)
+    summary.seats.iter().filter(|seat| who.is_at(seat))
 }
 
 /// What the participant did in a game; nothing if it took no part.
-fn lines_of_game(summary: &v1::RecordSummary, lines: &[v1::RecordLine], name: &str) -> Vec<Value> {
+fn lines_of_game(summary: &v1::RecordSummary, lines: &[v1::RecordLine], who: &Named) -> Vec<Value> {
     let game_id = &summary.game_id;
-    let mut own = ParticipantSeats::at_start(lines, name);
+    let mut own = ParticipantSeats::at_start(lines, who);
     let mut rest = Vec::new();
     for line in lines.iter().filter_map(|line| line.line.as_ref()) {
         match line {
             Line::Decision(decision) if own.has(decision.seat) => {
-                rest.push(json!({ "decision": decision, "game_id": game_id }));
+                rest.push(json!({ "decision": decision, "gameId": game_id }));
             }
             Line::PrivateExpression(private) if own.has(private.seat) => {
                 let shown = private.expression.as_ref();
                 rest.push(expression(game_id, private.elapsed_ms, shown));
             }
             Line::Event(event) => {
-                own.follow(event, name);
+                own.follow(event, who);
                 if let Some(Kind::ExpressionShown(shown)) = &event.kind
                     && own.has(shown.seat)
                 {
@@ -231,7 +233,7 @@ fn lines_of_game(summary: &v1::RecordSummary, lines: &[v1::RecordLine], name: &s
             _ => {}
         }
     }
-    let seats: Vec<&v1::Participant> = seats_of(summary, name).collect();
+    let seats: Vec<&v1::Participant> = seats_of(summary, who).collect();
     if seats.is_empty() && rest.is_empty() {
         return Vec::new();
     }
@@ -239,12 +241,12 @@ fn lines_of_game(summary: &v1::RecordSummary, lines: &[v1::RecordLine], name: &s
         .filter(|standing| seats.iter().any(|seat| seat.seat == standing.seat))
         .collect();
     let game = json!({ "game": {
-        "game_id": game_id,
-        "room_name": summary.room_name,
+        "gameId": game_id,
+        "roomName": summary.room_name,
         "state": summary.state().as_str_name(),
-        "created_at_ms": summary.created_at_ms,
-        "ended_at_ms": summary.ended_at_ms,
-        "tournament_id": summary.tournament_id,
+        "createdAtMs": summary.created_at_ms,
+        "endedAtMs": summary.ended_at_ms,
+        "tournamentId": summary.tournament_id,
         "rules": summary.rules,
         "seats": seats,
         "results": results,
@@ -254,5 +256,5 @@ fn lines_of_game(summary: &v1::RecordSummary, lines: &[v1::RecordLine], name: &s
 }
 
 fn expression(game_id: &str, elapsed_ms: u64, expression: Option<&v1::Expression>) -> Value {
-    json!({ "expression": expression, "elapsed_ms": elapsed_ms, "game_id": game_id })
+    json!({ "expression": expression, "elapsedMs": elapsed_ms, "gameId": game_id })
 }

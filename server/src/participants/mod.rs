@@ -1,4 +1,4 @@
-//! The data of a participant, known by its name: exports and deletes what is stored about it.
+//! The data of a participant, known by its name and, if it has one, the fingerprint of its key: exports and deletes what is stored about it.
 //! [`ParticipantData`] does so with a store and a data directory; [`Participants`] also with what a
 //! running server has in memory.
 
@@ -11,7 +11,7 @@ mod stored_studies;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use chefshat_record::pseudonym::Pseudonym;
+use chefshat_record::pseudonym::{Named, Pseudonym};
 use tokio::sync::{Mutex, mpsc};
 use tracing::info;
 
@@ -65,10 +65,10 @@ impl Participants {
     /// As there.
     pub async fn export(
         &self,
-        name: &str,
+        who: &Named,
         sender: &mpsc::Sender<String>,
     ) -> Result<Skipped, DataError> {
-        self.data.export(name, sender).await
+        self.data.export(who, sender).await
     }
 
     /// Deletes a participant's data from the store, the files and the memory of this server. Its
@@ -79,18 +79,18 @@ impl Participants {
     /// failed.
     pub async fn delete(
         &self,
-        name: &str,
+        who: &Named,
         elsewhere: &impl StudiesElsewhere,
     ) -> Result<Deleted, DataError> {
         let _deleting = self.deleting.lock().await;
-        if self.plays(name).await {
-            return Err(ForgetError::GameRunning(name.to_owned()).into());
+        if self.plays(who).await {
+            return Err(ForgetError::GameRunning(who.name.clone()).into());
         }
-        if self.tournaments.is_playing(name) {
-            return Err(ForgetError::TournamentRunning(name.to_owned()).into());
+        if self.tournaments.is_playing(who) {
+            return Err(ForgetError::TournamentRunning(who.name.clone()).into());
         }
         let mut studies = 0;
-        for (stored, number) in self.data.in_studies(name).await? {
+        for (stored, number) in self.data.in_studies(who).await? {
             let id = stored.header.id;
             match self.studies.get(id).filter(|study| !study.is_stopped()) {
                 Some(study) => {
@@ -104,16 +104,16 @@ impl Participants {
         }
         // No record that was read before is written after.
         let writing = self.rooms.record_writer().pause().await;
-        let mut deleted = self.data.delete_from_games(name).await?;
+        let mut deleted = self.data.delete_from_games(who).await?;
         drop(writing);
-        let who = Pseudonym {
-            name: name.to_owned(),
+        let renamed = Pseudonym {
+            of: who.clone(),
             pseudonym: deleted.pseudonym.clone(),
         };
-        let renamed = self.tournaments.forget(&who).await;
+        let renamed = self.tournaments.forget(&renamed).await;
         deleted.tournaments = deleted.tournaments.max(renamed);
         deleted.studies = studies;
-        self.hide_rooms(name, &deleted).await;
+        self.hide_rooms(who, &deleted).await;
         self.rooms.count_forgotten();
         info!(
             games = deleted.games,
@@ -125,13 +125,13 @@ impl Participants {
     }
 
     /// Whether the participant has a seat in a room that is not over, other than those of studies.
-    async fn plays(&self, name: &str) -> bool {
+    async fn plays(&self, who: &Named) -> bool {
         for room in self.rooms.all(false) {
             let header = self.rooms.header(room.id());
             let is_of_study = header.is_some_and(|header| header.study.is_some());
             if !is_of_study
                 && let Ok(room) = room.describe().await
-                && has_seat(&room, name)
+                && has_seat(&room, who)
             {
                 return true;
             }
@@ -140,12 +140,12 @@ impl Participants {
     }
 
     /// Removes the rooms that are over and show the participant.
-    async fn hide_rooms(&self, name: &str, deleted: &Deleted) {
+    async fn hide_rooms(&self, who: &Named, deleted: &Deleted) {
         for handle in self.rooms.all(true) {
             let header = self.rooms.header(handle.id());
             let is_changed = header.is_some_and(|it| deleted.stored_games.contains(&it.game_id));
             let shows = match handle.describe().await {
-                Ok(room) => has_seat(&room, name),
+                Ok(room) => has_seat(&room, who),
                 Err(_) => false,
             };
             if is_changed || shows {
@@ -155,9 +155,8 @@ impl Participants {
     }
 }
 
-fn has_seat(room: &chefshat_proto::v1::Room, name: &str) -> bool {
-    let mut seats = room.seats.iter();
-    seats.any(|seat| seat.built_in_agent.is_empty() && seat.name == name)
+fn has_seat(room: &chefshat_proto::v1::Room, who: &Named) -> bool {
+    room.seats.iter().any(|seat| who.is_at(seat))
 }
 
 impl std::fmt::Debug for Participants {

@@ -1,6 +1,7 @@
 //! A participant's data in stored studies. Deleting them while no server runs does what its
 //! withdrawal does while one runs.
 
+use chefshat_record::pseudonym::Named;
 use chefshat_room::ids::Id;
 use chefshat_study::{Answer, Change, Study, Task};
 use serde_json::json;
@@ -15,8 +16,8 @@ use crate::store::studies::StoredStudy;
 
 impl ParticipantData {
     /// Whether a participant of this name has a game of a study that is not over.
-    pub(super) async fn plays_in_studies(&self, name: &str) -> Result<bool, StoreError> {
-        for (stored, number) in self.in_studies(name).await? {
+    pub(super) async fn plays_in_studies(&self, who: &Named) -> Result<bool, StoreError> {
+        for (stored, number) in self.in_studies(who).await? {
             let mut is_playing = false;
             for change in &stored.changes {
                 match change {
@@ -33,9 +34,9 @@ impl ParticipantData {
     }
 
     /// Deletes a participant's data from the studies. Returns from how many.
-    pub(super) async fn delete_from_studies(&self, name: &str) -> Result<u64, DataError> {
+    pub(super) async fn delete_from_studies(&self, who: &Named) -> Result<u64, DataError> {
         let mut count = 0;
-        for (stored, number) in self.in_studies(name).await? {
+        for (stored, number) in self.in_studies(who).await? {
             let mut changes = stored.changes;
             let games = games_of(&changes, number);
             changes.push(Change::Withdrew {
@@ -60,10 +61,10 @@ impl ParticipantData {
     /// Sends a participant's consent, answers and interface traces.
     pub(super) async fn export_studies(
         &self,
-        name: &str,
+        who: &Named,
         sheet: &mut Sheet<'_>,
     ) -> Result<(), DataError> {
-        for (stored, number) in self.in_studies(name).await? {
+        for (stored, number) in self.in_studies(who).await? {
             let id = stored.header.id;
             let Some(study) = folded(&stored) else {
                 continue;
@@ -74,23 +75,23 @@ impl ParticipantData {
             let state = convert::participant_state(participant.status);
             let consent = participant.consent.as_ref().map(|consent| {
                 json!({
-                    "at_ms": consent.at_ms,
+                    "atMs": consent.at_ms,
                     "version": consent.version,
                     "language": consent.language,
-                    "text_sha256": hex::encode(consent.text_sha256),
+                    "textSha256": hex::encode(consent.text_sha256),
                 })
             });
             let games = games_of(&stored.changes, number);
             let games: Vec<String> = games.iter().map(Id::to_string).collect();
             let mut lines = vec![json!({ "study": {
-                "study_id": id.to_string(),
+                "studyId": id.to_string(),
                 "name": stored.header.settings.name,
                 "number": number,
                 "state": state.as_str_name(),
                 "consent": consent,
-                "reached_at_ms": participant.reached_at_ms,
-                "ended_at_ms": participant.ended_at_ms,
-                "game_ids": games,
+                "reachedAtMs": participant.reached_at_ms,
+                "endedAtMs": participant.ended_at_ms,
+                "gameIds": games,
             } })];
             let sequence = study.sequence_of(participant).unwrap_or_default();
             let steps = study.settings().steps(sequence);
@@ -111,8 +112,8 @@ impl ParticipantData {
                         "questionnaire": questionnaire.id,
                         "item": item.map(|item| &item.id),
                         "value": value,
-                        "answered_after_ms": answer.answered_after_ms,
-                    }, "study_id": id.to_string() }));
+                        "answeredAfterMs": answer.answered_after_ms,
+                    }, "studyId": id.to_string() }));
                 }
             }
             sheet.send(lines).await?;
@@ -120,17 +121,17 @@ impl ParticipantData {
             for traces in all.iter().filter(|traces| traces.number == number) {
                 let game = traces.game.to_string();
                 let lines = traces.traces.iter();
-                let lines = lines.map(|trace| json!({ "trace": trace, "game_id": game }));
+                let lines = lines.map(|trace| json!({ "trace": trace, "gameId": game }));
                 sheet.send(lines.collect()).await?;
             }
         }
         Ok(())
     }
 
-    /// The studies that have a participant of this name, with its number.
+    /// The studies that have the participant, with its number. Nobody has a key there.
     pub(super) async fn in_studies(
         &self,
-        name: &str,
+        who: &Named,
     ) -> Result<Vec<(StoredStudy, u32)>, StoreError> {
         let mut found = Vec::new();
         for id in self.store.studies().await? {
@@ -138,7 +139,7 @@ impl ParticipantData {
                 continue;
             };
             let number = stored.changes.iter().find_map(|change| match change {
-                Change::Added { number, pseudonym } if pseudonym == name => Some(*number),
+                Change::Added { number, pseudonym } if who.is(pseudonym, "") => Some(*number),
                 _ => None,
             });
             found.extend(number.map(|number| (stored, number)));

@@ -1,7 +1,7 @@
 //! The handle of a room: sends messages to its mailbox and returns the answers.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use chefshat_engine::Seat;
@@ -36,6 +36,7 @@ pub struct Handle {
     fence: CancellationToken,
     clock: RoomClock,
     sharing: Arc<AtomicU32>,
+    next_join_code: Arc<Mutex<String>>,
 }
 
 /// Spectators who share a stream of a room at another node; they count until it is dropped.
@@ -80,6 +81,7 @@ pub fn spawn_room(
         fence,
         clock,
         sharing: Arc::default(),
+        next_join_code: Arc::default(),
     }
 }
 
@@ -256,6 +258,18 @@ impl Handle {
         let sharing = self.sharing.load(Ordering::Relaxed);
         room.spectators = room.spectators.saturating_add(sharing);
         Ok(room)
+    }
+
+    /// The join code of the room in which the participants play again; empty if there is none.
+    pub fn next_join_code(&self) -> String {
+        let code = self.next_join_code.lock();
+        code.unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Sets the join code of the room in which the participants play again.
+    pub fn set_next_join_code(&self, join_code: String) {
+        let code = self.next_join_code.lock();
+        *code.unwrap_or_else(PoisonError::into_inner) = join_code;
     }
 
     /// Counts spectators who share one of its streams at another node.

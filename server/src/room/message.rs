@@ -127,6 +127,8 @@ pub struct SpectateRequest {
     pub from: usize,
     /// Whether to start with a snapshot.
     pub snapshot: bool,
+    /// Whether the owner of the room asks.
+    pub is_owner: bool,
     /// Who is charged for it.
     pub charged: Key,
 }

@@ -451,6 +451,7 @@ async fn one_caller_cannot_take_all_places_of_spectators() {
             outbox,
             from: 0,
             snapshot: false,
+            is_owner: false,
             charged,
         };
         room.spectate(request).await.expect("the room exists")
@@ -496,6 +497,7 @@ async fn check_streams_end_after_panic(at_once: bool) {
         outbox,
         from: 0,
         snapshot: false,
+        is_owner: false,
         charged: Key::Local,
     })
     .await

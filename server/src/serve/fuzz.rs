@@ -166,6 +166,14 @@ fn calls(
             }],
         ),
         call(
+            "RoomService/SetNextRoom",
+            [&v1::SetNextRoomRequest {
+                room_id: room_id.clone(),
+                owner_token: room.owner_token.clone(),
+                join_code: "BCDF2345".into(),
+            }],
+        ),
+        call(
             "PlayService/Play",
             [
                 &command(Command::Attach(attach)),
@@ -279,6 +287,11 @@ fn calls(
                     channels: vec!["valence".into()],
                     elapsed_us: vec![1, 2],
                     values: vec![0.5, 0.25],
+                }),
+                owned_seat: Some(v1::OwnedSeat {
+                    room_id: room_id.clone(),
+                    owner_token: room.owner_token.clone(),
+                    seat: 1,
                 }),
             }],
         ),

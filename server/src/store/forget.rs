@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use chefshat_proto::v1;
 use chefshat_record::convert::seat_number;
-use chefshat_record::pseudonym::{ParticipantSeats, Pseudonym, Redactions};
+use chefshat_record::pseudonym::{Named, ParticipantSeats, Pseudonym, Redactions};
 use chefshat_tournament::Change as TournamentChange;
 use prost::Message as _;
 
@@ -14,7 +14,7 @@ use super::form::{self, Unreadable};
 use super::tournaments::TournamentEntry;
 use super::{ForgetError, Forgotten, StoredGame};
 use chefshat_room::ids::Id;
-use chefshat_room::journal::{Change, Entry, Fill, GameHeader};
+use chefshat_room::journal::{Change, Entry, Fill, GameHeader, StudyGame};
 
 /// The rows of a game that may contain the name.
 #[derive(Debug)]
@@ -38,6 +38,8 @@ pub(super) struct GameRewrite {
     pub(super) header: Option<Vec<u8>>,
     /// The summary, and the name of the room.
     pub(super) summary: Option<(Vec<u8>, String)>,
+    /// The seats of the participant in the summary.
+    pub(super) seats: Vec<i64>,
     pub(super) record: Option<Vec<u8>>,
     pub(super) journal: Vec<(i64, Vec<u8>)>,
 }
@@ -80,7 +82,7 @@ impl Rewrite {
             return Ok(self);
         };
         if is_running {
-            return Err(ForgetError::GameRunning(self.who.name));
+            return Err(ForgetError::GameRunning(self.who.of.name));
         }
         self.games.push(game);
         self.forgotten.add(id, is_filed, redactions);
@@ -112,7 +114,7 @@ impl Rewrite {
             return Ok(self);
         }
         if !is_over {
-            return Err(ForgetError::TournamentRunning(self.who.name));
+            return Err(ForgetError::TournamentRunning(self.who.of.name));
         }
         self.forgotten.tournaments += 1;
         let rows = changed;
@@ -145,10 +147,14 @@ pub(super) fn forget_stored(
 ) -> Redactions {
     let redactions = match stored {
         StoredGame::Hosted(header, entries, signature) => {
+            let is_in = is_in_header(header, &who.of) || is_seated(entries, &who.of);
+            if who.of.fingerprint.is_some() && !is_in {
+                return Redactions::default();
+            }
             let mut changed = entries.to_vec();
             let mut seats = ParticipantSeats::default();
             let mut redactions = forget_entries(&mut changed, &mut seats, who);
-            if redactions != Redactions::default() {
+            if is_in || redactions != Redactions::default() {
                 redactions.names += forget_header(Arc::make_mut(header), who);
                 *entries = changed.into();
                 *signature = None;
@@ -178,9 +184,19 @@ fn rewrite_game(
         number: rows.number,
         header: None,
         summary: None,
+        seats: Vec::new(),
         record: None,
         journal: Vec::new(),
     };
+    let header = rows.header.as_deref().map(form::header_from_bytes);
+    let mut header = header.transpose()?;
+    let mut is_in = header.as_ref().is_some_and(|it| is_in_header(it, &who.of));
+    if who.of.fingerprint.is_some() && rows.record.is_none() {
+        is_in = is_in || is_seated_in_rows(&rows.journal, &who.of)?;
+        if !is_in {
+            return Ok(None);
+        }
+    }
     let (mut own, mut redactions) = (ParticipantSeats::default(), Redactions::default());
     // Row by row, because a long decoded game is much larger.
     for (key, bytes) in rows.journal {
@@ -198,33 +214,70 @@ fn rewrite_game(
         redactions += who.redact(&mut lines);
         game.record = Some(form::lines_to_bytes(&lines));
     }
-    if redactions == Redactions::default() {
+    if !is_in && redactions == Redactions::default() {
         return Ok(None);
     }
-    if let Some(header) = rows.header {
-        let mut header = form::header_from_bytes(&header)?;
-        redactions.names += forget_header(&mut header, who);
-        game.header = Some(form::header_to_bytes(&header));
+    if let Some(header) = &mut header {
+        redactions.names += forget_header(header, who);
+        game.header = Some(form::header_to_bytes(header));
     }
     if let Some(summary) = rows.summary {
         let mut summary = v1::RecordSummary::decode(summary.as_slice())?;
+        game.seats = (summary.seats.iter())
+            .filter(|seat| who.of.is_at(seat))
+            .map(|seat| seat.seat.into())
+            .collect();
         forget_summary(&mut summary, who);
         game.summary = Some((summary.encode_to_vec(), summary.room_name));
     }
     Ok(Some((game, redactions)))
 }
 
+/// Whether the header of a game names the participant: at its physical table, or in its study.
+/// Neither has a key.
+fn is_in_header(header: &GameHeader, who: &Named) -> bool {
+    let mut names = header.display_names.iter();
+    let of_study = |study: &Arc<StudyGame>| who.is(&study.participant, "");
+    names.any(|(seat, name)| is_at_table(&header.fills, *seat) && who.is(name, ""))
+        || header.study.as_ref().is_some_and(of_study)
+}
+
+fn is_at_table(fills: &[Fill], seat: usize) -> bool {
+    matches!(fills.get(seat), Some(Fill::AtTable(_)))
+}
+
+/// Whether the participant sits down in entries of a journal.
+fn is_seated(entries: &[Entry], who: &Named) -> bool {
+    entries.iter().any(|entry| match &entry.change {
+        Change::Seated { participant, .. } => {
+            who.is(&participant.name, &participant.name_fingerprint)
+        }
+        _ => false,
+    })
+}
+
+/// As [`is_seated`], for the rows of a journal.
+fn is_seated_in_rows(rows: &[(i64, Vec<u8>)], who: &Named) -> Result<bool, Unreadable> {
+    for (_, bytes) in rows {
+        let mut entries = Vec::new();
+        form::read_entries(bytes, &mut entries)?;
+        if is_seated(&entries, who) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
 /// Removes a participant from the header of its game; returns the number of replacements.
 fn forget_header(header: &mut GameHeader, who: &Pseudonym) -> u64 {
     let mut names = who.in_text(&mut header.name);
     for (seat, name) in &mut header.display_names {
-        let is_at_table = matches!(header.fills.get(*seat), Some(Fill::AtTable(_)));
-        if is_at_table && *name == who.name {
+        if is_at_table(&header.fills, *seat) && who.of.is(name, "") {
             name.clone_from(&who.pseudonym);
             names += 1;
         }
     }
-    if let Some(study) = (header.study.as_mut()).filter(|it| it.participant == who.name) {
+    if let Some(study) = (header.study.as_mut()).filter(|it| who.of.is(&it.participant, "")) {
         Arc::make_mut(study).participant.clone_from(&who.pseudonym);
         names += 1;
     }
@@ -245,7 +298,7 @@ fn forget_entries(
     let mut out = Redactions::default();
     entries.retain_mut(|entry| match &mut entry.change {
         Change::Seated { seat, participant } => {
-            let is_own = participant.name == who.name;
+            let is_own = who.of.is(&participant.name, &participant.name_fingerprint);
             own.seated(seat_number(*seat), is_own);
             if is_own {
                 participant.name.clone_from(&who.pseudonym);
@@ -286,7 +339,7 @@ fn forget_entrant(entries: &mut [TournamentEntry], who: &Pseudonym) -> bool {
             TournamentChange::Joined(entrant) | TournamentChange::Replaced { by: entrant, .. },
         ) = entry
             && entrant.built_in.is_none()
-            && entrant.name == who.name
+            && who.of.is(&entrant.name, &entrant.name_fingerprint)
         {
             entrant.name.clone_from(&who.pseudonym);
             entrant.name_fingerprint.clear();

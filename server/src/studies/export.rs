@@ -1,12 +1,14 @@
 //! The data of a study as files: tables of participants, games, answers and interface traces, the
-//! settings, and the records of games. A file is sent in parts, so that no table is in memory as a
+//! settings, and the records and samples of games. A file is sent in parts, so that no table is in memory as a
 //! whole.
 
 use std::collections::BTreeMap;
+use std::io;
 
 use chefshat_proto::v1;
 use chefshat_record::outcome;
 use chefshat_study::{Answer, Outcome, Participant, PlayedGame, Study, Task};
+use tokio::io::AsyncReadExt as _;
 use tokio::sync::mpsc;
 
 use super::handle::StudyHandle;
@@ -55,6 +57,11 @@ impl<'s> File<'s> {
     async fn line(&mut self, text: &str) -> Result<(), ExportError> {
         self.buffer.extend_from_slice(text.as_bytes());
         self.buffer.push(b'\n');
+        self.send_full().await
+    }
+
+    /// Sends the parts of the buffer that have their full size.
+    async fn send_full(&mut self) -> Result<(), ExportError> {
         while self.buffer.len() >= STUDY_EXPORT_CHUNK {
             let rest = self.buffer.split_off(STUDY_EXPORT_CHUNK);
             let data = std::mem::replace(&mut self.buffer, rest);
@@ -295,6 +302,28 @@ async fn games(
             let json = serde_json::to_string(line)
                 .map_err(|error| StoreError::Failed(error.to_string()))?;
             file.line(&json).await?;
+        }
+        file.end().await?;
+        samples(rooms, game, sender).await?;
+    }
+    Ok(())
+}
+
+/// The samples of a game's seats, in files that `chefshat export` finds beside the records.
+async fn samples(
+    rooms: &Rooms,
+    game: Id,
+    sender: &mpsc::Sender<ExportedFile>,
+) -> Result<(), ExportError> {
+    let failed = |error: io::Error| StoreError::Failed(format!("reading samples failed: {error}"));
+    for path in rooms.samples().files(game) {
+        let Some(name) = path.file_name().and_then(|it| it.to_str()) else {
+            continue;
+        };
+        let mut file = File::new(format!("samples/{name}"), sender);
+        let mut stored = tokio::fs::File::open(&path).await.map_err(failed)?;
+        while stored.read_buf(&mut file.buffer).await.map_err(failed)? > 0 {
+            file.send_full().await?;
         }
         file.end().await?;
     }

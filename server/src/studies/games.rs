@@ -157,11 +157,10 @@ impl Task {
                 reserved_for: Some(PARTICIPANT_KIND),
             },
         );
+        // The other seats make room for that of the participant.
+        let place = |index: usize| index + usize::from(index >= seat);
         let names = plan.names.iter();
-        let display_names = names.map(|(index, name)| {
-            let behind = usize::from(*index >= seat);
-            (index + behind, name.clone())
-        });
+        let display_names = names.map(|(index, name)| (place(*index), name.clone()));
         let seated = SeatedParticipant {
             name: participant.pseudonym.clone(),
             name_fingerprint: String::new(),
@@ -187,7 +186,7 @@ impl Task {
             fills,
             display_names: display_names.collect(),
             recorded: BTreeMap::new(),
-            wizards: std::collections::BTreeSet::new(),
+            wizards: plan.wizards.iter().map(|index| place(*index)).collect(),
             start: GameStart::default(),
             game_seed: placed.seed_index.map(|index| seeds[index]),
             physical: false,

@@ -5,7 +5,9 @@ use std::sync::{Mutex, MutexGuard};
 
 use chefshat_proto::v1;
 use chefshat_record::pseudonym::Pseudonym;
-use chefshat_tournament::{BeginProblem, Change, GameState, JoinProblem, State, Tournament};
+use chefshat_tournament::{
+    BeginProblem, Change, Entrant, GameState, JoinProblem, State, Tournament,
+};
 use sha2::{Digest as _, Sha256};
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
@@ -170,7 +172,8 @@ impl TournamentHandle {
 
     /// Renames a participant; the store must have done so. Returns whether there was one.
     pub(super) fn forget(&self, who: &Pseudonym) -> bool {
-        (self.committed().core).rename(&who.name, &who.pseudonym)
+        let is_meant = |it: &Entrant| who.of.is(&it.name, &it.name_fingerprint);
+        self.committed().core.rename(is_meant, &who.pseudonym)
     }
 
     /// Who sees it and its games.

@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use chefshat_record::convert::FieldProblem;
-use chefshat_record::pseudonym::Pseudonym;
+use chefshat_record::pseudonym::{Named, Pseudonym};
 use chefshat_tournament::{Change, Entrant, ParticipantKind, SettingsProblem, State, Tournament};
 use tokio::sync::{Mutex as AsyncMutex, Notify, mpsc, watch};
 use tokio_util::task::TaskTracker;
@@ -289,12 +289,14 @@ impl Tournaments {
         wanted.take(count).collect()
     }
 
-    /// Whether somebody of this name, other than a built-in agent, is in a tournament that is not
-    /// over.
-    pub fn is_playing(&self, name: &str) -> bool {
+    /// Whether a participant, other than a built-in agent, is in a tournament that is not over.
+    pub fn is_playing(&self, who: &Named) -> bool {
+        let is_meant =
+            |it: &Entrant| it.built_in.is_none() && who.is(&it.name, &it.name_fingerprint);
         let all = self.newest(None, None, usize::MAX);
-        all.iter()
-            .any(|(_, handle)| !handle.is_over() && handle.read(|core| core.has_person(name)))
+        all.iter().any(|(_, handle)| {
+            !handle.is_over() && handle.read(|core| core.participants().iter().any(is_meant))
+        })
     }
 
     /// Renames a participant in the tournaments in memory that are over. Returns in how many.

@@ -1,5 +1,5 @@
 //! What a participant may see of a study. No type here has a place for a condition, a slot, an
-//! identifier that researchers chose, or the labels of other seats, so none of them can be sent by
+//! identifier that researchers chose, or the names of other seats, so none of them can be sent by
 //! mistake.
 
 use std::collections::BTreeSet;
@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use crate::Study;
 use crate::games::Phase;
 use crate::questionnaire::{ItemKind, Questionnaire};
-use crate::settings::Hide;
+use crate::settings::{Hide, Labels};
 use crate::stage::{Consent, ExternalQuestionnaire, Task, Text};
 use crate::state::{Participant, Status};
 use crate::templates::Language;
@@ -87,6 +87,8 @@ pub struct ShownGame {
     pub place: Option<([u8; 16], [u8; 16])>,
     /// Whether the game has ended.
     pub ended: bool,
+    /// What is shown of the other seats; as they are until there is a room.
+    pub labels: Labels,
 }
 
 /// Why nothing more is shown.
@@ -158,6 +160,7 @@ impl Study {
             hide: game.map_or_else(BTreeSet::new, |it| conditions[it.condition].hide.clone()),
             place: game.map(|it| (it.room, it.game)),
             ended,
+            labels: game.map_or(Labels::AsTheyAre, |it| conditions[it.condition].labels),
         }
     }
 }

@@ -133,18 +133,12 @@ impl Tournament {
         &self.state.settings
     }
 
-    /// Whether a participant other than a built-in agent has this name.
-    pub fn has_person(&self, name: &str) -> bool {
-        let mut participants = self.state.participants.iter();
-        participants.any(|it| it.built_in.is_none() && it.name == name)
-    }
-
-    /// Gives participants of this name, other than built-in agents, another one, as if they had
-    /// joined under it. Returns whether there were any.
-    pub fn rename(&mut self, name: &str, to: &str) -> bool {
+    /// Gives some participants, never built-in agents, another name, as if they had joined under
+    /// it. Returns whether there were any.
+    pub fn rename(&mut self, who: impl Fn(&Entrant) -> bool, to: &str) -> bool {
         let participants = self.state.participants.iter_mut();
         let mut any = false;
-        for entrant in participants.filter(|it| it.built_in.is_none() && it.name == name) {
+        for entrant in participants.filter(|it| it.built_in.is_none() && who(it)) {
             to.clone_into(&mut entrant.name);
             entrant.name_fingerprint.clear();
             any = true;

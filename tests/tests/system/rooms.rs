@@ -4,6 +4,7 @@ use chefshat_client::Client;
 use chefshat_engine::RuleSetSpec;
 use chefshat_proto::v1::{
     self, game_event::Kind, record_line::Line, record_service_client::RecordServiceClient,
+    room_service_client::RoomServiceClient,
 };
 use chefshat_record::{jsonl, replay};
 use chefshat_tests::{
@@ -11,6 +12,7 @@ use chefshat_tests::{
 };
 
 use crate::played::{built_in, ended};
+use crate::records::reason;
 
 async fn until_over(client: &Client, room_id: &str) -> v1::Room {
     let mut watching = client.spectate(room_id, 0);
@@ -391,4 +393,51 @@ async fn built_in_agents_slow_down_for_people() {
         let room = client.get_room(&room.room_id).await.expect("it exists");
         assert_eq!(room.policy.expect("a policy").pace_ms, Some(pace_ms));
     }
+}
+
+#[tokio::test]
+async fn only_the_participants_of_a_room_learn_where_they_play_again() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let create = async || {
+        let request = v1::CreateRoomRequest::default();
+        client.create_room(request).await.expect("a new room")
+    };
+    let (made, next) = (create().await, create().await);
+    let room_id = made.room.expect("a room").room_id;
+    let joined = client.join_with_code(made.join_code.as_str(), "Ada").await;
+    let ticket = joined.expect("a free seat").ticket;
+    let mut rooms = RoomServiceClient::new(client.channel());
+    let set = |owner_token: &str, join_code: &str| v1::SetNextRoomRequest {
+        room_id: room_id.clone(),
+        owner_token: owner_token.into(),
+        join_code: join_code.into(),
+    };
+    for (token, code, expected) in [
+        (
+            ticket.as_str(),
+            next.join_code.as_str(),
+            "OWNER_TOKEN_WRONG",
+        ),
+        (&next.owner_token, &next.join_code, "OWNER_TOKEN_WRONG"),
+        (&made.owner_token, "BCDF234", "JOIN_CODE_WRONG"),
+    ] {
+        let refused = rooms.set_next_room(set(token, code)).await;
+        assert_eq!(reason(&refused.expect_err("refused")), expected);
+    }
+    let shown = async |secret: &str| {
+        let client = client.with_secrets([secret]).expect("a secret");
+        let room = client.get_room(&room_id).await.expect("it is public");
+        room.next_join_code
+    };
+    assert_eq!(shown(&ticket).await, "");
+    let said = next.join_code.to_lowercase();
+    let told = rooms.set_next_room(set(&made.owner_token, &said)).await;
+    told.expect("its owner");
+    assert_eq!(shown(&ticket).await, next.join_code);
+    assert_eq!(shown(&made.owner_token).await, next.join_code);
+    assert_eq!(shown(&next.owner_token).await, "", "of another room");
+    let listed = client.list_rooms(v1::ListRoomsRequest::default()).await;
+    let listed = listed.expect("a page").rooms;
+    assert!(listed.iter().all(|room| room.next_join_code.is_empty()));
 }

@@ -413,7 +413,7 @@ impl Lab {
         shown.expect("the study exists").into_inner().participants
     }
 
-    async fn export(&mut self) -> BTreeMap<String, Vec<u8>> {
+    pub(crate) async fn export(&mut self) -> BTreeMap<String, Vec<u8>> {
         let request = v1::ExportStudyRequest {
             study_id: self.study_id.clone(),
             owner_token: self.owner_token.clone(),

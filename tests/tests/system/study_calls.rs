@@ -5,10 +5,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use chefshat_client::{Client, ConnectOptions, Connection};
+use chefshat_client::{Client, ConnectOptions, Connection, RandomAgent};
 use chefshat_proto::v1::admin_service_client::AdminServiceClient;
+use chefshat_proto::v1::instrument_service_client::InstrumentServiceClient;
 use chefshat_proto::v1::study_service_client::StudyServiceClient;
-use chefshat_proto::v1::{self, study_view::Content};
+use chefshat_proto::v1::{self, record_line::Line, seat_config::FilledBy, study_view::Content};
+use chefshat_record::pseudonym::Named;
 use chefshat_record::samples;
 use chefshat_room::ids::Id;
 use chefshat_server::access::{Mode, NewToken, Role, TokenFile};
@@ -34,10 +36,14 @@ struct Running {
 }
 
 async fn running(host: &Host, names: &[&str]) -> Running {
+    created(host, settings(), names).await
+}
+
+async fn created(host: &Host, settings: v1::StudySettings, names: &[&str]) -> Running {
     let channel = Channel::from_shared(host.url().to_owned()).expect("a URL");
     let channel = channel.connect().await.expect("the server listens");
     let request = v1::CreateStudyRequest {
-        settings: Some(settings()),
+        settings: Some(settings),
         request_id: Vec::new(),
     };
     let mut service = StudyServiceClient::new(channel);
@@ -204,6 +210,177 @@ async fn operated(folder: &Path) -> (Host, AdminServiceClient<Connection>) {
     (host, operator)
 }
 
+/// A chunk of two samples.
+fn chunk() -> Option<v1::SampleChunk> {
+    Some(v1::SampleChunk {
+        stream: "affect".into(),
+        channels: vec!["valence".into()],
+        elapsed_us: vec![1, 2],
+        values: vec![0.5, 0.25],
+    })
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_instruments_of_the_researcher_reach_the_game_of_a_participant() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let host = host(folder.path()).await;
+    let mut study = running(&host, &["Ana"]).await;
+    let (mut person, view) = Person::new(&study.tap, &study.links[0]).await;
+    let (view, _) = person.go_on(view, GAMES + 1).await;
+    let game = person.until(|content| playable(content).is_some()).await;
+    let game = game
+        .content
+        .as_ref()
+        .and_then(playable)
+        .expect("a game")
+        .clone();
+    let placed = study.lab.participants().await.remove(0).games.pop();
+    let seat = placed.expect("its game").seat;
+
+    let stranger = Client::connect(host.url()).await.expect("it listens");
+    let owner = stranger
+        .with_secrets([&study.lab.owner_token])
+        .expect("a token");
+    let unseen = stranger.spectate(&game.room_id, 0).next().await;
+    let unseen = unseen
+        .expect_err("it is private")
+        .reason()
+        .map(str::to_owned);
+    assert_eq!(unseen.as_deref(), Some("ROOM_UNKNOWN"));
+    let mut watching = owner.spectate(&game.room_id, 0);
+    let first = patiently("an event", watching.next()).await;
+    let first = first.expect("the owner watches").expect("an event");
+    // Like the participants, the owner sees the game without labels that name the condition.
+    assert!(!format!("{first:?}").contains("Robot"), "{first:?}");
+
+    let mut instruments = InstrumentServiceClient::new(stranger.channel());
+    let mark = |owner_token: &str| v1::AddMarkerRequest {
+        room_id: game.room_id.clone(),
+        owner_token: owner_token.into(),
+        label: "EEG on".into(),
+        elapsed_us: Some(1),
+    };
+    let marked = instruments.add_marker(mark(&study.lab.owner_token)).await;
+    assert_eq!(
+        marked
+            .expect("its owner")
+            .into_inner()
+            .marker
+            .map(|it| it.number),
+        Some(1)
+    );
+    let refused = instruments.add_marker(mark(&game.ticket)).await;
+    assert_eq!(
+        reason(&refused.expect_err("a participant")),
+        "OWNER_TOKEN_WRONG"
+    );
+    let add = |owner_token: &str, seat: u32| v1::AddSamplesRequest {
+        owned_seat: Some(v1::OwnedSeat {
+            room_id: game.room_id.clone(),
+            owner_token: owner_token.into(),
+            seat,
+        }),
+        chunk: chunk(),
+        ..v1::AddSamplesRequest::default()
+    };
+    for (token, seat, expected) in [
+        (game.ticket.as_str(), seat, "OWNER_TOKEN_WRONG"),
+        ("", seat, "ROOM_UNKNOWN"),
+        (&study.lab.owner_token, 4, "SAMPLES_REFUSED"),
+    ] {
+        let refused = instruments.add_samples(add(token, seat)).await;
+        assert_eq!(
+            reason(&refused.expect_err("not its owner, or no seat")),
+            expected
+        );
+    }
+    // The samples of a seat may come until the room is gone, but not before its game.
+    let early = instruments
+        .add_samples(add(&study.lab.owner_token, seat))
+        .await;
+    assert_eq!(reason(&early.expect_err("it waits")), "GAME_NOT_STARTED");
+    person.go_on(view, GAMES + 2).await;
+    let added = instruments
+        .add_samples(add(&study.lab.owner_token, seat))
+        .await;
+    assert_eq!(added.expect("its owner").into_inner().recorded, 2);
+
+    let data = study.lab.export().await;
+    let samples = &data[&format!("samples/{}.{seat}.samples", game.game_id)];
+    let stored = std::fs::read(samples::path_of(
+        folder.path(),
+        &game.game_id,
+        seat as usize,
+    ));
+    assert_eq!(samples, &stored.expect("its file"));
+    let record = &data[&format!("records/{}.jsonl", game.game_id)];
+    assert!(String::from_utf8_lossy(record).contains("EEG on"));
+    drop((watching, person, study));
+    let stopping = patiently("the server to stop", host.stop());
+    stopping.await.expect("a clean end");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_robot_of_a_study_may_be_played_by_a_person() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let host = host(folder.path()).await;
+    let mut settings = settings();
+    for condition in &mut settings.conditions {
+        let robot = v1::ParticipantKind::Robot.into();
+        condition.seats[1].name.clear();
+        condition.seats[1].filled_by = Some(FilledBy::Wizard(robot));
+    }
+    let mut study = created(&host, settings, &["Ana"]).await;
+    let (mut person, view) = Person::new(&study.tap, &study.links[0]).await;
+    let step = GAMES + 1;
+    // The practice, which needs the robot too, and a game.
+    let client = Client::connect(host.url()).await.expect("it listens");
+    let links = async {
+        for step in [GAMES, GAMES + 1] {
+            let code = loop {
+                let games = study.lab.participants().await.remove(0).games;
+                let open = games
+                    .into_iter()
+                    .find(|it| it.step == step && !it.join_code.is_empty());
+                if let Some(game) = open {
+                    break game.join_code;
+                }
+                tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+            };
+            let request = v1::JoinRoomRequest {
+                join_code: code,
+                name: "Robbie".into(),
+                kind: v1::ParticipantKind::Robot.into(),
+                ..v1::JoinRoomRequest::default()
+            };
+            let joined = client.join(request).await.expect("a seat for a robot");
+            let played = client.play(joined.ticket, RandomAgent::new(3)).await;
+            played.expect("it ends");
+        }
+    };
+    let playing = person.go_on(view, step + 1);
+    patiently("both games to end", futures::future::join(links, playing)).await;
+
+    let data = study.lab.export().await;
+    let placed = study.lab.participants().await.remove(0).games;
+    let game = placed.iter().find(|it| it.step == step).expect("a game");
+    let record = &data[&format!("records/{}.jsonl", game.game_id)];
+    let first = record.split(|byte| *byte == b'\n').next();
+    let first: v1::RecordLine = serde_json::from_slice(first.expect("a line")).expect("a record");
+    let Some(Line::Header(header)) = &first.line else {
+        panic!("no header");
+    };
+    let robots: Vec<_> = (header.seats.iter())
+        .filter(|it| it.name == "Robbie")
+        .map(|it| (it.kind(), it.shown_kind()))
+        .collect();
+    let person_as_robot = (v1::ParticipantKind::Human, v1::ParticipantKind::Robot);
+    assert_eq!(robots, [person_as_robot]);
+    drop((person, study));
+    let stopping = patiently("the server to stop", host.stop());
+    stopping.await.expect("a clean end");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_participant_is_known_by_its_name_to_the_operator() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -211,7 +388,10 @@ async fn a_participant_is_known_by_its_name_to_the_operator() {
     let mut study = running(&host, &["Pseudonym-of-Ana", "Pseudonym-of-Bo"]).await;
     let (mut person, _) = at_a_game(&study.tap, &study.links[0]).await;
     let name = || "Pseudonym-of-Ana".to_owned();
-    let request = v1::ExportParticipantRequest { name: name() };
+    let request = v1::ExportParticipantRequest {
+        name: name(),
+        ..v1::ExportParticipantRequest::default()
+    };
     let exported = operator.export_participant(request).await;
     let mut lines = exported.expect("allowed").into_inner();
     let mut kinds: BTreeMap<&str, u32> = BTreeMap::new();
@@ -232,7 +412,10 @@ async fn a_participant_is_known_by_its_name_to_the_operator() {
     assert_eq!(kinds, expected.into());
 
     // Its game is closed, and its data in the study are deleted.
-    let request = v1::DeleteParticipantRequest { name: name() };
+    let request = v1::DeleteParticipantRequest {
+        name: name(),
+        ..v1::DeleteParticipantRequest::default()
+    };
     let deleted = operator.delete_participant(request.clone()).await;
     let deleted = deleted.expect("all can be closed").into_inner();
     assert_eq!((deleted.studies, deleted.games), (1, 0));
@@ -248,7 +431,10 @@ async fn a_participant_is_known_by_its_name_to_the_operator() {
         .await
         .expect("the same");
     assert_eq!(again.into_inner().studies, 0);
-    let request = v1::ExportParticipantRequest { name: name() };
+    let request = v1::ExportParticipantRequest {
+        name: name(),
+        ..v1::ExportParticipantRequest::default()
+    };
     let exported = operator.export_participant(request).await;
     let unknown = exported.expect("allowed").into_inner().message().await;
     assert_eq!(
@@ -273,8 +459,11 @@ async fn a_participant_is_known_by_its_name_to_the_operator() {
 async fn a_participant_is_deleted_from_a_study_of_a_server_that_is_stopped() {
     let folder = tempfile::tempdir().expect("a folder");
     let host = host(folder.path()).await;
-    let name = "Pseudonym-of-Ana";
-    let study = running(&host, &[name]).await;
+    let ana = Named {
+        name: "Pseudonym-of-Ana".into(),
+        fingerprint: None,
+    };
+    let study = running(&host, &[&ana.name]).await;
     let (mut person, view) = Person::new(&study.tap, &study.links[0]).await;
     person.go_on(view, GAMES).await;
     let game = person.until(|content| playable(content).is_some()).await;
@@ -295,7 +484,7 @@ async fn a_participant_is_deleted_from_a_study_of_a_server_that_is_stopped() {
         (store, data)
     };
     let (store, data) = with_data().await;
-    let refused = data.delete(name).await.expect_err("its game is not over");
+    let refused = data.delete(&ana).await.expect_err("its game is not over");
     assert!(
         refused.to_string().contains("a game that is not over"),
         "{refused}"
@@ -316,16 +505,16 @@ async fn a_participant_is_deleted_from_a_study_of_a_server_that_is_stopped() {
     std::fs::write(&samples, []).expect("written");
 
     let (store, data) = with_data().await;
-    let deleted = data.delete(name).await.expect("its games are over");
+    let deleted = data.delete(&ana).await.expect("its games are over");
     assert_eq!(deleted.studies, 1);
     let id = store.studies().await.expect("readable")[0];
     let stored = store.study(id).await.expect("readable").expect("stored");
-    assert!(!format!("{:?}", stored.changes).contains(name));
+    assert!(!format!("{:?}", stored.changes).contains(&ana.name));
     assert_eq!(store.traces(id).await, Ok(Vec::new()));
     let game = Id::parse(&game.game_id).expect("an id");
     assert!(store.finished(game).await.expect("readable").is_none());
     assert!(!samples.exists());
-    let again = data.delete(name).await.expect("nothing to do");
+    let again = data.delete(&ana).await.expect("nothing to do");
     assert!(!again.found_any(), "{again:?}");
     store.close().await;
     drop((store, data));

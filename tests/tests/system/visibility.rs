@@ -381,6 +381,14 @@ async fn asked(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
             owner_token: wrong(room_id),
         })
     );
+    ask!(
+        "SetNextRoom",
+        rooms.set_next_room(v1::SetNextRoomRequest {
+            room_id: room_id.clone(),
+            owner_token: wrong(room_id),
+            join_code: "BCDF2345".into(),
+        })
+    );
     let mut servers = ServerServiceClient::new(client.channel());
     ask!(
         "GetClock",
@@ -409,6 +417,7 @@ async fn asked(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
     ask!(
         "AddSamples",
         instruments.add_samples(v1::AddSamplesRequest {
+            owned_seat: None,
             ticket: wrong(room_id),
             chunk: Some(v1::SampleChunk::default()),
         })

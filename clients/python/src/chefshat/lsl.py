@@ -1,8 +1,9 @@
 """Markers of a game for the Lab Streaming Layer (LSL), which records EEG, eye trackers and other instruments on one clock.
 
-`python -m chefshat.lsl --address HOST:PORT --room CODE` opens a stream of markers and sends every event of a room. `MarkerStream`
-does the same from a program, and `MarkedAgent` from an agent, with what its seat sees. A marker has the time at which the event
-happened at the server, on LSL's clock (`Client.clock`), not the time at which it arrived. docs/instruments.md describes the stream.
+`python -m chefshat.lsl --address HOST:PORT --room CODE` opens a stream of markers and sends every event of a room, with
+`--study ID --participant N` every event of all games of a participant. `MarkerStream` does the same from a program, and
+`MarkedAgent` from an agent, with what its seat sees. A marker has the time at which the event happened at the server, on LSL's
+clock (`Client.clock`), not the time at which it arrived. docs/instruments.md describes the stream.
 """
 
 import argparse
@@ -40,18 +41,21 @@ FIRST_READINGS = 5
 DRIFT = 2e-4
 # Seconds for which a command waits for recorders to receive the last markers.
 LINGER_S = 2.0
+# Seconds until a game of a study is looked for again whose room is just being created.
+ROOM_INTERVAL_S = 0.2
 # Name of the stream, unless another is given.
 NAME = "Chef's Hat"
 
 EXAMPLE = """examples:
   python -m chefshat.lsl --address 127.0.0.1:50051 --room BCDF2345
   python -m chefshat.lsl --address https://play.example.org --room ROOM-ID --secret OWNER-TOKEN --wait
+  python -m chefshat.lsl --address 127.0.0.1:50051 --study STUDY-ID --participant 3 --secret OWNER-TOKEN
   python -m chefshat.lsl --address 127.0.0.1:50051 --ticket TICKET --agent my_module:MyAgent
 
 Start it before the game, and the recorder (LabRecorder, for example) after it; --wait holds the markers back until something
 records them. The stream is called "Chef's Hat" and has the type Markers.
 
-exit code: 0 the game is over, 1 the server refused or was lost, 2 wrong arguments, 130 interrupted
+exit code: 0 the game or study is over, 1 the server refused or was lost, 2 wrong arguments, 130 interrupted
 """
 
 
@@ -131,9 +135,11 @@ class RoomClock:
 
 
 class MarkerStream:
-    """A stream of LSL with a marker for each event of one game; a context manager."""
+    """A stream of LSL with a marker for each event of one game, or of games one after another; a context manager."""
 
-    def __init__(self, client: Client, room_id: str, *, viewer: str = "spectator", name: str = NAME) -> None:
+    def __init__(
+        self, client: Client, room_id: str, *, viewer: str = "spectator", name: str = NAME, source: str | None = None
+    ) -> None:
         """Opens the stream.
 
         Args:
@@ -141,15 +147,17 @@ class MarkerStream:
             room_id: the room.
             viewer: whose view of the events it has, for the description of the stream: "spectator" or "seat 2".
             name: the name of the stream.
+            source: whose events these are, by which a recorder knows the stream again; None: the game and the viewer.
 
         Raises:
             ChefsHatError: the server refuses, or cannot be reached.
         """
+        self._client = client
         server = client.server_info()
         self.clock = RoomClock(client, room_id)
         reading = self.clock.reading
         # With the same id a recorder resumes the stream after a restart of this program.
-        source = f"chefshat {reading.game_id} {viewer}"
+        source = source or f"chefshat {reading.game_id} {viewer}"
         info = pylsl.StreamInfo(name, "Markers", 1, pylsl.IRREGULAR_RATE, pylsl.cf_string, source)
         description = info.desc()
         channel = description.append_child("channels").append_child("channel")
@@ -184,6 +192,17 @@ class MarkerStream:
     def wait_for_recorder(self, timeout_s: float) -> bool:
         """Waits until something receives the stream. Returns whether it does."""
         return bool(self._open().wait_for_consumers(timeout_s))
+
+    def go_on(self, room_id: str) -> None:
+        """Continues with the next game: that of another room, whose clock it reads.
+
+        Raises:
+            ChefsHatError: the server refuses, or cannot be reached.
+        """
+        clock = RoomClock(self._client, room_id)
+        self.clock.close()
+        self.clock = clock
+        self._last = 0
 
     def push(self, event: pb.GameEvent) -> None:
         """Sends an event, with the time at which it happened. Ignores events that were sent before."""
@@ -289,18 +308,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
     join_options.add_server_options(parser, required=True)
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument("--room", metavar="ID|CODE", help="watch this room, by its id or join code, as a spectator")
+    where.add_argument(
+        "--study", metavar="ID", help="watch a participant's games in this study; needs its owner's token as --secret"
+    )
     where.add_argument("--ticket", help="play this seat, and send what it sees; see --agent")
+    parser.add_argument("--participant", metavar="N", type=int, help="with --study: the number of the participant, from 1")
     parser.add_argument("--agent", default="random", help="with --ticket: 'random', or module:Class of an Agent (default: random)")
     parser.add_argument("--name", default=NAME, help=f"name of the stream (default: {NAME})")
     parser.add_argument("--wait", action="store_true", help="send nothing until something records the stream")
     options = parser.parse_args(arguments)
     wait_s = pylsl.FOREVER if options.wait else 0.0
+    if (options.study is None) != (options.participant is None):
+        parser.error("give --study and --participant together")
+    server = join_options.server_of(options)
+    # Secrets are 96 digits, of which the first 32 are the id of what they are of.
+    owner = next((secret for secret in server.secrets if secret.startswith(options.study or "?")), "")
+    if options.study is not None and not owner:
+        parser.error("--study needs the token of the study's owner: --secret OWNER-TOKEN")
 
     def run() -> int:
         # The ticket shows a private room, whose clock is read.
-        with Client(join_options.server_of(options), secrets=[options.ticket] if options.ticket else []) as client:
+        with Client(server, secrets=[options.ticket] if options.ticket else []) as client:
             if options.ticket is not None:
                 return play(client, options.ticket, options.agent, options.name, wait_s)
+            if options.study is not None:
+                return watch_participant(client, options.study, owner, options.participant, options.name, wait_s)
             return watch(client, options.room, options.name, wait_s)
 
     return exit_code(run, as_json=False)
@@ -318,6 +350,59 @@ def watch(client: Client, room: str, name: str, wait_s: float) -> int:
     markers.close(LINGER_S)
     print("the game is over", file=sys.stderr)
     return 0
+
+
+def watch_participant(client: Client, study_id: str, owner_token: str, number: int, name: str, wait_s: float) -> int:
+    """Sends the events of a participant's games as one stream, from the one played now to the last. Returns the exit code."""
+    source = f"chefshat {study_id} participant {number}"
+    markers: MarkerStream | None = None
+    known: set[str] = set()
+    games = 0
+    while (game := next_game(client, study_id, owner_token, number, known)) is not None:
+        try:
+            if markers is None:
+                markers = MarkerStream(client, game.room_id, name=name, source=source)
+                say(markers)
+                markers.wait_for_recorder(wait_s)
+            else:
+                markers.go_on(game.room_id)
+        except ChefsHatError as error:
+            if error.reason != "ROOM_UNKNOWN":
+                raise
+            # The room is just being created, or the server has already removed it.
+            if game.ended == pb.ROOM_STATE_UNSPECIFIED:
+                known.discard(game.room_id)
+                time.sleep(ROOM_INTERVAL_S)
+            continue
+        for event in client.watch(game.room_id):
+            markers.push(event)
+        games += 1
+        print(f"game {games} of participant {number} is over", file=sys.stderr, flush=True)
+    if markers is not None:
+        markers.close(LINGER_S)
+    print("the study is over", file=sys.stderr)
+    return 0
+
+
+def next_game(client: Client, study_id: str, owner_token: str, number: int, known: set[str]) -> pb.StudyGame | None:
+    """Waits for a game of a participant that is not known, and adds it to those that are. Returns None at the end of the study.
+
+    The first time, those that are over are known.
+    """
+    over = (pb.STUDY_PARTICIPANT_STATE_COMPLETED, pb.STUDY_PARTICIPANT_STATE_WITHDRAWN, pb.STUDY_PARTICIPANT_STATE_REMOVED)
+    is_first = not known
+    for participant in client.follow_study(study_id, owner_token):
+        if participant.number != number:
+            continue
+        for game in participant.games:
+            if game.room_id not in known:
+                known.add(game.room_id)
+                if not (is_first and game.ended):
+                    return game
+        is_first = False
+        if participant.state in over:
+            return None
+    return None
 
 
 def play(client: Client, ticket: str, agent: str, name: str, wait_s: float) -> int:

@@ -17,6 +17,8 @@ from chefshat._gen.chefshat.v1.room_service_pb2 import *
 from chefshat._gen.chefshat.v1.rules_pb2 import *
 from chefshat._gen.chefshat.v1.server_service_pb2 import *
 from chefshat._gen.chefshat.v1.spectator_service_pb2 import *
+from chefshat._gen.chefshat.v1.study_pb2 import *
+from chefshat._gen.chefshat.v1.study_service_pb2 import *
 from chefshat._gen.chefshat.v1.table_pb2 import *
 from chefshat._gen.chefshat.v1.table_service_pb2 import *
 from chefshat._gen.chefshat.v1.tournament_pb2 import *

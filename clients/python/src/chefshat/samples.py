@@ -18,20 +18,29 @@ class SampleStream:
     """Collects samples of a seat and sends them about once a second, in the thread that pushes them. Not thread-safe."""
 
     def __init__(
-        self, client: Client, ticket: str, room_id: str, stream: str, channels: Sequence[str], *, local: LocalClock = TIME_OF_DAY
+        self,
+        client: Client,
+        ticket: str,
+        room_id: str,
+        stream: str,
+        channels: Sequence[str],
+        *,
+        seat: int | None = None,
+        local: LocalClock = TIME_OF_DAY,
     ) -> None:
         """Reads the clock of the room.
 
         Args:
             client: a connection to the server.
-            ticket: the ticket of the seat.
+            ticket: the ticket of the seat; with `seat` the owner's token of the room, or of the study whose game it is.
             room_id: its room.
             stream: name of the stream, 1..=32 ASCII letters, digits, `_`, `-` or `.`.
             channels: names of its 1..=16 channels.
+            seat: the seat, from 0, if the token of the owner is given.
             local: the clock of this machine that times are from, in seconds; default: the time of day.
         """
         self._client = client
-        self._ticket = ticket
+        self._seat = ticket if seat is None else pb.OwnedSeat(room_id=room_id, owner_token=ticket, seat=seat)
         self._room_id = room_id
         self._local = local
         self._chunk = pb.SampleChunk(stream=stream, channels=channels)
@@ -73,7 +82,7 @@ class SampleStream:
                 elapsed_us=self._chunk.elapsed_us[:MAX_SAMPLES],
                 values=self._chunk.values[: MAX_SAMPLES * width],
             )
-            self._client.add_samples(self._ticket, first)
+            self._client.add_samples(self._seat, first)
             del self._chunk.elapsed_us[:MAX_SAMPLES]
             del self._chunk.values[: MAX_SAMPLES * width]
         self._sent_at = self._local()

@@ -5,6 +5,7 @@ use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 use std::process::ExitCode;
 
 use chefshat_proto::v1;
+use chefshat_record::pseudonym::Named;
 use chefshat_server::participants::Skipped;
 use chefshat_server::store::SqliteStore;
 use clap::Args;
@@ -17,7 +18,7 @@ use super::who::{Who, check};
 use crate::connect::ServerArg;
 
 const HELP: &str = "\
-The name gives way to a pseudonym, \"deleted participant\" and six letters and digits, in the database and in records/*.jsonl, markers included; expressions of the \
+Without --fingerprint, all who played under the name become one participant. The name gives way to a pseudonym, \"deleted participant\" and six letters and digits, in the database and in records/*.jsonl, markers included; expressions of the \
 participant, annotations of its decisions (times measured at its side among them) and samples of its seats are dropped. What was played stays, so that the \
 games of the others can still be replayed and checked; a record that changes loses its signature. In every study that has a participant of this name, it withdraws, \
 and its answers, traces and games are deleted; `chefshat study delete-participant` does so in one study. Copies elsewhere (datasets, backups, other servers) are not \
@@ -30,7 +31,7 @@ This cannot be undone. `chefshat participant export` first, if the data are stil
 Examples:
   chefshat participant delete P07 --server http://127.0.0.1:50051
   chefshat participant delete P07 --data-dir ./chefshat-data
-  chefshat participant delete \"Rosa L.\" --yes --json";
+  chefshat participant delete \"Rosa L.\" --fingerprint none --yes --json";
 
 /// Delete a participant's data: a pseudonym replaces the name.
 #[derive(Debug, Args)]
@@ -48,11 +49,12 @@ pub(super) struct Delete {
 
 impl Delete {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let name = &self.who.name;
+        let who = self.who.named();
+        let name = &who.name;
         let (deleted, skipped) = match self.who.server() {
             Some(server) => {
                 self.ask()?;
-                on_server(&server, name).await?
+                on_server(&server, who.clone()).await?
             }
             None => self.in_folder().await?,
         };
@@ -99,7 +101,7 @@ impl Delete {
     async fn in_folder(&self) -> Result<(v1::DeleteParticipantResponse, Skipped), CommandError> {
         let deleting = self.who.with_data(async |data| {
             self.ask()?;
-            Ok(data.delete(&self.who.name).await?)
+            Ok(data.delete(&self.who.named()).await?)
         });
         let deleted = deleting.await?;
         SqliteStore::purge(&self.who.data_dir()?).await?;
@@ -115,7 +117,7 @@ impl Delete {
         if !io::stdin().is_terminal() {
             return Err("nothing was changed: confirm with --yes".into());
         }
-        let name = &self.who.name;
+        let name = self.who.named().name;
         let mut out = anstream::stderr();
         write!(
             out,
@@ -134,10 +136,11 @@ impl Delete {
 
 async fn on_server(
     server: &ServerArg,
-    name: &str,
+    who: Named,
 ) -> Result<(v1::DeleteParticipantResponse, Skipped), CommandError> {
     let request = v1::DeleteParticipantRequest {
-        name: name.to_owned(),
+        name: who.name,
+        name_fingerprint: who.fingerprint,
     };
     let deleted = service(server).await?.delete_participant(request).await;
     let mut deleted = deleted.map_err(refused)?.into_inner();

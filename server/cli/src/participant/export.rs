@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use chefshat_proto::v1;
 use chefshat_record::atomic_file::AtomicFile;
+use chefshat_record::pseudonym::Named;
 use chefshat_server::participants::Skipped;
 use clap::Args;
 use serde_json::{Value, json};
@@ -25,7 +26,7 @@ expressions. Then a line `tournament` for each tournament it joined, and for eac
 Examples:
   chefshat participant export P07 --out p07.jsonl --server http://127.0.0.1:50051
   chefshat participant export P07 --out p07.jsonl --data-dir ./chefshat-data
-  chefshat participant export \"Rosa L.\" --out rosa.jsonl --json";
+  chefshat participant export \"Rosa L.\" --fingerprint eff42f032b0bc531 --out rosa.jsonl --json";
 
 /// Export everything stored about a participant as JSON Lines.
 #[derive(Debug, Args)]
@@ -82,7 +83,8 @@ impl Export {
             let out = self.out.display();
             return Err(format!("{out} exists already; --force replaces it").into());
         }
-        let name = &self.who.name;
+        let who = self.who.named();
+        let name = &who.name;
         let mut sheet = Sheet {
             file: AtomicFile::create(&self.out)?,
             games: 0,
@@ -92,7 +94,7 @@ impl Export {
             expressions: 0,
         };
         let skipped = match self.who.server() {
-            Some(server) => from_server(&server, name, &mut sheet).await?,
+            Some(server) => from_server(&server, who.clone(), &mut sheet).await?,
             None => from_folder(&self.who, &mut sheet).await?,
         };
         if !sheet.has_any() {
@@ -139,7 +141,7 @@ async fn from_folder(who: &Who, sheet: &mut Sheet) -> Result<Skipped, CommandErr
     who.with_data(async |data| {
         let (sender, mut lines) = mpsc::channel(LINES);
         let exporting = async {
-            let exported = data.export(&who.name, &sender).await;
+            let exported = data.export(&who.named(), &sender).await;
             drop(sender);
             exported
         };
@@ -160,11 +162,12 @@ async fn from_folder(who: &Who, sheet: &mut Sheet) -> Result<Skipped, CommandErr
 
 async fn from_server(
     server: &ServerArg,
-    name: &str,
+    who: Named,
     sheet: &mut Sheet,
 ) -> Result<Skipped, CommandError> {
     let request = v1::ExportParticipantRequest {
-        name: name.to_owned(),
+        name: who.name,
+        name_fingerprint: who.fingerprint,
     };
     let exported = service(server).await?.export_participant(request).await;
     let mut responses = exported.map_err(refused)?.into_inner();

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use chefshat_record::pseudonym::{Named, is_fingerprint};
 use chefshat_server::participants::{ParticipantData, Skipped};
 use chefshat_server::store::{SqliteStore, Store as _};
 use clap::Args;
@@ -18,7 +19,12 @@ use crate::error::CommandError;
 pub(super) struct Who {
     /// The exact name the participant played under.
     #[arg(value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
-    pub(super) name: String,
+    name: String,
+    /// Of those who played under the name, only the one with this fingerprint of its key: 16
+    /// hexadecimal digits, as the participant's page and `chefshat leaderboard --json` show; none:
+    /// those without a key. Default: all of the name.
+    #[arg(long, value_name = "DIGITS", value_parser = fingerprint)]
+    fingerprint: Option<String>,
     /// Data directory of a server that is stopped. Default: chefshat in the user's data directory.
     #[arg(long, env = "CHEFSHAT_DATA_DIR")]
     data_dir: Option<PathBuf>,
@@ -40,13 +46,21 @@ impl fmt::Debug for Who {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let place = (&self.server, &self.data_dir);
         f.debug_tuple("Who")
-            .field(&self.name)
+            .field(&self.named())
             .field(&place)
             .finish()
     }
 }
 
 impl Who {
+    /// Whom the data are of.
+    pub(super) fn named(&self) -> Named {
+        Named {
+            name: self.name.clone(),
+            fingerprint: self.fingerprint.clone(),
+        }
+    }
+
     /// The running server, if one was named.
     pub(super) fn server(&self) -> Option<ServerArg> {
         let server = self.server.clone()?;
@@ -84,6 +98,15 @@ impl Who {
         drop(data);
         store.close().await;
         done
+    }
+}
+
+/// Reads a fingerprint; empty for a participant without a key.
+fn fingerprint(text: &str) -> Result<String, &'static str> {
+    match text {
+        "none" => Ok(String::new()),
+        digits if !digits.is_empty() && is_fingerprint(digits) => Ok(digits.to_owned()),
+        _ => Err("give 16 hexadecimal digits (0-9, a-f), or none for a participant without a key"),
     }
 }
 

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use super::import::TRANSCRIPT;
-use super::run::{Ended, chefshat, json_lines, run, serve, serve_with};
+use super::run::{Ended, chefshat, in_runtime, json_lines, run, serve, serve_with};
 
 /// The participant. Letters beyond ASCII test that names are compared as text.
 const NAME: &str = "Rosa Müßig";
@@ -28,13 +28,6 @@ impl Agent for Talker {
             ..v1::Annotations::default()
         })
     }
-}
-
-fn in_runtime<T>(what: impl Future<Output = T>) -> T {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .enable_all()
-        .build();
-    runtime.unwrap().block_on(what)
 }
 
 fn one_shift() -> Option<v1::RuleSet> {
@@ -284,7 +277,7 @@ fn check_export(text: &str, game_id: &str, printed: &Value) {
     assert_eq!(of("expression").len(), 2);
     assert_eq!(json!(of("decision").len()), printed["decisions"]);
     let of_game: Vec<&Value> = (of("decision").into_iter())
-        .filter(|line| line["game_id"] == game_id)
+        .filter(|line| line["gameId"] == game_id)
         .collect();
     assert!(of_game.len() > 3);
     for line in of_game {
@@ -477,4 +470,112 @@ fn a_missing_folder_is_not_created() {
     participant(&["delete", "", "--yes"], folder.path()).assert_refused("a value is required");
     chefshat(&["participant", "delete", "--help"]).assert_helps("chefshat participant delete P07");
     chefshat(&["participant", "export", "--help"]).assert_helps("chefshat participant export P07");
+}
+
+#[test]
+fn of_those_who_share_a_name_only_the_one_meant_is_exported_and_deleted() {
+    let folder = TempDir::new().unwrap();
+    let data_dir = folder.path().join("data");
+    let (server, url) = serve(&data_dir);
+    let fingerprint = in_runtime(async {
+        let client = Client::connect(&url).await.unwrap();
+        let made = client
+            .create_room(v1::CreateRoomRequest {
+                rules: one_shift(),
+                ..v1::CreateRoomRequest::default()
+            })
+            .await
+            .unwrap();
+        let mut seats = Vec::new();
+        let mut fingerprint = String::new();
+        // Two of one name, and one who was there before the game and left.
+        let key: &[u8] = &[7; 32];
+        for (name, key) in [
+            (NAME, key),
+            (NAME, &[][..]),
+            (NAME, key),
+            (OTHER, &[]),
+            (OTHER, &[]),
+        ] {
+            let request = v1::JoinRoomRequest {
+                join_code: made.join_code.clone(),
+                name: name.into(),
+                name_key: key.into(),
+                ..v1::JoinRoomRequest::default()
+            };
+            let joined = client.join(request).await.unwrap();
+            let seat = joined.seat as usize;
+            if fingerprint.is_empty() {
+                fingerprint = joined.room.unwrap().seats[seat].name_fingerprint.clone();
+                client.leave_room(joined.ticket).await.unwrap();
+            } else {
+                seats.push((joined.ticket, RandomAgent::new(7)));
+            }
+        }
+        for outcome in client.play_many(seats).await {
+            outcome.unwrap();
+        }
+        fingerprint
+    });
+    drop(server);
+    let out = folder.path().join("out.jsonl");
+    let out = out.to_str().unwrap();
+    let export = |fingerprint: &str| {
+        let arguments = [
+            "export",
+            NAME,
+            "--out",
+            out,
+            "--force",
+            "--json",
+            "--fingerprint",
+            fingerprint,
+        ];
+        participant(&arguments, &data_dir)
+    };
+    let seats = |fingerprint: &str| -> Vec<Value> {
+        export(fingerprint).well();
+        let text = std::fs::read_to_string(out).unwrap();
+        let lines = json_lines(&text);
+        let games = lines.iter().filter(|line| line.get("game").is_some());
+        games.map(|line| line["game"]["seats"].clone()).collect()
+    };
+    for (fingerprint, shown) in [
+        (fingerprint.as_str(), json!(fingerprint)),
+        ("none", Value::Null),
+    ] {
+        let [seats] = &seats(fingerprint)[..] else {
+            panic!("one game");
+        };
+        assert_eq!(seats.as_array().map(Vec::len), Some(1));
+        assert_eq!(seats[0]["nameFingerprint"], shown);
+    }
+    export("eff42f032b0bc531").assert_failed("nothing is stored");
+    export("eff4").assert_refused("give 16 hexadecimal digits");
+
+    let delete = |fingerprint: &str| {
+        participant(
+            &[
+                "delete",
+                NAME,
+                "--yes",
+                "--json",
+                "--fingerprint",
+                fingerprint,
+            ],
+            &data_dir,
+        )
+    };
+    let deleted = delete(&fingerprint).well().json();
+    assert_eq!(
+        (&deleted["games"], &deleted["files"]),
+        (&json!(1), &json!(1))
+    );
+    verify(&data_dir);
+    assert_nowhere(&data_dir, &fingerprint);
+    export(&fingerprint).assert_failed("nothing is stored");
+    assert_eq!(seats("none").len(), 1, "the other is still there");
+    delete("none").well();
+    verify(&data_dir);
+    assert_nowhere(&data_dir, NAME);
 }

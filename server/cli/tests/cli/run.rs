@@ -23,6 +23,14 @@ pub(super) fn until(what: &str, holds: impl Fn() -> bool) {
     }
 }
 
+/// Runs what the test does with a client of the SDK.
+pub(super) fn in_runtime<T>(what: impl Future<Output = T>) -> T {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build();
+    runtime.unwrap().block_on(what)
+}
+
 /// The result of a run.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Ended {

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chefshat_dataset::decision_columns;
 use chefshat_engine::RewardScheme;
-use chefshat_proto::v1::{self, record_line::Line};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::signature::SigningKey;
 use serde_json::{Value, json};
 
@@ -70,6 +70,81 @@ fn rows_agree_with_the_engines_metrics() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn rows_of_a_study_have_its_columns_and_the_time_of_the_device() {
+    let mut lines = a_record(3);
+    let mut timed = 0;
+    for line in &mut lines {
+        match &mut line.line {
+            Some(Line::Header(header)) => {
+                header.study = Some(v1::StudyRecord {
+                    study_id: "5".repeat(32),
+                    name: "warmth".into(),
+                    condition: "cold".into(),
+                    number: 7,
+                    participant: "P07".into(),
+                    ..v1::StudyRecord::default()
+                });
+            }
+            Some(Line::Decision(decision)) if decision.seat == 0 => {
+                timed += 1;
+                let time = |text: &str| ("person_decision_time_ms".to_owned(), text.to_owned());
+                decision.annotations = Some(v1::Annotations {
+                    // Whatever a client sends: one of them is not a time.
+                    extra: [time(if timed == 1 { "soon" } else { "1234" })].into(),
+                    ..v1::Annotations::default()
+                });
+            }
+            _ => {}
+        }
+    }
+    let stage = Stage::new(&[("a.jsonl", lines)]);
+    stage.run(&stage.export()).unwrap();
+    let rows = stage.rows("decisions");
+    for row in &rows {
+        let study = [&row["study"], &row["condition"], &row["participant"]];
+        assert_eq!(study, ["warmth", "cold", "P07"]);
+    }
+    let times = |of: fn(&Value) -> bool| {
+        let rows = rows.iter().filter(move |row| of(&row["seat"]));
+        rows.map(|row| row["person_decision_time_ms"].clone())
+    };
+    let own: Vec<Value> = times(|seat| seat == 0).collect();
+    assert!(own.len() > 1 && own.len() == timed);
+    assert!(own[0].is_null() && own[1..].iter().all(|time| *time == 1234));
+    assert!(times(|seat| seat != 0).all(|time| time.is_null()));
+}
+
+#[test]
+fn players_of_one_name_are_told_apart_by_their_keys() {
+    let mut lines = a_record(3);
+    let fingerprint = "0123456789abcdef";
+    let seat = players(&lines)
+        .iter()
+        .position(|it| it.built_in_agent.is_empty());
+    let seat = seat.expect("a participant");
+    for line in &mut lines {
+        match &mut line.line {
+            Some(Line::Header(header)) => header.seats[seat].name_fingerprint = fingerprint.into(),
+            Some(Line::Event(event)) => {
+                if let Some(Kind::GameStarted(started)) = &mut event.kind {
+                    started.seats[seat].name_fingerprint = fingerprint.into();
+                }
+            }
+            _ => {}
+        }
+    }
+    let stage = Stage::new(&[("a.jsonl", lines)]);
+    stage.run(&stage.export()).unwrap();
+    for row in stage.rows("decisions") {
+        let expected = match row["seat"].as_u64() == Some(seat as u64) {
+            true => Value::from(fingerprint),
+            false => Value::Null,
+        };
+        assert_eq!(row["name_fingerprint"], expected);
     }
 }
 

@@ -31,3 +31,7 @@ pub use rules::{
 };
 pub use situation::situation_from_proto;
 pub use start::{script_from_proto, script_to_proto};
+
+/// Key of the annotation with the time that a decision was on the screen of a person, as the
+/// person's device measured it, in whole milliseconds.
+pub const PERSON_TIME_KEY: &str = "person_decision_time_ms";

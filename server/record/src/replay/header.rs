@@ -15,6 +15,7 @@ use crate::convert::{
 };
 use crate::import::start_of_header;
 use crate::jsonl::FORMAT_VERSION;
+use crate::pseudonym::is_fingerprint;
 
 const COMMITMENT_BYTES: usize = 32;
 /// Milliseconds of a day, the longest time of a policy.
@@ -142,8 +143,7 @@ fn check_seats(seats: &[v1::Participant], players: usize) -> Result<(), String> 
         if !seat.built_in_agent.is_empty() && !fingerprint.is_empty() {
             return Err(must_be(&field, fingerprint, "empty for a built-in agent"));
         }
-        let is_digit = |digit: u8| matches!(digit, b'0'..=b'9' | b'a'..=b'f');
-        if ![0, 16].contains(&fingerprint.len()) || !fingerprint.bytes().all(is_digit) {
+        if !is_fingerprint(fingerprint) {
             let what = "empty or 16 hexadecimal digits (0-9, a-f)";
             return Err(must_be(&field, fingerprint, what));
         }

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::fixture;
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::jsonl;
-use chefshat_record::pseudonym::Pseudonym;
+use chefshat_record::pseudonym::{Named, Pseudonym};
 use chefshat_record::replay::replay;
 use chefshat_record::signature::{PublicKey, SigningKey, signer};
 
@@ -327,7 +327,10 @@ fn a_restart_before_the_game_leaves_its_timeouts_valid() {
 fn a_record_without_a_participant_loses_its_signature() {
     let mut lines = signed();
     let delete = |name: &str| Pseudonym {
-        name: name.into(),
+        of: Named {
+            name: name.into(),
+            fingerprint: None,
+        },
         pseudonym: "deleted participant".into(),
     };
     delete("nobody").redact(&mut lines);

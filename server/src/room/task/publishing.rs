@@ -29,7 +29,7 @@ const MAX_EVENTS_UNREAD_AFTERWARDS: usize = 1_024;
 impl Room {
     fn spectate(&mut self, request: SpectateRequest) -> Result<(), SpectateError> {
         let policy = &self.core.header().policy;
-        if !policy.spectators {
+        if !policy.spectators && !request.is_owner {
             return Err(SpectateError::NotAdmitted);
         }
         if request.snapshot && policy.spectator_delay_decisions > 0 {

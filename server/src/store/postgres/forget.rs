@@ -23,7 +23,7 @@ impl Reader {
     /// See [`ForgetError`].
     pub(super) async fn forgetting(&self, who: &Pseudonym) -> Result<Rewrite, ForgetError> {
         let mut rewrite = Rewrite::new(who);
-        for number in self.games_with(&who.name).await? {
+        for number in self.games_with(&who.of.name).await? {
             if let Some(rows) = self.game_rows(number).await? {
                 let bytes: usize = rows.journal.iter().map(|(_, bytes)| bytes.len()).sum();
                 let bytes = bytes + rows.record.as_ref().map_or(0, Vec::len);
@@ -31,7 +31,7 @@ impl Reader {
                 rewrite = redacting.await??;
             }
         }
-        let name = who.name.as_bytes().to_vec();
+        let name = who.of.name.as_bytes().to_vec();
         let tournaments: Vec<i64> = (self.read(|connection| {
             sqlx::query_scalar(
                 "SELECT DISTINCT tournament FROM tournament_entries WHERE position($1 IN entries) > 0",
@@ -167,14 +167,12 @@ pub(super) async fn rewrite(connection: &mut PgConnection, rewrite: &Rewrite) ->
             .execute(&mut *connection)
             .await?;
         }
-        sqlx::query(
-            "UPDATE participants SET name = $3 WHERE game = $1 AND name = $2 AND agent = ''",
-        )
-        .bind(game.number)
-        .bind(text(&rewrite.who.name))
-        .bind(text(&rewrite.who.pseudonym))
-        .execute(&mut *connection)
-        .await?;
+        sqlx::query("UPDATE participants SET name = $3 WHERE game = $1 AND seat = ANY($2)")
+            .bind(game.number)
+            .bind(&game.seats)
+            .bind(text(&rewrite.who.pseudonym))
+            .execute(&mut *connection)
+            .await?;
     }
     for tournament in &rewrite.tournaments {
         let (positions, entries): (Vec<i64>, Vec<&[u8]>) = (tournament.rows.iter())

@@ -52,7 +52,7 @@ impl Reader {
                               UNION SELECT game FROM added_records WHERE instr(record, CAST($1 AS BLOB)) > 0)
              ORDER BY number",
         )
-        .bind(who.name.as_str())
+        .bind(who.of.name.as_str())
         .fetch_all(&self.pool)
         .await
         .map_err(failure)?;
@@ -68,7 +68,7 @@ impl Reader {
             "SELECT DISTINCT tournament FROM tournament_entries
              WHERE instr(entries, CAST($1 AS BLOB)) > 0",
         )
-        .bind(who.name.as_str())
+        .bind(who.of.name.as_str())
         .fetch_all(&self.pool)
         .await
         .map_err(failure)?;

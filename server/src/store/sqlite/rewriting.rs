@@ -46,14 +46,14 @@ pub(super) async fn rewrite(
             .execute(&mut *connection)
             .await?;
         }
-        sqlx::query(
-            "UPDATE participants SET name = $3 WHERE game = $1 AND name = $2 AND agent = ''",
-        )
-        .bind(game.number)
-        .bind(rewrite.who.name.as_str())
-        .bind(rewrite.who.pseudonym.as_str())
-        .execute(&mut *connection)
-        .await?;
+        for seat in &game.seats {
+            sqlx::query("UPDATE participants SET name = $3 WHERE game = $1 AND seat = $2")
+                .bind(game.number)
+                .bind(*seat)
+                .bind(rewrite.who.pseudonym.as_str())
+                .execute(&mut *connection)
+                .await?;
+        }
     }
     for tournament in &rewrite.tournaments {
         for (position, entries) in &tournament.rows {

@@ -2,7 +2,7 @@
 //! their files.
 
 use chefshat_engine::{ActionId, Seat};
-use chefshat_record::pseudonym::Redactions;
+use chefshat_record::pseudonym::{Named, Redactions};
 use chefshat_room::journal::{Decided, Marked, ParticipantKind, SeatedParticipant, Source};
 use chefshat_tournament::{Change as TournamentChange, Entrant};
 
@@ -12,7 +12,10 @@ use crate::store::tournaments::TournamentEntry;
 
 fn ana() -> Pseudonym {
     Pseudonym {
-        name: "Ana".into(),
+        of: Named {
+            name: "Ana".into(),
+            fingerprint: None,
+        },
         pseudonym: "deleted 1".into(),
     }
 }
@@ -186,6 +189,112 @@ async fn a_participant_is_removed_from_its_games_and_others_stay() {
 async fn created_of_others(store: &dyn Store) -> Box<dyn Journal> {
     let created = store.create(header(2, Durability::Durable), vec![seated(0, "Bo")]);
     created.await.expect("a new game")
+}
+
+#[tokio::test]
+async fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
+    with_each_store(async |store| {
+        let without_key = |mut entry: Entry| {
+            if let Change::Seated { participant, .. } = &mut entry.change {
+                participant.name_fingerprint.clear();
+            }
+            entry
+        };
+        let mut both = summary_of(&header(1, Durability::Durable));
+        both.seats[0].name = "Ana".into();
+        both.seats[0].name_fingerprint.clear();
+        let mut other = both.clone();
+        other.seats.truncate(1);
+        let games = [
+            (
+                1,
+                vec![without_key(seated(0, "Ana")), seated(1, "Ana")],
+                both,
+            ),
+            (2, vec![without_key(seated(0, "Ana"))], other),
+        ];
+        for (number, mut entries, summary) in games {
+            let created = store.create(header(number, Durability::Durable), Vec::new());
+            let mut journal = created.await.expect("a new game");
+            entries.extend([expressed(0), expressed(1), marked("Ana laughs")]);
+            journal.append(&mut entries).await.expect("committed");
+            let ended = journal.finish(Some(summary), None);
+            ended.await.expect("committed");
+        }
+        let games_of = async |name: &str| {
+            let filter = v1::RecordFilter {
+                participant: name.into(),
+                ..v1::RecordFilter::default()
+            };
+            let found = store.list(&filter, Part::FROM_OLDEST, 9).await;
+            found.expect("readable").len()
+        };
+        let with_fingerprint = |fingerprint: &str| Pseudonym {
+            of: Named {
+                name: "Ana".into(),
+                fingerprint: Some(fingerprint.into()),
+            },
+            pseudonym: format!("deleted {fingerprint}"),
+        };
+        let nobody = store.forget(&with_fingerprint("key of Bo")).await;
+        assert_eq!(nobody.expect("nothing to do"), Forgotten::default());
+
+        let with_key = with_fingerprint("key of Ana");
+        let forgotten = store.forget(&with_key).await.expect("it is over");
+        assert_eq!(forgotten.games, [Id([1; 16])]);
+        let redactions = Redactions {
+            names: 2,
+            expressions: 1,
+            annotations: 0,
+        };
+        assert_eq!(forgotten.redactions, redactions);
+        let found = (games_of("Ana").await, games_of(&with_key.pseudonym).await);
+        assert_eq!(found, (2, 1));
+
+        let forgotten = store.forget(&with_fingerprint("")).await;
+        assert_eq!(forgotten.expect("both are over").games.len(), 2);
+        let found = (games_of("Ana").await, games_of("deleted ").await);
+        assert_eq!(found, (0, 2));
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn a_player_at_a_physical_table_is_removed() {
+    with_each_database(async |store| {
+        let mut fills = vec![Fill::Open { reserved_for: None }; 4];
+        fills[0] = Fill::AtTable(ParticipantKind::Human);
+        let at_table = Arc::new(GameHeader {
+            name: "Ana’s table".into(),
+            fills,
+            display_names: [(0, "Ana".to_owned())].into(),
+            ..GameHeader::clone(&header(1, Durability::Durable))
+        });
+        let created = store.create(Arc::clone(&at_table), Vec::new()).await;
+        let mut journal = created.expect("a new game");
+        let mut summary = summary_of(&at_table);
+        summary.seats.truncate(2);
+        let ended = journal.finish(Some(summary), None);
+        ended.await.expect("committed");
+        let with_key = Pseudonym {
+            of: Named {
+                fingerprint: Some("key of Ana".into()),
+                ..ana().of
+            },
+            ..ana()
+        };
+        let forgotten = store.forget(&with_key).await.expect("it is over");
+        assert_eq!(forgotten, Forgotten::default(), "nobody there has a key");
+        let forgotten = store.forget(&ana()).await.expect("it is over");
+        assert_eq!(forgotten.games, [at_table.game_id]);
+        let stored = store.finished(at_table.game_id).await.expect("readable");
+        let Some(StoredGame::Hosted(header, ..)) = stored else {
+            panic!("{stored:?}");
+        };
+        assert_eq!(header.name, "deleted 1’s table");
+        assert_eq!(header.display_names[&0], "deleted 1");
+    })
+    .await;
 }
 
 #[tokio::test]

@@ -20,6 +20,7 @@ from chefshat._gen.chefshat.v1.record_service_pb2_grpc import RecordServiceStub
 from chefshat._gen.chefshat.v1.room_service_pb2_grpc import RoomServiceStub
 from chefshat._gen.chefshat.v1.server_service_pb2_grpc import ServerServiceStub
 from chefshat._gen.chefshat.v1.spectator_service_pb2_grpc import SpectatorServiceStub
+from chefshat._gen.chefshat.v1.study_service_pb2_grpc import StudyServiceStub
 from chefshat._gen.chefshat.v1.table_service_pb2_grpc import TableServiceStub
 from chefshat._gen.chefshat.v1.tournament_service_pb2_grpc import TournamentServiceStub
 from chefshat.address import ServerAddress, server_address
@@ -76,6 +77,7 @@ class AsyncCalls(ABC):
         self._spectators = SpectatorServiceStub(self._channel)
         self._table = TableServiceStub(self._channel)
         self._instruments = InstrumentServiceStub(self._channel)
+        self._studies = StudyServiceStub(self._channel)
         self._tournaments = TournamentServiceStub(self._channel)
         self._analysis = AnalysisServiceStub(self._channel)
 
@@ -239,7 +241,7 @@ class AsyncCalls(ABC):
 
         Args:
             room_id: the room.
-            owner_token: its creator's token.
+            owner_token: its creator's token, or that of the study whose game it is.
             label: what the marker says, 1..=128 characters.
             elapsed_us: the marked moment on the room's clock, microseconds since the room was created (see `clock`); None: when the
                 server reads the request.
@@ -273,14 +275,43 @@ class AsyncCalls(ABC):
             finally:
                 call.cancel()
 
-    async def add_samples(self, ticket: str, chunk: pb.SampleChunk) -> int:
-        """Records samples of the seat of a ticket beside its game. See `chefshat.samples.SampleStream`.
+    async def add_samples(self, ticket: str | pb.OwnedSeat, chunk: pb.SampleChunk) -> int:
+        """Records samples of a seat beside its game. See `chefshat.samples.SampleStream`.
+
+        Args:
+            ticket: the ticket of the seat, or for the owner of a room or study the seat itself.
+            chunk: the samples.
 
         Returns:
             How many were new. Samples that are not later than the last one of their stream are ignored.
         """
-        request = pb.AddSamplesRequest(ticket=ticket, chunk=chunk)
+        if isinstance(ticket, pb.OwnedSeat):
+            request = pb.AddSamplesRequest(owned_seat=ticket, chunk=chunk)
+        else:
+            request = pb.AddSamplesRequest(ticket=ticket, chunk=chunk)
         return (await awaited(self._instruments.AddSamples, request)).recorded
+
+    async def follow_study(self, study_id: str, owner_token: str) -> AsyncIterator[pb.StudyParticipant]:
+        """Iterates over the participants of a study, then over each one that changes, until the study is over. Reconnects.
+
+        Args:
+            study_id: the study.
+            owner_token: its owner's token.
+        """
+        failures = 0
+        while True:
+            call = self._studies.FollowStudy(pb.FollowStudyRequest(study_id=study_id, owner_token=owner_token))
+            try:
+                async for response in call:
+                    failures = 0
+                    for participant in response.participants:
+                        yield participant
+                return
+            except grpc.RpcError as error:
+                failures += 1
+                await self._wait(failures, from_rpc_error(error))
+            finally:
+                call.cancel()
 
     async def report(self, table_ticket: str, report: pb.TableReport, *, report_id: str = "") -> pb.ReportResponse:
         """Reports something that happened at a physical table.

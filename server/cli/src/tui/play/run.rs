@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use chefshat_client::v1::{self, seat_command::Command};
 use chefshat_client::{Client, ENTROPY_BYTES};
+use chefshat_record::convert::PERSON_TIME_KEY;
 use tokio::sync::mpsc;
 
 use super::app::{App, Do, EXPRESSIONS};
@@ -24,8 +25,6 @@ const HEARD: usize = 64;
 const ORDERS: usize = 16;
 /// Time between two drawings of the clock.
 const TICK: Duration = Duration::from_millis(250);
-/// Key of the annotation with the time a decision was on screen; the page uses the same.
-const PERSON_TIME_KEY: &str = "person_decision_time_ms";
 
 /// A ticket and, if it is for a seat, the table as of joining.
 pub(super) struct Taken {

@@ -375,18 +375,27 @@ class ExportParticipantRequest(_message.Message):
     DESCRIPTOR: _descriptor.Descriptor
 
     NAME_FIELD_NUMBER: _builtins.int
+    NAME_FINGERPRINT_FIELD_NUMBER: _builtins.int
     name: _builtins.str
     """The exact name that the participant played under."""
+    name_fingerprint: _builtins.str
+    """Of those who played under the name, the one with this fingerprint (as in
+    `Participant.name_fingerprint`), 16 hexadecimal digits; empty: those without a key, also in
+    studies. Unset: all who played under the name.
+    """
     def __init__(
         self,
         *,
         name: _builtins.str = ...,
+        name_fingerprint: _builtins.str | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_name_fingerprint", b"_name_fingerprint", "name_fingerprint", b"name_fingerprint"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["name", b"name"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_name_fingerprint", b"_name_fingerprint", "name", b"name", "name_fingerprint", b"name_fingerprint"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    def WhichOneof(self, oneof_group: _Never) -> None: ...
+    _WhichOneofReturnType__name_fingerprint: _TypeAlias = _typing.Literal["name_fingerprint"]  # noqa: Y015
+    _WhichOneofArgType__name_fingerprint: _TypeAlias = _typing.Literal["_name_fingerprint", b"_name_fingerprint"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__name_fingerprint) -> _WhichOneofReturnType__name_fingerprint | None: ...
 
 Global___ExportParticipantRequest: _TypeAlias = ExportParticipantRequest  # noqa: Y015
 
@@ -427,18 +436,27 @@ class DeleteParticipantRequest(_message.Message):
     DESCRIPTOR: _descriptor.Descriptor
 
     NAME_FIELD_NUMBER: _builtins.int
+    NAME_FINGERPRINT_FIELD_NUMBER: _builtins.int
     name: _builtins.str
     """The exact name that the participant played under."""
+    name_fingerprint: _builtins.str
+    """Of those who played under the name, the one with this fingerprint (as in
+    `Participant.name_fingerprint`), 16 hexadecimal digits; empty: those without a key, also in
+    studies. Unset: all who played under the name.
+    """
     def __init__(
         self,
         *,
         name: _builtins.str = ...,
+        name_fingerprint: _builtins.str | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_name_fingerprint", b"_name_fingerprint", "name_fingerprint", b"name_fingerprint"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["name", b"name"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_name_fingerprint", b"_name_fingerprint", "name", b"name", "name_fingerprint", b"name_fingerprint"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    def WhichOneof(self, oneof_group: _Never) -> None: ...
+    _WhichOneofReturnType__name_fingerprint: _TypeAlias = _typing.Literal["name_fingerprint"]  # noqa: Y015
+    _WhichOneofArgType__name_fingerprint: _TypeAlias = _typing.Literal["_name_fingerprint", b"_name_fingerprint"]  # noqa: Y015
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__name_fingerprint) -> _WhichOneofReturnType__name_fingerprint | None: ...
 
 Global___DeleteParticipantRequest: _TypeAlias = DeleteParticipantRequest  # noqa: Y015
 

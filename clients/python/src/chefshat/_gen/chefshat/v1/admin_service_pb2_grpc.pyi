@@ -56,17 +56,17 @@ class AdminServiceStub:
     ExportParticipant: _grpc.UnaryStreamMultiCallable[_admin_service_pb2.ExportParticipantRequest, _admin_service_pb2.ExportParticipantResponse]
     """Streams all that is stored under a participant's name: its games that are over with its
     decisions and expressions, its tournaments, and its answers in studies. INVALID_ARGUMENT
-    (NAME_REFUSED if the name is empty); NOT_FOUND (PARTICIPANT_UNKNOWN); UNAVAILABLE
-    (STORE_FAILED).
+    (NAME_REFUSED if the name is empty or the fingerprint is none); NOT_FOUND
+    (PARTICIPANT_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteParticipant: _grpc.UnaryUnaryMultiCallable[_admin_service_pb2.DeleteParticipantRequest, _admin_service_pb2.DeleteParticipantResponse]
     """Deletes the data of a participant, known by its name: a pseudonym replaces the name in games,
     records, tournaments and ratings, and its expressions and annotations are dropped. In studies
     it withdraws, and its data there are deleted as by DeleteStudyParticipant, in every study that
     has a participant of this name. Repeating the call completes what was interrupted, and changes
-    nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty); FAILED_PRECONDITION
-    (PARTICIPANT_PLAYING while a game or tournament with the name is not over: nothing was
-    changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
+    nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint is none);
+    FAILED_PRECONDITION (PARTICIPANT_PLAYING while a game or tournament with the participant is not
+    over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
     """
 
 @_typing.type_check_only
@@ -97,17 +97,17 @@ class AdminServiceAsyncStub(AdminServiceStub):
     ExportParticipant: _aio.UnaryStreamMultiCallable[_admin_service_pb2.ExportParticipantRequest, _admin_service_pb2.ExportParticipantResponse]  # type: ignore[assignment]
     """Streams all that is stored under a participant's name: its games that are over with its
     decisions and expressions, its tournaments, and its answers in studies. INVALID_ARGUMENT
-    (NAME_REFUSED if the name is empty); NOT_FOUND (PARTICIPANT_UNKNOWN); UNAVAILABLE
-    (STORE_FAILED).
+    (NAME_REFUSED if the name is empty or the fingerprint is none); NOT_FOUND
+    (PARTICIPANT_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteParticipant: _aio.UnaryUnaryMultiCallable[_admin_service_pb2.DeleteParticipantRequest, _admin_service_pb2.DeleteParticipantResponse]  # type: ignore[assignment]
     """Deletes the data of a participant, known by its name: a pseudonym replaces the name in games,
     records, tournaments and ratings, and its expressions and annotations are dropped. In studies
     it withdraws, and its data there are deleted as by DeleteStudyParticipant, in every study that
     has a participant of this name. Repeating the call completes what was interrupted, and changes
-    nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty); FAILED_PRECONDITION
-    (PARTICIPANT_PLAYING while a game or tournament with the name is not over: nothing was
-    changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
+    nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint is none);
+    FAILED_PRECONDITION (PARTICIPANT_PLAYING while a game or tournament with the participant is not
+    over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
     """
 
 class AdminServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -177,8 +177,8 @@ class AdminServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_abc.Iterator[_admin_service_pb2.ExportParticipantResponse], _abc.AsyncIterator[_admin_service_pb2.ExportParticipantResponse]]:
         """Streams all that is stored under a participant's name: its games that are over with its
         decisions and expressions, its tournaments, and its answers in studies. INVALID_ARGUMENT
-        (NAME_REFUSED if the name is empty); NOT_FOUND (PARTICIPANT_UNKNOWN); UNAVAILABLE
-        (STORE_FAILED).
+        (NAME_REFUSED if the name is empty or the fingerprint is none); NOT_FOUND
+        (PARTICIPANT_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         """
 
     @_abc_1.abstractmethod
@@ -191,9 +191,9 @@ class AdminServiceServicer(metaclass=_abc_1.ABCMeta):
         records, tournaments and ratings, and its expressions and annotations are dropped. In studies
         it withdraws, and its data there are deleted as by DeleteStudyParticipant, in every study that
         has a participant of this name. Repeating the call completes what was interrupted, and changes
-        nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty); FAILED_PRECONDITION
-        (PARTICIPANT_PLAYING while a game or tournament with the name is not over: nothing was
-        changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
+        nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint is none);
+        FAILED_PRECONDITION (PARTICIPANT_PLAYING while a game or tournament with the participant is not
+        over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
         """
 
 def add_AdminServiceServicer_to_server(servicer: AdminServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from chefshat._gen.chefshat.v1 import record_pb2 as chefshat_dot_v1_dot_record__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$chefshat/v1/instrument_service.proto\x12\x0b\x63hefshat.v1\x1a\x18\x63hefshat/v1/record.proto\"o\n\x10\x41\x64\x64MarkerRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\x12\r\n\x05label\x18\x03 \x01(\t\x12\x17\n\nelapsed_us\x18\x04 \x01(\x04H\x00\x88\x01\x01\x42\r\n\x0b_elapsed_us\"8\n\x11\x41\x64\x64MarkerResponse\x12#\n\x06marker\x18\x01 \x01(\x0b\x32\x13.chefshat.v1.Marker\"Q\n\x14\x46ollowMarkersRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\x12\x13\n\x0b\x66rom_number\x18\x03 \x01(\x04\"=\n\x15\x46ollowMarkersResponse\x12$\n\x07markers\x18\x01 \x03(\x0b\x32\x13.chefshat.v1.Marker\"L\n\x11\x41\x64\x64SamplesRequest\x12\x0e\n\x06ticket\x18\x01 \x01(\t\x12\'\n\x05\x63hunk\x18\x02 \x01(\x0b\x32\x18.chefshat.v1.SampleChunk\"&\n\x12\x41\x64\x64SamplesResponse\x12\x10\n\x08recorded\x18\x01 \x01(\r\"S\n\x0bSampleChunk\x12\x0e\n\x06stream\x18\x01 \x01(\t\x12\x10\n\x08\x63hannels\x18\x02 \x03(\t\x12\x12\n\nelapsed_us\x18\x03 \x03(\x04\x12\x0e\n\x06values\x18\x04 \x03(\x02\x32\x88\x02\n\x11InstrumentService\x12J\n\tAddMarker\x12\x1d.chefshat.v1.AddMarkerRequest\x1a\x1e.chefshat.v1.AddMarkerResponse\x12X\n\rFollowMarkers\x12!.chefshat.v1.FollowMarkersRequest\x1a\".chefshat.v1.FollowMarkersResponse0\x01\x12M\n\nAddSamples\x12\x1e.chefshat.v1.AddSamplesRequest\x1a\x1f.chefshat.v1.AddSamplesResponseb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n$chefshat/v1/instrument_service.proto\x12\x0b\x63hefshat.v1\x1a\x18\x63hefshat/v1/record.proto\"o\n\x10\x41\x64\x64MarkerRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\x12\r\n\x05label\x18\x03 \x01(\t\x12\x17\n\nelapsed_us\x18\x04 \x01(\x04H\x00\x88\x01\x01\x42\r\n\x0b_elapsed_us\"8\n\x11\x41\x64\x64MarkerResponse\x12#\n\x06marker\x18\x01 \x01(\x0b\x32\x13.chefshat.v1.Marker\"Q\n\x14\x46ollowMarkersRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\x12\x13\n\x0b\x66rom_number\x18\x03 \x01(\x04\"=\n\x15\x46ollowMarkersResponse\x12$\n\x07markers\x18\x01 \x03(\x0b\x32\x13.chefshat.v1.Marker\"x\n\x11\x41\x64\x64SamplesRequest\x12\x0e\n\x06ticket\x18\x01 \x01(\t\x12\'\n\x05\x63hunk\x18\x02 \x01(\x0b\x32\x18.chefshat.v1.SampleChunk\x12*\n\nowned_seat\x18\x03 \x01(\x0b\x32\x16.chefshat.v1.OwnedSeat\"?\n\tOwnedSeat\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\x12\x0c\n\x04seat\x18\x03 \x01(\r\"&\n\x12\x41\x64\x64SamplesResponse\x12\x10\n\x08recorded\x18\x01 \x01(\r\"S\n\x0bSampleChunk\x12\x0e\n\x06stream\x18\x01 \x01(\t\x12\x10\n\x08\x63hannels\x18\x02 \x03(\t\x12\x12\n\nelapsed_us\x18\x03 \x03(\x04\x12\x0e\n\x06values\x18\x04 \x03(\x02\x32\x88\x02\n\x11InstrumentService\x12J\n\tAddMarker\x12\x1d.chefshat.v1.AddMarkerRequest\x1a\x1e.chefshat.v1.AddMarkerResponse\x12X\n\rFollowMarkers\x12!.chefshat.v1.FollowMarkersRequest\x1a\".chefshat.v1.FollowMarkersResponse0\x01\x12M\n\nAddSamples\x12\x1e.chefshat.v1.AddSamplesRequest\x1a\x1f.chefshat.v1.AddSamplesResponseb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -41,11 +41,13 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_FOLLOWMARKERSRESPONSE']._serialized_start=333
   _globals['_FOLLOWMARKERSRESPONSE']._serialized_end=394
   _globals['_ADDSAMPLESREQUEST']._serialized_start=396
-  _globals['_ADDSAMPLESREQUEST']._serialized_end=472
-  _globals['_ADDSAMPLESRESPONSE']._serialized_start=474
-  _globals['_ADDSAMPLESRESPONSE']._serialized_end=512
-  _globals['_SAMPLECHUNK']._serialized_start=514
-  _globals['_SAMPLECHUNK']._serialized_end=597
-  _globals['_INSTRUMENTSERVICE']._serialized_start=600
-  _globals['_INSTRUMENTSERVICE']._serialized_end=864
+  _globals['_ADDSAMPLESREQUEST']._serialized_end=516
+  _globals['_OWNEDSEAT']._serialized_start=518
+  _globals['_OWNEDSEAT']._serialized_end=581
+  _globals['_ADDSAMPLESRESPONSE']._serialized_start=583
+  _globals['_ADDSAMPLESRESPONSE']._serialized_end=621
+  _globals['_SAMPLECHUNK']._serialized_start=623
+  _globals['_SAMPLECHUNK']._serialized_end=706
+  _globals['_INSTRUMENTSERVICE']._serialized_start=709
+  _globals['_INSTRUMENTSERVICE']._serialized_end=973
 # @@protoc_insertion_point(module_scope)

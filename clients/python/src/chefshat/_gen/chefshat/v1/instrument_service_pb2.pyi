@@ -32,7 +32,7 @@ class AddMarkerRequest(_message.Message):
     room_id: _builtins.str
     """Identifies the room."""
     owner_token: _builtins.str
-    """`owner_token` of CreateRoomResponse."""
+    """`owner_token` of CreateRoomResponse, or that of the study."""
     label: _builtins.str
     """What the marker says, 1..=128 characters without control characters."""
     elapsed_us: _builtins.int
@@ -93,7 +93,7 @@ class FollowMarkersRequest(_message.Message):
     room_id: _builtins.str
     """Identifies the room."""
     owner_token: _builtins.str
-    """`owner_token` of CreateRoomResponse."""
+    """`owner_token` of CreateRoomResponse, or that of the study."""
     from_number: _builtins.int
     """Number of the first marker to send; 0 and 1: all."""
     def __init__(
@@ -143,25 +143,61 @@ class AddSamplesRequest(_message.Message):
 
     TICKET_FIELD_NUMBER: _builtins.int
     CHUNK_FIELD_NUMBER: _builtins.int
+    OWNED_SEAT_FIELD_NUMBER: _builtins.int
     ticket: _builtins.str
-    """The ticket of the seat."""
+    """The ticket of the seat; empty with `owned_seat`."""
     @_builtins.property
     def chunk(self) -> Global___SampleChunk:
         """The samples."""
+
+    @_builtins.property
+    def owned_seat(self) -> Global___OwnedSeat:
+        """Instead of a ticket: a seat of a room of the owner, such as that of a participant of a study."""
 
     def __init__(
         self,
         *,
         ticket: _builtins.str = ...,
         chunk: Global___SampleChunk | None = ...,
+        owned_seat: Global___OwnedSeat | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["chunk", b"chunk"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["chunk", b"chunk", "owned_seat", b"owned_seat"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["chunk", b"chunk", "ticket", b"ticket"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["chunk", b"chunk", "owned_seat", b"owned_seat", "ticket", b"ticket"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___AddSamplesRequest: _TypeAlias = AddSamplesRequest  # noqa: Y015
+
+@_typing.final
+class OwnedSeat(_message.Message):
+    """A seat, for the owner of its room."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    ROOM_ID_FIELD_NUMBER: _builtins.int
+    OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    SEAT_FIELD_NUMBER: _builtins.int
+    room_id: _builtins.str
+    """Identifies the room."""
+    owner_token: _builtins.str
+    """`owner_token` of CreateRoomResponse, or that of the study."""
+    seat: _builtins.int
+    """The seat, from 0."""
+    def __init__(
+        self,
+        *,
+        room_id: _builtins.str = ...,
+        owner_token: _builtins.str = ...,
+        seat: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["owner_token", b"owner_token", "room_id", b"room_id", "seat", b"seat"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___OwnedSeat: _TypeAlias = OwnedSeat  # noqa: Y015
 
 @_typing.final
 class AddSamplesResponse(_message.Message):

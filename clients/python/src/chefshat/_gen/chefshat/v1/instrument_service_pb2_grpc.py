@@ -26,7 +26,8 @@ if _version_not_supported:
 
 
 class InstrumentServiceStub(object):
-    """The recording of a room: markers of its owner, and streams of samples of its seats.
+    """The recording of a room: markers of its owner, and streams of samples of its seats. The owner of a
+    study is the owner of the rooms of its games.
     """
 
     def __init__(self, channel):
@@ -53,7 +54,8 @@ class InstrumentServiceStub(object):
 
 
 class InstrumentServiceServicer(object):
-    """The recording of a room: markers of its owner, and streams of samples of its seats.
+    """The recording of a room: markers of its owner, and streams of samples of its seats. The owner of a
+    study is the owner of the rooms of its games.
     """
 
     def AddMarker(self, request, context):
@@ -80,7 +82,8 @@ class InstrumentServiceServicer(object):
         no event and not in the record, and reach nobody. `chefshat export` exports them from the
         server's data directory. Sent from the start of the game until the room is no longer listed.
         What is acknowledged survives the end of the server's process. INVALID_ARGUMENT
-        (SAMPLES_REFUSED) names the field; UNAUTHENTICATED (TICKET_UNKNOWN); FAILED_PRECONDITION
+        (SAMPLES_REFUSED) names the field; UNAUTHENTICATED (TICKET_UNKNOWN); for an owned seat NOT_FOUND
+        (ROOM_UNKNOWN) and PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
         (GAME_NOT_STARTED; SAMPLES_OFF: the server has no data directory, or shares its games with
         other servers); RESOURCE_EXHAUSTED (TOO_MANY_SAMPLES: 16 streams, or 67108864 bytes of a seat;
         DISK_NEARLY_FULL).
@@ -116,7 +119,8 @@ def add_InstrumentServiceServicer_to_server(servicer, server):
 
  # This class is part of an EXPERIMENTAL API.
 class InstrumentService(object):
-    """The recording of a room: markers of its owner, and streams of samples of its seats.
+    """The recording of a room: markers of its owner, and streams of samples of its seats. The owner of a
+    study is the owner of the rooms of its games.
     """
 
     @staticmethod

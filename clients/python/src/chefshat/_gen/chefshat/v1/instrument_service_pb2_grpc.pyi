@@ -27,7 +27,9 @@ GRPC_GENERATED_VERSION: str
 GRPC_VERSION: str
 
 class InstrumentServiceStub:
-    """The recording of a room: markers of its owner, and streams of samples of its seats."""
+    """The recording of a room: markers of its owner, and streams of samples of its seats. The owner of a
+    study is the owner of the rooms of its games.
+    """
 
     @_typing.overload
     def __new__(cls, channel: _grpc.Channel) -> _Self: ...
@@ -49,7 +51,8 @@ class InstrumentServiceStub:
     no event and not in the record, and reach nobody. `chefshat export` exports them from the
     server's data directory. Sent from the start of the game until the room is no longer listed.
     What is acknowledged survives the end of the server's process. INVALID_ARGUMENT
-    (SAMPLES_REFUSED) names the field; UNAUTHENTICATED (TICKET_UNKNOWN); FAILED_PRECONDITION
+    (SAMPLES_REFUSED) names the field; UNAUTHENTICATED (TICKET_UNKNOWN); for an owned seat NOT_FOUND
+    (ROOM_UNKNOWN) and PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
     (GAME_NOT_STARTED; SAMPLES_OFF: the server has no data directory, or shares its games with
     other servers); RESOURCE_EXHAUSTED (TOO_MANY_SAMPLES: 16 streams, or 67108864 bytes of a seat;
     DISK_NEARLY_FULL).
@@ -57,7 +60,9 @@ class InstrumentServiceStub:
 
 @_typing.type_check_only
 class InstrumentServiceAsyncStub(InstrumentServiceStub):
-    """The recording of a room: markers of its owner, and streams of samples of its seats."""
+    """The recording of a room: markers of its owner, and streams of samples of its seats. The owner of a
+    study is the owner of the rooms of its games.
+    """
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     AddMarker: _aio.UnaryUnaryMultiCallable[_instrument_service_pb2.AddMarkerRequest, _instrument_service_pb2.AddMarkerResponse]  # type: ignore[assignment]
@@ -76,14 +81,17 @@ class InstrumentServiceAsyncStub(InstrumentServiceStub):
     no event and not in the record, and reach nobody. `chefshat export` exports them from the
     server's data directory. Sent from the start of the game until the room is no longer listed.
     What is acknowledged survives the end of the server's process. INVALID_ARGUMENT
-    (SAMPLES_REFUSED) names the field; UNAUTHENTICATED (TICKET_UNKNOWN); FAILED_PRECONDITION
+    (SAMPLES_REFUSED) names the field; UNAUTHENTICATED (TICKET_UNKNOWN); for an owned seat NOT_FOUND
+    (ROOM_UNKNOWN) and PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
     (GAME_NOT_STARTED; SAMPLES_OFF: the server has no data directory, or shares its games with
     other servers); RESOURCE_EXHAUSTED (TOO_MANY_SAMPLES: 16 streams, or 67108864 bytes of a seat;
     DISK_NEARLY_FULL).
     """
 
 class InstrumentServiceServicer(metaclass=_abc_1.ABCMeta):
-    """The recording of a room: markers of its owner, and streams of samples of its seats."""
+    """The recording of a room: markers of its owner, and streams of samples of its seats. The owner of a
+    study is the owner of the rooms of its games.
+    """
 
     @_abc_1.abstractmethod
     def AddMarker(
@@ -118,7 +126,8 @@ class InstrumentServiceServicer(metaclass=_abc_1.ABCMeta):
         no event and not in the record, and reach nobody. `chefshat export` exports them from the
         server's data directory. Sent from the start of the game until the room is no longer listed.
         What is acknowledged survives the end of the server's process. INVALID_ARGUMENT
-        (SAMPLES_REFUSED) names the field; UNAUTHENTICATED (TICKET_UNKNOWN); FAILED_PRECONDITION
+        (SAMPLES_REFUSED) names the field; UNAUTHENTICATED (TICKET_UNKNOWN); for an owned seat NOT_FOUND
+        (ROOM_UNKNOWN) and PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
         (GAME_NOT_STARTED; SAMPLES_OFF: the server has no data directory, or shares its games with
         other servers); RESOURCE_EXHAUSTED (TOO_MANY_SAMPLES: 16 streams, or 67108864 bytes of a seat;
         DISK_NEARLY_FULL).

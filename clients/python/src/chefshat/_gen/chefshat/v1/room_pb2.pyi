@@ -809,6 +809,7 @@ class Room(_message.Message):
     SERIES_ID_FIELD_NUMBER: _builtins.int
     AWAITED_FIELD_NUMBER: _builtins.int
     SPECTATORS_FIELD_NUMBER: _builtins.int
+    NEXT_JOIN_CODE_FIELD_NUMBER: _builtins.int
     room_id: _builtins.str
     """Identifies the room: 32 hexadecimal digits."""
     game_id: _builtins.str
@@ -837,6 +838,11 @@ class Room(_message.Message):
     """
     spectators: _builtins.int
     """How many spectators watch now. Only in answers of GetRoom and ListRooms."""
+    next_join_code: _builtins.str
+    """The join code of the room in which the participants play again (SetNextRoom); empty if there is
+    none. Only in answers of GetRoom to those who show the owner token or a ticket of the room. The
+    server knows it until it ends.
+    """
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set, every field set."""
@@ -879,10 +885,11 @@ class Room(_message.Message):
         series_id: _builtins.str = ...,
         awaited: Global___Awaited | None = ...,
         spectators: _builtins.int = ...,
+        next_join_code: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["awaited", b"awaited", "branched_from", b"branched_from", "policy", b"policy", "rules", b"rules"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["abort_reason", b"abort_reason", "awaited", b"awaited", "branched_from", b"branched_from", "created_at_ms", b"created_at_ms", "game_id", b"game_id", "name", b"name", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "rules", b"rules", "seats", b"seats", "seed_commitment", b"seed_commitment", "seed_fixed", b"seed_fixed", "series_id", b"series_id", "spectators", b"spectators", "state", b"state", "tournament_id", b"tournament_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["abort_reason", b"abort_reason", "awaited", b"awaited", "branched_from", b"branched_from", "created_at_ms", b"created_at_ms", "game_id", b"game_id", "name", b"name", "next_join_code", b"next_join_code", "origin", b"origin", "policy", b"policy", "room_id", b"room_id", "rules", b"rules", "seats", b"seats", "seed_commitment", b"seed_commitment", "seed_fixed", b"seed_fixed", "series_id", b"series_id", "spectators", b"spectators", "state", b"state", "tournament_id", b"tournament_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -138,6 +138,53 @@ class CreateRoomResponse(_message.Message):
 Global___CreateRoomResponse: _TypeAlias = CreateRoomResponse  # noqa: Y015
 
 @_typing.final
+class SetNextRoomRequest(_message.Message):
+    """Names the next room of the participants of a room."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    ROOM_ID_FIELD_NUMBER: _builtins.int
+    OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    JOIN_CODE_FIELD_NUMBER: _builtins.int
+    room_id: _builtins.str
+    """Identifies the room whose participants play again."""
+    owner_token: _builtins.str
+    """`owner_token` of its CreateRoomResponse."""
+    join_code: _builtins.str
+    """`join_code` of the next room: 8 letters and digits."""
+    def __init__(
+        self,
+        *,
+        room_id: _builtins.str = ...,
+        owner_token: _builtins.str = ...,
+        join_code: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["join_code", b"join_code", "owner_token", b"owner_token", "room_id", b"room_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___SetNextRoomRequest: _TypeAlias = SetNextRoomRequest  # noqa: Y015
+
+@_typing.final
+class SetNextRoomResponse(_message.Message):
+    """The next room is known."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    def __init__(
+        self,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___SetNextRoomResponse: _TypeAlias = SetNextRoomResponse  # noqa: Y015
+
+@_typing.final
 class GetRoomRequest(_message.Message):
     """Requests one room."""
 

@@ -65,6 +65,11 @@ class RoomServiceStub(object):
                 request_serializer=chefshat_dot_v1_dot_room__service__pb2.CloseRoomRequest.SerializeToString,
                 response_deserializer=chefshat_dot_v1_dot_room__service__pb2.CloseRoomResponse.FromString,
                 _registered_method=True)
+        self.SetNextRoom = channel.unary_unary(
+                '/chefshat.v1.RoomService/SetNextRoom',
+                request_serializer=chefshat_dot_v1_dot_room__service__pb2.SetNextRoomRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_room__service__pb2.SetNextRoomResponse.FromString,
+                _registered_method=True)
 
 
 class RoomServiceServicer(object):
@@ -131,6 +136,15 @@ class RoomServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def SetNextRoom(self, request, context):
+        """Tells the participants of a room where they play again (`Room.next_join_code`), in place of what
+        was said before. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+        NOT_FOUND (ROOM_UNKNOWN).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
 
 def add_RoomServiceServicer_to_server(servicer, server):
     rpc_method_handlers = {
@@ -163,6 +177,11 @@ def add_RoomServiceServicer_to_server(servicer, server):
                     servicer.CloseRoom,
                     request_deserializer=chefshat_dot_v1_dot_room__service__pb2.CloseRoomRequest.FromString,
                     response_serializer=chefshat_dot_v1_dot_room__service__pb2.CloseRoomResponse.SerializeToString,
+            ),
+            'SetNextRoom': grpc.unary_unary_rpc_method_handler(
+                    servicer.SetNextRoom,
+                    request_deserializer=chefshat_dot_v1_dot_room__service__pb2.SetNextRoomRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_room__service__pb2.SetNextRoomResponse.SerializeToString,
             ),
     }
     generic_handler = grpc.method_handlers_generic_handler(
@@ -328,6 +347,33 @@ class RoomService(object):
             '/chefshat.v1.RoomService/CloseRoom',
             chefshat_dot_v1_dot_room__service__pb2.CloseRoomRequest.SerializeToString,
             chefshat_dot_v1_dot_room__service__pb2.CloseRoomResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def SetNextRoom(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.RoomService/SetNextRoom',
+            chefshat_dot_v1_dot_room__service__pb2.SetNextRoomRequest.SerializeToString,
+            chefshat_dot_v1_dot_room__service__pb2.SetNextRoomResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -69,6 +69,11 @@ class RoomServiceStub:
     """Closes a room. Aborts its game. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
     (ROOM_UNKNOWN).
     """
+    SetNextRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.SetNextRoomRequest, _room_service_pb2.SetNextRoomResponse]
+    """Tells the participants of a room where they play again (`Room.next_join_code`), in place of what
+    was said before. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+    NOT_FOUND (ROOM_UNKNOWN).
+    """
 
 @_typing.type_check_only
 class RoomServiceAsyncStub(RoomServiceStub):
@@ -110,6 +115,11 @@ class RoomServiceAsyncStub(RoomServiceStub):
     CloseRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.CloseRoomRequest, _room_service_pb2.CloseRoomResponse]  # type: ignore[assignment]
     """Closes a room. Aborts its game. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
     (ROOM_UNKNOWN).
+    """
+    SetNextRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.SetNextRoomRequest, _room_service_pb2.SetNextRoomResponse]  # type: ignore[assignment]
+    """Tells the participants of a room where they play again (`Room.next_join_code`), in place of what
+    was said before. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+    NOT_FOUND (ROOM_UNKNOWN).
     """
 
 class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -185,6 +195,17 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_room_service_pb2.CloseRoomResponse, _abc.Awaitable[_room_service_pb2.CloseRoomResponse]]:
         """Closes a room. Aborts its game. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
         (ROOM_UNKNOWN).
+        """
+
+    @_abc_1.abstractmethod
+    def SetNextRoom(
+        self,
+        request: _room_service_pb2.SetNextRoomRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_room_service_pb2.SetNextRoomResponse, _abc.Awaitable[_room_service_pb2.SetNextRoomResponse]]:
+        """Tells the participants of a room where they play again (`Room.next_join_code`), in place of what
+        was said before. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+        NOT_FOUND (ROOM_UNKNOWN).
         """
 
 def add_RoomServiceServicer_to_server(servicer: RoomServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

@@ -34,10 +34,10 @@ class SpectatorServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> SpectatorServiceAsyncStub: ...
     Watch: _grpc.UnaryStreamMultiCallable[_spectator_service_pb2.SpectatorServiceWatchRequest, _spectator_service_pb2.SpectatorServiceWatchResponse]
-    """Streams the events of a room, as its policy allows, until the game is over. A message without
-    events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
-    (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED);
-    OUT_OF_RANGE (EVENTS_GONE: a long game of built-in agents keeps only its last events; metadata
+    """Streams the events of a room, as its policy allows, until the game is over. The owner, who shows
+    the owner token of the room or of its study (`Visibility`), may also watch a room that admits no
+    spectators. A message without events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
+    (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: a long game of built-in agents keeps only its last events; metadata
     `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
     (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
     last one received.
@@ -49,10 +49,10 @@ class SpectatorServiceAsyncStub(SpectatorServiceStub):
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     Watch: _aio.UnaryStreamMultiCallable[_spectator_service_pb2.SpectatorServiceWatchRequest, _spectator_service_pb2.SpectatorServiceWatchResponse]  # type: ignore[assignment]
-    """Streams the events of a room, as its policy allows, until the game is over. A message without
-    events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
-    (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED);
-    OUT_OF_RANGE (EVENTS_GONE: a long game of built-in agents keeps only its last events; metadata
+    """Streams the events of a room, as its policy allows, until the game is over. The owner, who shows
+    the owner token of the room or of its study (`Visibility`), may also watch a room that admits no
+    spectators. A message without events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
+    (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: a long game of built-in agents keeps only its last events; metadata
     `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
     (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
     last one received.
@@ -67,10 +67,10 @@ class SpectatorServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _spectator_service_pb2.SpectatorServiceWatchRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_spectator_service_pb2.SpectatorServiceWatchResponse], _abc.AsyncIterator[_spectator_service_pb2.SpectatorServiceWatchResponse]]:
-        """Streams the events of a room, as its policy allows, until the game is over. A message without
-        events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
-        (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED);
-        OUT_OF_RANGE (EVENTS_GONE: a long game of built-in agents keeps only its last events; metadata
+        """Streams the events of a room, as its policy allows, until the game is over. The owner, who shows
+        the owner token of the room or of its study (`Visibility`), may also watch a room that admits no
+        spectators. A message without events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
+        (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: a long game of built-in agents keeps only its last events; metadata
         `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
         (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
         last one received.
