@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use crate::kind::KindArg;
 use crate::name_key::NameKeyArg;
+use crate::numbers::seat_number;
 use chefshat_agents::{BuiltInAgent, RecordedPlayer};
 use chefshat_client::{Client, Outcome, PlayError, v1};
 use chefshat_record::jsonl;
@@ -33,9 +34,8 @@ use chefshat_server::convert::recorded_player;
                   Exit code: 0 when the game finished, 1 when it was aborted or the seat was lost."
 )]
 pub(super) struct AgentCommand {
-    /// The agent: random, random_unmasked, greedy, trained, monte_carlo (searches on all cores; with
-    /// a budget: monte_carlo:50ms), replay (imitates the player of a record), or llm (a language
-    /// model).
+    /// The agent: random, greedy, trained, monte_carlo (searches on all cores; with a budget:
+    /// monte_carlo:50ms), replay (imitates the player of a record), or llm (a language model).
     #[arg(value_parser = agent_arg, value_name = "KIND")]
     agent: AgentArg,
     #[command(flatten)]
@@ -159,7 +159,8 @@ impl AgentCommand {
             1 => "waits for 1 other seat to be taken, then ".to_owned(),
             free => format!("waits for {free} other seats to be taken, then "),
         };
-        anstream::eprintln!("{name} has seat {}; {waits}plays to the end", joined.seat);
+        let number = seat_number(joined.seat);
+        anstream::eprintln!("{name} has seat {number}; {waits}plays to the end");
         // The ticket grants the seat: it is shown only here, to the person who started the agent.
         anstream::eprintln!(
             "if this agent stops before the end of its game, resume its seat with --ticket {}",

@@ -32,6 +32,11 @@ pub(super) fn duration(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| "use a number above 0 with s, m, h or d, such as 90m, 12h or 30d".to_owned())
 }
 
+/// A seat as people count it, from 1. The protocol and JSON count from 0.
+pub(super) fn seat_number(seat: u32) -> u32 {
+    seat.saturating_add(1)
+}
+
 /// A place: `1st`, `2nd`, … `11th`, … `21st`.
 pub(super) fn ordinal(place: u32) -> String {
     let ending = match (place % 100, place % 10) {

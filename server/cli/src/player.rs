@@ -12,7 +12,7 @@ use crate::CommandError;
 use crate::kind::KindArg;
 use crate::llm::{self, Endpoint, LanguageModel, LlmArgs};
 use crate::numbers::grouped;
-use crate::remote::{RemoteAgent, seed_for};
+use crate::remote::{RemoteAgent, offered_agents, seed_for};
 
 /// A player as named on the command line.
 #[derive(Debug, Clone, Copy)]
@@ -102,7 +102,7 @@ pub(super) fn player_arg(name: &str) -> Result<PlayerArg, String> {
         .map(PlayerArg::BuiltIn)
         .map_err(|error| match error {
             AgentNameError::Unknown(_) => {
-                format!("use one of {}, {}", NamedAgent::NAMES.join(", "), llm::NAME)
+                format!("use one of {}, {}", offered_agents(), llm::NAME)
             }
             AgentNameError::MonteCarlo(error) => error.to_string(),
         })

@@ -163,10 +163,18 @@ pub(super) fn seed_for(purpose: &str, number: Option<u64>) -> [u8; 32] {
     }
 }
 
+/// The names of the built-in agents that people choose from. `random_unmasked`, which tests how
+/// wrong actions are handled, is accepted too.
+pub(super) fn offered_agents() -> String {
+    let names = NamedAgent::NAMES.into_iter();
+    let offered = names.filter(|name| *name != AgentKind::RandomUnmasked.name());
+    offered.collect::<Vec<_>>().join(", ")
+}
+
 /// Parses the name of a built-in agent.
 pub(super) fn named_agent(name: &str) -> Result<NamedAgent, String> {
     name.parse().map_err(|error| match error {
-        AgentNameError::Unknown(_) => format!("use one of {}", NamedAgent::NAMES.join(", ")),
+        AgentNameError::Unknown(_) => format!("use one of {}", offered_agents()),
         AgentNameError::MonteCarlo(error) => error.to_string(),
     })
 }
@@ -181,6 +189,14 @@ mod tests {
 
     use crate::remote::*;
     use chefshat_record::convert::observation_to_proto;
+
+    #[test]
+    fn the_agent_that_ignores_the_mask_is_accepted_but_not_offered() {
+        let accepted = named_agent("random_unmasked");
+        assert_eq!(accepted, Ok(AgentKind::RandomUnmasked.into()));
+        let offered = "use one of random, greedy, trained, monte_carlo".to_owned();
+        assert_eq!(named_agent("nobody"), Err(offered));
+    }
 
     /// The open decision of a game as a server requests it.
     fn request(game: &Game) -> v1::DecisionRequest {

@@ -65,7 +65,7 @@ pub(super) struct Render {
     /// Animation: only this Shift. Picture: its end.
     #[arg(long, value_name = "SHIFT", conflicts_with_all = ["from", "to", "at"])]
     shift: Option<u32>,
-    /// Show only what this seat saw; other hands are face down.
+    /// Show only what this seat saw, counted from 0; other hands are face down.
     #[arg(long, value_name = "SEAT", conflicts_with = "spectator")]
     seat: Option<u32>,
     /// Show only what spectators saw: all hands are face down.

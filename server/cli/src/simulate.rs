@@ -43,7 +43,7 @@ pub(super) struct Simulate {
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// The agents by seat, separated by commas; monte_carlo takes a budget for each decision:
-    /// monte_carlo:50ms or monte_carlo:400 (rollouts). Default: greedy on seat 0, random on the others.
+    /// monte_carlo:50ms or monte_carlo:400 (rollouts). Default: greedy on the first seat, random on the others.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = str::parse::<NamedAgent>)]
     agents: Vec<NamedAgent>,
     /// Reward turns by this scheme and print each seat's mean reward.

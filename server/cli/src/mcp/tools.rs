@@ -99,7 +99,7 @@ pub(super) fn all(must_name_table: bool) -> Vec<Tool> {
             json!({
                 "join_code": {"type": "string", "description": "from the host; not needed if this program was started with one"},
                 "name": {"type": "string", "description": "your display name"},
-                "seat": {"type": "integer", "description": "default: the first free one"},
+                "seat": {"type": "integer", "description": "from 0; default: the first free one"},
             }),
         ),
         define(

@@ -71,21 +71,21 @@ mod tests {
             left_ms: Some(12_000),
         };
         for (now_ms, seconds) in [(1_000, 12), (1_001, 12), (2_000, 11), (99_000, 0)] {
-            let expected = format!("Waiting for seat 2 (away): {seconds} s");
+            let expected = format!("Waiting for seat 3 (away): {seconds} s");
             assert_eq!(words(away, now_ms), Some(expected));
         }
         let unknown = v1::Awaited {
             left_ms: None,
             ..away
         };
-        let expected = Some("Waiting for seat 2 (away)".to_owned());
+        let expected = Some("Waiting for seat 3 (away)".to_owned());
         assert_eq!(words(unknown, 2_000), expected);
         let here = v1::Awaited {
             away: false,
             ..away
         };
         assert_eq!(words(here, 5_899), None);
-        let expected = Some("Waiting for seat 2 for 5 s".to_owned());
+        let expected = Some("Waiting for seat 3 for 5 s".to_owned());
         assert_eq!(words(here, 5_900), expected);
         assert_eq!(words(v1::Awaited::default(), 9_000), None);
     }

@@ -19,6 +19,7 @@ use chefshat_client::v1::{self, game_event::Kind};
 use chefshat_engine::{Opening, RuleSet};
 
 use crate::kind::kind_name;
+use crate::numbers::counted;
 use crate::output::{stop_in_words, variations};
 use awaited::AwaitedSeat;
 use chain::Chain;
@@ -119,7 +120,7 @@ impl Narrator {
             Kind::CardsExchanged(cards) => {
                 let item = self
                     .name(cards.giver)
-                    .and(PLAIN, &format!(" {} ", cards.count))
+                    .and(PLAIN, &format!(" {} ", counted(cards.count.into(), "card")))
                     .and(DIM, "→ ")
                     .join(&self.name(cards.receiver));
                 self.exchanges.push(item);

@@ -7,7 +7,7 @@ use super::text::{MAX_NAME, clean};
 use super::view::GameView;
 use super::words;
 use crate::kind::kind_name;
-use crate::numbers::ordinal;
+use crate::numbers::{ordinal, seat_number};
 
 /// Longest text of a referee, characters.
 const MAX_TEXT: usize = 200;
@@ -83,7 +83,7 @@ fn lines_of(view: &GameView, kind: &Kind) -> Vec<Line> {
             "{} ({}) takes seat {}",
             clean(&seated.name, MAX_NAME),
             kind_name(seated.kind()),
-            seated.seat
+            seat_number(seated.seat)
         )),
         Kind::Vacated(seat) => plain(format!("{} leaves the table", view.name(seat.seat))),
         Kind::Disconnected(seat) => about(seat.seat, "is disconnected".into()),

@@ -226,7 +226,8 @@ fn roles_special_actions_and_incidents() {
    Chef Greta · Sous-Chef Rolf · Waiter Gustav · Dishwasher Rita
    Rita ✦ Food Fight! Two jokers: all roles are reversed
    now  Chef Rita · Sous-Chef Gustav · Waiter Rolf · Dishwasher Greta
-   exchange  Greta 2 → Rita · Rita 2 → Greta · Rolf 1 → Gustav · Gustav 1 → Rolf
+   exchange  Greta 2 cards → Rita · Rita 2 cards → Greta · Rolf 1 card → Gustav
+             Gustav 1 card → Rolf
 
 pizza                                                                Greta    Rolf  Gustav    Rita
     1  Rita 2×11★
@@ -270,7 +271,7 @@ fn a_branch_and_a_restart() {
    the rules     to 15 points · 11 faces and 2 jokers · 17 cards each · 5, 3, 1, 0 points by place
 
 ━━ Shift 3 ━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━
-   exchange  Greta 2 → Rita
+   exchange  Greta 2 cards → Rita
 
 pizza                                                                Greta    Rolf  Gustav    Rita
     1  Rita 2×11★ › (Greta) › Rolf 2×9
@@ -328,7 +329,7 @@ fn a_tie_is_explained() {
         reveal: None,
     }));
     let text = text_of(&mut Narrator::default(), [ended]);
-    assert!(text.contains("seat 2"), "{text}");
+    assert!(text.contains("seat 3"), "{text}");
     assert_eq!(
         text.matches("wins by its place in the last Shift").count(),
         1
@@ -347,7 +348,7 @@ fn names_are_safe_and_unique() {
     let table = text.lines().next().unwrap_or_default();
     assert_eq!(
         table,
-        "   at the table  bot#0 agent · bot#1 agent · [2Jwipe agent · seat 3 agent"
+        "   at the table  bot#1 agent · bot#2 agent · [2Jwipe agent · seat 4 agent"
     );
 }
 

@@ -7,6 +7,7 @@ use chefshat_record::convert::rules_from_proto;
 
 use super::hand::Hand;
 use super::text::{MAX_NAME, clean};
+use crate::numbers::seat_number;
 
 /// Maximum columns of a room's name, as in the server.
 const MAX_ROOM_NAME: usize = 64;
@@ -125,7 +126,7 @@ impl GameView {
     pub(crate) fn name(&self, seat: u32) -> String {
         match self.seat(seat) {
             Some(place) if !place.name.is_empty() => place.name.clone(),
-            _ => format!("seat {seat}"),
+            _ => format!("seat {}", seat_number(seat)),
         }
     }
 
@@ -420,14 +421,15 @@ fn names(seats: &[v1::Participant]) -> Vec<String> {
         .iter()
         .map(|seat| clean(&seat.name, MAX_NAME))
         .collect();
-    (0..short.len())
-        .map(|seat| {
-            let name = &short[seat];
+    (0u32..)
+        .zip(&short)
+        .map(|(seat, name)| {
+            let number = seat_number(seat);
             let alike = short.iter().filter(|other| *other == name).count();
             if name.is_empty() {
-                format!("seat {seat}")
+                format!("seat {number}")
             } else if alike > 1 {
-                format!("{}#{seat}", clean(name, MAX_NAME - 2))
+                format!("{}#{number}", clean(name, MAX_NAME - 2))
             } else {
                 name.clone()
             }

@@ -10,6 +10,7 @@ use super::super::policy_args::visibility_mark;
 use super::super::{CommandError, pages};
 use super::filter::FilterArgs;
 use crate::narration::{abort_reason, clean};
+use crate::numbers::seat_number;
 
 /// List the records of a server, oldest first.
 #[derive(Debug, Args)]
@@ -60,7 +61,7 @@ pub(super) fn in_a_line(summary: &v1::RecordSummary) -> String {
         let participant = summary.seats.iter().find(|other| other.seat == seat);
         let name = participant.map_or("", |participant| participant.name.as_str());
         match name {
-            "" => format!("seat {seat}"),
+            "" => format!("seat {}", seat_number(seat)),
             name => clean(name, 20),
         }
     };
@@ -128,7 +129,7 @@ mod tests {
         };
         assert_eq!(
             in_a_line(&aborted),
-            "5f0c6a4de2b14b7f8a3d9c1e7b60425d  aborted     0 Shifts       0 decisions  Greta, seat 1"
+            "5f0c6a4de2b14b7f8a3d9c1e7b60425d  aborted     0 Shifts       0 decisions  Greta, seat 2"
         );
     }
 }

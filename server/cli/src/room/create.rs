@@ -12,6 +12,7 @@ use clap::Args;
 
 use super::super::connect::{ServerArg, attendant_link};
 use super::super::policy_args::PolicyArgs;
+use super::super::remote::offered_agents;
 use super::super::rules_args::{RulesArgs, by_flag};
 use super::super::secret_file::SecretFile;
 use super::super::{CommandError, say};
@@ -282,9 +283,9 @@ fn filled_by(word: &str) -> Result<FilledBy, String> {
     match word.parse::<NamedAgent>() {
         Ok(agent) => Ok(FilledBy::BuiltInAgent(agent.name())),
         Err(AgentNameError::Unknown(_)) => {
-            let known = NamedAgent::NAMES.join(", ");
+            let offered = offered_agents();
             Err(format!(
-                "use one of {known}, replay:GAME-ID:SEAT, open, agent, human, robot, model, wizard"
+                "use one of {offered}, replay:GAME-ID:SEAT, open, agent, human, robot, model, wizard"
             ))
         }
         Err(error) => Err(error.to_string()),
@@ -298,7 +299,9 @@ fn recorded_player(words: &str) -> Result<v1::RecordedPlayer, String> {
             seat: seat.parse().ok()?,
         })
     });
-    player.ok_or_else(|| "use replay:, the ID of a recorded game, a colon, and a seat".to_owned())
+    player.ok_or_else(|| {
+        "use replay:, the ID of a recorded game, a colon, and a seat, from 0".to_owned()
+    })
 }
 
 fn game_seed(digits: &str) -> Result<[u8; 32], String> {

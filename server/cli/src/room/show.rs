@@ -10,6 +10,7 @@ use super::super::policy_args::visibility_mark;
 use super::super::{CommandError, pages, say};
 use crate::kind::kind_name;
 use crate::narration::{abort_reason, clean};
+use crate::numbers::seat_number;
 
 /// List the rooms of a server, newest first.
 #[derive(Debug, Args)]
@@ -155,7 +156,8 @@ fn in_full(room: &v1::Room) -> String {
         v1::Visibility::Private => out.push_str("seen  by those who have a ticket of it\n"),
     }
     for seat in &room.seats {
-        out.push_str(&format!("seat {} {}\n", seat.seat, seat_in_words(seat)));
+        let number = seat_number(seat.seat);
+        out.push_str(&format!("seat {number} {}\n", seat_in_words(seat)));
     }
     out
 }
@@ -190,7 +192,8 @@ fn seat_in_words(seat: &v1::Participant) -> String {
     let name = clean(&seat.name, 30);
     if let Some(player) = &seat.replay {
         let game = clean(&player.game_id, 40);
-        return format!("{name}, imitates seat {} of game {game}", player.seat);
+        let number = seat_number(player.seat);
+        return format!("{name}, imitates seat {number} of game {game}");
     }
     if !seat.built_in_agent.is_empty() {
         return match name == seat.built_in_agent {
@@ -253,8 +256,8 @@ mod tests {
              start as game c until after decision 40, later deals as there\n\
              deal  from a seed its creator fixed\n\
              store in memory; the game is lost when the server stops\n\
-             seat 0 replay, imitates seat 2 of game c\n\
-             seat 1 free for anyone\n"
+             seat 1 replay, imitates seat 3 of game c\n\
+             seat 2 free for anyone\n"
         );
         assert_eq!(in_a_line(&room), "a  playing   1/2 seats    (branched)");
         let scripted = v1::Room {
@@ -284,7 +287,7 @@ mod tests {
         assert_eq!(
             in_full(&room),
             "room  a\ngame  b\nstate playing\nstart with real cards\ndeal  at a table\n\
-             seat 0 Ada, human, at the table\n"
+             seat 1 Ada, human, at the table\n"
         );
         assert_eq!(in_a_line(&room), "a  playing   1/1 seats    (real cards)");
     }

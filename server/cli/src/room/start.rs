@@ -22,8 +22,8 @@ pub(super) struct StartArgs {
     #[arg(long, requires = "branch")]
     same_deals: bool,
     /// Start with the hands in this file: a ScriptedShift in canonical JSON, for example {"hands":
-    /// [{"seat": 0, "cards": [1, 4, 12], "golden": true}, ...]} with every seat's cards (a joker is
-    /// the number of faces plus 1).
+    /// [{"seat": 0, "cards": [1, 4, 12], "golden": true}, ...]} with every seat's cards (seats
+    /// count from 0; a joker is the number of faces plus 1).
     #[arg(long, value_name = "FILE")]
     hands: Option<PathBuf>,
 }

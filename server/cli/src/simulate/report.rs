@@ -150,7 +150,7 @@ fn results(text: &mut String, batch: &Batch, table: &BatchTable) {
     ];
     let rows = table.seats.iter().map(|(seat, sums)| {
         vec![
-            seat.to_string(),
+            (seat.index() + 1).to_string(),
             batch.agents()[seat].name(),
             grouped(sums.games_won),
             format!("{:.1}", 100.0 * table.per_game(sums.games_won)),
@@ -180,7 +180,7 @@ fn actions(text: &mut String, batch: &Batch, table: &BatchTable) {
     header.extend(mean_reward.as_deref());
     let rows = table.seats.iter().map(|(seat, sums)| {
         let mut row = vec![
-            seat.to_string(),
+            (seat.index() + 1).to_string(),
             batch.agents()[seat].name(),
             grouped(sums.valid),
             grouped(sums.wrong),

@@ -4,6 +4,7 @@
 use chefshat_client::v1::{self, table_report::Kind};
 
 use crate::narration::view::GameView;
+use crate::numbers::seat_number;
 
 /// What can be typed.
 pub(super) const HELP: &str = "\
@@ -280,7 +281,7 @@ impl<'a> Grammar<'a> {
         self.state.seat.filter(|_| self.state.stage() == stage)
     }
 
-    /// A seat by its name, or as "seat 2".
+    /// A seat by its name, or as "seat 2", which counts from 1.
     fn seat(&self, name: &str) -> Result<u32, String> {
         let name = name.trim().to_lowercase();
         let number = name.strip_prefix("seat ").map(str::trim);
@@ -290,7 +291,9 @@ impl<'a> Grammar<'a> {
         };
         let matching: Vec<u32> = (0u32..)
             .zip(self.seats)
-            .filter(|(seat, it)| named(seat, it) || number == Some(&*seat.to_string()))
+            .filter(|(seat, it)| {
+                named(seat, it) || number == Some(&*seat_number(*seat).to_string())
+            })
             .map(|(seat, _)| seat)
             .collect();
         match matching.as_slice() {
@@ -303,7 +306,8 @@ impl<'a> Grammar<'a> {
                 Err(format!("{name:?} is not a player of this table: {names}"))
             }
             [first, ..] => Err(format!(
-                "{name:?} is the name of several players; type for example seat {first}"
+                "{name:?} is the name of several players; type for example seat {}",
+                seat_number(*first)
             )),
         }
     }
@@ -538,10 +542,10 @@ mod tests {
             ("joker", laid(None, &[12], None)),
             ("Ada: 7", laid(Some(ADA), &[7], None)),
             ("bo ek:  2×8 ", laid(Some(BO), &[8, 8], None)),
-            ("seat 3: 8", laid(Some(3), &[8], None)),
+            ("seat 4: 8", laid(Some(3), &[8], None)),
             ("golden 11", laid(None, &[11, 11], Some(true))),
             ("11 no golden", laid(None, &[11], Some(false))),
-            ("greta#3: 8", laid(Some(3), &[8], None)),
+            ("greta#4: 8", laid(Some(3), &[8], None)),
             ("pass", pass(None)),
             ("PASS Ada", pass(Some(ADA))),
             ("Ada: pass", pass(Some(ADA))),
@@ -662,8 +666,9 @@ mod tests {
             ("300x7", "is not a card"),
             ("Ada 7 7", "Ada: 7 7"),
             ("Ada:", "7 7 joker"),
-            ("Cy: 7", "Ada, Bo Ek, Greta#2, Greta#3"),
-            ("Greta: 7", "seat 2"),
+            ("Cy: 7", "Ada, Bo Ek, Greta#3, Greta#4"),
+            ("Greta: 7", "seat 3"),
+            ("seat 0: 7", "is not a player"),
             ("pass Cy", "Bo Ek"),
             ("take", "take back"),
             ("hand 1 2", "hand Ada: 1 2 joker"),

@@ -5,7 +5,7 @@ use chefshat_client::v1;
 use crate::narration::view::GameView;
 use crate::narration::{aborted, clean, heading, row, title};
 use crate::numbers::{counted, ordinal};
-use crate::tui::view::play_words;
+use crate::tui::view::{beating, play_words};
 
 /// Maximum columns of a text from the server.
 const TEXT: usize = 200;
@@ -105,16 +105,12 @@ fn answers(question: &v1::TableQuestion) -> String {
 /// What a play must be.
 fn requirement(required: &v1::PlayRequirement) -> String {
     let highest = required.highest_face;
-    let fewest = u64::from(required.fewest_cards);
     let play = match (required.golden_card, required.lowest_face, highest) {
         (true, ..) => format!("{highest}s, the Golden {highest} among them"),
         (false, 2.., _) => format!("{highest}s"),
         (false, _, 0) => "nothing beats the board".to_owned(),
         (false, ..) if required.lone_joker => "any face, or a joker alone".to_owned(),
-        (false, _, 1) if fewest == 1 => "the 1".to_owned(),
-        (false, ..) if fewest == 1 => format!("{highest} or lower"),
-        (false, _, 1) => format!("the 1, {} or more", counted(fewest, "card")),
-        (false, ..) => format!("{highest} or lower, {} or more", counted(fewest, "card")),
+        (false, ..) => beating(highest, required.fewest_cards),
     };
     match required.may_pass {
         true => format!("{play}; or a pass"),
@@ -260,7 +256,7 @@ mod tests {
                 "   not allowed   ⚠ Bo: It is Ada's turn.[2J",
                 "   to do         Show the pass card of Greta",
                 "   now           Paused. It is Ada's turn.",
-                "   a play        7 or lower, 3 cards or more; or a pass",
+                "   a play        7 or lower, at least 3 cards; or a pass",
                 "   board         2 × 8 + 1 joker",
                 "   Ada           5 cards · 5 points · Chef · at the table",
                 "   Bo            1st · 3 points · Sous-Chef · at the table",
@@ -296,8 +292,8 @@ mod tests {
             ),
             (of(11, 11, 1), "11s; or a pass"),
             (leading, "any face, or a joker alone; or a pass"),
-            (of(1, 5, 1), "5 or lower; or a pass"),
-            (of(1, 1, 2), "the 1, 2 cards or more; or a pass"),
+            (of(1, 5, 1), "5 or lower, at least 1 card; or a pass"),
+            (of(1, 1, 2), "1, at least 2 cards; or a pass"),
             (of(1, 0, 2), "nothing beats the board; or a pass"),
         ];
         for (required, expected) in cases {

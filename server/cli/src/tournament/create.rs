@@ -37,8 +37,8 @@ pub(super) struct Create {
     format: FormatArg,
     #[command(flatten)]
     server: ServerArg,
-    /// Built-in participants: random, random_unmasked, greedy or trained, or several as in
-    /// greedy*4, separated by commas, for example greedy*4,trained. Repeatable.
+    /// Built-in participants: random, greedy or trained, or several as in greedy*4, separated by
+    /// commas, for example greedy*4,trained. Repeatable.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = built_in)]
     built_in: Vec<BuiltIn>,
     /// Start when this many have joined, built-in agents included. Default: `chefshat tournament

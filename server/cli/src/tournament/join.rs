@@ -28,8 +28,8 @@ use super::words::state;
                   Exit code: 0 when the tournament finished, 1 when it was closed or the place in it was lost."
 )]
 pub(super) struct Join {
-    /// The agent: random, random_unmasked, greedy, trained, monte_carlo, or llm (a language model,
-    /// which plays one game at a time).
+    /// The agent: random, greedy, trained, monte_carlo, or llm (a language model, which plays one
+    /// game at a time).
     #[arg(long, value_parser = player_arg, value_name = "KIND")]
     agent: PlayerArg,
     #[command(flatten)]

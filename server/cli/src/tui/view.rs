@@ -255,10 +255,7 @@ fn draw_pizza(frame: &mut Frame<'_>, theme: Theme, table: &GameView, me: Option<
     let what = ingredient(play.face, faces).map_or_else(String::new, |name| format!(" ({name})"));
     let beat = match play.face {
         1 => "Nothing is rarer than face 1.".to_owned(),
-        face => format!(
-            "Beaten by a face below {face}, {} or more.",
-            counted(u64::from(size), "card")
-        ),
+        face => format!("Beaten by {}.", beating(face.saturating_sub(1), size)),
     };
     let lines = vec![
         Line::from(vec![
@@ -308,6 +305,13 @@ pub(crate) fn play_words(face: u32, quantity: u32, jokers: u32, faces: u32) -> S
             counted(u64::from(jokers), "joker")
         ),
     }
+}
+
+/// What beats the board, in words: `7 or lower, at least 2 cards`.
+pub(crate) fn beating(highest_face: u32, fewest_cards: u32) -> String {
+    let lower = if highest_face > 1 { " or lower" } else { "" };
+    let cards = counted(u64::from(fewest_cards), "card");
+    format!("{highest_face}{lower}, at least {cards}")
 }
 
 fn waiting(table: &GameView) -> String {

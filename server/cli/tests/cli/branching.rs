@@ -92,7 +92,7 @@ fn a_recorded_game_is_branched_with_replayed_seats() {
     let shown = run(&url, &format!("room show {room_id}"));
     shown.assert_says(&[
         &format!("as game {first} until after decision 25"),
-        &format!("imitates seat 1 of game {first}"),
+        &format!("imitates seat 2 of game {first}"),
         "free for anyone",
     ]);
     assert!(output_of(&url, "room list").contains("(branched)"));

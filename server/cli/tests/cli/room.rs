@@ -97,7 +97,7 @@ fn an_agent_reports_an_aborted_game() {
     let mut line = String::new();
     let mut stderr = BufReader::new(agent.0.stderr.take().unwrap());
     stderr.read_line(&mut line).unwrap();
-    assert!(line.contains("seat 0; waits for 3 other seats"), "{line}");
+    assert!(line.contains("seat 1; waits for 3 other seats"), "{line}");
 
     let (room_id, token) = (text(&made["room"]["roomId"]), text(&made["owner_token"]));
     run(&url, &format!("room close {room_id} --owner-token {token}")).well();

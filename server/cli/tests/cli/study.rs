@@ -1,8 +1,15 @@
-//! `chefshat study` against a server: a study is created from the example, and deleted.
+//! `chefshat study` against a server: a study is created from the example, managed, exported and
+//! deleted.
 
+use std::path::Path;
+
+use chefshat_client::Client;
+use chefshat_proto::v1;
+use chefshat_proto::v1::participation_service_client::ParticipationServiceClient;
+use serde_json::Value;
 use tempfile::TempDir;
 
-use super::run::{chefshat, run, serve};
+use super::run::{Ended, chefshat, in_runtime, run, serve};
 
 /// The example of the documentation.
 const EXAMPLE: &str = concat!(
@@ -10,15 +17,20 @@ const EXAMPLE: &str = concat!(
     "/../../docs/studies/example.toml"
 );
 
+/// Creates the study of the example, with the owner token in a file. Returns its id.
+fn create(url: &str, owner: &Path) -> String {
+    let create = ["study", "create", EXAMPLE, "--json", "--server", url];
+    let owner_file = ["--owner-file", owner.to_str().unwrap()];
+    let created = chefshat(&[&create[..], &owner_file].concat()).well().json();
+    created["study"]["studyId"].as_str().unwrap().to_owned()
+}
+
 #[test]
 fn a_study_is_created_and_deleted() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(&folder.path().join("data"));
     let owner = folder.path().join("owner");
-    let create = ["study", "create", EXAMPLE, "--json", "--server", &url];
-    let owner_file = ["--owner-file", owner.to_str().unwrap()];
-    let created = chefshat(&[&create[..], &owner_file].concat()).well().json();
-    let id = created["study"]["studyId"].as_str().unwrap();
+    let id = create(&url, &owner);
     let owned = |command: &str| {
         let owner = owner.to_str().unwrap();
         run(&url, &format!("study {command} {id} --owner-file {owner}"))
@@ -30,4 +42,95 @@ fn a_study_is_created_and_deleted() {
     owned("show").assert_failed("no study with this id and owner token");
     owned("delete --yes").assert_failed("no study with this id and owner token");
     chefshat(&["study", "--help"]).assert_helps("chefshat study links");
+}
+
+/// Opens the study with a participant's link: from then on it is active.
+fn open(url: &str, link: &str) {
+    let request = v1::OpenStudyRequest { link: link.into() };
+    in_runtime(async {
+        let client = Client::connect(url).await.unwrap();
+        let mut service = ParticipationServiceClient::new(client.channel());
+        service.open_study(request).await.unwrap();
+    });
+}
+
+/// The files of an export without the records, one after the other.
+fn exported(folder: &Path) -> String {
+    let files = std::fs::read_dir(folder).unwrap().map(Result::unwrap);
+    let files = files.filter(|file| file.file_type().unwrap().is_file());
+    let texts = files.map(|file| std::fs::read_to_string(file.path()).unwrap());
+    texts.collect()
+}
+
+#[test]
+fn a_study_is_listed_shown_exported_and_closed_and_participants_leave_it() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(&folder.path().join("data"));
+    let owner = folder.path().join("owner");
+    let owner_file = format!("--owner-file {}", owner.to_str().unwrap());
+    let id = create(&url, &owner);
+    let owned = |command: &str, more: &str| -> Ended {
+        run(&url, &format!("study {command} {id} {more} {owner_file}"))
+    };
+    let participants =
+        || -> Value { owned("show", "--json").well().json()["participants"].clone() };
+    let state = |name: &str| format!("STUDY_PARTICIPANT_STATE_{name}");
+    let links = owned("links", "--pseudonym Anabel --pseudonym Bonifaz --json").well();
+    let links = links.json_lines();
+    open(&url, links[0]["link"].as_str().unwrap());
+
+    let summary = |state: &str, counts: &str| {
+        format!("study {id} (strength-pilot) is {state}: 0 completed, {counts}\n")
+    };
+    let listed = run(&url, &format!("study list {owner_file}")).well();
+    let counts = "1 active, 1 invited, 0 left";
+    assert_eq!(listed.stdout, summary("open", counts));
+    let listed = run(&url, &format!("study list {owner_file} --json")).well();
+    assert_eq!(listed.json()["studyId"], id.as_str());
+    let shown = owned("show", "").well().stdout;
+    let shown: Vec<&str> = shown.lines().collect();
+    assert_eq!(shown[0], summary("open", counts).trim_end());
+    assert!(shown[1].starts_with("1\tAnabel\tactive"), "{shown:?}");
+    assert_eq!(shown[2], "2\tBonifaz\tinvited\tstep 0\t");
+    assert_eq!(shown.len(), 3);
+
+    let removed = owned("remove", "2 --replace").well().stdout;
+    let removed: Vec<&str> = removed.lines().collect();
+    assert!(removed[0].starts_with("2\tBonifaz\tremoved"), "{removed:?}");
+    assert!(removed[1].starts_with("3\t"), "{removed:?}");
+    assert!(removed[1].contains(&format!("{url}/study/")), "{removed:?}");
+    let now = participants();
+    assert_eq!(now[1]["state"], state("REMOVED").as_str(), "{now}");
+    assert_eq!(now[2]["state"], state("INVITED").as_str(), "{now}");
+
+    let (before, after) = (folder.path().join("before"), folder.path().join("after"));
+    let out = format!("--out {}", before.display());
+    let printed = owned("export", &out).well();
+    printed.assert_says(&["study.json (", "participants.csv (", "records/ (0 games)"]);
+    let data = exported(&before);
+    assert!(
+        data.contains("Anabel") && data.contains("Bonifaz"),
+        "{data}"
+    );
+    owned("export", &out).assert_failed("exists; choose a new folder");
+
+    let deleted = owned("delete-participant", "1").well();
+    let words = "the data of participant 1 are deleted, with 0 games\n";
+    assert_eq!(deleted.stdout, words);
+    let ana = participants()[0].clone();
+    assert_eq!(ana["dataDeleted"], true, "{ana}");
+    assert_eq!(ana["state"], state("WITHDRAWN").as_str(), "{ana}");
+    let out = format!("--out {} --json", after.display());
+    let printed = owned("export", &out).well().json();
+    assert_eq!(printed["event"], "exported");
+    let data = exported(&after);
+    assert!(
+        !data.contains("Anabel") && data.contains("Bonifaz"),
+        "{data}"
+    );
+
+    let closed = owned("close", "").well().stdout;
+    let counts = "0 active, 1 invited, 2 left";
+    assert_eq!(closed, summary("closed", counts));
+    owned("links", "--add 1").assert_failed("STUDY_CLOSED");
 }

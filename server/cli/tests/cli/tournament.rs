@@ -5,10 +5,11 @@ use std::collections::BTreeSet;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
 
+use chefshat_client::{Client, v1};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use super::run::{Running, json_lines, run, serve, until};
+use super::run::{Running, in_runtime, json_lines, run, serve, until};
 
 /// Waits for the end of a program that must succeed. Returns its output, JSON lines.
 fn objects_of(program: Running) -> Vec<Value> {
@@ -201,6 +202,103 @@ fn only_its_owner_starts_and_closes_a_tournament() {
     let listed = |state: &str| run(&url, &format!("tournament list --state {state}")).stdout;
     assert!(listed("closed").starts_with(id));
     assert_eq!(listed("open"), "no tournaments\n");
+}
+
+/// Joins a tournament as a participant that never connects. Returns its ticket.
+fn ticket_of(url: &str, code: &str, name: &str) -> String {
+    let request = v1::JoinTournamentRequest {
+        join_code: code.to_owned(),
+        name: name.to_owned(),
+        ..v1::JoinTournamentRequest::default()
+    };
+    in_runtime(async {
+        let client = Client::connect(url).await.unwrap();
+        client.join_tournament(request).await.unwrap().ticket
+    })
+}
+
+/// The participant with this name, as the results have it.
+fn participant(url: &str, id: &str, name: &str) -> Value {
+    let results = run(url, &format!("tournament results {id} --json")).json();
+    let participants = results["tournament"]["participants"].as_array().unwrap();
+    let found = participants.iter().find(|it| it["name"] == name);
+    found
+        .unwrap_or_else(|| panic!("{name}: {results}"))
+        .to_owned()
+}
+
+/// The games of a tournament, in order.
+fn games(url: &str, id: &str) -> Vec<Value> {
+    let listed = run(url, &format!("tournament games {id} --json")).json_lines();
+    listed.iter().map(|line| line["game"].clone()).collect()
+}
+
+/// Two games wait for the same absent participants, one is played at a time, and its first decision
+/// takes a minute: what the organiser does is not overtaken by the games.
+#[test]
+fn an_organiser_changes_a_tournament_by_hand() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(folder.path());
+    let owner = path(folder.path(), "owner");
+    let settings = "--name friday --format round_robin --rounds 2 --built-in greedy*2";
+    let slow = "--no-show-time-ms 3600000 --max-parallel-games 1 --pace-ms 60000";
+    let create = format!("tournament create {settings} {slow} --owner-file {owner} --json");
+    let made = run(&url, &create).json();
+    let id = made["tournament"]["tournamentId"].as_str().unwrap();
+    let code = made["join_code"].as_str().unwrap();
+    let command = |words: &str| run(&url, &format!("tournament {words} --owner-file {owner}"));
+
+    // Before the start, a place is free again.
+    let cy = ticket_of(&url, code, "Cy");
+    let left = run(&url, &format!("tournament withdraw {id} --ticket {cy}"));
+    assert_eq!(left.well().stdout, "participants  greedy 1, greedy 2\n");
+    let [ada, _] = ["Ada", "Bo"].map(|name| ticket_of(&url, code, name));
+    command(&format!("start {id}")).well();
+    assert_eq!(participant(&url, id, "Cy")["withdrawn"], true);
+
+    // The first game goes behind the second one, and then before it again.
+    let postpone = format!("tournament postpone {id} 0 --ticket {ada} --json");
+    let postponed = run(&url, &postpone).well().json();
+    assert_eq!(postponed["event"], "postponed");
+    assert_eq!(games(&url, id)[0]["postponed"], 1);
+    let called = command(&format!("call {id} 0")).well();
+    called.assert_says(&["   0  round 1 table 1 game 1  due      ", "Ada", "Bo"]);
+
+    // While the tournament is paused, everybody who is absent leaves, and no game is called.
+    let paused = command(&format!("pause {id}")).well();
+    assert_eq!(paused.stdout, format!("tournament {id} is paused\n"));
+    let listed = || run(&url, "tournament list --json").json();
+    assert_eq!(listed()["paused"], true);
+    command(&format!("remove {id} bo")).well();
+    assert_eq!(participant(&url, id, "Bo")["withdrawn"], true);
+    let replaced = command(&format!("replace {id} Ada --built-in random --name Robbie"));
+    let names = "participants  greedy 1, greedy 2, Robbie\n";
+    assert_eq!(replaced.well().stdout, names);
+    let robbie = participant(&url, id, "Robbie");
+    assert_eq!(robbie["builtInAgent"], "random", "{robbie}");
+    assert_eq!(robbie["former"][0]["name"], "Ada", "{robbie}");
+    let ticket_file = path(folder.path(), "dee");
+    let replace = format!("replace {id} Bo --name Dee --ticket-file {ticket_file} --json");
+    let replaced = command(&replace).well().json();
+    let dee = std::fs::read_to_string(ticket_file).unwrap();
+    assert_eq!(replaced["ticket"], dee.trim());
+    let withdrawn = command(&format!("withdraw {id} --participant Dee --json"));
+    assert_eq!(withdrawn.well().json()["event"], "withdrawn");
+    assert_eq!(participant(&url, id, "Dee")["withdrawn"], true);
+    let states = || -> Vec<Value> {
+        let games = games(&url, id);
+        games.iter().map(|game| game["state"].clone()).collect()
+    };
+    let [due, playing] = ["DUE", "PLAYING"].map(|it| format!("TOURNAMENT_GAME_STATE_{it}"));
+    assert_eq!(states(), [due.as_str(), &due]);
+
+    let resumed = command(&format!("resume {id}")).well();
+    assert_eq!(resumed.stdout, format!("tournament {id} is playing\n"));
+    assert_ne!(listed()["paused"], true);
+    until("the game that was called", || {
+        states() == [playing.as_str(), &due]
+    });
+    command(&format!("call {id} 0")).assert_failed("GAME_NOT_DUE");
 }
 
 #[test]

@@ -34,6 +34,8 @@ pub(super) struct Reel {
     moved_ms: u64,
     /// More events may come.
     pub(super) live: bool,
+    /// The events are those of a record.
+    pub(super) recorded: bool,
     /// Whom a live game waits for.
     awaited: Option<AwaitedSeat>,
     /// The same in words, as of the last tick.
@@ -76,6 +78,7 @@ impl Reel {
             pace: STANDARD_PACE,
             moved_ms: 0,
             live,
+            recorded: !live,
             awaited: None,
             waiting: None,
             lost: None,

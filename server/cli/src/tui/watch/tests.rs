@@ -82,10 +82,10 @@ fn a_live_game_shows_whom_it_waits_for() {
         left_ms: Some(12_000),
     };
     reel.wait_for(&awaited, 500);
-    assert!(screen(&reel).contains("Waiting for seat 1 (away): 12 s"));
+    assert!(screen(&reel).contains("Waiting for seat 2 (away): 12 s"));
     assert!(!reel.tick(501), "the same second");
     assert!(reel.tick(1_500));
-    assert!(screen(&reel).contains("Waiting for seat 1 (away): 11 s"));
+    assert!(screen(&reel).contains("Waiting for seat 2 (away): 11 s"));
     reel.wait_for(&v1::Awaited::default(), 1_600);
     assert!(!screen(&reel).contains("Waiting for seat"));
 }
@@ -117,6 +117,34 @@ fn the_reel_runs_stops_and_jumps() {
     assert!(reel.table.end.is_some());
     press(&mut reel, KeyCode::Char('q'));
     assert!(reel.left);
+}
+
+#[test]
+fn unknown_hands_say_why_they_are_unknown() {
+    let mut events = recorded("fixed.jsonl");
+    for event in &mut events {
+        if let Some(Kind::ShiftStarted(start)) = &mut event.kind {
+            start.hands.clear();
+        }
+    }
+    let hints = BTreeMap::default();
+    let mut imported = Reel::recorded(GameView::default(), events.clone(), hints);
+    assert_eq!(screen(&imported).matches("not recorded").count(), 3);
+    press(&mut imported, KeyCode::End);
+    assert_eq!(screen(&imported).matches("not recorded").count(), 3);
+
+    let mut live = Reel::live(GameView::default());
+    press(&mut live, KeyCode::Char('h'));
+    let last = events.pop().expect("the end");
+    events.into_iter().for_each(|event| live.push(event));
+    let shown = screen(&live);
+    assert_eq!(
+        shown.matches("not shown while the game is played").count(),
+        3
+    );
+    live.push(last);
+    let shown = screen(&live);
+    assert_eq!(shown.matches("not shown to spectators").count(), 3);
 }
 
 #[test]

@@ -8,7 +8,6 @@ use ratatui::widgets::Paragraph;
 use super::reel::Reel;
 use crate::narration::MAX_NAME;
 use crate::narration::hand::Hand;
-use crate::narration::view::GameView;
 use crate::tui::theme::Theme;
 use crate::tui::view::{draw as draw_table, end_lines, padded, popup};
 
@@ -55,7 +54,7 @@ pub(super) fn draw(frame: &mut Frame<'_>, theme: Theme, reel: &Reel) {
     ])
     .areas(area);
     if reel.hands {
-        draw_hands(frame, theme, table, hands);
+        draw_hands(frame, theme, reel, hands);
     }
     draw_bar(frame, theme, reel, bar);
     frame.render_widget(Paragraph::new(KEYS).style(theme.dim()), keys);
@@ -71,16 +70,20 @@ pub(super) fn draw(frame: &mut Frame<'_>, theme: Theme, reel: &Reel) {
     }
 }
 
-fn draw_hands(frame: &mut Frame<'_>, theme: Theme, table: &GameView, area: Rect) {
+fn draw_hands(frame: &mut Frame<'_>, theme: Theme, reel: &Reel, area: Rect) {
+    let table = &reel.table;
+    let unknown = match (reel.recorded, &table.end) {
+        (true, _) => "not recorded",
+        (false, None) => "not shown while the game is played",
+        // Its record may have them.
+        (false, Some(_)) => "not shown to spectators",
+    };
     let lines = (0u32..).zip(&table.seats).map(|(seat, place)| {
         let name = Span::styled(padded(&table.name(seat), MAX_NAME + 1), theme.seat(seat));
         let mut spans = vec![Span::raw(" "), name];
         match &place.hand {
             Some(hand) => spans.extend(cards(theme, table.faces(), hand)),
-            None if table.started => spans.push(Span::styled(
-                "not shown while the game is played",
-                theme.dim(),
-            )),
+            None if table.started => spans.push(Span::styled(unknown, theme.dim())),
             None => {}
         }
         Line::from(spans)
@@ -89,23 +92,20 @@ fn draw_hands(frame: &mut Frame<'_>, theme: Theme, table: &GameView, area: Rect)
     frame.render_widget(Paragraph::new(lines).block(theme.boxed(" hands ")), area);
 }
 
-/// A hand in a line: `2 5×3 11×2★ J`.
+/// A hand in a line: `2 3×5 2×11★ J`.
 fn cards(theme: Theme, faces: u32, hand: &Hand) -> Vec<Span<'static>> {
     let stacks = hand.stacks().into_iter();
     stacks
         .map(|stack| {
-            let face = if stack.joker {
-                "J".to_owned()
-            } else {
-                stack.face.to_string()
-            };
-            let count = match stack.count {
-                1 => String::new(),
-                count => format!("×{count}"),
-            };
             let star = if stack.golden { "★" } else { "" };
+            let words = match (stack.count, stack.joker) {
+                (1, true) => "J".to_owned(),
+                (count, true) => format!("{count}J"),
+                (1, false) => format!("{}{star}", stack.face),
+                (count, false) => format!("{count}×{}{star}", stack.face),
+            };
             let style = theme.card(stack.face, faces);
-            Span::styled(format!("{face}{count}{star} "), style)
+            Span::styled(format!("{words} "), style)
         })
         .collect()
 }
@@ -126,4 +126,22 @@ fn draw_bar(frame: &mut Frame<'_>, theme: Theme, reel: &Reel, area: Rect) {
     let bar = format!(" {}{}", "━".repeat(filled), "─".repeat(room - filled));
     let line = Line::from(vec![Span::styled(bar, theme.frame()), Span::raw(words)]);
     frame.render_widget(Paragraph::new(line), area);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hand_is_counted_as_plays_are() {
+        for (held, golden, expected) in [
+            (&[2, 5, 5, 5, 11, 11, 12][..], true, "2 3×5 2×11★ J "),
+            (&[11, 12, 12], true, "11★ 2J "),
+            (&[11, 4], false, "4 11 "),
+            (&[], false, ""),
+        ] {
+            let spans = cards(Theme::new(false), 11, &Hand::of(11, held, golden));
+            assert_eq!(Line::from(spans).to_string(), expected);
+        }
+    }
 }
