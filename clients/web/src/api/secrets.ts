@@ -7,7 +7,8 @@ import type { Interceptor } from "@connectrpc/connect";
 import { type RoomPolicy, Visibility } from "../gen/chefshat/v1/room_pb";
 import { recall, recallObject, remember } from "../store";
 
-const HEADER = "chefshat-secret";
+/** The header that shows a secret. */
+export const SECRET_HEADER = "chefshat-secret";
 const STORED = "secrets";
 /** Most secrets that the server accepts with a call. */
 const MAX_SHOWN = 16;
@@ -27,7 +28,7 @@ export function keepSecret(secret: string, policy: Pick<RoomPolicy, "visibility"
 /** Shows secrets with each call that they may be needed for. */
 export const showSecrets: Interceptor = (next) => async (request) => {
   const show = (message: object) => {
-    for (const secret of secretsFor(request.method.name, message)) request.header.append(HEADER, secret);
+    for (const secret of secretsFor(request.method.name, message)) request.header.append(SECRET_HEADER, secret);
   };
   if (!request.stream) {
     show(request.message);

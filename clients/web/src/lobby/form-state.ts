@@ -1,7 +1,7 @@
 // The state of a form that creates something on the server: its values, its invalid fields and its
 // submission. The form itself defines the fields.
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { type Fault, faultOf, wordsOf } from "../api/faults";
 import { t } from "../i18n";
 
@@ -45,7 +45,7 @@ export function useFormState<Form extends object, Name extends string>(
   const [unfolded, unfold] = useState(false);
   const sent = useRef<HTMLElement | null>(null);
   const [refusals, setRefusals] = useState(0);
-  useEffect(() => {
+  useLayoutEffect(() => {
     // The first invalid field, once all are marked and unfolded.
     if (refusals > 0) sent.current?.querySelector<HTMLElement>('[aria-invalid="true"]')?.focus();
   }, [refusals]);

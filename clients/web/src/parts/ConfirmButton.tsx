@@ -2,7 +2,7 @@
 // focus moves to the question, so that it is read out, and back to the button.
 
 import type { ComponentChildren } from "preact";
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { t } from "../i18n";
 import { useAttempt } from "./attempt";
 import { Button, type ButtonLook } from "./Button";
@@ -36,7 +36,8 @@ export function ConfirmButton(props: ConfirmButtonProps) {
   const { busy, fault, run, reset } = useAttempt();
   const whole = useRef<HTMLDivElement>(null);
   const before = useRef(asked);
-  useEffect(() => {
+  // Before anybody can use the question: later, the focus would leave what was chosen meanwhile.
+  useLayoutEffect(() => {
     if (before.current === asked) return;
     before.current = asked;
     whole.current?.querySelector<HTMLElement>(asked ? '[data-part="question"]' : "button")?.focus();

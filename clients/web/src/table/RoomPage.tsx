@@ -16,7 +16,7 @@ import { Again } from "../lobby/Again";
 import { Doorway } from "../lobby/Doorway";
 import { HostInvite } from "../lobby/Invite";
 import { LeaveButton, LeaveDialog } from "../lobby/Leaving";
-import { giveUpSeat, heldSeat, hostedRoom, leaveSeat } from "../lobby/seat";
+import { giveUpSeat, heldSeat, leaveSeat } from "../lobby/seat";
 import { Button } from "../parts/Button";
 import { ErrorPage } from "../parts/ErrorPage";
 import { Notice } from "../parts/Notice";
@@ -141,7 +141,7 @@ function Held({ session }: { session: Session }) {
         study={studyIn(roomId) !== null}
         banner={banner}
         tools={!isOver(table) && leave}
-        onward={hostedRoom(roomId) && !studyIn(roomId) && <Again roomId={roomId} others={others} />}
+        onward={!studyIn(roomId) && <Again roomId={roomId} others={others} />}
         below={
           <>
             <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />

@@ -1,5 +1,6 @@
 // The table in words: cards, events, decisions. Combines the texts with the model's values.
 
+import { shownName } from "../experiment/labels";
 import { type AnswerResult, AnswerStatus } from "../gen/chefshat/v1/decision_pb";
 import { Role, SpecialAction } from "../gen/chefshat/v1/rules_pb";
 import { t } from "../i18n";
@@ -12,7 +13,8 @@ import type { Breach, Demand, LogEntry, LogLine, SeatState, TableState } from ".
 
 /** A seat's name, or its number while it is free. */
 export function nameOf(table: TableState, seat: number): string {
-  return table.seats[seat]?.name || t().common.seat(seat);
+  const name = table.seats[seat]?.name;
+  return name ? shownName(seat, name) : t().common.seat(seat);
 }
 
 /** A seat's name, with its number if another seat has the same name. */

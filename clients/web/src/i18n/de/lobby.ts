@@ -17,6 +17,7 @@ export const lobby: Texts["lobby"] = {
     start: "Jetzt spielen",
     again: "Nochmal spielen",
     againTogether: "Zur Revanche einladen",
+    joinAgain: "An der Revanche teilnehmen",
     learn: "Neu hier? In drei Minuten lernen",
   },
   join: {

@@ -41,6 +41,12 @@ export const studies: Texts["studies"] = {
     open: "Fragebogen öffnen",
     done: "Ich habe ihn ausgefüllt",
   },
+  labels: {
+    agent: (seat) => `Agent ${seat}`,
+    player: (seat) => `Spieler ${seat}`,
+    robot: (seat) => `Roboter ${seat}`,
+    model: (seat) => `Modell ${seat}`,
+  },
   game: {
     practice: "Übungspartie",
     game: "Partie",

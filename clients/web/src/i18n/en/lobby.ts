@@ -16,6 +16,7 @@ export const lobby = {
     start: "Play now",
     again: "Play again",
     againTogether: "Invite to a rematch",
+    joinAgain: "Join the rematch",
     learn: "New here? Learn it in three minutes",
   },
   join: {

@@ -40,6 +40,12 @@ export const studies = {
     open: "Open the questionnaire",
     done: "I have filled it in",
   },
+  labels: {
+    agent: (seat: number) => `Agent ${seat}`,
+    player: (seat: number) => `Player ${seat}`,
+    robot: (seat: number) => `Robot ${seat}`,
+    model: (seat: number) => `Model ${seat}`,
+  },
   game: {
     practice: "Practice game",
     game: "Game",

@@ -17,6 +17,7 @@ export const lobby: Texts["lobby"] = {
     start: "Jugar ya",
     again: "Jugar otra vez",
     againTogether: "Invitar a la revancha",
+    joinAgain: "Unirse a la revancha",
     learn: "Aprende a jugar en tres minutos",
   },
   join: {

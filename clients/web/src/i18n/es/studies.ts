@@ -41,6 +41,12 @@ export const studies: Texts["studies"] = {
     open: "Abrir el cuestionario",
     done: "Lo he rellenado",
   },
+  labels: {
+    agent: (seat) => `Agente ${seat}`,
+    player: (seat) => `Jugador ${seat}`,
+    robot: (seat) => `Robot ${seat}`,
+    model: (seat) => `Modelo ${seat}`,
+  },
   game: {
     practice: "Partida de práctica",
     game: "Partida",

@@ -17,6 +17,7 @@ export const lobby: Texts["lobby"] = {
     start: "Gioca subito",
     again: "Gioca ancora",
     againTogether: "Invita alla rivincita",
+    joinAgain: "Entra nella rivincita",
     learn: "Prima volta? Impara in tre minuti",
   },
   join: {

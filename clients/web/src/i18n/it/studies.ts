@@ -41,6 +41,12 @@ export const studies: Texts["studies"] = {
     open: "Apri il questionario",
     done: "L’ho compilato",
   },
+  labels: {
+    agent: (seat) => `Agente ${seat}`,
+    player: (seat) => `Giocatore ${seat}`,
+    robot: (seat) => `Robot ${seat}`,
+    model: (seat) => `Modello ${seat}`,
+  },
   game: {
     practice: "Partita di prova",
     game: "Partita",
