@@ -3,11 +3,12 @@
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
-import { GameOrigin, type Participant, type Room, RoomPolicySchema } from "../gen/chefshat/v1/room_pb";
+import { GameOrigin, type Participant, ParticipantKind, type Room, RoomPolicySchema } from "../gen/chefshat/v1/room_pb";
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
+import { NO_KEY, nameKey } from "../name-key";
 import { navigate } from "../router";
 import { MAX_NAME } from "./room-form";
-import { createRoom, takeSeat } from "./seat";
+import { createRoom, hostedRoom, takeSeat } from "./seat";
 
 /** Why a room cannot be repeated exactly; null if it can. */
 export function notToBeRepeated(room: Room): "seed" | "hands" | "real" | null {
@@ -16,15 +17,16 @@ export function notToBeRepeated(room: Room): "seed" | "hands" | "real" | null {
   return room.seedFixed ? "seed" : null;
 }
 
-/** The request for a room with the rules, the policy and the agents of another. */
+/** The request for a room with the rules, the policy and the agents of another that this device created. */
 export function requestLike(
   room: Room,
   name: string,
   waitingTimeMs = room.policy?.waitingTimeMs,
 ): MessageInitShape<typeof CreateRoomRequestSchema> {
+  const wizards = hostedRoom(room.roomId)?.wizards ?? [];
   return {
     name: Array.from(name).slice(0, MAX_NAME).join(""),
-    seats: room.seats.map(seatLike),
+    seats: room.seats.map((seat) => seatLike(seat, wizards.includes(seat.seat))),
     physical: room.origin === GameOrigin.PHYSICAL,
     policy: { ...(room.policy ?? create(RoomPolicySchema)), ...(waitingTimeMs === undefined ? {} : { waitingTimeMs }) },
     // A branched game keeps the rules of the game it branches from.
@@ -34,8 +36,10 @@ export function requestLike(
   };
 }
 
-function seatLike(seat: Participant) {
+/** A seat like another, in which a person played as another kind (`wizard`) or not. */
+function seatLike(seat: Participant, wizard: boolean) {
   const { replay, builtInAgent, name, reservedFor, atTable, kind } = seat;
+  if (wizard) return { filledBy: { case: "wizard" as const, value: reservedFor } };
   if (atTable) return { filledBy: { case: "atTable" as const, value: kind }, name };
   if (replay) return { filledBy: { case: "replay" as const, value: replay }, name };
   if (builtInAgent) return { filledBy: { case: "builtInAgent" as const, value: builtInAgent }, name };
@@ -47,6 +51,9 @@ export async function playAgain(roomId: string, name: string, seat: number): Pro
   const { room } = await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS });
   if (!room) throw new Error("the server did not say which room it is");
   const { joinCode } = await createRoom(requestLike(room, room.name));
-  const again = await takeSeat(joinCode, name, seat);
+  const kind = room.seats[seat]?.kind || ParticipantKind.HUMAN;
+  // A robot's name is not the person's own.
+  const key = kind === ParticipantKind.HUMAN ? nameKey() : NO_KEY;
+  const again = await takeSeat(joinCode, name, seat, kind, key);
   navigate({ page: "room", roomId: again.roomId });
 }
