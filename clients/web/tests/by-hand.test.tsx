@@ -1,47 +1,47 @@
-// The organiser's changes by hand: removing a participant by name, and the links of people who take
-// over a place.
+// The organiser's changes by hand: pausing, games that are called or postponed, removing a participant
+// by name, giving its place to an agent, and the links of people who take over a place.
 
 import { create } from "@bufbuild/protobuf";
 import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { tournamentApi } from "../src/api/client";
-import { TournamentSchema, TournamentState } from "../src/gen/chefshat/v1/tournament_pb";
+import { TournamentGameState, TournamentSchema, TournamentState } from "../src/gen/chefshat/v1/tournament_pb";
 import {
+  CallGameResponseSchema,
+  ListTournamentGamesResponseSchema,
+  PauseTournamentResponseSchema,
+  PostponeGameResponseSchema,
   RemoveParticipantResponseSchema,
   ReplaceParticipantResponseSchema,
+  ResumeTournamentResponseSchema,
 } from "../src/gen/chefshat/v1/tournament_service_pb";
 import { forgetAll, remember } from "../src/store";
-import { ManageParticipants } from "../src/tournaments/ByHand";
+import { ManageGames, ManageParticipants, Pause } from "../src/tournaments/ByHand";
 import { hostedTournament, placeLinks, removeParticipant, replaceByPerson } from "../src/tournaments/hosting";
 import { WhichPlace } from "../src/tournaments/OwnPlace";
-import { root } from "./mounted";
+import { root, settle } from "./mounted";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
 const TICKET = "ab".repeat(48);
+const OWNER = { tournamentId: ID, ownerToken: "cd".repeat(48) };
 
 beforeEach(() => {
-  remember(`organised.${ID}`, JSON.stringify({ joinCode: "ABCD", ownerToken: "cd".repeat(48) }));
+  remember(`organised.${ID}`, JSON.stringify({ joinCode: "ABCD", ownerToken: OWNER.ownerToken }));
 });
 afterEach(() => {
   vi.restoreAllMocks();
   forgetAll();
 });
 
+const tournament = (names: readonly string[], state = TournamentState.OPEN) =>
+  create(TournamentSchema, {
+    tournamentId: ID,
+    state,
+    participants: names.map((name, participant) => ({ name, participant })),
+  });
 const show = (...names: string[]) =>
-  act(() =>
-    render(
-      <ManageParticipants
-        tournament={create(TournamentSchema, {
-          tournamentId: ID,
-          state: TournamentState.OPEN,
-          participants: names.map((name, participant) => ({ name, participant })),
-        })}
-        agents={[]}
-      />,
-      root,
-    ),
-  );
+  act(() => render(<ManageParticipants tournament={tournament(names)} agents={["greedy", "trained"]} />, root));
 const button = (words: string) =>
   [...root.querySelectorAll("button")].find((one) => one.textContent?.startsWith(words));
 const press = (words: string) => act(() => button(words)?.click());
@@ -113,4 +113,101 @@ test("a device asks which of two places it shall have", async () => {
   await press("Continue as Ada");
   await press("Take part as Bo");
   expect(decide.mock.calls).toEqual([[null], [brought]]);
+});
+
+test("an agent takes the place of a participant", async () => {
+  const replace = replacing();
+  await show("Ada", "Bo");
+  const [, form] = root.querySelectorAll("form");
+  const by = form?.querySelector("select");
+  if (!form || !by) throw new Error("Bo can be replaced");
+  expect([...by.options].map(({ textContent }) => textContent)).toEqual([
+    "another person",
+    "the agent “greedy”",
+    "the agent “trained”",
+  ]);
+  const submit = () => act(() => form.requestSubmit());
+  // Another person needs a name, an agent does not.
+  await submit();
+  expect(form.textContent).toContain("Enter a name.");
+  expect(replace).not.toHaveBeenCalled();
+  by.value = "trained";
+  await act(() => {
+    by.dispatchEvent(new Event("change", { bubbles: true }));
+  });
+  expect(form.querySelector("input")).toBeNull();
+  await submit();
+  await settle();
+  expect(replace.mock.calls.map(([request]) => request)).toEqual([
+    { ...OWNER, participant: 1, builtInAgent: "trained" },
+  ]);
+  // No link is to be passed on.
+  expect(placeLinks(ID)).toEqual([]);
+});
+
+test("a tournament is paused and resumed, and an error is shown", async () => {
+  const pause = vi.spyOn(tournamentApi, "pauseTournament");
+  pause.mockRejectedValueOnce(new Error("not now")).mockResolvedValue(create(PauseTournamentResponseSchema));
+  const resume = vi.spyOn(tournamentApi, "resumeTournament");
+  resume.mockResolvedValue(create(ResumeTournamentResponseSchema));
+  const showPause = (paused: boolean) => act(() => render(<Pause tournament={{ ...tournament([]), paused }} />, root));
+  await showPause(false);
+  expect(root.textContent).toContain("No new game starts; running games continue.");
+  await press("Pause");
+  await settle();
+  expect(root.querySelector('[role="alert"]')?.textContent).toContain("The server does not answer.");
+  await press("Pause");
+  await settle();
+  expect(root.querySelector('[role="alert"]')).toBeNull();
+  expect(pause.mock.calls.map(([request]) => request)).toEqual([OWNER, OWNER]);
+  expect(resume).not.toHaveBeenCalled();
+
+  await showPause(true);
+  expect(root.textContent).toContain("The tournament is paused");
+  await press("Resume the tournament");
+  await settle();
+  expect(resume.mock.calls.map(([request]) => request)).toEqual([OWNER]);
+  expect(pause).toHaveBeenCalledTimes(2);
+});
+
+test("a due game is called or postponed, a void one called again, and no other game is listed", async () => {
+  const names = ["Ada", "Bo", "Cleo", "Dora"];
+  const states = [
+    TournamentGameState.COUNTED,
+    TournamentGameState.PLAYING,
+    TournamentGameState.DUE,
+    TournamentGameState.VOID,
+  ];
+  const games = states.map((state, game) => ({
+    game,
+    state,
+    round: 2,
+    table: game + 1,
+    number: 1,
+    seats: [{ participant: game }, { participant: 0 }],
+  }));
+  vi.spyOn(tournamentApi, "listTournamentGames").mockResolvedValue(
+    create(ListTournamentGamesResponseSchema, { games }),
+  );
+  const call = vi.spyOn(tournamentApi, "callGame").mockResolvedValue(create(CallGameResponseSchema));
+  const postpone = vi.spyOn(tournamentApi, "postponeGame").mockResolvedValue(create(PostponeGameResponseSchema));
+  const live = { tournament: tournament(names, TournamentState.PLAYING), standings: [], games: [] };
+  await act(() => render(<ManageGames live={live} />, root));
+  await settle();
+  const [due, again, ...others] = root.querySelectorAll("li");
+  expect(others).toEqual([]);
+  expect(due?.textContent).toContain("Cleo, Ada");
+  expect(again?.textContent).toContain("Dora, Ada");
+  const buttons = (within: Element | undefined) => [...(within?.querySelectorAll("button") ?? [])];
+  expect(buttons(due).map(({ textContent }) => textContent)).toEqual(["Call now", "Postpone"]);
+  expect(buttons(again).map(({ textContent }) => textContent)).toEqual(["Call now"]);
+  for (const one of [...buttons(due), ...buttons(again)]) {
+    await act(() => one.click());
+    await settle();
+  }
+  expect(call.mock.calls.map(([request]) => request)).toEqual([
+    { ...OWNER, game: 2 },
+    { ...OWNER, game: 3 },
+  ]);
+  expect(postpone.mock.calls.map(([request]) => request)).toEqual([{ ...OWNER, game: 2 }]);
 });

@@ -63,6 +63,13 @@ describe("numbers", () => {
     expect(plurals(language)(count, { one: "# card", other: "# cards" })).toBe(words);
   });
 
+  test.each(languages)("a seat in $label has one point, or several", async ({ value }) => {
+    await setLanguage(value);
+    const { pointsWord } = t().table;
+    expect(pointsWord(0)).toBe(pointsWord(5));
+    expect(pointsWord(1)).not.toBe(pointsWord(5));
+  });
+
   test.each([
     [1, "1st"],
     [2, "2nd"],

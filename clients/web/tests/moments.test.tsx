@@ -77,6 +77,16 @@ test("a moment is shown for a while; the past of a table is not", async () => {
   expect(shown()).toBeUndefined();
 });
 
+test("a last card is no longer announced once it has been played", async () => {
+  const dealt = played(start(), deal, play(1, 11, 2, 15));
+  const last = played(dealt, play(2, 9, 2, 1));
+  const show = (table: TableState) => act(() => render(<Moment table={table} />, root));
+  for (const table of [dealt, last]) await show(table);
+  expect(root.textContent).toContain("Cleo has one card left");
+  await show(played(last, play(2, 8, 1, 0)));
+  expect(root.textContent).toBe("");
+});
+
 test("moments can be switched off", async () => {
   setPreference("moments", false);
   const dealt = played(start(), deal);

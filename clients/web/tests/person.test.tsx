@@ -164,3 +164,14 @@ test("the result of a replay leads to the players, that of a game in progress do
   await act(() => render(<Result table={table} own={undefined} />, root));
   expect(link("Ada")).toBeUndefined();
 });
+
+test.each([
+  ["its name", ["Ada", "Bo", "Bo", "Ci"], "Ada won"],
+  ["its name and seat, if another one has that name", ["Bo", "Ada", "Bo", "Ci"], "Bo (1) won"],
+])("the result names the winner with %s", async (_, names, words) => {
+  const dealt = tableOf(stateOf());
+  const seats = dealt.seats.map((seat) => ({ ...seat, name: names[seat.seat] ?? "" }));
+  const standings = seats.map(({ seat }) => ({ seat, points: 0, place: seat + 1 }));
+  await act(() => render(<Result table={{ ...dealt, seats, phase: "gameOver", standings }} own={3} />, root));
+  expect(root.querySelector("h2")?.textContent).toBe(words);
+});

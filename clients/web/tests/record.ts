@@ -34,3 +34,17 @@ export function seenBy(event: GameEvent, seat: number | undefined): GameEvent {
       return event;
   }
 }
+
+/** A record in which no hand is known, as of games imported from a table with real cards. */
+export function withoutHands(lines: readonly RecordLine[]): RecordLine[] {
+  return lines.map((record) => {
+    const { line } = record;
+    if (line.case === "decision") {
+      const value = { ...line.value, actionMask: new Uint8Array() };
+      return create(RecordLineSchema, { line: { case: "decision", value } });
+    }
+    return line.case === "event"
+      ? create(RecordLineSchema, { line: { case: "event", value: seenBy(line.value, undefined) } })
+      : record;
+  });
+}

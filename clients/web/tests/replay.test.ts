@@ -1,16 +1,12 @@
 // A record as a film: every decision is open once, and no perspective reveals hidden cards.
 
-import { create } from "@bufbuild/protobuf";
 import { expect, test } from "vitest";
 import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
-import { type RecordLine, RecordLineSchema } from "../src/gen/chefshat/v1/record_pb";
 import { type Film, type Frame, filmOf } from "../src/replay/frames";
 import { decidingFor, seenFrom } from "../src/replay/perspective";
 import { legalActions } from "../src/table/model/actions";
 import { applyEvent } from "../src/table/model/reduce";
-import { RECORDS, recorded, seenBy } from "./record";
-
-const NOTHING = new Uint8Array();
+import { RECORDS, recorded, withoutHands } from "./record";
 
 /** All moments of a film. */
 function framesOf(film: Film): Frame[] {
@@ -57,15 +53,7 @@ test.each(RECORDS)("%s: a seat's perspective has its own hand only, and no gift 
 
 test.each(RECORDS)("%s: with unknown hands, as at a table with real cards, leads to the same result", (name) => {
   const lines = recorded(name);
-  const unknown = lines.map((line): RecordLine => {
-    const decision = line.line.case === "decision" ? line.line.value : undefined;
-    if (decision)
-      return create(RecordLineSchema, { line: { case: "decision", value: { ...decision, actionMask: NOTHING } } });
-    return line.line.case === "event"
-      ? create(RecordLineSchema, { line: { case: "event", value: seenBy(line.line.value, undefined) } })
-      : line;
-  });
-  const [known, film] = [filmOf(lines), filmOf(unknown)];
+  const [known, film] = [filmOf(lines), filmOf(withoutHands(lines))];
   expect([known.handsKnown, film.handsKnown]).toEqual([true, false]);
   expect(film.length).toBe(known.length);
   for (let at = 0; at < film.length; at += 1) {

@@ -1,7 +1,7 @@
 //! What a researcher does with a running study besides reading its data: follows it, deletes a
 //! participant by its name or the whole study. And what a participant cannot do to its room.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -333,33 +333,35 @@ async fn a_robot_of_a_study_may_be_played_by_a_person() {
     let mut study = created(&host, settings, &["Ana"]).await;
     let (mut person, view) = Person::new(&study.tap, &study.links[0]).await;
     let step = GAMES + 1;
-    // The practice, which needs the robot too, and a game.
+    // The practice and each game need the robot.
     let client = Client::connect(host.url()).await.expect("it listens");
-    let links = async {
-        for step in [GAMES, GAMES + 1] {
-            let code = loop {
-                let games = study.lab.participants().await.remove(0).games;
-                let open = games
-                    .into_iter()
-                    .find(|it| it.step == step && !it.join_code.is_empty());
-                if let Some(game) = open {
-                    break game.join_code;
-                }
+    let robot = async {
+        let mut played = BTreeSet::new();
+        loop {
+            let games = study.lab.participants().await.remove(0).games;
+            let open = games.into_iter().find(|it| !it.join_code.is_empty());
+            let Some(game) = open.filter(|it| played.insert(it.game_id.clone())) else {
                 tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+                continue;
             };
             let request = v1::JoinRoomRequest {
-                join_code: code,
+                join_code: game.join_code,
                 name: "Robbie".into(),
                 kind: v1::ParticipantKind::Robot.into(),
                 ..v1::JoinRoomRequest::default()
             };
             let joined = client.join(request).await.expect("a seat for a robot");
-            let played = client.play(joined.ticket, RandomAgent::new(3)).await;
-            played.expect("it ends");
+            let playing = client.play(joined.ticket, RandomAgent::new(3)).await;
+            playing.expect("it ends");
         }
     };
-    let playing = person.go_on(view, step + 1);
-    patiently("both games to end", futures::future::join(links, playing)).await;
+    let playing = async {
+        tokio::select! {
+            () = robot => {}
+            _ = person.go_on(view, step + 1) => {}
+        }
+    };
+    patiently("the games to end", playing).await;
 
     let data = study.lab.export().await;
     let placed = study.lab.participants().await.remove(0).games;

@@ -24,10 +24,10 @@ export function SeatList({ state, table }: { state: TableState; table: Table }) 
             <li key={seat.seat} class={`${css.seat} ${next ? css.next : ""}`} data-part="attend-seat">
               <SeatNumber seat={seat.seat} />
               <div class={css.who}>
-                <p class={css.name}>
-                  <strong>{isTaken(seat) ? distinctName(table, seat.seat) : t().table.freeSeat}</strong>
+                <div class={css.name}>
+                  <h3>{isTaken(seat) ? distinctName(table, seat.seat) : t().table.freeSeat}</h3>
                   {role && <span class="soft"> {role}</span>}
-                </p>
+                </div>
                 <p class={css.badges}>
                   {isTaken(seat) && <KindBadge kind={seat.kind} builtIn={seat.builtIn} />}
                   <span class="soft">{seat.atTable ? words.atTable : words.remote}</span>

@@ -8,7 +8,7 @@ import { announce } from "../parts/Announcer";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import { joinAgain, nextCode, playAgain } from "./room-like";
+import { joinAgain, playAgain, roomOfTicket } from "./room-like";
 import { heldSeat, hostedRoom } from "./seat";
 
 /** Polling interval of the next room, milliseconds. */
@@ -28,13 +28,14 @@ export function Again({ roomId, others }: { roomId: string; others: boolean }) {
 function JoinAgain({ roomId }: { roomId: string }) {
   const label = t().lobby.quick.joinAgain;
   const held = heldSeat(roomId);
-  const ask = async (signal: AbortSignal) => (held ? nextCode(roomId, held.ticket, signal) : "");
-  const code = usePolled(ask, EVERY_MS, roomId).value ?? "";
+  const ask = async (signal: AbortSignal) => held && roomOfTicket(roomId, held.ticket, signal);
+  const room = usePolled(ask, EVERY_MS, roomId).value;
+  const code = room?.nextJoinCode ?? "";
   useEffect(() => {
     if (code !== "") announce(label);
   }, [code]);
-  if (!held || code === "") return null;
-  return <Onward label={label} act={() => joinAgain(code, held.name, held.seat)} />;
+  if (!held || !room || code === "") return null;
+  return <Onward label={label} act={() => joinAgain(room, held.name, held.seat)} />;
 }
 
 function Onward({ label, act }: { label: string; act: () => Promise<void> }) {

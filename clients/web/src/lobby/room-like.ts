@@ -4,8 +4,9 @@
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { SECRET_HEADER } from "../api/secrets";
-import { GameOrigin, type Participant, type Room, RoomPolicySchema } from "../gen/chefshat/v1/room_pb";
+import { GameOrigin, type Participant, ParticipantKind, type Room, RoomPolicySchema } from "../gen/chefshat/v1/room_pb";
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
+import { NO_KEY, nameKey } from "../name-key";
 import { navigate } from "../router";
 import { MAX_NAME } from "./room-form";
 import { createRoom, hostedRoom, takeSeat } from "./seat";
@@ -17,15 +18,16 @@ export function notToBeRepeated(room: Room): "seed" | "hands" | "real" | null {
   return room.seedFixed ? "seed" : null;
 }
 
-/** The request for a room with the rules, the policy and the agents of another. */
+/** The request for a room with the rules, the policy and the agents of another that this device created. */
 export function requestLike(
   room: Room,
   name: string,
   waitingTimeMs = room.policy?.waitingTimeMs,
 ): MessageInitShape<typeof CreateRoomRequestSchema> {
+  const wizards = hostedRoom(room.roomId)?.wizards ?? [];
   return {
     name: Array.from(name).slice(0, MAX_NAME).join(""),
-    seats: room.seats.map(seatLike),
+    seats: room.seats.map((seat) => seatLike(seat, wizards.includes(seat.seat))),
     physical: room.origin === GameOrigin.PHYSICAL,
     policy: { ...(room.policy ?? create(RoomPolicySchema)), ...(waitingTimeMs === undefined ? {} : { waitingTimeMs }) },
     // A branched game keeps the rules of the game it branches from.
@@ -35,8 +37,10 @@ export function requestLike(
   };
 }
 
-function seatLike(seat: Participant) {
+/** A seat like another, in which a person played as another kind (`wizard`) or not. */
+function seatLike(seat: Participant, wizard: boolean) {
   const { replay, builtInAgent, name, reservedFor, atTable, kind } = seat;
+  if (wizard) return { filledBy: { case: "wizard" as const, value: reservedFor } };
   if (atTable) return { filledBy: { case: "atTable" as const, value: kind }, name };
   if (replay) return { filledBy: { case: "replay" as const, value: replay }, name };
   if (builtInAgent) return { filledBy: { case: "builtInAgent" as const, value: builtInAgent }, name };
@@ -48,22 +52,30 @@ export async function playAgain(roomId: string, name: string, seat: number): Pro
   const { room } = await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS });
   if (!room) throw new Error("the server did not say which room it is");
   const { joinCode } = await createRoom(requestLike(room, room.name));
-  const again = await takeSeat(joinCode, name, seat);
+  const again = await sitAgain(room, joinCode, name, seat);
   const ownerToken = hostedRoom(roomId)?.ownerToken ?? "";
   // Without it the others need the invitation, which the new room shows.
   await roomApi.setNextRoom({ roomId, ownerToken, joinCode }, { timeoutMs: CALL_LIMIT_MS }).catch(() => undefined);
-  navigate({ page: "room", roomId: again.roomId });
+  navigate({ page: "room", roomId: again });
 }
 
-/** The join code of the room in which the participants of a room play again; empty if there is none. */
-export async function nextCode(roomId: string, ticket: string, signal: AbortSignal): Promise<string> {
+/** A room as its participants see it, with the join code of the room in which they play again. */
+export async function roomOfTicket(roomId: string, ticket: string, signal: AbortSignal): Promise<Room | undefined> {
   const headers = { [SECRET_HEADER]: ticket };
   const { room } = await roomApi.getRoom({ roomId }, { signal, headers, timeoutMs: CALL_LIMIT_MS });
-  return room?.nextJoinCode ?? "";
+  return room;
 }
 
-/** Takes the same seat in the next room and navigates to it. */
-export async function joinAgain(code: string, name: string, seat: number): Promise<void> {
-  const { roomId } = await takeSeat(code, name, seat);
-  navigate({ page: "room", roomId });
+/** Takes the same seat in the room in which the participants of a room play again, and navigates to it. */
+export async function joinAgain(room: Room, name: string, seat: number): Promise<void> {
+  navigate({ page: "room", roomId: await sitAgain(room, room.nextJoinCode, name, seat) });
+}
+
+/** Takes a seat as in a room before. Returns the id of its room. */
+async function sitAgain(before: Room, code: string, name: string, seat: number): Promise<string> {
+  const kind = before.seats[seat]?.kind || ParticipantKind.HUMAN;
+  // A robot's name is not the person's own.
+  const key = kind === ParticipantKind.HUMAN ? nameKey() : NO_KEY;
+  const { roomId } = await takeSeat(code, name, seat, kind, key);
+  return roomId;
 }

@@ -23,6 +23,8 @@ export interface HeldSeat {
 export interface HostedRoom {
   joinCode: string;
   ownerToken: string;
+  /** Seats of people who play as another kind. The server names them to nobody before the record. */
+  wizards: readonly number[];
 }
 
 /** This device's seat in a room, if any. */
@@ -57,9 +59,14 @@ export function leaveSeat(roomId: string): void {
 export function hostedRoom(roomId: string): HostedRoom | null {
   return recallObject(`hosted.${roomId}`, (value) =>
     typeof value.joinCode === "string" && typeof value.ownerToken === "string"
-      ? { joinCode: value.joinCode, ownerToken: value.ownerToken }
+      ? { joinCode: value.joinCode, ownerToken: value.ownerToken, wizards: seatsIn(value.wizards) }
       : null,
   );
+}
+
+/** The seats in a stored value; none if it was stored before there were any. */
+function seatsIn(stored: unknown): readonly number[] {
+  return Array.isArray(stored) ? stored.filter((seat) => typeof seat === "number") : [];
 }
 
 /** The room in which this device has a seat taken with this code, if any. */
@@ -104,7 +111,8 @@ export async function createRoom(
 ): Promise<{ room: Room; joinCode: string }> {
   const made = await roomApi.createRoom(request, { timeoutMs: CALL_LIMIT_MS });
   const room = saidRoom(made.room);
-  const hosted: HostedRoom = { joinCode: made.joinCode, ownerToken: made.ownerToken };
+  const wizards = (request.seats ?? []).flatMap(({ filledBy }, seat) => (filledBy?.case === "wizard" ? [seat] : []));
+  const hosted: HostedRoom = { joinCode: made.joinCode, ownerToken: made.ownerToken, wizards };
   remember(`hosted.${room.roomId}`, JSON.stringify(hosted));
   keepSecret(hosted.ownerToken, room.policy, room.gameId);
   if (made.tableTicket !== "") keepTableTicket(room.roomId, made.tableTicket);

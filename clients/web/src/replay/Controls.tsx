@@ -4,7 +4,7 @@ import { t } from "../i18n";
 import { SelectField } from "../parts/Field";
 import { Icon } from "../parts/Icon";
 import toolsCss from "../table/view/Tools.module.css";
-import { nameOf } from "../table/words";
+import { distinctName } from "../table/words";
 import type { Film, Frame } from "./frames";
 import type { Perspective } from "./perspective";
 import replayCss from "./Replay.module.css";
@@ -103,7 +103,7 @@ export function Controls({
             { value: "all", label: film.handsKnown ? words.allHands : words.noHands },
             ...frame.table.seats.map(({ seat }) => ({
               value: String(seat),
-              label: words.as(nameOf(frame.table, seat)),
+              label: words.as(distinctName(frame.table, seat)),
             })),
             { value: "none", label: words.asSpectator },
           ]}

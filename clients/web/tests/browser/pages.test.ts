@@ -1,11 +1,11 @@
-// Every page: no serious accessibility error in the light and the dark theme, no horizontal
-// scrolling on a phone; and the size of the first page.
+// Every page: no accessibility error in the light and the dark theme, no horizontal scrolling on a
+// phone, names for everything in each language; and the size of the first page.
 
 import type { Page } from "playwright-core";
 import { beforeAll, expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
 import { languages } from "../../src/i18n";
-import { PHONE, serious, tooWide } from "./checks";
+import { inaccessible, PHONE, tooWide, unnamed } from "./checks";
 import { newStudy } from "./participants";
 import { byClicks, nextDecision, sitDown } from "./play";
 import { agent, clientsOf, gameOf, newPhysicalRoom, newRoom } from "./rooms";
@@ -20,7 +20,7 @@ let gameId: string;
 let tournamentId: string;
 /** A tournament created by the device that has not started. */
 let ownId: string;
-let rooms: { table: string; waiting: string; wizard: string };
+let rooms: { over: string; table: string; waiting: string; wizard: string };
 /** A study whose key the device has. */
 let studyId: string;
 /** A room with real cards, which the device attends to. */
@@ -47,7 +47,7 @@ beforeAll(async () => {
   const table = await newRoom(server, { seats: ["person", "greedy", "random", "greedy"] });
   const waiting = await newRoom(server, { seats: ["person", "agent", "random", "greedy"], name: "Sunday" });
   const wizard = await newRoom(server, { seats: ["wizard", "greedy", "random", "greedy"], policy: { hints: true } });
-  rooms = { table: table.roomId, waiting: waiting.roomId, wizard: wizard.roomId };
+  rooms = { over: over.roomId, table: table.roomId, waiting: waiting.roomId, wizard: wizard.roomId };
   code = (await newRoom(server, { seats: ["person", "agent", "random", "greedy"], name: "Monday" })).code;
   seated = (await person(browser)).page;
   const physical = await newPhysicalRoom(server, ["Ada", "Bo", "Cleo"]);
@@ -117,6 +117,7 @@ const PAGES: Record<string, { path: () => string; ready: string; opened?: string
     opened: '[data-part~="choice"] button',
   },
   watch: { path: () => `/watch/${rooms.table}`, ready: '[data-view="watched"]' },
+  "end of a game": { path: () => `/watch/${rooms.over}`, ready: '[data-part~="result"]' },
   replay: {
     path: () => `/replay/${gameId}`,
     ready: '[data-part~="replay"]',
@@ -154,14 +155,12 @@ const PAGES: Record<string, { path: () => string; ready: string; opened?: string
 test.each(Object.keys(PAGES))("%s: accessible in both themes, and no wider than a phone", async (name) => {
   const { path = () => "", ready = "", opened } = PAGES[name] ?? {};
   const page = seated;
-  await page.emulateMedia({ colorScheme: "light", reducedMotion: "reduce" });
+  await page.emulateMedia({ reducedMotion: "reduce" });
   await page.setViewportSize(COMPUTER);
   await page.goto(server.url + path());
   await page.locator(ready).first().waitFor();
   if (opened) await page.locator(opened).first().click();
-  expect(await serious(page)).toEqual([]);
-  await page.emulateMedia({ colorScheme: "dark" });
-  expect(await serious(page, { runOnly: ["color-contrast"] })).toEqual([]);
+  expect(await inaccessible(page)).toEqual([]);
   await page.setViewportSize(PHONE);
   // The page adapts to the new size over a few frames.
   await expect.poll(() => tooWide(page)).toEqual([]);
@@ -169,9 +168,25 @@ test.each(Object.keys(PAGES))("%s: accessible in both themes, and no wider than 
   for (const { value } of languages.filter(({ value }) => value !== "en")) {
     await page.goto(`${server.url}${path()}${path().includes("?") ? "&" : "?"}lang=${value}`);
     await page.locator(ready).first().waitFor();
+    if (opened) await page.locator(opened).first().click();
     expect(await page.locator("html").getAttribute("lang")).toBe(value);
+    expect(await unnamed(page), value).toEqual([]);
     await expect.poll(() => tooWide(page), { message: value }).toEqual([]);
   }
+});
+
+test("the checks find what is wrong with a page", async () => {
+  const { page } = await person(browser);
+  await page.setContent(`
+    <style>@media (prefers-color-scheme: dark) { p { color: #777; background: #666 } }</style>
+    <main style="width: 3000px"><h1>A page</h1><h3>Skips a level</h3><p>Seen by day</p><button></button></main>`);
+  const [everything, names] = [await inaccessible(page), await unnamed(page)];
+  for (const theme of ["light", "dark"])
+    for (const rule of ["button-name", "document-title", "heading-order", "html-has-lang"])
+      expect(everything.join("\n")).toContain(`${theme}: ${rule}: `);
+  expect(everything.filter((finding) => finding.includes("color-contrast")).join()).toMatch(/^dark: /);
+  expect(names.map((finding) => finding.split(":")[0])).toEqual(["button-name", "document-title", "html-has-lang"]);
+  expect(await tooWide(page)).not.toEqual([]);
 });
 
 const LOCALES = ["en-GB", "de-DE", "es-ES", "it-IT"];

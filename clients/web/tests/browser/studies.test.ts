@@ -3,7 +3,7 @@
 
 import { readFileSync } from "node:fs";
 import { expect, test } from "vitest";
-import { PHONE, serious, tooWide } from "./checks";
+import { inaccessible, PHONE, tooWide } from "./checks";
 import { consent, expectNoSecretOn, expectNoSecretSent, newStudy, playGame } from "./participants";
 import { clientsOf } from "./rooms";
 import { browser, person, server, until, useStage } from "./stage";
@@ -19,10 +19,10 @@ test("a participant goes through all stages, on two devices, without meeting a c
   const first = await person(browser);
   await first.page.goto(links[0] ?? "");
   await first.page.getByRole("heading", { name: "Before you begin" }).waitFor();
-  expect(await serious(first.page)).toEqual([]);
+  expect(await inaccessible(first.page)).toEqual([]);
   await consent(first.page);
   expect(await first.page.locator('[data-part~="header-nav"]').isVisible()).toBe(false);
-  expect(await serious(first.page)).toEqual([]);
+  expect(await inaccessible(first.page)).toEqual([]);
   await first.page.reload();
   await first.page.locator("[data-decision]").waitFor();
   // The study hides what the others are, but not that they are there.
@@ -40,7 +40,7 @@ test("a participant goes through all stages, on two devices, without meeting a c
   await second.page.getByRole("heading", { name: "About the game" }).waitFor();
   await second.page.getByRole("button", { name: "Send the answers" }).click();
   await second.page.getByText("3 questions have no answer yet.").first().waitFor();
-  expect(await serious(second.page)).toEqual([]);
+  expect(await inaccessible(second.page)).toEqual([]);
   expect(await tooWide(second.page)).toEqual([]);
   await second.page.getByRole("radio", { name: "4 of 5" }).check();
   // What was entered survives a reload.
@@ -52,7 +52,7 @@ test("a participant goes through all stages, on two devices, without meeting a c
   await second.page.getByRole("heading", { name: "About this study" }).waitFor();
   await second.page.getByRole("button", { name: "Continue" }).click();
   await second.page.getByRole("heading", { name: "Thank you for taking part" }).waitFor();
-  expect(await serious(second.page)).toEqual([]);
+  expect(await inaccessible(second.page)).toEqual([]);
   await expectNoSecretOn(second.page);
   expectNoSecretSent(tap);
   expect([...first.faults, ...second.faults]).toEqual([]);
@@ -72,7 +72,7 @@ test("a participant goes through all stages, on two devices, without meeting a c
   await researcher.page.getByRole("button", { name: "Use this key" }).click();
   const rows = researcher.page.locator('[data-part~="participants"] tbody tr');
   await expect.poll(() => rows.allInnerTexts().then((texts) => texts.join())).toMatch(/completed[\s\S]*withdrawn/);
-  expect(await serious(researcher.page)).toEqual([]);
+  expect(await inaccessible(researcher.page)).toEqual([]);
   const [saved] = await Promise.all([
     researcher.page.waitForEvent("download"),
     researcher.page.getByRole("button", { name: "Download the data (ZIP)" }).click(),
@@ -99,7 +99,7 @@ test("a researcher deletes a study with a participant in the middle of it, and i
   await page.getByRole("button", { name: "Delete everything now" }).press("Enter");
   await page.getByText("Participants are in the middle of this study.").waitFor();
   await page.getByRole("button", { name: "Remove the participants and delete…" }).press("Enter");
-  expect(await serious(page)).toEqual([]);
+  expect(await inaccessible(page)).toEqual([]);
   expect(await tooWide(page)).toEqual([]);
   await page.getByRole("button", { name: "Remove them and delete everything now" }).press("Enter");
   await page.getByText("This device has no studies.").waitFor();

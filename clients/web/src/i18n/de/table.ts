@@ -19,7 +19,7 @@ export const table: Texts["table"] = {
   },
   you: "du",
   freeSeat: "freier Platz",
-  pointsWord: "Punkte",
+  pointsWord: (count) => plural(count, { one: "Punkt", other: "Punkte" }),
   chips: { toPlay: "ist dran", toGive: "gibt", toDeclare: "sagt an?", passed: "gepasst" },
   presence: {
     away: "nicht verbunden",

@@ -37,7 +37,7 @@ export const table = {
   },
   you: "you",
   freeSeat: "free seat",
-  pointsWord: "points",
+  pointsWord: (count: number) => plural(count, { one: "point", other: "points" }),
   chips: { toPlay: "to play", toGive: "to give", toDeclare: "to declare?", passed: "passed" },
   presence: {
     away: "not connected",

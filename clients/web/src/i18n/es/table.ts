@@ -19,7 +19,7 @@ export const table: Texts["table"] = {
   },
   you: "tú",
   freeSeat: "asiento libre",
-  pointsWord: "puntos",
+  pointsWord: (count) => plural(count, { one: "punto", other: "puntos" }),
   chips: { toPlay: "juega", toGive: "da", toDeclare: "¿declara?", passed: "ha pasado" },
   presence: {
     away: "sin conexión",

@@ -19,7 +19,7 @@ export const table: Texts["table"] = {
   },
   you: "tu",
   freeSeat: "posto libero",
-  pointsWord: "punti",
+  pointsWord: (count) => plural(count, { one: "punto", other: "punti" }),
   chips: { toPlay: "gioca", toGive: "dà", toDeclare: "dichiara?", passed: "ha passato" },
   presence: {
     away: "non connesso",

@@ -1,5 +1,6 @@
 // The history of the table, newest last. The announcer reads it out line by line, not this list.
 
+import { useId } from "preact/hooks";
 import { hidden } from "../../experiment/hiding";
 import { t } from "../../i18n";
 import { SeatNumber } from "../../parts/SeatNumber";
@@ -9,11 +10,12 @@ import { happeningWords, nameOf } from "../words";
 import css from "./Log.module.css";
 
 export function Log({ table }: { table: TableState }) {
+  const title = useId();
   return (
-    <section class={`${css.log} sheet`} data-part="log" aria-label={t().table.log.title}>
-      <h2>{t().table.log.title}</h2>
+    <div class={`${css.log} sheet`} data-part="log">
+      <h2 id={title}>{t().table.log.title}</h2>
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: a scrollable region must be reachable by keyboard */}
-      <div class={css.lines} tabIndex={0}>
+      <section class={css.lines} tabIndex={0} aria-labelledby={title}>
         <ol>
           {visibleLines(table.log, !hidden.value.includes("expressions")).map((line) => {
             const { seat, text } = happeningWords(table, line.entry);
@@ -30,7 +32,7 @@ export function Log({ table }: { table: TableState }) {
             );
           })}
         </ol>
-      </div>
-    </section>
+      </section>
+    </div>
   );
 }

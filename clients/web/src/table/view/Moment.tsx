@@ -42,7 +42,7 @@ export function Moment({ table }: { table: TableState }) {
     const timer = setTimeout(() => setShown(undefined), SHOWN_MS);
     return () => clearTimeout(timer);
   }, [shown]);
-  if (!shown) return null;
+  if (!shown || isPast(table, shown)) return null;
   const words = t().table.moments[shown.kind];
   return (
     <div class={css.moment} data-part="moment" key={shown.sequence} aria-hidden="true">
@@ -51,4 +51,9 @@ export function Moment({ table }: { table: TableState }) {
       <p>{words.text}</p>
     </div>
   );
+}
+
+/** Whether a moment no longer holds: the last card has been played. */
+function isPast({ seats }: TableState, { kind, seat }: GameMoment): boolean {
+  return kind === "lastCard" && seats[seat]?.cardsLeft !== 1;
 }

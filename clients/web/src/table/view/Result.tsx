@@ -6,7 +6,7 @@ import { ButtonLink } from "../../parts/Button";
 import { SeatNumber } from "../../parts/SeatNumber";
 import { PersonName } from "../../people/PersonName";
 import type { ShiftResult, TableState } from "../model/state";
-import { nameOf } from "../words";
+import { distinctName, nameOf } from "../words";
 import css from "./Result.module.css";
 
 interface ResultProps {
@@ -94,7 +94,7 @@ function GameResult({ table, own, profiles, ways }: EndProps & { own: number | u
   const winner = table.standings[0]?.seat;
   return (
     <section class={`${css.result} sheet`} data-part="result" aria-label={words.game}>
-      <h2>{winner !== undefined && (winner === own ? words.youWon : words.wins(nameOf(table, winner)))}</h2>
+      <h2>{winner !== undefined && (winner === own ? words.youWon : words.wins(distinctName(table, winner)))}</h2>
       <table>
         <thead>
           <tr>

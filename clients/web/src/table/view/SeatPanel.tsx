@@ -76,7 +76,7 @@ export function SeatPanel({ table, seat, own = false, deciding, kind, cards = tr
       </div>
       {!waiting && (
         <p class={css.points} data-part="seat-points">
-          <strong class="number">{seat.points}</strong> <span class="soft small">{words.pointsWord}</span>
+          <strong class="number">{seat.points}</strong> <span class="soft small">{words.pointsWord(seat.points)}</span>
         </p>
       )}
       {!waiting && (

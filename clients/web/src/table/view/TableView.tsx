@@ -15,7 +15,7 @@ import type { Gesture } from "../expressions";
 import type { AwaitedSeat } from "../model/awaited";
 import type { OpenDecision } from "../model/live";
 import { awaitsHand, type TableState } from "../model/state";
-import { headingWords, nameOf, violationWords } from "../words";
+import { distinctName, headingWords, violationWords } from "../words";
 import { ActionBar } from "./ActionBar";
 import { Board } from "./Board";
 import { useDeciding } from "./deciding";
@@ -132,7 +132,7 @@ export function TableView(props: TableViewProps) {
 
   // A remote player at a table with real cards waits until somebody has shown them.
   const handAwaited = awaitsHand(table, own) && !props.replayed;
-  const handLabel = props.replayed && mine ? t().table.hand.of(nameOf(table, mine.seat)) : t().table.hand.label;
+  const handLabel = props.replayed && mine ? t().table.hand.of(distinctName(table, mine.seat)) : t().table.hand.label;
 
   return (
     <div class={css.table} data-part="table" data-view={mine ? "own" : "watched"} {...keepFocus}>
@@ -259,7 +259,7 @@ function Physical({ table }: { table: TableState }) {
       {violation && (
         <Notice kind="fault">
           {words.violation(
-            seat === undefined ? "" : nameOf(table, seat),
+            seat === undefined ? "" : distinctName(table, seat),
             violationWords(table, violation.breach, violation.demand),
           )}
         </Notice>
