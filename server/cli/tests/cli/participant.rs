@@ -2,6 +2,7 @@
 //! remains after a deletion, and refusals.
 
 use std::path::Path;
+use std::time::Duration;
 
 use chefshat_client::{ActionId, Agent, Client, RandomAgent, v1};
 use serde_json::{Value, json};
@@ -514,6 +515,11 @@ fn of_those_who_share_a_name_only_the_one_meant_is_exported_and_deleted() {
         }
         for outcome in client.play_many(seats).await {
             outcome.unwrap();
+        }
+        let game_id = made.room.unwrap().game_id;
+        let record = data_dir.join("records").join(format!("{game_id}.jsonl"));
+        while !record.exists() {
+            tokio::time::sleep(Duration::from_millis(20)).await;
         }
         fingerprint
     });
