@@ -142,6 +142,9 @@ class FakeServer(
             game.end(pb.ABORT_REASON_CLOSED)
         return pb.CloseRoomResponse(room=game.room)
 
+    def SetNextRoom(self, request: pb.SetNextRoomRequest, context: Context) -> pb.SetNextRoomResponse:
+        return refuse(context, grpc.StatusCode.UNIMPLEMENTED, "UNIMPLEMENTED", "the tests of the SDK play no rematch")
+
     def game(self, room_id: str, context: Context) -> FakeGame:
         """Returns the game of a room; refuses with NOT_FOUND if there is none."""
         for game in self.games:

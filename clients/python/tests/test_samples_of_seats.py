@@ -52,7 +52,7 @@ def test_what_was_not_received_is_sent_again_in_chunks(fake: FakeServer) -> None
             except ChefsHatError:
                 refused += 1
         assert refused == 11
-        stream._ticket = ticket
+        stream._seat = ticket
         stream.flush()
         assert [len(chunk.elapsed_us) for chunk in fake.samples] == [MAX_SAMPLES, 10]
         assert [value for chunk in fake.samples for value in chunk.values] == [float(number) for number in range(MAX_SAMPLES + 10)]
