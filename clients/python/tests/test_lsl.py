@@ -238,5 +238,5 @@ def test_the_command_sends_all_games_of_a_participant_of_a_study(
         studies.CloseStudy(pb.CloseStudyRequest(**owned))
         _, said = processes[-1].communicate(timeout=WAIT_S)
         assert processes[-1].returncode == 0, said
-        assert "the study is over" in said
+        assert "participant 1 has finished" in said
         channel.close()

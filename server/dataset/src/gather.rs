@@ -99,7 +99,6 @@ impl Gatherer {
                         Some(_) => SeatInfo::wizard(&seated.name, seated.kind()),
                         None => SeatInfo::new(&seated.name, seated.kind(), ""),
                     };
-                    let info = info.with_fingerprint(&seated.name_fingerprint);
                     self.set_participant(seated.seat, Some(info));
                 }
                 Some(Kind::Vacated(vacated)) => self.set_participant(vacated.seat, None),

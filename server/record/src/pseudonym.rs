@@ -40,21 +40,17 @@ impl Named {
         seat.built_in_agent.is_empty() && self.is(&seat.name, &seat.name_fingerprint)
     }
 
-    /// Whether the participant is in a record. If all of a name are meant, markers may name them in
-    /// any record.
+    /// Whether the participant may be in a record: markers may name those who are not, if all of a
+    /// name are meant.
     fn may_be_in(&self, lines: &[v1::RecordLine]) -> bool {
-        let mut lines = lines.iter().filter_map(|line| line.line.as_ref());
+        let in_header = |header: &v1::RecordHeader| {
+            let of_study = |study: &v1::StudyRecord| self.is(&study.participant, "");
+            header.seats.iter().any(|seat| self.is_at(seat))
+                || header.study.as_ref().is_some_and(of_study)
+        };
         self.fingerprint.is_none()
-            || lines.any(|line| match line {
-                Line::Header(header) => {
-                    let of_study = |study: &v1::StudyRecord| self.is(&study.participant, "");
-                    header.seats.iter().any(|seat| self.is_at(seat))
-                        || header.study.as_ref().is_some_and(of_study)
-                }
-                Line::Event(event) => match &event.kind {
-                    Some(Kind::Seated(seated)) => self.is(&seated.name, &seated.name_fingerprint),
-                    _ => false,
-                },
+            || lines.iter().any(|line| match &line.line {
+                Some(Line::Header(header)) => in_header(header),
                 _ => false,
             })
     }
@@ -88,9 +84,16 @@ impl std::ops::AddAssign for Redactions {
     }
 }
 
-/// The seats of one participant, followed through the events of a game.
+/// The seats of one participant, followed through the events of a game. Records have the fingerprints
+/// of those who played: who left before the game is the participant only if all of a name are meant.
 #[derive(Debug, Clone, Default)]
-pub struct ParticipantSeats(Vec<u32>);
+pub struct ParticipantSeats {
+    seats: Vec<u32>,
+    /// The seats in which the participant played.
+    played: Vec<u32>,
+    /// The seat of each who leaves from now on.
+    leaving: Vec<u32>,
+}
 
 impl ParticipantSeats {
     /// The seats at the start of a record; in imported games no event seats a participant.
@@ -99,30 +102,39 @@ impl ParticipantSeats {
         for line in lines.iter().filter_map(|line| line.line.as_ref()) {
             match line {
                 Line::Header(header) => {
-                    for seat in &header.seats {
-                        own.seated(seat.seat, who.is_at(seat));
-                    }
+                    let played = header.seats.iter().filter(|seat| who.is_at(seat));
+                    own.played = played.map(|seat| seat.seat).collect();
+                    own.seats.clone_from(&own.played);
                 }
-                Line::Event(event) => {
-                    if let Some(Kind::Seated(seated)) = &event.kind {
-                        own.vacated(seated.seat);
-                    }
-                }
+                Line::Event(event) => match &event.kind {
+                    Some(Kind::Seated(seated)) => own.vacated(seated.seat),
+                    Some(Kind::Vacated(vacated)) => own.leaving.push(vacated.seat),
+                    _ => {}
+                },
                 _ => {}
             }
         }
         own
     }
 
-    /// Applies an event.
-    pub fn follow(&mut self, event: &v1::GameEvent, who: &Named) {
+    /// Applies an event. Returns whether the participant takes a seat with it.
+    pub fn follow(&mut self, event: &v1::GameEvent, who: &Named) -> bool {
         match &event.kind {
             Some(Kind::Seated(seated)) => {
-                let is_own = who.is(&seated.name, &seated.name_fingerprint);
+                let stays = !self.leaving.contains(&seated.seat);
+                let is_meant =
+                    who.fingerprint.is_none() || (stays && self.played.contains(&seated.seat));
+                let is_own = seated.name == who.name && is_meant;
                 self.seated(seated.seat, is_own);
+                is_own
             }
-            Some(Kind::Vacated(vacated)) => self.vacated(vacated.seat),
-            _ => {}
+            Some(Kind::Vacated(vacated)) => {
+                let left = self.leaving.iter().position(|seat| *seat == vacated.seat);
+                left.map(|index| self.leaving.swap_remove(index));
+                self.vacated(vacated.seat);
+                false
+            }
+            _ => false,
         }
     }
 
@@ -130,18 +142,18 @@ impl ParticipantSeats {
     pub fn seated(&mut self, seat: u32, own: bool) {
         self.vacated(seat);
         if own {
-            self.0.push(seat);
+            self.seats.push(seat);
         }
     }
 
     /// Applies a vacated seat.
     pub fn vacated(&mut self, seat: u32) {
-        self.0.retain(|known| *known != seat);
+        self.seats.retain(|known| *known != seat);
     }
 
     /// Whether a seat is the participant's.
     pub fn has(&self, seat: u32) -> bool {
-        self.0.contains(&seat)
+        self.seats.contains(&seat)
     }
 }
 
@@ -180,13 +192,10 @@ impl Pseudonym {
                     return false;
                 }
                 event.sequence = event.sequence.saturating_sub(dropped_events);
-                own.follow(event, &self.of);
+                let is_own = own.follow(event, &self.of);
                 match &mut event.kind {
-                    Some(Kind::Seated(seated))
-                        if self.of.is(&seated.name, &seated.name_fingerprint) =>
-                    {
+                    Some(Kind::Seated(seated)) if is_own => {
                         seated.name.clone_from(&self.pseudonym);
-                        seated.name_fingerprint.clear();
                         out.names += 1;
                     }
                     Some(Kind::GameStarted(started)) => {

@@ -15,7 +15,6 @@ use super::labels::{shown_name, shown_policy, shown_substitute};
 use super::room::{abort_reason, seed_commitment, shown_participants};
 use super::table::violation_to_proto;
 use chefshat_room::Core;
-use chefshat_room::journal::SeatLabels;
 use chefshat_room::log::RoomEvent;
 
 /// The event at a position of the log (from 0), redacted for `viewer`. `None` beyond the end.
@@ -33,15 +32,10 @@ fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
     match event {
         RoomEvent::Seated(seat, participant) => {
             let (name, kind) = shown_name(core, *seat, &participant.name, Some(participant.kind));
-            let name_fingerprint = match core.header().labels() {
-                SeatLabels::AsTheyAre => participant.name_fingerprint.clone(),
-                SeatLabels::Kinds | SeatLabels::Players => String::new(),
-            };
             Kind::Seated(Box::new(v1::Seated {
                 seat: seat_number(*seat),
                 name,
                 kind: kind_to_proto(kind),
-                name_fingerprint,
             }))
         }
         RoomEvent::Vacated(seat) => Kind::Vacated(v1::Vacated {

@@ -4,7 +4,7 @@
 use chefshat_proto::v1::{self, study_item, study_item_answer, study_shown_item, study_view};
 use chefshat_room::ids::Id;
 use chefshat_study::{
-    Answer, Content, End, Hide, ItemAnswer, Labels, ShownGame, ShownItem, ShownQuestionnaire, View,
+    Answer, Content, End, Hide, ItemAnswer, ShownGame, ShownItem, ShownQuestionnaire, View,
 };
 
 use super::number;
@@ -93,12 +93,7 @@ fn shown_game(game: &ShownGame, ticket_of: impl FnOnce(Id) -> String) -> v1::Stu
         game_id,
         ticket,
         ended: game.ended,
-        labels: match game.labels {
-            Labels::AsTheyAre => v1::StudyLabels::AsTheyAre,
-            Labels::Kinds => v1::StudyLabels::Kinds,
-            Labels::Players => v1::StudyLabels::Players,
-        }
-        .into(),
+        labelled: game.labelled,
     }
 }
 

@@ -276,7 +276,8 @@ fn given(name: String, fingerprint: Option<String>) -> Result<Named, Status> {
         return refused("name", "give the exact name the participant played under");
     }
     if !fingerprint.as_deref().is_none_or(is_fingerprint) {
-        let what = "give the 16 hexadecimal digits (0-9, a-f) of the participant's page, or none for those without a key";
+        let what =
+            "give 16 hexadecimal digits (0-9, a-f), or an empty text for those without a key";
         return refused("name_fingerprint", what);
     }
     Ok(Named { name, fingerprint })

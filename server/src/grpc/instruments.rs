@@ -92,7 +92,7 @@ impl Instruments {
                 &FieldProblem::new("owned_seat.seat", words),
             ));
         };
-        let has_started = described.state() != v1::RoomState::Waiting;
+        let has_started = room.has_started().await.map_err(Refusal::from)?;
         Ok((room, Seat::new(number), has_started))
     }
 }

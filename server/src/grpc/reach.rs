@@ -402,9 +402,13 @@ impl Reach {
         by_ticket.max().map_or(standing, |it| it.max(standing))
     }
 
-    /// Whether a caller is the owner of a room, as also the owner of its tournament or study is.
+    /// Whether a caller shows the owner token of a room, or of its tournament or study.
     pub(super) fn is_owner(&self, caller: &Caller, header: &GameHeader) -> bool {
-        self.standing_by_header(caller, header) == Standing::Owner
+        let caller = Caller {
+            secrets: caller.secrets.clone(),
+            ..Caller::default()
+        };
+        self.standing_by_header(&caller, header) == Standing::Owner
     }
 
     /// Whether this is the owner token of a room, or of its tournament or study.
@@ -412,8 +416,12 @@ impl Reach {
         self.is_owner(&Caller::default().showing(token), header)
     }
 
-    /// Whether a caller has a seat in a room, or is its owner.
+    /// Whether a caller shows a ticket or the owner token of a room.
     pub(super) async fn takes_part(&self, caller: &Caller, handle: &Handle) -> bool {
+        let caller = &Caller {
+            secrets: caller.secrets.clone(),
+            ..Caller::default()
+        };
         match self.rooms.header(handle.id()) {
             None => false,
             Some(header) => {

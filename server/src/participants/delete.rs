@@ -144,13 +144,16 @@ impl ParticipantData {
             files.skipped = skipped;
             let Some(lines) = lines else { continue };
             let mut who = who.clone();
-            if let Some(held) = self.held(&lines, &who.of).await?
-                && held != who.pseudonym
-            {
-                who.pseudonym.clone_from(&held);
-                files.earlier = Some(held);
+            let held = self.held(&lines, &who.of).await?;
+            let mut stored = None;
+            if let Some((pseudonym, lines)) = held {
+                if pseudonym != who.pseudonym {
+                    who.pseudonym.clone_from(&pseudonym);
+                    files.earlier = Some(pseudonym);
+                }
+                stored = who.of.fingerprint.is_some().then_some(lines);
             }
-            match blocking(move || redact(&candidate, lines, &who)).await? {
+            match blocking(move || redact(&candidate, lines, &who, stored)).await? {
                 Ok(None) => {}
                 Ok(Some(redactions)) => {
                     files.changed += 1;
@@ -162,12 +165,13 @@ impl ParticipantData {
         Ok(files)
     }
 
-    /// The pseudonym the store has for a name in a record, so that file and store agree.
+    /// The pseudonym the store has for a name in a record, so that file and store agree, and the
+    /// record as the store has it.
     async fn held(
         &self,
         lines: &[v1::RecordLine],
         who: &Named,
-    ) -> Result<Option<String>, StoreError> {
+    ) -> Result<Option<(String, Vec<v1::RecordLine>)>, StoreError> {
         let Some(game) = header_of(lines).and_then(|it| Id::parse(&it.game_id)) else {
             return Ok(None);
         };
@@ -175,23 +179,26 @@ impl ParticipantData {
             return Ok(None);
         };
         let stored = blocking(move || convert::lines_of(&stored).into_owned()).await?;
-        Ok(pseudonym_of(who, lines, &stored).map(str::to_owned))
+        let pseudonym = pseudonym_of(who, lines, &stored).map(str::to_owned);
+        Ok(pseudonym.map(|pseudonym| (pseudonym, stored)))
     }
 }
 
-/// Rewrites a file without the participant; `None` if the participant is not in it.
+/// Rewrites a file without the participant; `None` if the participant is not in it. `stored` is the
+/// record without it, if the store says more precisely than the file where it was.
 fn redact(
     candidate: &Candidate,
     mut lines: Vec<v1::RecordLine>,
     who: &Pseudonym,
+    stored: Option<Vec<v1::RecordLine>>,
 ) -> Result<Option<Redactions>, String> {
     // Before the name is gone from the record, so that running it again completes it.
     remove_samples(candidate, &lines, &who.of).map_err(|error| error.to_string())?;
     let redactions = who.redact(&mut lines);
-    if redactions == Redactions::default() {
+    if stored.is_none() && redactions == Redactions::default() {
         return Ok(None);
     }
-    let written = jsonl::write(&candidate.path, &lines);
+    let written = jsonl::write(&candidate.path, &stored.unwrap_or(lines));
     written
         .map(|()| Some(redactions))
         .map_err(|error| error.to_string())
@@ -226,26 +233,29 @@ fn pseudonym_of<'s>(
     stored: &'s [v1::RecordLine],
 ) -> Option<&'s str> {
     let both = names_in(lines).into_iter().zip(names_in(stored));
-    both.filter(|((name, fingerprint), _)| who.is(name, fingerprint))
+    // A record does not say which of a name left before the game; the store knows it.
+    let is_meant = |name: &str, fingerprint: Option<&str>| match fingerprint {
+        Some(fingerprint) => who.is(name, fingerprint),
+        None => name == who.name,
+    };
+    both.filter(|((name, fingerprint), _)| is_meant(name, *fingerprint))
         .map(|(_, (there, _))| there)
         .find(|there| there.starts_with(PSEUDONYM))
 }
 
 /// The names of a record, with the fingerprints of their keys: at the seats of its header, and then of those who sat down, in order. A
 /// participant who left before the game has no seat in the header.
-fn names_in(lines: &[v1::RecordLine]) -> Vec<(&str, &str)> {
+fn names_in(lines: &[v1::RecordLine]) -> Vec<(&str, Option<&str>)> {
     let seats = header_of(lines).map_or(&[][..], |header| header.seats.as_slice());
     let seats = seats
         .iter()
         .map(|seat| match seat.built_in_agent.is_empty() {
-            true => (seat.name.as_str(), seat.name_fingerprint.as_str()),
-            false => ("", ""),
+            true => (seat.name.as_str(), Some(seat.name_fingerprint.as_str())),
+            false => ("", None),
         });
     let seated = lines.iter().filter_map(|line| match &line.line {
         Some(Line::Event(event)) => match &event.kind {
-            Some(Kind::Seated(seated)) => {
-                Some((seated.name.as_str(), seated.name_fingerprint.as_str()))
-            }
+            Some(Kind::Seated(seated)) => Some((seated.name.as_str(), None)),
             _ => None,
         },
         _ => None,

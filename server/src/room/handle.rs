@@ -297,6 +297,14 @@ impl Handle {
         self.ask(|reply| Message::SeatOf(secret, reply)).await
     }
 
+    /// Whether the game has started.
+    ///
+    /// # Errors
+    /// The room is gone.
+    pub async fn has_started(&self) -> Result<bool, RoomGone> {
+        self.ask(Message::HasStarted).await
+    }
+
     /// Frees a seat; `None` if the room has no such ticket.
     ///
     /// # Errors

@@ -222,6 +222,8 @@ pub(super) enum Message {
     HasTicket(Vec<[u8; 32]>, oneshot::Sender<bool>),
     /// The seat of a ticket, and whether the game has started.
     SeatOf([u8; 32], oneshot::Sender<Option<(Seat, bool)>>),
+    /// Whether the game has started.
+    HasStarted(oneshot::Sender<bool>),
     Close([u8; 32], oneshot::Sender<Option<v1::Room>>),
     Leave(
         [u8; 32],

@@ -567,11 +567,13 @@ fn next_sequence(core: &Core) -> u64 {
     u64::try_from(core.log().len()).unwrap_or(u64::MAX) + 1
 }
 
-/// The current view of spectators: all hands after the game, or if the room allows it. In a series
-/// of games with the same deals hands stay hidden, because others still play them.
+/// The current view of spectators: all hands after the game, or if the room allows it. Where it
+/// admits none, its owner watches, who may also play. In a series of games with the same deals
+/// hands stay hidden, because others still play them.
 fn spectator_view(core: &Core) -> Viewer {
     let header = core.header();
-    let shows_hands = header.policy.spectators_see_hands || core.state().is_over();
+    let policy = &header.policy;
+    let shows_hands = (policy.spectators && policy.spectators_see_hands) || core.state().is_over();
     if shows_hands && header.series().is_none() {
         Viewer::Everything
     } else {

@@ -87,8 +87,8 @@ pub struct ShownGame {
     pub place: Option<([u8; 16], [u8; 16])>,
     /// Whether the game has ended.
     pub ended: bool,
-    /// What is shown of the other seats; as they are until there is a room.
-    pub labels: Labels,
+    /// Whether the other seats have names in place of their own; `false` until there is a room.
+    pub labelled: bool,
 }
 
 /// Why nothing more is shown.
@@ -160,7 +160,7 @@ impl Study {
             hide: game.map_or_else(BTreeSet::new, |it| conditions[it.condition].hide.clone()),
             place: game.map(|it| (it.room, it.game)),
             ended,
-            labels: game.map_or(Labels::AsTheyAre, |it| conditions[it.condition].labels),
+            labelled: game.is_some_and(|it| conditions[it.condition].labels != Labels::AsTheyAre),
         }
     }
 }

@@ -247,11 +247,16 @@ async fn the_instruments_of_the_researcher_reach_the_game_of_a_participant() {
         .reason()
         .map(str::to_owned);
     assert_eq!(unseen.as_deref(), Some("ROOM_UNKNOWN"));
+    let seated = stranger.with_secrets([&game.ticket]).expect("a ticket");
+    let refused = seated.spectate(&game.room_id, 0).next().await;
+    let refused = refused
+        .expect_err("no spectators")
+        .reason()
+        .map(str::to_owned);
+    assert_eq!(refused.as_deref(), Some("SPECTATORS_NOT_ADMITTED"));
     let mut watching = owner.spectate(&game.room_id, 0);
     let first = patiently("an event", watching.next()).await;
-    let first = first.expect("the owner watches").expect("an event");
-    // Like the participants, the owner sees the game without labels that name the condition.
-    assert!(!format!("{first:?}").contains("Robot"), "{first:?}");
+    first.expect("the owner watches").expect("an event");
 
     let mut instruments = InstrumentServiceClient::new(stranger.channel());
     let mark = |owner_token: &str| v1::AddMarkerRequest {
@@ -300,6 +305,19 @@ async fn the_instruments_of_the_researcher_reach_the_game_of_a_participant() {
         .await;
     assert_eq!(reason(&early.expect_err("it waits")), "GAME_NOT_STARTED");
     person.go_on(view, GAMES + 2).await;
+    let mut seen = String::new();
+    while let Some(event) = patiently("an event", watching.next())
+        .await
+        .expect("still watched")
+    {
+        seen += &format!("{event:?}\n");
+    }
+    // Like the participant, the owner sees the game without what names the condition.
+    assert!(
+        seen.contains("GameStarted") && seen.contains("GameEnded"),
+        "{seen}"
+    );
+    assert!(!seen.contains("Robot"), "{seen}");
     let added = instruments
         .add_samples(add(&study.lab.owner_token, seat))
         .await;

@@ -193,7 +193,7 @@ class MarkerStream:
         """Waits until something receives the stream. Returns whether it does."""
         return bool(self._open().wait_for_consumers(timeout_s))
 
-    def go_on(self, room_id: str) -> None:
+    def continue_with(self, room_id: str) -> None:
         """Continues with the next game: that of another room, whose clock it reads.
 
         Raises:
@@ -365,7 +365,7 @@ def watch_participant(client: Client, study_id: str, owner_token: str, number: i
                 say(markers)
                 markers.wait_for_recorder(wait_s)
             else:
-                markers.go_on(game.room_id)
+                markers.continue_with(game.room_id)
         except ChefsHatError as error:
             if error.reason != "ROOM_UNKNOWN":
                 raise
@@ -380,7 +380,7 @@ def watch_participant(client: Client, study_id: str, owner_token: str, number: i
         print(f"game {games} of participant {number} is over", file=sys.stderr, flush=True)
     if markers is not None:
         markers.close(LINGER_S)
-    print("the study is over", file=sys.stderr)
+    print(f"participant {number} has finished", file=sys.stderr)
     return 0
 
 
@@ -391,6 +391,7 @@ def next_game(client: Client, study_id: str, owner_token: str, number: int, know
     """
     over = (pb.STUDY_PARTICIPANT_STATE_COMPLETED, pb.STUDY_PARTICIPANT_STATE_WITHDRAWN, pb.STUDY_PARTICIPANT_STATE_REMOVED)
     is_first = not known
+    print(f"waiting for a game of participant {number}", file=sys.stderr, flush=True)
     for participant in client.follow_study(study_id, owner_token):
         if participant.number != number:
             continue

@@ -28,7 +28,10 @@ export function keepSecret(secret: string, policy: Pick<RoomPolicy, "visibility"
 /** Shows secrets with each call that they may be needed for. */
 export const showSecrets: Interceptor = (next) => async (request) => {
   const show = (message: object) => {
-    for (const secret of secretsFor(request.method.name, message)) request.header.append(SECRET_HEADER, secret);
+    // The call may show one of its own.
+    const shown = request.header.get(SECRET_HEADER)?.split(", ") ?? [];
+    const more = secretsFor(request.method.name, message).filter((secret) => !shown.includes(secret));
+    for (const secret of more.slice(0, MAX_SHOWN - shown.length)) request.header.append(SECRET_HEADER, secret);
   };
   if (!request.stream) {
     show(request.message);

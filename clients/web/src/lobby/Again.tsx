@@ -9,7 +9,7 @@ import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { joinAgain, playAgain, roomOfTicket } from "./room-like";
-import { heldSeat, hostedRoom } from "./seat";
+import { type HeldSeat, heldSeat, hostedRoom } from "./seat";
 
 /** Polling interval of the next room, milliseconds. */
 const EVERY_MS = 3000;
@@ -18,23 +18,27 @@ const EVERY_MS = 3000;
 export function Again({ roomId, others }: { roomId: string; others: boolean }) {
   const words = t().lobby.quick;
   const held = heldSeat(roomId);
-  if (!held) return null;
-  if (!hostedRoom(roomId)) return <JoinAgain roomId={roomId} />;
+  if (!held || !hostedRoom(roomId)) return null;
   const label = others ? words.againTogether : words.again;
   return <Onward label={label} act={() => playAgain(roomId, held.name, held.seat)} />;
 }
 
-/** The button to the next room of another device, once there is one. */
-function JoinAgain({ roomId }: { roomId: string }) {
-  const label = t().lobby.quick.joinAgain;
+/** After a game in a room of another device: the button to its next room, once there is one. */
+export function JoinAgain({ roomId }: { roomId: string }) {
   const held = heldSeat(roomId);
-  const ask = async (signal: AbortSignal) => held && roomOfTicket(roomId, held.ticket, signal);
+  if (!held || hostedRoom(roomId)) return null;
+  return <Invited roomId={roomId} held={held} />;
+}
+
+function Invited({ roomId, held }: { roomId: string; held: HeldSeat }) {
+  const label = t().lobby.quick.joinAgain;
+  const ask = (signal: AbortSignal) => roomOfTicket(roomId, held.ticket, signal);
   const room = usePolled(ask, EVERY_MS, roomId).value;
   const code = room?.nextJoinCode ?? "";
   useEffect(() => {
     if (code !== "") announce(label);
   }, [code]);
-  if (!held || !room || code === "") return null;
+  if (!room || code === "") return null;
   return <Onward label={label} act={() => joinAgain(room, held.name, held.seat)} />;
 }
 

@@ -6,7 +6,7 @@ import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { type Fault, faultOf, isPassing, wordsOf } from "../api/faults";
 import { type Hideable, leaveOut } from "../experiment/hiding";
 import { labelled } from "../experiment/labels";
-import { StudyHide, StudyLabels, type StudyShownGame } from "../gen/chefshat/v1/study_pb";
+import { StudyHide, type StudyShownGame } from "../gen/chefshat/v1/study_pb";
 import { t } from "../i18n";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
@@ -45,13 +45,12 @@ export function StudyGame({ game, title, traces, part }: StudyGameProps) {
   }, [game.ticket]);
   const hide = game.hide.flatMap((one) => HIDEABLE[one] ?? []).join(" ");
   useLayoutEffect(() => leaveOut((hide === "" ? [] : hide.split(" ")) as Hideable[]), [hide]);
-  const isLabelled = [StudyLabels.KINDS, StudyLabels.PLAYERS].includes(game.labels);
   useLayoutEffect(() => {
-    labelled.value = isLabelled;
+    labelled.value = game.labelled;
     return () => {
       labelled.value = false;
     };
-  }, [isLabelled]);
+  }, [game.labelled]);
   const session = table?.session.value;
   const fault = table?.fault.value;
   const label = game.practice ? words.practice : game.games > 1 ? words.gameOf(game.game, game.games) : words.game;

@@ -12,11 +12,11 @@ import { KeptLinks } from "../experiment/StudyLinks";
 import { studyIn } from "../experiment/study";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
-import { Again } from "../lobby/Again";
+import { Again, JoinAgain } from "../lobby/Again";
 import { Doorway } from "../lobby/Doorway";
 import { HostInvite } from "../lobby/Invite";
 import { LeaveButton, LeaveDialog } from "../lobby/Leaving";
-import { giveUpSeat, heldSeat, leaveSeat } from "../lobby/seat";
+import { giveUpSeat, heldSeat, hostedRoom, leaveSeat } from "../lobby/seat";
 import { Button } from "../parts/Button";
 import { ErrorPage } from "../parts/ErrorPage";
 import { Notice } from "../parts/Notice";
@@ -118,6 +118,7 @@ function Held({ session }: { session: Session }) {
     <>
       <Banner session={session} />
       <AtTable roomId={roomId} over={isOver(table) && hasBegun(table)} />
+      {isOver(table) && !studyIn(roomId) && <JoinAgain roomId={roomId} />}
     </>
   );
   const waiting = table.phase === "waiting";
@@ -141,7 +142,7 @@ function Held({ session }: { session: Session }) {
         study={studyIn(roomId) !== null}
         banner={banner}
         tools={!isOver(table) && leave}
-        onward={!studyIn(roomId) && <Again roomId={roomId} others={others} />}
+        onward={hostedRoom(roomId) && !studyIn(roomId) && <Again roomId={roomId} others={others} />}
         below={
           <>
             <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />

@@ -2,14 +2,13 @@
 //! remains after a deletion, and refusals.
 
 use std::path::Path;
-use std::time::Duration;
 
 use chefshat_client::{ActionId, Agent, Client, RandomAgent, v1};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use super::import::TRANSCRIPT;
-use super::run::{Ended, chefshat, in_runtime, json_lines, run, serve, serve_with};
+use super::run::{Ended, chefshat, in_runtime, json_lines, run, serve, serve_with, until};
 
 /// The participant. Letters beyond ASCII test that names are compared as text.
 const NAME: &str = "Rosa Müßig";
@@ -478,7 +477,7 @@ fn of_those_who_share_a_name_only_the_one_meant_is_exported_and_deleted() {
     let folder = TempDir::new().unwrap();
     let data_dir = folder.path().join("data");
     let (server, url) = serve(&data_dir);
-    let fingerprint = in_runtime(async {
+    let (fingerprint, game_id) = in_runtime(async {
         let client = Client::connect(&url).await.unwrap();
         let made = client
             .create_room(v1::CreateRoomRequest {
@@ -516,13 +515,10 @@ fn of_those_who_share_a_name_only_the_one_meant_is_exported_and_deleted() {
         for outcome in client.play_many(seats).await {
             outcome.unwrap();
         }
-        let game_id = made.room.unwrap().game_id;
-        let record = data_dir.join("records").join(format!("{game_id}.jsonl"));
-        while !record.exists() {
-            tokio::time::sleep(Duration::from_millis(20)).await;
-        }
-        fingerprint
+        (fingerprint, made.room.unwrap().game_id)
     });
+    let record = data_dir.join("records").join(format!("{game_id}.jsonl"));
+    until("the record", || record.exists());
     drop(server);
     let out = folder.path().join("out.jsonl");
     let out = out.to_str().unwrap();

@@ -111,7 +111,6 @@ fn a_participant_that_leaves_removes_its_last_expression() {
         seat: 0,
         name: "Ann".into(),
         kind: v1::ParticipantKind::Human.into(),
-        ..v1::Seated::default()
     })));
     let leaves = event(Kind::Vacated(v1::Vacated { seat: 0 }));
     let added = [

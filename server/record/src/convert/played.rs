@@ -143,7 +143,6 @@ impl Lines {
                 seat: seat.seat,
                 name: seat.name.clone(),
                 kind: seat.kind,
-                name_fingerprint: seat.name_fingerprint.clone(),
             })
             .collect::<Vec<_>>();
         let started = v1::GameStarted {

@@ -145,7 +145,6 @@ impl Importer {
                 seat: seat.seat,
                 name: seat.name,
                 kind: seat.kind,
-                name_fingerprint: seat.name_fingerprint,
             })));
         }
         let rows = &transcript.rows;

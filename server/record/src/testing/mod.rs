@@ -58,7 +58,6 @@ impl TestGame<'_> {
                 seat: seat.seat,
                 name: seat.name,
                 kind: seat.kind,
-                name_fingerprint: seat.name_fingerprint,
             })));
         }
         lines.event(Kind::GameStarted(Box::new(self.started())));

@@ -56,6 +56,7 @@ impl Room {
                 let seat = self.core.seat_of_ticket(&secret);
                 answer(reply, seat.map(|seat| (seat, has_started)));
             }
+            Message::HasStarted(reply) => answer(reply, self.core.game().is_some()),
             Message::Close(secret, reply) => {
                 if self.core.header().owner.matches(&secret) {
                     self.core.abort(self.now, AbortReason::Closed);

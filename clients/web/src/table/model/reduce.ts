@@ -81,8 +81,8 @@ function change(table: TableState, event: GameEvent, sequence: number): Change {
   const kind = event.kind;
   switch (kind.case) {
     case "seated": {
-      const { seat, name, nameFingerprint, kind: what } = kind.value;
-      return [withSeat(table, seat, { name, nameFingerprint, kind: what, builtIn: "" }), { kind: "seated", seat }];
+      const { seat, name, kind: what } = kind.value;
+      return [withSeat(table, seat, { name, nameFingerprint: "", kind: what, builtIn: "" }), { kind: "seated", seat }];
     }
     case "vacated":
       return [

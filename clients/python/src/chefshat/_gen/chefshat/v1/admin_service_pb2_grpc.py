@@ -131,7 +131,7 @@ class AdminServiceServicer(object):
     def ExportParticipant(self, request, context):
         """Streams all that is stored under a participant's name: its games that are over with its
         decisions and expressions, its tournaments, and its answers in studies. INVALID_ARGUMENT
-        (NAME_REFUSED if the name is empty or the fingerprint is none); NOT_FOUND
+        (NAME_REFUSED if the name is empty or the fingerprint malformed); NOT_FOUND
         (PARTICIPANT_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -143,7 +143,7 @@ class AdminServiceServicer(object):
         records, tournaments and ratings, and its expressions and annotations are dropped. In studies
         it withdraws, and its data there are deleted as by DeleteStudyParticipant, in every study that
         has a participant of this name. Repeating the call completes what was interrupted, and changes
-        nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint is none);
+        nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint malformed);
         FAILED_PRECONDITION (PARTICIPANT_PLAYING while a game or tournament with the participant is not
         over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
         """

@@ -56,7 +56,7 @@ class AdminServiceStub:
     ExportParticipant: _grpc.UnaryStreamMultiCallable[_admin_service_pb2.ExportParticipantRequest, _admin_service_pb2.ExportParticipantResponse]
     """Streams all that is stored under a participant's name: its games that are over with its
     decisions and expressions, its tournaments, and its answers in studies. INVALID_ARGUMENT
-    (NAME_REFUSED if the name is empty or the fingerprint is none); NOT_FOUND
+    (NAME_REFUSED if the name is empty or the fingerprint malformed); NOT_FOUND
     (PARTICIPANT_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteParticipant: _grpc.UnaryUnaryMultiCallable[_admin_service_pb2.DeleteParticipantRequest, _admin_service_pb2.DeleteParticipantResponse]
@@ -64,7 +64,7 @@ class AdminServiceStub:
     records, tournaments and ratings, and its expressions and annotations are dropped. In studies
     it withdraws, and its data there are deleted as by DeleteStudyParticipant, in every study that
     has a participant of this name. Repeating the call completes what was interrupted, and changes
-    nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint is none);
+    nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint malformed);
     FAILED_PRECONDITION (PARTICIPANT_PLAYING while a game or tournament with the participant is not
     over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
     """
@@ -97,7 +97,7 @@ class AdminServiceAsyncStub(AdminServiceStub):
     ExportParticipant: _aio.UnaryStreamMultiCallable[_admin_service_pb2.ExportParticipantRequest, _admin_service_pb2.ExportParticipantResponse]  # type: ignore[assignment]
     """Streams all that is stored under a participant's name: its games that are over with its
     decisions and expressions, its tournaments, and its answers in studies. INVALID_ARGUMENT
-    (NAME_REFUSED if the name is empty or the fingerprint is none); NOT_FOUND
+    (NAME_REFUSED if the name is empty or the fingerprint malformed); NOT_FOUND
     (PARTICIPANT_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteParticipant: _aio.UnaryUnaryMultiCallable[_admin_service_pb2.DeleteParticipantRequest, _admin_service_pb2.DeleteParticipantResponse]  # type: ignore[assignment]
@@ -105,7 +105,7 @@ class AdminServiceAsyncStub(AdminServiceStub):
     records, tournaments and ratings, and its expressions and annotations are dropped. In studies
     it withdraws, and its data there are deleted as by DeleteStudyParticipant, in every study that
     has a participant of this name. Repeating the call completes what was interrupted, and changes
-    nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint is none);
+    nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint malformed);
     FAILED_PRECONDITION (PARTICIPANT_PLAYING while a game or tournament with the participant is not
     over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
     """
@@ -177,7 +177,7 @@ class AdminServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_abc.Iterator[_admin_service_pb2.ExportParticipantResponse], _abc.AsyncIterator[_admin_service_pb2.ExportParticipantResponse]]:
         """Streams all that is stored under a participant's name: its games that are over with its
         decisions and expressions, its tournaments, and its answers in studies. INVALID_ARGUMENT
-        (NAME_REFUSED if the name is empty or the fingerprint is none); NOT_FOUND
+        (NAME_REFUSED if the name is empty or the fingerprint malformed); NOT_FOUND
         (PARTICIPANT_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         """
 
@@ -191,7 +191,7 @@ class AdminServiceServicer(metaclass=_abc_1.ABCMeta):
         records, tournaments and ratings, and its expressions and annotations are dropped. In studies
         it withdraws, and its data there are deleted as by DeleteStudyParticipant, in every study that
         has a participant of this name. Repeating the call completes what was interrupted, and changes
-        nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint is none);
+        nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint malformed);
         FAILED_PRECONDITION (PARTICIPANT_PLAYING while a game or tournament with the participant is not
         over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
         """

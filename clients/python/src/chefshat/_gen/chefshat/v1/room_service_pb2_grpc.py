@@ -137,8 +137,8 @@ class RoomServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def SetNextRoom(self, request, context):
-        """Tells the participants of a room where they play again (`Room.next_join_code`), in place of what
-        was said before. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+        """Sets the join code of the room in which the participants of a room play again
+        (`Room.next_join_code`); it replaces an earlier one. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
         NOT_FOUND (ROOM_UNKNOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)

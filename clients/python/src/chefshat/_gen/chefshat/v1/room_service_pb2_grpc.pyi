@@ -70,8 +70,8 @@ class RoomServiceStub:
     (ROOM_UNKNOWN).
     """
     SetNextRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.SetNextRoomRequest, _room_service_pb2.SetNextRoomResponse]
-    """Tells the participants of a room where they play again (`Room.next_join_code`), in place of what
-    was said before. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+    """Sets the join code of the room in which the participants of a room play again
+    (`Room.next_join_code`); it replaces an earlier one. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
     NOT_FOUND (ROOM_UNKNOWN).
     """
 
@@ -117,8 +117,8 @@ class RoomServiceAsyncStub(RoomServiceStub):
     (ROOM_UNKNOWN).
     """
     SetNextRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.SetNextRoomRequest, _room_service_pb2.SetNextRoomResponse]  # type: ignore[assignment]
-    """Tells the participants of a room where they play again (`Room.next_join_code`), in place of what
-    was said before. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+    """Sets the join code of the room in which the participants of a room play again
+    (`Room.next_join_code`); it replaces an earlier one. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
     NOT_FOUND (ROOM_UNKNOWN).
     """
 
@@ -203,8 +203,8 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _room_service_pb2.SetNextRoomRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.SetNextRoomResponse, _abc.Awaitable[_room_service_pb2.SetNextRoomResponse]]:
-        """Tells the participants of a room where they play again (`Room.next_join_code`), in place of what
-        was said before. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+        """Sets the join code of the room in which the participants of a room play again
+        (`Room.next_join_code`); it replaces an earlier one. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
         NOT_FOUND (ROOM_UNKNOWN).
         """
 

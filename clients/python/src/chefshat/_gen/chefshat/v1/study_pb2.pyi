@@ -1412,7 +1412,7 @@ class StudyShownGame(_message.Message):
     GAME_ID_FIELD_NUMBER: _builtins.int
     TICKET_FIELD_NUMBER: _builtins.int
     ENDED_FIELD_NUMBER: _builtins.int
-    LABELS_FIELD_NUMBER: _builtins.int
+    LABELLED_FIELD_NUMBER: _builtins.int
     practice: _builtins.bool
     """Whether it is practice."""
     game: _builtins.int
@@ -1427,9 +1427,9 @@ class StudyShownGame(_message.Message):
     """The ticket of the participant's seat, for PlayService; empty while there is no room."""
     ended: _builtins.bool
     """Whether it has ended: show the end, then ContinueStudy."""
-    labels: Global___StudyLabels.ValueType
-    """What the names of the other seats are, for a client that shows them in the language of the
-    study.
+    labelled: _builtins.bool
+    """Whether the other seats have names such as "Agent 2" in place of their own. A client may show
+    them in its language.
     """
     @_builtins.property
     def hide(self) -> _containers.RepeatedScalarFieldContainer[Global___StudyHide.ValueType]:
@@ -1446,11 +1446,11 @@ class StudyShownGame(_message.Message):
         game_id: _builtins.str = ...,
         ticket: _builtins.str = ...,
         ended: _builtins.bool = ...,
-        labels: Global___StudyLabels.ValueType = ...,
+        labelled: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["ended", b"ended", "game", b"game", "game_id", b"game_id", "games", b"games", "hide", b"hide", "labels", b"labels", "practice", b"practice", "room_id", b"room_id", "ticket", b"ticket"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["ended", b"ended", "game", b"game", "game_id", b"game_id", "games", b"games", "hide", b"hide", "labelled", b"labelled", "practice", b"practice", "room_id", b"room_id", "ticket", b"ticket"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
