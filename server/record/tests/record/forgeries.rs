@@ -340,6 +340,71 @@ fn a_record_without_a_participant_loses_its_signature() {
 }
 
 #[test]
+fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
+    let seat = |seat: u32, fingerprint: &str| v1::Participant {
+        seat,
+        name: "Ana".into(),
+        name_fingerprint: fingerprint.into(),
+        ..v1::Participant::default()
+    };
+    let header = v1::RecordHeader {
+        seats: vec![seat(0, "0123456789abcdef"), seat(1, "")],
+        ..v1::RecordHeader::default()
+    };
+    let event = |kind| {
+        Line::Event(v1::GameEvent {
+            kind: Some(kind),
+            ..v1::GameEvent::default()
+        })
+    };
+    let seated = |seat| {
+        event(Kind::Seated(Box::new(v1::Seated {
+            seat,
+            name: "Ana".into(),
+            ..v1::Seated::default()
+        })))
+    };
+    let shown = |seat| {
+        event(Kind::ExpressionShown(Box::new(v1::ExpressionShown {
+            seat,
+            ..v1::ExpressionShown::default()
+        })))
+    };
+    let lines = vec![
+        Line::Header(header),
+        // One of the name leaves before the game: the record does not say which.
+        seated(0),
+        event(Kind::Vacated(v1::Vacated { seat: 0 })),
+        seated(0),
+        seated(1),
+        shown(0),
+        shown(1),
+    ];
+    let lines = lines.into_iter().map(|line| v1::RecordLine { line: Some(line) });
+    let lines: Vec<v1::RecordLine> = lines.collect();
+    for (fingerprint, names, expressions) in [
+        (Some("0123456789abcdef"), 2, 1),
+        (Some(""), 2, 1),
+        (Some("fedcba9876543210"), 0, 0),
+        (None, 5, 2),
+    ] {
+        let who = Pseudonym {
+            of: Named {
+                name: "Ana".into(),
+                fingerprint: fingerprint.map(str::to_owned),
+            },
+            pseudonym: "deleted participant".into(),
+        };
+        let mut redacted = lines.clone();
+        let found = who.redact(&mut redacted);
+        assert_eq!((found.names, found.expressions), (names, expressions), "{fingerprint:?}");
+        let text = format!("{redacted:?}");
+        assert_eq!(text.matches("deleted participant").count() as u64, names);
+        assert_eq!(text.matches("\"Ana\"").count() as u64, 5 - names);
+    }
+}
+
+#[test]
 fn the_docs_list_what_a_record_can_and_cannot_prove() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/records.md");
     let docs = std::fs::read_to_string(path).expect("the docs");
