@@ -380,7 +380,9 @@ fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
         shown(0),
         shown(1),
     ];
-    let lines = lines.into_iter().map(|line| v1::RecordLine { line: Some(line) });
+    let lines = lines
+        .into_iter()
+        .map(|line| v1::RecordLine { line: Some(line) });
     let lines: Vec<v1::RecordLine> = lines.collect();
     for (fingerprint, names, expressions) in [
         (Some("0123456789abcdef"), 2, 1),
@@ -397,7 +399,11 @@ fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
         };
         let mut redacted = lines.clone();
         let found = who.redact(&mut redacted);
-        assert_eq!((found.names, found.expressions), (names, expressions), "{fingerprint:?}");
+        assert_eq!(
+            (found.names, found.expressions),
+            (names, expressions),
+            "{fingerprint:?}"
+        );
         let text = format!("{redacted:?}");
         assert_eq!(text.matches("deleted participant").count() as u64, names);
         assert_eq!(text.matches("\"Ana\"").count() as u64, 5 - names);
