@@ -198,7 +198,7 @@ def simulated(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset
 @pytest.mark.parametrize("table", TABLES)
 def test_every_column_has_its_documented_type(hosted: Dataset, table: str) -> None:
     columns = documented_columns(table)
-    assert len(columns) == {"decisions": 63, "expressions": 20, "markers": 6, "samples": 8}[table]
+    assert len(columns) == {"decisions": 65, "expressions": 20, "markers": 6, "samples": 8}[table]
     schema = pyarrow.parquet.read_schema(hosted.parquet(table))
     in_polars = polars.read_parquet(hosted.parquet(table))
     in_pandas = pandas.read_parquet(hosted.parquet(table), dtype_backend="pyarrow")
