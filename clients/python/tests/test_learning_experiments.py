@@ -141,11 +141,11 @@ def test_experiment_3_begins_with_the_networks_of_2(real_address: str, tmp_path:
     with monkeypatch.context() as patched:
         patched.setattr(learning, "learn", never)
         again = rules.networks(Config(ServerAddress(real_address), (1, 2), True, tmp_path), quiet)
-    # A seed gives the same result alone and beside another.
+    # A seed gives the same result alone and beside another, but for the order in which this machine adds.
     (tmp_path / "alone").mkdir()
     alone = rules.networks(Config(ServerAddress(real_address), (2,), True, tmp_path / "alone"), quiet)
     jax.tree.map(np.testing.assert_array_equal, both, again)
-    jax.tree.map(lambda first, third: np.testing.assert_array_equal(first[1], third[0]), both, alone)
+    jax.tree.map(lambda first, third: np.testing.assert_allclose(first[1], third[0], rtol=0, atol=1e-5), both, alone)
 
 
 @pytest.mark.server
