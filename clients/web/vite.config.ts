@@ -1,4 +1,4 @@
-// Builds the page (into dist/, which the server embeds), serves it during development, and
+// Builds the page (into dist/, which the server serves), serves it during development, and
 // configures the tests without a browser.
 
 import { readdirSync, readFileSync, realpathSync, rmSync, writeFileSync } from "node:fs";

@@ -15,8 +15,6 @@ use crate::webhooks::WebhookSettings;
 
 /// Version of this server, as its records and webhooks name it.
 pub const SERVER_VERSION: &str = env!("CARGO_PKG_VERSION");
-/// Largest message a client may send, bytes.
-pub const MAX_MESSAGE_BYTES: usize = 64 * 1024;
 /// Largest message between nodes, bytes: a batch of inputs of one client, or of updates for it.
 pub const MAX_PEER_MESSAGE_BYTES: usize = 16 * 1024 * 1024;
 /// Most streams of one connection.
@@ -33,8 +31,6 @@ pub const MAX_COMMANDS_CONTESTED: usize = 64;
 pub const FIRST_MESSAGE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Messages that wait for one room.
 pub const ROOM_MAILBOX: usize = 256;
-/// Largest message of a vector stream, bytes: large enough for a list of seeds.
-pub const MAX_VECTOR_MESSAGE_BYTES: usize = 1024 * 1024;
 /// Largest batch of a vector stream, bytes.
 pub const MAX_VECTOR_BATCH_BYTES: usize = chefshat_vector::MAX_BATCH_BYTES;
 /// Most vector streams at a time.
@@ -76,6 +72,8 @@ pub const MIN_ANALYSIS_UPDATE: Duration = Duration::from_millis(50);
 pub const MAX_IMPORT_BYTES: usize = 64 * 1024 * 1024;
 /// Most lines of a record that may be imported.
 pub const MAX_IMPORT_LINES: usize = 1_500_000;
+/// Most bytes of memory that the lines of all records take that are being imported.
+pub const MAX_IMPORT_MEMORY: usize = 192 * 1024 * 1024;
 /// How long the upload of a record may take.
 pub const IMPORT_TIMEOUT: Duration = Duration::from_secs(120);
 /// How long a client may take to send the next part of a record.
@@ -94,10 +92,11 @@ pub const MAX_TOURNAMENTS: usize = 256;
 pub const TOURNAMENT_MAILBOX: usize = 256;
 /// Most studies.
 pub const MAX_STUDIES: usize = 256;
+/// Most bytes of memory that the settings of all studies take. Decoding them is costed, which is
+/// about as much as a study keeps.
+pub const MAX_STUDY_MEMORY: usize = 48 * 1024 * 1024;
 /// Messages that may wait for one study.
 pub const STUDY_MAILBOX: usize = 256;
-/// Largest request about a study, bytes.
-pub const MAX_STUDY_MESSAGE_BYTES: usize = 1024 * 1024;
 /// Most participants that one request adds to a study.
 pub const MAX_STUDY_ADDED: usize = 1_000;
 /// Most participants in one message to a follower of a study.
@@ -134,15 +133,28 @@ pub const FOLLOW_SEND_TIMEOUT: Duration = Duration::from_secs(30);
 pub const MAX_GAMES_PAGE: u32 = 500;
 /// Most rows of a leaderboard.
 pub const MAX_LEADERBOARD_LINES: u32 = 1_000;
-/// How old a cached leaderboard may be although games have ended since.
+/// How old a cached leaderboard may be.
 pub const LEADERBOARD_AGE: Duration = Duration::from_secs(2);
+/// Time between two readings of all games for the leaderboard: until then it may count games that
+/// were deleted, and show a name that another node deleted.
+pub const LEADERBOARD_READ_AGAIN: Duration = Duration::from_secs(600);
 /// 1/N of the time may be spent computing the leaderboard.
 pub const LEADERBOARD_SHARE: u32 = 10;
-/// How long open streams and connections may delay a shutdown.
+/// How long open streams and connections may delay a shutdown, and then what is still written.
 pub const DRAIN_LIMIT: Duration = Duration::from_secs(5);
-/// Longest time for which a node of a cluster that ends hands over what it owns, after the grace for
-/// games that no other node can resume.
+/// Longest time for which a node of a cluster that ends hands over what it owns, unless the grace for
+/// games that no other node can resume is longer.
 pub const HAND_OVER_LIMIT: Duration = Duration::from_secs(20);
+/// How long games may take to end after the grace, at most.
+pub const END_LIMIT: Duration = Duration::from_secs(5);
+/// How long closing the database may delay a shutdown at last.
+pub const CLOSE_LIMIT: Duration = Duration::from_secs(5);
+
+/// The longest time of a shutdown. What stops the server must wait for longer.
+pub fn longest_shutdown(grace: Duration) -> Duration {
+    grace.max(HAND_OVER_LIMIT) + END_LIMIT + 2 * DRAIN_LIMIT + CLOSE_LIMIT
+}
+
 /// Longest name of a room or participant, characters.
 pub const MAX_NAME_CHARS: usize = 64;
 /// Most Shifts of a hosted game, and highest target in points.

@@ -180,6 +180,7 @@ impl Connections {
         let client = Arc::new(Client {
             id,
             address,
+            key,
             since: SystemTime::now(),
             calls: AtomicU64::new(0),
             streams: AtomicUsize::new(0),
@@ -216,6 +217,8 @@ pub struct Client {
     pub id: u64,
     /// Its address; `None` if it has none, as on a unix socket.
     pub address: Option<SocketAddr>,
+    /// Who is charged for its connection.
+    key: Key,
     /// When it connected.
     pub since: SystemTime,
     calls: AtomicU64,
@@ -421,6 +424,13 @@ fn set_options(stream: &TcpStream) -> io::Result<()> {
 pub struct Connection {
     stream: Socket,
     client: Arc<Client>,
+}
+
+impl Connection {
+    /// Who is charged for it.
+    pub(crate) fn key(&self) -> Key {
+        self.client.key
+    }
 }
 
 impl Connected for Connection {

@@ -134,10 +134,12 @@ pub enum WebhookOutcome {
     Failed,
     /// Dropped, because too many waited.
     Dropped,
+    /// Dropped, because the receiver refused it for good.
+    Refused,
 }
 
 impl WebhookOutcome {
-    const LABELS: [&str; 3] = ["delivered", "failed", "dropped"];
+    const LABELS: [&str; 4] = ["delivered", "failed", "dropped", "refused"];
 }
 
 /// What a stream is for.
@@ -176,7 +178,7 @@ pub struct Metrics {
     games_ended: [Counter; 2],
     /// Refused requests, by reason.
     refusals: Family<[(&'static str, String); 1], Counter>,
-    webhooks: [Counter; 3],
+    webhooks: [Counter; 4],
     vector_decisions: Counter,
     vector_games: Gauge,
     outboxes: Mutex<Vec<Weak<Outbox>>>,

@@ -2,7 +2,6 @@
 //! operator's request or on a schedule, and gives their disk space back. A crash in between leaves
 //! nothing behind that the next run does not delete.
 
-use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,8 +14,6 @@ use crate::clock::since_epoch_ms;
 use crate::config::KeepGames;
 use crate::rooms::Rooms;
 use crate::store::{DiskUsage, Keep, StoreError};
-use crate::studies::Studies;
-use crate::tournaments::Tournaments;
 
 /// Games that are deleted in one commit: rooms wait for it.
 const GAMES_PER_COMMIT: usize = 16;
@@ -68,19 +65,12 @@ pub struct Usage {
 #[derive(Debug, Clone)]
 pub struct Retention {
     rooms: Arc<Rooms>,
-    tournaments: Arc<Tournaments>,
-    studies: Arc<Studies>,
 }
 
 impl Retention {
-    /// For the games of these rooms, except for those of tournaments that are not over and those of
-    /// studies.
-    pub fn new(rooms: Arc<Rooms>, tournaments: Arc<Tournaments>, studies: Arc<Studies>) -> Self {
-        Self {
-            rooms,
-            tournaments,
-            studies,
-        }
+    /// For the games of these rooms. Their store knows which of them tournaments and studies need.
+    pub fn new(rooms: Arc<Rooms>) -> Self {
+        Self { rooms }
     }
 
     /// How much is stored.
@@ -107,20 +97,13 @@ impl Retention {
     pub async fn prune(&self, keep: Keep) -> Result<Pruned, StoreError> {
         let before = self.usage().await?;
         let mut pruned = Pruned::default();
-        let of_studies = self.games_of_studies().await?;
         let mut after = 0;
         loop {
             let store = self.rooms.store();
             let found = store.prunable(keep, after, GAMES_PER_COMMIT).await?;
             let Some((last, _)) = found.last() else { break };
             after = *last;
-            let games: Vec<Id> = (found.into_iter())
-                .map(|(_, game)| game)
-                .filter(|game| !self.tournaments.needs(*game) && !of_studies.contains(game))
-                .collect();
-            if games.is_empty() {
-                continue;
-            }
+            let games: Vec<Id> = found.into_iter().map(|(_, game)| game).collect();
             // Files before the games: after a crash in between, the next run deletes them.
             if let Some(data_dir) = self.rooms.record_writer().data_dir() {
                 let paths: Vec<_> = (games.iter())
@@ -132,13 +115,15 @@ impl Retention {
                     .map_err(|error| StoreError::Failed(format!("deleting a record: {error}")))?;
             }
             pruned.games += games.len() as u64;
-            self.rooms.delete_games(games).await?;
+            self.rooms.prune_games(games).await?;
             tokio::time::sleep(PAUSE).await;
         }
         let after = self.usage().await?;
         let bytes = |usage: &Usage| usage.disk.bytes + usage.record_bytes;
         pruned.freed_bytes = bytes(&before).saturating_sub(bytes(&after));
         if pruned.games > 0 {
+            // The leaderboard counts only what is left.
+            self.rooms.count_forgotten();
             info!(
                 games = pruned.games,
                 freed_bytes = pruned.freed_bytes,
@@ -146,21 +131,6 @@ impl Retention {
             );
         }
         Ok(pruned)
-    }
-
-    /// The games of all studies, those of other nodes of a cluster as well.
-    async fn games_of_studies(&self) -> Result<BTreeSet<Id>, StoreError> {
-        let mut games = self.studies.games();
-        if self.rooms.lease().is_none() {
-            return Ok(games);
-        }
-        let store = self.rooms.store();
-        for id in store.studies().await? {
-            if let Some(stored) = store.study(id).await? {
-                games.extend(stored.games());
-            }
-        }
-        Ok(games)
     }
 
     /// Deletes games on a schedule, until the future is dropped.

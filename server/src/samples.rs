@@ -1,7 +1,7 @@
 //! Records the samples of seats in files beside the records (`chefshat_record::samples`), on threads
 //! that may block. A room is only asked whose ticket it is.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
 use std::fs::{DirBuilder, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _};
@@ -23,6 +23,9 @@ pub(crate) const MAX_STREAMS: usize = 16;
 const MAX_AHEAD: Duration = Duration::from_secs(1);
 /// Most files that stay open while nothing is written to them.
 const MAX_IDLE_FILES: usize = 256;
+/// Most deleted games whose samples are refused by their id: more than there are rooms that may
+/// still have sent some.
+const MAX_DELETED_GAMES: usize = 65_536;
 
 /// Why samples are refused.
 #[derive(Debug, thiserror::Error)]
@@ -41,6 +44,9 @@ pub enum SampleError {
     /// The seat has too many samples.
     #[error("the samples of a seat may take at most {MAX_SAMPLE_BYTES} bytes")]
     TooMany,
+    /// The game was deleted.
+    #[error("the game was deleted, and its samples with it")]
+    Deleted,
     /// The file system failed.
     #[error("{0}")]
     Io(#[from] io::Error),
@@ -52,6 +58,29 @@ pub struct Samples {
     data_dir: Option<PathBuf>,
     /// By game and seat.
     files: Mutex<HashMap<(Id, usize), SharedFile>>,
+    deleted: Mutex<Deleted>,
+}
+
+/// The games that were deleted last. What was on its way for them must not create their files
+/// again.
+#[derive(Debug, Default)]
+struct Deleted {
+    games: HashSet<Id>,
+    /// Oldest first.
+    in_order: VecDeque<Id>,
+}
+
+impl Deleted {
+    fn add(&mut self, game: Id) {
+        if self.games.insert(game) {
+            self.in_order.push_back(game);
+        }
+        if self.in_order.len() > MAX_DELETED_GAMES
+            && let Some(oldest) = self.in_order.pop_front()
+        {
+            self.games.remove(&oldest);
+        }
+    }
 }
 
 /// The file of a seat; `None` while it is not open.
@@ -78,6 +107,7 @@ impl Samples {
         Self {
             data_dir,
             files: Mutex::default(),
+            deleted: Mutex::default(),
         }
     }
 
@@ -112,6 +142,12 @@ impl Samples {
             Arc::clone(files.entry((game, seat)).or_default())
         };
         let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+        // Once it has the file, no deletion comes before it has written.
+        let deleted = self.deleted.lock().unwrap_or_else(PoisonError::into_inner);
+        if deleted.games.contains(&game) {
+            return Err(SampleError::Deleted);
+        }
+        drop(deleted);
         let open = match file.take() {
             Some(open) => open,
             None => SeatFile::open(
@@ -130,26 +166,52 @@ impl Samples {
         let Some(data_dir) = &self.data_dir else {
             return Vec::new();
         };
-        let seats = 0..samples::MAX_SEATS;
-        seats
-            .map(|seat| samples::path_of(data_dir, &game.to_string(), seat))
-            .filter(|path| path.exists())
-            .collect()
+        let game = game.to_string();
+        let paths = samples::paths_of(data_dir, &game);
+        paths.filter(|path| path.exists()).collect()
     }
 
-    /// Deletes the samples of games.
+    /// Takes no more samples of these games. What is just being written is written when it returns.
+    pub async fn refuse(self: &Arc<Self>, games: Vec<Id>) -> io::Result<()> {
+        if self.data_dir.is_none() {
+            return Ok(());
+        }
+        let samples = Arc::clone(self);
+        let refusing = tokio::task::spawn_blocking(move || samples.refuse_now(&games));
+        refusing.await.map_err(io::Error::other)
+    }
+
+    fn refuse_now(&self, games: &[Id]) {
+        let mut deleted = self.deleted.lock().unwrap_or_else(PoisonError::into_inner);
+        games.iter().for_each(|game| deleted.add(*game));
+        drop(deleted);
+        let mut open = Vec::new();
+        let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
+        files.retain(|(of, _), file| {
+            let stays = !games.contains(of);
+            if !stays {
+                open.push(Arc::clone(file));
+            }
+            stays
+        });
+        drop(files);
+        for file in open {
+            // Its present holder finishes first; later ones are refused.
+            drop(file.lock().unwrap_or_else(PoisonError::into_inner).take());
+        }
+    }
+
+    /// Deletes the samples of games, and takes no more of them.
     ///
     /// # Errors
     /// The file system failed.
-    pub async fn delete(&self, games: Vec<Id>) -> io::Result<()> {
+    pub async fn delete(self: &Arc<Self>, games: Vec<Id>) -> io::Result<()> {
         let Some(data_dir) = self.data_dir.clone() else {
             return Ok(());
         };
-        {
-            let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
-            files.retain(|(of, _), _| !games.contains(of));
-        }
+        let samples = Arc::clone(self);
         let deleting = move || {
+            samples.refuse_now(&games);
             let mut games = games.iter();
             games.try_for_each(|game| samples::delete(&data_dir, &game.to_string()))
         };
@@ -305,9 +367,44 @@ mod tests {
         assert_eq!(recorded(folder.path(), game, 0).len(), MAX_STREAMS + 1);
         server.delete(vec![game]).await.expect("deleted");
         assert!(recorded(folder.path(), game, 0).is_empty());
-        assert_eq!(add(chunk("stream0", 1, 1)).await.expect("a new file"), 1);
+        let refused = add(chunk("stream0", 1, 1)).await.expect_err("deleted");
+        assert!(matches!(refused, SampleError::Deleted));
+        assert!(server.files(game).is_empty(), "it is not created again");
         let nowhere = Arc::new(Samples::new(None));
         let refused = nowhere.add(game, seat, chunk("affect", 0, 1), HOUR).await;
         assert!(matches!(refused, Err(SampleError::Off)));
+    }
+
+    /// An append that was on its way when the game was deleted: it has found the file's place before
+    /// and comes to it after.
+    #[test]
+    fn what_is_on_its_way_creates_no_deleted_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let server = Arc::new(Samples::new(Some(folder.path().to_path_buf())));
+        let game = Id::random();
+        assert_eq!(server.append(game, 0, chunk("a", 0, 1)).expect("open"), 1);
+        let file = Arc::clone(&server.files.lock().expect("no panic")[&(game, 0)]);
+        let held = file.lock().expect("no panic");
+        std::thread::scope(|scope| {
+            let appending = scope.spawn(|| server.append(game, 0, chunk("a", 9, 1)));
+            // Until it has the place, it does not hold the file.
+            while Arc::strong_count(&file) < 3 {
+                std::thread::yield_now();
+            }
+            let deleting = scope.spawn(|| server.refuse_now(&[game]));
+            while !(server.deleted.lock().expect("no panic").games).contains(&game) {
+                std::thread::yield_now();
+            }
+            drop(held);
+            deleting.join().expect("no panic");
+            let appended = appending.join().expect("no panic");
+            assert!(matches!(appended, Err(SampleError::Deleted)));
+        });
+        let mut deleted = Deleted::default();
+        let games = (0..=MAX_DELETED_GAMES).map(|_| Id::random());
+        let games: Vec<Id> = games.collect();
+        games.iter().for_each(|game| deleted.add(*game));
+        assert_eq!(deleted.games.len(), MAX_DELETED_GAMES);
+        assert!(!deleted.games.contains(&games[0]), "the oldest");
     }
 }

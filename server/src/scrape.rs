@@ -9,6 +9,7 @@ use axum::Router;
 use axum::routing::get;
 use axum::serve::Listener;
 use chefshat_tournament::{State, Tournament};
+use http::Response;
 use hyper::server::conn::http1;
 use hyper_util::rt::TokioIo;
 use hyper_util::service::TowerToHyperService;
@@ -22,11 +23,15 @@ use prometheus_client::metrics::info::Info;
 use prometheus_client::registry::Unit;
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
+use tower::Layer as _;
+use tower::util::MapResponse;
 
+use crate::clock::ProcessClock;
 use crate::metrics::Metrics;
 use crate::rooms::Rooms;
 use crate::store::DiskUsage;
 use crate::tournaments::Tournaments;
+use crate::web::{OriginLayer, Origins};
 
 /// The media type of the answers.
 const MEDIA_TYPE: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
@@ -36,14 +41,16 @@ const MAX_CONNECTIONS: usize = 8;
 /// Longest time of a connection, which serves one request.
 const TIME_LIMIT: Duration = Duration::from_secs(10);
 
-/// Answers `GET /metrics` on a listener, without end.
-pub async fn serve(listener: TcpListener, metrics: Arc<Metrics>) {
-    serve_within(listener, metrics, MAX_CONNECTIONS, TIME_LIMIT).await;
+/// Answers `GET /metrics` on a listener, without end. `origins`: under which names; no page needs
+/// the metrics.
+pub async fn serve(listener: TcpListener, metrics: Arc<Metrics>, origins: Origins) {
+    serve_within(listener, metrics, origins, MAX_CONNECTIONS, TIME_LIMIT).await;
 }
 
 async fn serve_within(
     mut listener: TcpListener,
     metrics: Arc<Metrics>,
+    origins: Origins,
     max_connections: usize,
     time_limit: Duration,
 ) {
@@ -52,6 +59,10 @@ async fn serve_within(
         async move { ([(http::header::CONTENT_TYPE, MEDIA_TYPE)], metrics.text()) }
     };
     let router = Router::new().route("/metrics", get(answer));
+    let router = MapResponse::new(router, |answer: Response<axum::body::Body>| {
+        answer.map(tonic::body::Body::new)
+    });
+    let checked = OriginLayer::new(origins).layer(router);
     let places = Arc::new(Semaphore::new(max_connections));
     // The semaphore is never closed.
     while let Ok(place) = Arc::clone(&places).acquire_owned().await {
@@ -59,7 +70,7 @@ async fn serve_within(
         let (stream, _) = Listener::accept(&mut listener).await;
         let connection = http1::Builder::new().keep_alive(false).serve_connection(
             TokioIo::new(stream),
-            TowerToHyperService::new(router.clone()),
+            TowerToHyperService::new(checked.clone()),
         );
         tokio::spawn(async move {
             // A client that fails or is too slow is disconnected.
@@ -98,6 +109,7 @@ impl Collector for ServerState {
         let draining = u64::from(rooms.is_shutting_down());
         let help = "1 while the server stops, else 0";
         to.gauge("draining", help, None, draining)?;
+        pauses(rooms.process_clock(), &mut to)?;
         queues(&rooms, &mut to)?;
         states(&tournaments, &mut to)?;
         match rooms.store().disk() {
@@ -105,6 +117,16 @@ impl Collector for ServerState {
             None => Ok(()),
         }
     }
+}
+
+fn pauses(clock: &ProcessClock, to: &mut Encoder<'_, '_>) -> fmt::Result {
+    let count = ConstCounter::new(clock.pause_count());
+    let help = "Times that the process did not run for a second or longer";
+    to.metric("process_pauses", help, None, &count)?;
+    let left_out = ConstCounter::new(clock.left_out().as_secs_f64());
+    let help = "Time of these pauses, which no participant is charged for";
+    let unit = Some(&Unit::Seconds);
+    to.metric("process_paused", help, unit, &left_out)
 }
 
 /// The depth of all queues of a kind together, and of the deepest.
@@ -230,7 +252,8 @@ mod tests {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = listener.local_addr().expect("bound");
         let limit = Duration::from_millis(20);
-        tokio::spawn(serve_within(listener, Arc::default(), 1, limit));
+        let anywhere = Origins::new(Vec::new(), None);
+        tokio::spawn(serve_within(listener, Arc::default(), anywhere, 1, limit));
         let mut idle = std::net::TcpStream::connect(address).expect("it listens");
         idle.set_nonblocking(true).expect("a socket");
         // Time limits may end this one, too, on a busy machine.
@@ -245,5 +268,37 @@ mod tests {
         assert!(text.starts_with("HTTP/1.1 200 OK"), "{text}");
         let end = idle.read(&mut [0]).map_err(|error| error.kind());
         assert_ne!(end, Err(io::ErrorKind::WouldBlock), "still open");
+    }
+
+    #[tokio::test]
+    async fn a_page_that_points_its_name_here_reads_no_metrics() {
+        for (hosts, name, answered) in [
+            (Some(vec![]), "rebound.example.net", false),
+            (Some(vec![]), "localhost:9464", true),
+            (Some(vec![]), "127.0.0.1:9464", true),
+            (
+                Some(vec!["chef.example.org".into()]),
+                "chef.example.org",
+                true,
+            ),
+            (None, "chefshat:9464", true),
+        ] {
+            let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+            let address = listener.local_addr().expect("bound");
+            let origins = Origins::new(Vec::new(), hosts);
+            tokio::spawn(serve(listener, Arc::default(), origins));
+            let mut client = TcpStream::connect(address).await.expect("it listens");
+            let request = format!("GET /metrics HTTP/1.1\r\nHost: {name}\r\n\r\n");
+            client.write_all(request.as_bytes()).await.expect("sent");
+            let mut answer = String::new();
+            client.read_to_string(&mut answer).await.expect("text");
+            let status = if answered {
+                "HTTP/1.1 200 "
+            } else {
+                "HTTP/1.1 403 "
+            };
+            assert!(answer.starts_with(status), "{name}: {answer}");
+            assert_eq!(answer.contains("chefshat_"), answered, "{name}: {answer}");
+        }
     }
 }

@@ -2,43 +2,46 @@
 //! leaving a client waiting.
 
 #[cfg(test)]
+mod budget;
+#[cfg(test)]
 mod fuzz;
 
 use std::future::Future;
 use std::io;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use chefshat_proto::v1;
 use futures::future::{Either, try_join};
-use futures::{Stream, StreamExt as _, TryStreamExt as _};
+use futures::{FutureExt as _, Stream, StreamExt as _, TryStreamExt as _};
 use http::HeaderName;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::sync::watch;
-use tokio::time::timeout;
+use tokio::time::{Instant, timeout_at};
 use tokio_util::sync::CancellationToken;
-use tokio_util::task::TaskTracker;
+use tokio_util::task::{AbortOnDropHandle, TaskTracker};
 use tonic::body::Body;
 use tonic::service::Routes;
 use tonic::transport;
-use tonic::transport::server::{Connected, TcpConnectInfo};
+use tonic::transport::server::Connected;
 use tonic_health::ServingStatus;
 use tonic_health::server::HealthReporter;
 use tower::util::{MapRequestLayer, option_layer};
 use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
 use tracing::{info, warn};
 
-use crate::access::{Access, TokenFileError};
+use crate::access::{Access, Call, TokenFileError};
 use crate::cluster::{
     CONNECTION_WINDOW, ClusterNode, Directory, Hosted, MAX_RESET_STREAMS, NodeLease, PING_INTERVAL,
     PING_TIMEOUT, PeerPort, STREAM_WINDOW, SingleServer, StoreDirectory,
 };
 use crate::config::{
-    DRAIN_LIMIT, HAND_OVER_LIMIT, MAX_MESSAGE_BYTES, MAX_PEER_MESSAGE_BYTES,
-    MAX_STREAMS_PER_CONNECTION, MAX_STUDY_MESSAGE_BYTES, MAX_VECTOR_MESSAGE_BYTES, ServerConfig,
+    CLOSE_LIMIT, DRAIN_LIMIT, END_LIMIT, HAND_OVER_LIMIT, MAX_STREAMS_PER_CONNECTION, ServerConfig,
+    longest_shutdown,
 };
-use crate::connections::{self, Connections, Limits, Listener};
+use crate::connections::{self, Client, Connection, Connections, Limits, Listener};
 use crate::forwarded::ForwardedLayer;
 use crate::grpc;
+use crate::handshakes::Handshakes;
 use crate::limits::{CallLimits, Metered};
 use crate::metrics::Metrics;
 use crate::participants::Participants;
@@ -49,6 +52,7 @@ use crate::scrape;
 use crate::store::cluster::{ClusterStore, NodeInfo};
 use crate::store::{Store, StoreError};
 use crate::studies::Studies;
+use crate::tasks::{LongTask, named};
 use crate::tls::{MaybeTls, Tls, TlsError};
 use crate::tournaments::Tournaments;
 use crate::web::{OriginLayer, Origins, PageLayer};
@@ -69,8 +73,8 @@ pub enum ServeError {
         "{0}; every acknowledged decision is stored, and durable games resume when the server is started again"
     )]
     Store(#[from] StoreError),
-    /// The threads that step vector games could not be started.
-    #[error("starting the threads of vector streams failed: {0}")]
+    /// The threads for work that takes long could not be started.
+    #[error("starting the threads for work that takes long failed: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// The tokens file is unreadable.
     #[error(transparent)]
@@ -257,11 +261,18 @@ impl Server {
         listener: impl Into<Listener>,
         shutdown: impl Future<Output = ()> + Send,
     ) -> Result<(), ServeError> {
+        let clock = Arc::clone(self.rooms.process_clock());
+        let _watching =
+            AbortOnDropHandle::new(tokio::spawn(named(LongTask::ProcessClock, clock.watch())));
         let connections = Arc::clone(&self.connections);
         let incoming = connections::accept(listener.into(), connections);
         let incoming = match self.tls.clone() {
             None => incoming.map_ok(MaybeTls::Plain).left_stream(),
-            Some(tls) => tls.secure(incoming).right_stream(),
+            Some(tls) => {
+                let limits = Handshakes::new(self.config.shares, Arc::clone(self.metrics()))?;
+                let secured = tls.secure(incoming, limits, Connection::key);
+                secured.right_stream()
+            }
         };
         self.serve_incoming(incoming, shutdown).await
     }
@@ -296,22 +307,18 @@ impl Server {
         } = self;
         let is_node = node.is_some();
         let closing = CancellationToken::new();
-        tracker.spawn(
-            closing
-                .clone()
-                .run_until_cancelled_owned(Arc::clone(&connections).close_stalled()),
-        );
+        let until_closing =
+            |task, work| named(task, closing.clone().run_until_cancelled_owned(work));
+        tracker.spawn(until_closing(
+            LongTask::StalledConnections,
+            Arc::clone(&connections).close_stalled().boxed(),
+        ));
         if let Some(keep) = config.keep_games {
-            let retention = Retention::new(
-                Arc::clone(&rooms),
-                Arc::clone(&tournaments),
-                Arc::clone(&studies),
-            );
-            tracker.spawn(
-                closing
-                    .clone()
-                    .run_until_cancelled_owned(retention.follow(keep)),
-            );
+            let retention = Retention::new(Arc::clone(&rooms));
+            tracker.spawn(until_closing(
+                LongTask::Retention,
+                retention.follow(keep).boxed(),
+            ));
         }
         // Above any encryption, because it reads frames.
         let first_bytes = config.first_bytes_timeout;
@@ -330,18 +337,19 @@ impl Server {
         health.set_service_status("", ServingStatus::Serving).await;
         let following = node.as_ref().map(|node| {
             let lease = node.may_publish();
-            tracker.spawn(follow_lease(health.clone(), lease, closing.clone()))
+            let following = follow_lease(health.clone(), lease, closing.clone());
+            tracker.spawn(named(LongTask::NodeHealth, following))
         });
 
-        tracker.spawn(
-            closing
-                .clone()
-                .run_until_cancelled_owned(Arc::clone(&access).follow()),
-        );
-        tracker.spawn(rooms.webhooks().clone().deliver(closing.clone()));
+        tracker.spawn(until_closing(
+            LongTask::TokenFile,
+            Arc::clone(&access).follow().boxed(),
+        ));
+        let delivering = rooms.webhooks().clone().deliver(closing.clone());
+        tracker.spawn(named(LongTask::Webhooks, delivering));
         let encrypted = tls.is_some();
         if let Some(tls) = tls {
-            tracker.spawn(closing.clone().run_until_cancelled_owned(tls.follow()));
+            tracker.spawn(until_closing(LongTask::Certificates, tls.follow().boxed()));
         }
         let forwarding = (peers.as_ref()).map(|port| {
             let directory = Arc::clone(rooms.directory());
@@ -352,13 +360,13 @@ impl Server {
             Arc::clone(&tournaments),
             closing.clone(),
         );
-        let peer_play =
-            PeerServiceServer::new(play).max_decoding_message_size(MAX_PEER_MESSAGE_BYTES);
+        let peer_play = PeerServiceServer::new(play)
+            .max_decoding_message_size(longest("chefshat.peer.v1.PeerService"));
         let peer_serving = match peers {
             None => Either::Left(std::future::ready(Ok(()))),
             Some(port) => {
                 if let Some(tls) = port.tls() {
-                    tracker.spawn(closing.clone().run_until_cancelled_owned(tls.follow()));
+                    tracker.spawn(until_closing(LongTask::Certificates, tls.follow().boxed()));
                 }
                 let closed = closing.clone();
                 Either::Right(
@@ -381,10 +389,12 @@ impl Server {
                             Arc::clone(&calls),
                         ))
                         .layer(grpc::LimitsLayer::new(Arc::clone(&calls)))
+                        .layer(grpc::DecodingLayer::new(Arc::clone(&calls)))
                         .add_routes(routes.clone().add_service(peer_play))
-                        .serve_with_incoming_shutdown(port.incoming(), async move {
-                            closed.cancelled().await;
-                        }),
+                        .serve_with_incoming_shutdown(
+                            port.incoming(rooms.metrics())?,
+                            async move { closed.cancelled().await },
+                        ),
                 )
             }
         };
@@ -402,7 +412,7 @@ impl Server {
             .layer(ForwardedLayer::new(config.trusted_proxies.clone()))
             .layer(OriginLayer::new(origins))
             .layer(cors(&config.allowed_origins)?)
-            .layer(PageLayer { tls: encrypted })
+            .layer(PageLayer::new(encrypted, config.shares)?)
             .layer(tonic_web::GrpcWebLayer::new())
             .layer(grpc::count_refusals(rooms.metrics()))
             .layer(option_layer(forwarding))
@@ -411,9 +421,11 @@ impl Server {
                 Arc::clone(&calls),
             ))
             .layer(grpc::LimitsLayer::new(Arc::clone(&calls)))
+            .layer(grpc::DecodingLayer::new(Arc::clone(&calls)))
             .add_routes(routes)
             .serve_with_incoming_shutdown(incoming, async move { closed.cancelled().await });
 
+        let shutdown_began = OnceLock::new();
         let ending = async {
             match &node {
                 None => shutdown.await,
@@ -433,22 +445,27 @@ impl Server {
             health
                 .set_service_status("", ServingStatus::NotServing)
                 .await;
+            // All steps share one budget.
+            let began = *shutdown_began.get_or_init(Instant::now);
+            let games_end = began + config.grace.max(HAND_OVER_LIMIT) + END_LIMIT;
             if let Some(node) = &mut node {
                 rooms.refuse_new();
-                if timeout(config.grace + HAND_OVER_LIMIT, node.drain())
-                    .await
-                    .is_err()
-                {
+                if timeout_at(games_end, node.drain()).await.is_err() {
                     warn!(
                         "not everything was handed over; other nodes take it over when the lease expires"
                     );
                     rooms.fence_all();
                 }
             }
+            store.stop_waiting();
             // Games that end from here on count when the server is restarted.
             tournaments.stop();
             studies.stop();
-            rooms.shut_down(config.grace).await;
+            let grace_left = (began + config.grace).saturating_duration_since(Instant::now());
+            let ended = timeout_at(games_end, rooms.shut_down(grace_left)).await;
+            if ended.is_err() {
+                warn!("not all games could be suspended in time; their journals are stored");
+            }
             tournaments.end();
             studies.end();
             closing.cancel();
@@ -468,13 +485,19 @@ impl Server {
         studies.end();
         drop((rooms, tournaments, studies));
         tracker.close();
-        if is_node {
-            // The database may be away, for which a node does not wait.
-            let _ = timeout(DRAIN_LIMIT, tracker.wait()).await;
-        } else {
-            tracker.wait().await;
+        // The database may be away, for which a node does not wait.
+        let began = shutdown_began.get().copied().filter(|_| !is_node);
+        let latest = began.map(|began| began + longest_shutdown(config.grace));
+        let soonest = Instant::now() + DRAIN_LIMIT;
+        let end = latest.map_or(soonest, |latest| soonest.max(latest - CLOSE_LIMIT));
+        if timeout_at(end, tracker.wait()).await.is_err() {
+            warn!("not everything that was to be written or sent has been");
         }
-        store.close().await;
+        let soonest = Instant::now() + CLOSE_LIMIT;
+        let end = latest.map_or(soonest, |latest| soonest.max(latest));
+        if timeout_at(end, store.close()).await.is_err() {
+            warn!("the database was not closed in time; what was acknowledged is stored");
+        }
         Ok(())
     }
 }
@@ -501,9 +524,15 @@ async fn follow_lease(
 /// Marks a request of another node, and removes that node's address: it names the client's, if it
 /// has one.
 fn from_peer(mut request: http::Request<Body>) -> http::Request<Body> {
-    request.extensions_mut().remove::<TcpConnectInfo>();
+    request.extensions_mut().remove::<Arc<Client>>();
     request.extensions_mut().insert(grpc::FromPeer);
     request
+}
+
+/// The longest message of a service. The layer of `grpc/decoding.rs` refuses those of each call
+/// before they are read; this is what the transport itself accepts.
+fn longest(service: &str) -> usize {
+    Call::longest_message_of(service)
 }
 
 fn routes(
@@ -529,11 +558,7 @@ fn routes(
     use v1::vector_service_server::VectorServiceServer;
     let reach = grpc::Reach::new(Arc::clone(rooms), Arc::clone(tournaments));
     let recorded = grpc::Recorded::new(reach.clone(), config.access.records);
-    let retention = Retention::new(
-        Arc::clone(rooms),
-        Arc::clone(tournaments),
-        Arc::clone(studies),
-    );
+    let retention = Retention::new(Arc::clone(rooms));
     let study_calls = grpc::StudyCalls::new(
         Arc::clone(studies),
         reach.clone(),
@@ -559,7 +584,7 @@ fn routes(
             Arc::clone(tournaments),
             closing.clone(),
         ))
-        .max_decoding_message_size(MAX_MESSAGE_BYTES),
+        .max_decoding_message_size(longest("chefshat.v1.PlayService")),
     )
     .add_service(
         TournamentServiceServer::new(grpc::TournamentCalls::new(
@@ -568,15 +593,15 @@ fn routes(
             Arc::clone(calls),
             closing.clone(),
         ))
-        .max_decoding_message_size(MAX_MESSAGE_BYTES),
+        .max_decoding_message_size(longest("chefshat.v1.TournamentService")),
     )
     .add_service(
         StudyServiceServer::new(study_calls.clone())
-            .max_decoding_message_size(MAX_STUDY_MESSAGE_BYTES),
+            .max_decoding_message_size(longest("chefshat.v1.StudyService")),
     )
     .add_service(
         ParticipationServiceServer::new(study_calls)
-            .max_decoding_message_size(MAX_STUDY_MESSAGE_BYTES),
+            .max_decoding_message_size(longest("chefshat.v1.ParticipationService")),
     )
     .add_service(
         RoomServiceServer::new(grpc::RoomCalls::new(
@@ -585,19 +610,19 @@ fn routes(
             Arc::clone(calls),
             config.client_endpoint.as_deref(),
         ))
-        .max_decoding_message_size(MAX_MESSAGE_BYTES),
+        .max_decoding_message_size(longest("chefshat.v1.RoomService")),
     )
     .add_service(
         SpectatorServiceServer::new(grpc::Spectate::new(reach.clone(), closing.clone()))
-            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+            .max_decoding_message_size(longest("chefshat.v1.SpectatorService")),
     )
     .add_service(
         TableServiceServer::new(grpc::TableCalls::new(reach.clone()))
-            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+            .max_decoding_message_size(longest("chefshat.v1.TableService")),
     )
     .add_service(
         InstrumentServiceServer::new(grpc::Instruments::new(reach.clone()))
-            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+            .max_decoding_message_size(longest("chefshat.v1.InstrumentService")),
     )
     .add_service(
         RecordServiceServer::new(grpc::Records::new(
@@ -605,16 +630,23 @@ fn routes(
             Arc::clone(tournaments),
             config,
         ))
-        .max_decoding_message_size(MAX_MESSAGE_BYTES),
+        .max_decoding_message_size(longest("chefshat.v1.RecordService")),
     )
     .add_service(
-        VectorServiceServer::new(vectors).max_decoding_message_size(MAX_VECTOR_MESSAGE_BYTES),
+        VectorServiceServer::new(vectors)
+            .max_decoding_message_size(longest("chefshat.v1.VectorService")),
     )
-    .add_service(AnalysisServiceServer::new(analyses).max_decoding_message_size(MAX_MESSAGE_BYTES))
-    .add_service(AdminServiceServer::new(admin).max_decoding_message_size(MAX_MESSAGE_BYTES))
+    .add_service(
+        AnalysisServiceServer::new(analyses)
+            .max_decoding_message_size(longest("chefshat.v1.AnalysisService")),
+    )
+    .add_service(
+        AdminServiceServer::new(admin)
+            .max_decoding_message_size(longest("chefshat.v1.AdminService")),
+    )
     .add_service(
         ServerServiceServer::new(grpc::Info::new(reach, calls, config))
-            .max_decoding_message_size(MAX_MESSAGE_BYTES),
+            .max_decoding_message_size(longest("chefshat.v1.ServerService")),
     );
     Ok(routes)
 }

@@ -114,6 +114,11 @@ impl Signer {
         }
     }
 
+    /// Its key, if it signs.
+    pub fn key(&self) -> Option<Arc<SigningKey>> {
+        self.key.clone()
+    }
+
     /// Its public key, if it signs.
     pub fn public(&self) -> Option<PublicKey> {
         self.key.as_ref().map(|key| key.public())

@@ -1,5 +1,5 @@
 //! TLS on the server's connections. Each handshake is a task of its own beside the accept loop, so a
-//! peer that stalls delays nobody. The certificate is read again when its files change; existing
+//! peer that stalls delays nobody; `handshakes` limits them. The certificate is read again when its files change; existing
 //! connections keep theirs.
 
 use std::io;
@@ -24,6 +24,8 @@ use tonic::transport::server::Connected;
 use tracing::{debug, error, info};
 
 use crate::file_watch::FileWatch;
+use crate::handshakes::{Handshake, Handshakes};
+use crate::limits::Key;
 
 /// How long a client may take for the handshake.
 const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
@@ -205,17 +207,20 @@ impl Tls {
         }
     }
 
-    /// These connections, encrypted. Those whose handshake fails are dropped.
+    /// These connections, encrypted. Those whose handshake fails, or for whose address `limits` has
+    /// no place, are dropped.
     pub fn secure<C>(
         self: Arc<Self>,
         incoming: impl Stream<Item = io::Result<C>> + Send,
+        limits: Arc<Handshakes>,
+        key_of: fn(&C) -> Key,
     ) -> impl Stream<Item = io::Result<MaybeTls<C>>> + Send
     where
         C: AsyncRead + AsyncWrite + Connected + Unpin + Send + 'static,
     {
         let state = (Box::pin(incoming), JoinSet::new());
         stream::unfold(state, move |(mut incoming, mut handshakes)| {
-            let tls = Arc::clone(&self);
+            let (tls, limits) = (Arc::clone(&self), Arc::clone(&limits));
             async move {
                 loop {
                     tokio::select! {
@@ -225,7 +230,15 @@ impl Tls {
                             }
                         }
                         next = incoming.next() => match next? {
-                            Ok(connection) => drop(handshakes.spawn(tls.handshake(connection))),
+                            Ok(connection) => {
+                                let (tls, limits) = (Arc::clone(&tls), Arc::clone(&limits));
+                                let key = key_of(&connection);
+                                handshakes.spawn(async move {
+                                    // Others' handshakes do not use up the time of this one.
+                                    let admitted = timeout(HANDSHAKE_TIMEOUT, limits.admit(key));
+                                    tls.handshake(connection, admitted.await.ok()??).await
+                                });
+                            }
                             Err(error) => return Some((Err(error), (incoming, handshakes))),
                         },
                     }
@@ -234,19 +247,18 @@ impl Tls {
         })
     }
 
-    fn handshake<C>(&self, connection: C) -> impl Future<Output = Option<MaybeTls<C>>> + use<C>
+    async fn handshake<C>(&self, connection: C, admitted: Handshake) -> Option<MaybeTls<C>>
     where
-        C: AsyncRead + AsyncWrite + Unpin,
+        C: AsyncRead + AsyncWrite + Unpin + Send + 'static,
     {
         let acceptor = TlsAcceptor::from(self.current.load_full());
-        async move {
-            let shaken = timeout(HANDSHAKE_TIMEOUT, acceptor.accept(connection)).await;
-            let stream = shaken.unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()));
-            stream
-                .map(|stream| MaybeTls::Tls(Box::new(stream)))
-                .inspect_err(|error| debug!(%error, "a TLS handshake failed"))
-                .ok()
-        }
+        let computing = admitted.compute(acceptor.accept(connection));
+        let shaken = timeout(HANDSHAKE_TIMEOUT, computing).await;
+        let stream = shaken.unwrap_or_else(|_| Some(Err(io::ErrorKind::TimedOut.into())))?;
+        stream
+            .map(|stream| MaybeTls::Tls(Box::new(stream)))
+            .inspect_err(|error| debug!(%error, "a TLS handshake failed"))
+            .ok()
     }
 }
 
@@ -330,11 +342,56 @@ impl<C: AsyncRead + AsyncWrite + Unpin> AsyncWrite for MaybeTls<C> {
 
 #[cfg(test)]
 mod tests {
+    use futures::TryStreamExt as _;
     use rustls::pki_types::ServerName;
     use tokio::io::{AsyncReadExt as _, DuplexStream, duplex};
     use tokio_rustls::TlsConnector;
 
     use super::*;
+    use crate::limits::Shares;
+
+    /// A connection of a caller.
+    struct Keyed {
+        connection: DuplexStream,
+        key: Key,
+    }
+
+    impl Connected for Keyed {
+        type ConnectInfo = ();
+
+        fn connect_info(&self) {}
+    }
+
+    impl AsyncRead for Keyed {
+        fn poll_read(
+            mut self: Pin<&mut Self>,
+            context: &mut Context<'_>,
+            buffer: &mut ReadBuf<'_>,
+        ) -> Poll<io::Result<()>> {
+            Pin::new(&mut self.connection).poll_read(context, buffer)
+        }
+    }
+
+    impl AsyncWrite for Keyed {
+        fn poll_write(
+            mut self: Pin<&mut Self>,
+            context: &mut Context<'_>,
+            bytes: &[u8],
+        ) -> Poll<io::Result<usize>> {
+            Pin::new(&mut self.connection).poll_write(context, bytes)
+        }
+
+        fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+            Pin::new(&mut self.connection).poll_flush(context)
+        }
+
+        fn poll_shutdown(
+            mut self: Pin<&mut Self>,
+            context: &mut Context<'_>,
+        ) -> Poll<io::Result<()>> {
+            Pin::new(&mut self.connection).poll_shutdown(context)
+        }
+    }
 
     /// A server's side of the connections of these clients, and what clients trust.
     fn server() -> (tempfile::TempDir, Arc<Tls>, RootCertStore) {
@@ -367,20 +424,50 @@ mod tests {
         connector.connect(name, connection).await.expect("trusted")
     }
 
-    #[tokio::test(start_paused = true)]
+    fn handshakes() -> Arc<Handshakes> {
+        Handshakes::new(Shares::default(), Arc::default()).expect("a thread")
+    }
+
+    #[tokio::test]
     async fn a_handshake_that_stalls_is_given_up_and_delays_nobody() {
         let (_folder, tls, roots) = server();
         let ((stalled, first), (near, second)) = (duplex(16 * 1024), duplex(16 * 1024));
         let incoming = stream::iter([Ok(first), Ok(second)]).chain(stream::pending());
-        let mut secured = std::pin::pin!(tls.secure(incoming));
+        let secured = tls.secure(incoming, handshakes(), |_| Key::Local);
+        let mut secured = std::pin::pin!(secured);
         let (_client, accepted) = tokio::join!(connect(roots, near), secured.next());
         accepted.expect("one").expect("no error");
         // The stalled handshake ends with its connection, and is not handed on.
+        tokio::time::pause();
         let mut stalled = stalled;
         let ended = async { stalled.read_u8().await.is_err() };
         tokio::select! {
             next = secured.next() => panic!("{}", next.is_some()),
             ended = ended => assert!(ended),
         }
+    }
+
+    #[tokio::test]
+    async fn a_flood_of_handshakes_is_refused_after_few_and_others_are_served() {
+        let (_folder, tls, roots) = server();
+        let flood = (0..2_000).map(|_| {
+            // It says nothing, and its client has gone.
+            let (client, connection) = duplex(16 * 1024);
+            drop(client);
+            Ok((connection, Key::Resumed))
+        });
+        let (near, honest) = duplex(16 * 1024);
+        let incoming = stream::iter(flood.chain([Ok((honest, Key::Local))]));
+        let incoming = incoming.map_ok(|(connection, key)| Keyed { connection, key });
+        let limits = handshakes();
+        let secured = tls.secure(
+            incoming.chain(stream::pending()),
+            Arc::clone(&limits),
+            |keyed| keyed.key,
+        );
+        let mut secured = std::pin::pin!(secured);
+        let (_client, accepted) = tokio::join!(connect(roots, near), secured.next());
+        accepted.expect("one").expect("no error");
+        assert!(limits.admit(Key::Resumed).await.is_none(), "too many");
     }
 }

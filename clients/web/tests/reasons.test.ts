@@ -33,6 +33,9 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "FILTER_REFUSED",
     "KIND_REFUSED",
     "MAX_GAMES_REFUSED",
+    "MESSAGE_MALFORMED",
+    "MESSAGE_TOO_LARGE",
+    "MESSAGE_TOO_SLOW",
     "NAME_KEY_REFUSED",
     "PAGE_TOKEN_REFUSED",
     "REPORT_ID_USED",
@@ -43,6 +46,7 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "SEED_REFUSED",
     "SNAPSHOT_DELAYED",
     "STATE_REFUSED",
+    "TOO_MANY_ELEMENTS",
   ],
   "only programs make these calls: Play, vectors, imports, operating": [
     "ACTIONS_REFUSED",
@@ -84,9 +88,10 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "ANSWERS_NOT_READ",
     "OUT_OF_DESCRIPTORS",
     "TOO_MANY_CONNECTIONS",
+    "TOO_MANY_HANDSHAKES",
   ],
   "only nodes of a cluster send it to each other": ["NOT_OWNER"],
-  "environment variables": ["CARGO_MANIFEST_DIR", "CARGO_PKG_VERSION", "CHEFSHAT_PAIRS"],
+  "environment variables": ["CARGO_MANIFEST_DIR", "CARGO_PKG_VERSION", "CHEFSHAT_PAIRS", "OUT_DIR"],
 };
 
 test("each reason of the server has a text, or a cause not to have one", () => {

@@ -3,6 +3,7 @@
 
 use chefshat_engine::MAX_SEATS;
 use chefshat_proto::v1;
+use chefshat_record::sheet;
 use serde_json::{Value, json};
 
 use super::CommandError;
@@ -72,18 +73,18 @@ pub(super) fn as_json(board: &v1::GetLeaderboardResponse) -> Vec<Value> {
 
 /// The participants as CSV with a header.
 pub(super) fn as_csv(board: &v1::GetLeaderboardResponse) -> Result<Vec<u8>, CommandError> {
-    let mut sheet = csv::Writer::from_writer(Vec::new());
+    let mut writer = csv::Writer::from_writer(Vec::new());
     let mut header: Vec<String> = ["place", "name", "kind", "mean", "deviation", "games"]
         .map(str::to_owned)
         .into();
     header.extend((1..=MAX_SEATS).map(|place| format!("place_{place}")));
     header.push("name_fingerprint".to_owned());
-    sheet.write_record(&header)?;
+    writer.write_record(&header)?;
     for line in &board.rated {
         let rating = line.rating.unwrap_or_default();
         let mut row = vec![
             line.place.to_string(),
-            line.name.clone(),
+            sheet::cell(&line.name).into_owned(),
             rated_kind(line).to_owned(),
             rating.mean.to_string(),
             rating.deviation.to_string(),
@@ -91,9 +92,9 @@ pub(super) fn as_csv(board: &v1::GetLeaderboardResponse) -> Result<Vec<u8>, Comm
         ];
         row.extend(times(line, MAX_SEATS));
         row.push(line.name_fingerprint.clone());
-        sheet.write_record(&row)?;
+        writer.write_record(&row)?;
     }
-    Ok(sheet.into_inner()?)
+    Ok(writer.into_inner()?)
 }
 
 /// The name, with the beginning of its fingerprint if it has a key.

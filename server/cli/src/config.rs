@@ -454,7 +454,14 @@ mod tests {
             .collect();
         assert_eq!(
             others,
-            ["config", "lease", "until_stdin_closes", "json", "help"]
+            [
+                "config",
+                "lease",
+                "until_stdin_closes",
+                "new",
+                "json",
+                "help"
+            ]
         );
         for argument in settings(Line::command()) {
             let variable = argument.get_env().expect("settings have one");

@@ -15,7 +15,9 @@ use super::{CommandError, progress};
 
 const HELP: &str = "\
 The directory contains the tables `decisions`, `expressions`, `markers` and `samples` in every requested format, a dataset card (README.md) and SHA256SUMS. \
-It is written atomically. Every record is replayed first; a damaged one fails the export unless --skip-damaged is given.
+It is written atomically. Every record is replayed first. A damaged one is left out and named.
+
+Exit code 0: all records are in the dataset, or excluded by a filter. 1: some are damaged (0 with --skip-damaged), or nothing was written.
 
 Examples:
   chefshat export --out dataset
@@ -53,7 +55,7 @@ pub(super) struct Export {
     /// Only games with at least one player of this kind.
     #[arg(long, value_name = "KIND", value_parser = PossibleValuesParser::new(KINDS))]
     with: Option<String>,
-    /// Skip damaged records and report them.
+    /// End with exit code 0 although damaged records were left out.
     #[arg(long)]
     skip_damaged: bool,
     /// Licence of the dataset, for its card.
@@ -94,7 +96,6 @@ impl Export {
                 room_name: self.room.clone(),
                 player_kind: self.with.clone(),
             },
-            skip_damaged: self.skip_damaged,
             licence: self.licence.clone(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         };
@@ -108,6 +109,11 @@ impl Export {
             writeln!(out, "{}", self.json_report(&exported))?;
         } else {
             self.write_report(&mut out, &exported)?;
+        }
+        if exported.damaged > 0 && !self.skip_damaged {
+            let damaged = counted(exported.damaged, "damaged record");
+            anstream::eprintln!("{damaged} left out; with --skip-damaged this is no failure");
+            return Ok(ExitCode::FAILURE);
         }
         Ok(ExitCode::SUCCESS)
     }

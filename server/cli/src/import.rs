@@ -11,6 +11,7 @@ use chefshat_record::import;
 use chefshat_record::import::MAX_TRANSCRIPT_BYTES;
 use chefshat_record::jsonl;
 use chefshat_record::replay::{Replayed, replay};
+use chefshat_record::signature::{self, Signed};
 use clap::Args;
 use serde_json::json;
 
@@ -64,7 +65,11 @@ impl Import {
             )
             .into());
         }
-        jsonl::write(&path, &lines)?;
+        match signature::check(&lines, None) {
+            // Only the text of the file shows what an older version signed, if anything does.
+            Ok(Signed::Uncheckable(_)) => jsonl::copy(&self.file, &path)?,
+            _ => jsonl::write(&path, &lines)?,
+        }
         self.print(&path, header, &replayed)?;
         Ok(ExitCode::SUCCESS)
     }

@@ -68,9 +68,9 @@ use tracing_subscriber::{EnvFilter, Layer as _, fmt};
 
 use error::{CommandError, say};
 
-/// The allocator of glibc keeps the memory that a flood of clients took; this one gives it back
-/// within seconds.
-#[cfg(all(target_os = "linux", target_env = "gnu"))]
+/// The allocators of C libraries keep the memory that a flood of clients took; this one gives it
+/// back within seconds.
+#[cfg(all(target_os = "linux", feature = "dist"))]
 #[global_allocator]
 static ALLOCATOR: tikv_jemallocator::Jemalloc = tikv_jemallocator::Jemalloc;
 

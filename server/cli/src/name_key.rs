@@ -1,10 +1,9 @@
 //! `--name-key`: the file with the key of a participant's name.
 
-use std::fs::{self, File};
-use std::io::{self, Write as _};
-use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
+use chefshat_record::atomic_file::{AtomicFile, WriteError};
 use clap::Args;
 
 use crate::CommandError;
@@ -31,7 +30,7 @@ impl NameKeyArg {
         let key = match fs::read_to_string(file) {
             Ok(text) => hex::decode(text.trim()).ok().filter(|key| key.len() == 32),
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                Some(create(file).map_err(failed)?)
+                Some(create(file).map_err(|error| failed(error.source))?)
             }
             Err(error) => return Err(failed(error).into()),
         };
@@ -43,15 +42,11 @@ impl NameKeyArg {
 }
 
 /// Creates a file with a new key, readable only by its owner.
-fn create(file: &Path) -> io::Result<Vec<u8>> {
+fn create(path: &Path) -> Result<Vec<u8>, WriteError> {
     let key = rand::random::<[u8; 32]>();
-    let mut options = File::options();
-    let mut created = options
-        .write(true)
-        .create_new(true)
-        .mode(0o600)
-        .open(file)?;
-    writeln!(created, "{}", hex::encode(key))?;
+    let mut file = AtomicFile::create_private(path)?;
+    file.write_all(format!("{}\n", hex::encode(key)).as_bytes())?;
+    file.finish_new()?;
     Ok(key.into())
 }
 

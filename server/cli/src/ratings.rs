@@ -9,9 +9,11 @@ use std::process::ExitCode;
 use chefshat_proto::v1;
 use chefshat_record::files::RecordFile;
 use chefshat_record::jsonl;
-use chefshat_record::outcome::{Identity, Outcome, OutcomeError, outcome};
+use chefshat_record::outcome::{Identity, Unrated};
+use chefshat_record::rated::rated;
 use chefshat_record::replay::replay;
-use chefshat_tournament::ratings::Ratings;
+use chefshat_record::summary::summary;
+use chefshat_tournament::ratings::{Finish, Ratings};
 use clap::Args;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -22,10 +24,11 @@ use super::output::{heading, line};
 use super::{CommandError, board, progress};
 use crate::kind::{KindArg, kind_filter};
 use chefshat_server::convert::leaderboard;
+use chefshat_server::tournaments::finish;
 
 const HELP: &str = "\
-A game is rated if it is finished, was dealt from the server's own seed, and each seat was played by a different participant without a \
-substitute. Every record is replayed first. Games count once, in the order in which they ended. A rating is a mean with its deviation: \
+A game is rated if it was dealt from the server's own seed and each seat had a different participant. A participant who left it, broke it off or was \
+given a hint has lost it. Every record is replayed first. Games count once, in the order in which they ended. A rating is a mean with its deviation: \
 the skill lies within 1.96 deviations with a confidence of 95 %. Participants are sorted by the mean minus two deviations. \
 docs/ratings.md says how reliable these numbers are.
 
@@ -115,22 +118,22 @@ impl RatingsCommand {
                     .into());
                 }
             };
-            if !known.insert(record.game_id) {
+            if !known.insert(record.game_id.clone()) {
                 continue;
             }
             gathered.records += 1;
-            match record.outcome {
-                Ok(outcome) => games.push(outcome),
-                Err(reason) => *gathered.not_rated.entry(reason).or_default() += 1,
+            match record.results {
+                Ok(results) => games.push((record.ended_at_ms, record.game_id, results)),
+                Err(reason) => {
+                    let reason = (reason.name(), reason.to_string());
+                    *gathered.not_rated.entry(reason).or_default() += 1;
+                }
             }
         }
-        games.sort_by(|left, right| {
-            let key = |game: &Outcome| (game.ended_at_ms, game.game_id.clone());
-            key(left).cmp(&key(right))
-        });
-        for game in games {
+        games.sort_by(|left, right| (left.0, &left.1).cmp(&(right.0, &right.1)));
+        for (_, _, results) in games {
             // The record would not have replayed with another number of seats.
-            gathered.ratings.fold(&game.places())?;
+            gathered.ratings.fold_finishes(&results)?;
         }
         Ok(gathered)
     }
@@ -139,8 +142,9 @@ impl RatingsCommand {
 /// What a record contributes to ratings.
 struct ReadRecord {
     game_id: String,
-    /// Why the game is not rated.
-    outcome: Result<Outcome, (&'static str, String)>,
+    ended_at_ms: u64,
+    /// The results, or why the game is not rated.
+    results: Result<Vec<(Identity, Finish)>, Unrated>,
 }
 
 /// Reads and verifies a record.
@@ -149,20 +153,20 @@ fn read(path: &Path) -> Result<ReadRecord, String> {
         jsonl::RecordFileError::Io { source, .. } => source.to_string(),
         jsonl::RecordFileError::Line { line, problem, .. } => format!("line {line} {problem}"),
     })?;
-    replay(&lines).map_err(|error| error.to_string())?;
+    let replayed = replay(&lines).map_err(|error| error.to_string())?;
     let game_id = match lines.first().and_then(|line| line.line.as_ref()) {
         Some(v1::record_line::Line::Header(header)) => header.game_id.clone(),
         _ => String::new(),
     };
-    let outcome = match outcome(&lines) {
-        Ok(outcome) => match outcome.unrated {
-            None => Ok(outcome),
-            Some(reason) => Err((reason.name(), reason.to_string())),
-        },
-        Err(error @ OutcomeError::NotFinished) => Err(("not_finished", error.to_string())),
-        Err(damage) => return Err(damage.to_string()),
-    };
-    Ok(ReadRecord { game_id, outcome })
+    let summary = summary(&lines, &replayed);
+    Ok(ReadRecord {
+        game_id,
+        ended_at_ms: summary.as_ref().map_or(0, |summary| summary.ended_at_ms),
+        results: summary
+            .ok_or(Unrated::NotFinished)
+            .and_then(|summary| rated(&summary))
+            .map(|seats| seats.into_iter().map(finish).collect()),
+    })
 }
 
 fn as_text(gathered: &Gathered, board: &v1::GetLeaderboardResponse) -> String {

@@ -1,58 +1,41 @@
 //! Writes a secret to a file for another program: the join code of a room or tournament, or its
 //! owner token.
 
-use std::fs::File;
-use std::io::{self, Write as _};
-use std::os::unix::fs::OpenOptionsExt as _;
-use std::path::{Path, PathBuf};
+use std::io;
+use std::path::Path;
+
+use chefshat_record::atomic_file::{AtomicFile, WriteError};
 
 use super::CommandError;
 
 /// A file for a secret, written atomically and readable only by its owner.
 pub(super) struct SecretFile<'a> {
     what: &'static str,
-    file: &'a Path,
-    part: PathBuf,
-    temporary: File,
+    path: &'a Path,
+    file: AtomicFile,
 }
 
 impl<'a> SecretFile<'a> {
-    /// Opens a temporary file beside `file`. `flag` named it; `what` is the secret, as in "a join
+    /// Opens a temporary file beside `path`. `flag` named it; `what` is the secret, as in "a join
     /// code".
     ///
     /// # Errors
     /// It cannot be written.
     pub(super) fn prepare(
-        file: &'a Path,
+        path: &'a Path,
         flag: &str,
         what: &'static str,
     ) -> Result<Self, CommandError> {
-        let mut part = file.as_os_str().to_owned();
-        part.push(".part");
-        let part = PathBuf::from(part);
-        let open = || {
-            if file.is_dir() {
-                return Err(io::ErrorKind::IsADirectory.into());
-            }
-            // A file left by an interrupted process may have another mode.
-            match std::fs::remove_file(&part) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-                _ => {}
-            }
-            let mut options = File::options();
-            options.write(true).create_new(true).mode(0o600).open(&part)
+        let opened = match path.is_dir() {
+            true => Err(io::ErrorKind::IsADirectory.into()),
+            false => AtomicFile::create_private(path).map_err(|error| error.source),
         };
-        match open() {
-            Ok(temporary) => Ok(Self {
-                what,
-                file,
-                part,
-                temporary,
-            }),
+        match opened {
+            Ok(file) => Ok(Self { what, path, file }),
             Err(error) => {
-                let file = file.display();
+                let path = path.display();
                 Err(format!(
-                    "{flag}: {what} cannot be written to {file}: {error}; nothing was created"
+                    "{flag}: {what} cannot be written to {path}: {error}; nothing was created"
                 )
                 .into())
             }
@@ -63,24 +46,20 @@ impl<'a> SecretFile<'a> {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub(super) fn write(mut self, secret: &str) -> Result<(), CommandError> {
-        writeln!(self.temporary, "{secret}")
-            .and_then(|()| std::fs::rename(&self.part, self.file))
-            .map_err(|error| {
-                format!(
-                    "everything was created, but {} cannot be written to {}: {error}",
-                    self.what,
-                    self.file.display()
-                )
-                .into()
+    pub(super) fn write(self, secret: &str) -> Result<(), CommandError> {
+        let Self {
+            what,
+            path,
+            mut file,
+        } = self;
+        let written = file.write_all(format!("{secret}\n").as_bytes());
+        written
+            .and_then(|()| file.finish())
+            .map_err(|WriteError { source, .. }| {
+                let path = path.display();
+                format!("everything was created, but {what} cannot be written to {path}: {source}")
+                    .into()
             })
-    }
-}
-
-impl Drop for SecretFile<'_> {
-    fn drop(&mut self) {
-        // After success it no longer exists.
-        let _ = std::fs::remove_file(&self.part);
     }
 }
 

@@ -27,7 +27,7 @@ use chefshat_server::serve::Server;
 use chefshat_server::signing::key_or_new;
 use chefshat_server::store::{MemoryStore, PostgresOptions, SqliteStore, Store};
 use chefshat_server::tls::TlsFiles;
-use chefshat_server::web;
+use chefshat_server::web::{self, Origins};
 use chefshat_server::webhooks::WebhookSettings;
 
 /// The settings of a server. Each has a flag, an environment variable, a key in the file of
@@ -260,6 +260,10 @@ pub(super) struct Serve {
     /// time.
     #[arg(long)]
     until_stdin_closes: bool,
+    /// Begin with an empty database if that of the data directory is empty or missing although a
+    /// server used the directory before. Without this, such a start is refused.
+    #[arg(long)]
+    new: bool,
     /// Print the server's address as a JSON line on standard output.
     #[arg(long)]
     json: bool,
@@ -299,6 +303,7 @@ impl Serve {
         let storage = match settings.node.open(settings.max_rooms, options).await? {
             Some(node) => Storage::Shared(Box::new(node)),
             None => Storage::Own(match &data_dir {
+                Some(folder) if self.new => Arc::new(SqliteStore::open_or_new(folder).await?),
                 Some(folder) => Arc::new(SqliteStore::open(folder).await?),
                 None => Arc::new(MemoryStore::default()),
             }),
@@ -313,6 +318,11 @@ impl Serve {
         let grace = settings.grace;
         let is_node = settings.node.database.is_some();
         let allowed_hosts = without_empty(settings.allowed_hosts);
+        // The metrics need no token: pages of other names must not reach them on this machine.
+        let has_local_metrics = metrics_address.is_some_and(|address| address.ip().is_loopback());
+        let metrics_hosts = has_local_metrics || !allowed_hosts.is_empty();
+        let metrics_hosts = metrics_hosts.then(|| allowed_hosts.clone());
+        let metrics_names = Origins::new(Vec::new(), metrics_hosts);
         let signing_key = data_dir.as_deref().map(key_or_new).transpose()?;
         let config = ServerConfig {
             data_dir,
@@ -375,10 +385,10 @@ impl Serve {
         if let (Some(listener), Some(address)) = (metrics_listener, metrics_address) {
             eprintln!("metrics at http://{address}/metrics");
             let metrics = Arc::clone(server.metrics());
-            tokio::spawn(scrape::serve(listener, metrics));
+            tokio::spawn(scrape::serve(listener, metrics, metrics_names));
         }
-        if !web::is_built_in() {
-            eprintln!("the web page is not built in; `cargo xtask web` builds it");
+        if !web::is_built() {
+            eprintln!("the web page is not built yet; `cargo xtask web` builds it");
         }
         // A failure only delays systemd, which says so itself.
         let _ = sd_notify::notify(&[NotifyState::Ready]);

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::jsonl;
 use chefshat_record::jsonl::RecordFileError;
-use chefshat_record::replay::{Replayed, replay};
+use chefshat_record::replay::{Replayed, walk_file};
 use chefshat_record::signature::PublicKey;
 use clap::Args;
 use rayon::prelude::*;
@@ -23,7 +23,8 @@ const HELP: &str = "\
 All contents are checked: the seed against the commitment, every deal, the seat and the legal actions of each decision, every event, \
 reward, score and count, and the signature, if there is one. docs/records.md describes the format, and what a record cannot prove.
 
-Exit code 0: all records fit. 1: one does not, or there is none.
+Exit code 0: all records fit. 1: one does not, or there is none. 3: all fit, but the signature of one cannot be checked: versions before \
+0.3.0 signed annotations with several keys in an order that is lost. Such a signature proves as little as none.
 
 Examples:
   chefshat verify
@@ -33,6 +34,8 @@ Examples:
 
 /// Records checked per batch: enough for all cores, with results printed as they come.
 const AT_A_TIME: usize = 64;
+/// The exit code if all records fit, but a signature cannot be checked.
+const UNCHECKABLE: u8 = 3;
 
 /// Verify records by replaying them; report the first wrong line.
 #[derive(Debug, Args)]
@@ -59,6 +62,8 @@ struct Problem {
     /// The first wrong line, from 1; none if the file is unreadable.
     line: Option<usize>,
     problem: String,
+    /// Whether it is only that its signature cannot be checked.
+    uncheckable: bool,
 }
 
 impl Verify {
@@ -70,7 +75,7 @@ impl Verify {
             .map(|file| file.path)
             .collect();
         let bar = progress::of_items(files.len().try_into().unwrap_or(u64::MAX), "records");
-        let (mut fitting, mut decisions) = (0usize, 0u64);
+        let (mut fitting, mut decisions, mut uncheckable) = (0usize, 0u64, 0u64);
         for files in files.chunks(AT_A_TIME) {
             let checked: Vec<_> = files
                 .par_iter()
@@ -86,6 +91,7 @@ impl Verify {
             {
                 fitting += 1;
                 decisions += fits.replayed.decisions;
+                uncheckable += u64::from(fits.replayed.uncheckable.is_some());
             }
             bar.suspend(|| print(&checked, self.json))?;
         }
@@ -102,45 +108,62 @@ impl Verify {
                 )?,
                 wrong => writeln!(out, "{wrong} of {} records do not fit", files.len())?,
             }
+            if uncheckable > 0 {
+                let signatures = counted(uncheckable, "signature");
+                writeln!(out, "{signatures} cannot be checked")?;
+            }
         }
-        Ok(if fitting == files.len() {
-            ExitCode::SUCCESS
-        } else {
-            ExitCode::FAILURE
+        Ok(match (fitting == files.len(), uncheckable) {
+            (false, _) => ExitCode::FAILURE,
+            (true, 0) => ExitCode::SUCCESS,
+            (true, _) => ExitCode::from(UNCHECKABLE),
         })
     }
 }
 
 /// Reads and replays a record.
 fn check(file: &Path, keys: &[PublicKey]) -> Result<Fits, Problem> {
-    let lines = jsonl::read(file).map_err(|error| match error {
+    let record = jsonl::read_record(file).map_err(|error| match error {
         RecordFileError::Io { source, .. } => Problem {
             line: None,
             problem: source.to_string(),
+            uncheckable: false,
         },
         RecordFileError::Line { line, problem, .. } => Problem {
             line: Some(line),
             problem: format!("the line {problem}"),
+            uncheckable: false,
         },
     })?;
-    let replayed = replay(&lines).map_err(|error| Problem {
+    let replayed = walk_file(&record, |_| {}).map_err(|error| Problem {
         line: Some(error.line),
         problem: error.problem,
+        uncheckable: false,
     })?;
     let trusted = replayed.signed_by.is_some_and(|key| keys.contains(&key));
     if !keys.is_empty() && !trusted {
         return Err(Problem {
-            line: Some(lines.len()),
-            problem: match replayed.signed_by {
-                Some(key) => format!("signed by {key}, which is not the key asked for"),
-                None => "unsigned, but a signature was asked for with --key".into(),
+            line: Some(record.lines.len()),
+            problem: match (replayed.signed_by, replayed.uncheckable) {
+                (Some(key), _) => format!("signed by {key}, which is not the key asked for"),
+                (None, Some(key)) => uncheckable(key),
+                (None, None) => "unsigned, but a signature was asked for with --key".into(),
             },
+            uncheckable: replayed.uncheckable.is_some(),
         });
     }
-    match lines.into_iter().next().and_then(|line| line.line) {
+    match record.lines.into_iter().next().and_then(|line| line.line) {
         Some(Line::Header(header)) => Ok(Fits { header, replayed }),
         _ => unreachable!("a record that replays begins with its header"),
     }
+}
+
+/// Why a signature cannot be checked.
+fn uncheckable(key: PublicKey) -> String {
+    format!(
+        "unproven: it names {key}, but versions before 0.3.0 signed annotations with several keys \
+         in an order that is lost; everything else fits"
+    )
 }
 
 /// How the deals of a record were verified, in words.
@@ -174,20 +197,26 @@ fn print(checked: &[(&PathBuf, Result<Fits, Problem>)], json: bool) -> Result<()
             (checked, true) => writeln!(out, "{}", json_report(file, checked))?,
             (Ok(Fits { header, replayed }), false) => writeln!(
                 out,
-                "{name}: fits: {}, {} decisions, {} events, {}, {}",
+                "{name}: fits: {}, {} decisions, {} events, {}, {}{}",
                 ending(replayed),
                 replayed.decisions,
                 replayed.events,
                 deals(header),
-                match replayed.signed_by {
-                    Some(key) => format!("signed by {key}"),
-                    None => "unsigned".into(),
+                match (replayed.signed_by, replayed.uncheckable) {
+                    (Some(key), _) => format!("signed by {key}"),
+                    (None, Some(key)) => format!("signature {}", uncheckable(key)),
+                    (None, None) => "unsigned".into(),
+                },
+                match replayed.redacted {
+                    true => ", redacted",
+                    false => "",
                 }
             )?,
             (
                 Err(Problem {
                     line: Some(line),
                     problem,
+                    ..
                 }),
                 false,
             ) => {
@@ -197,6 +226,7 @@ fn print(checked: &[(&PathBuf, Result<Fits, Problem>)], json: bool) -> Result<()
                 Err(Problem {
                     line: None,
                     problem,
+                    ..
                 }),
                 false,
             ) => writeln!(out, "{name}: {problem}")?,
@@ -218,12 +248,23 @@ fn json_report(file: &Path, checked: &Result<Fits, Problem>) -> Value {
             "origin": header.origin().as_str_name(),
             "seed_committed": !header.seed_commitment.is_empty(),
             "signed_by": replayed.signed_by.map(|key| key.to_string()),
+            "signature": match (replayed.signed_by, replayed.uncheckable) {
+                (Some(_), _) => "valid",
+                (None, Some(_)) => "uncheckable",
+                (None, None) => "none",
+            },
+            "redacted": replayed.redacted,
             "line": null,
             "problem": null,
         }),
-        Err(Problem { line, problem }) => json!({
+        Err(Problem {
+            line,
+            problem,
+            uncheckable,
+        }) => json!({
             "file": file,
             "fits": false,
+            "signature": uncheckable.then_some("uncheckable"),
             "line": line,
             "problem": problem,
         }),

@@ -191,9 +191,11 @@ impl<K: Ord + Copy> Node<K> {
         self.owned.iter().map(|(id, epoch)| (*id, *epoch))
     }
 
-    /// When it wants to be woken with [`Input::Time`]; `None` if only answers matter.
+    /// When it wants to be woken with [`Input::Time`]; `None` if only answers matter. It has nothing
+    /// due until then.
     pub fn wakes_at_ms(&self) -> Option<u64> {
-        let beats_at_ms = (!self.beating).then_some(self.beats_at_ms);
+        let beats = !self.beating && self.phase != Phase::Left;
+        let beats_at_ms = beats.then_some(self.beats_at_ms);
         let has_claimable = self.owned.len() > self.ephemeral.len();
         let ends_ms = match (self.suspended, has_claimable) {
             (false, _) => Some(self.lease.ends_ms()),

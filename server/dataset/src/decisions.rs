@@ -511,7 +511,7 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
         "signed_by",
         Type::Text,
         "Public key of the server that signed the record, as `chefshat key show` prints it; null if unsigned.",
-        |row| row.game.signed_by.as_deref().into(),
+        |row| row.game.signed_by.get().map(String::as_str).into(),
     ),
     Column::new(
         "shown_kind",

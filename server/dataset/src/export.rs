@@ -40,8 +40,6 @@ pub struct Export {
     pub formats: Vec<Format>,
     /// Which games to export.
     pub filter: Filter,
-    /// Whether to skip damaged records instead of failing.
-    pub skip_damaged: bool,
     /// Licence of the dataset, as an SPDX identifier.
     pub licence: String,
     /// Version of the exporting program, for the card.
@@ -76,6 +74,8 @@ pub struct Exported {
     pub filtered: u64,
     /// Damaged records and duplicate games.
     pub skipped: Vec<Skipped>,
+    /// Number of damaged records among them.
+    pub damaged: u64,
     /// The files except the list of checksums.
     pub files: Vec<FileSummary>,
     /// Games by origin.

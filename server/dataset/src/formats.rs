@@ -4,6 +4,8 @@
 use std::io::{self, Write as _};
 use std::path::Path;
 
+use chefshat_record::sheet;
+
 use super::column::{Column, ColumnInfo, Value};
 use super::files::{FileSummary, SummedFile};
 use super::parquet::ParquetFile;
@@ -144,7 +146,7 @@ impl RowFile for CsvFile {
             };
             match value {
                 Value::Null => self.file.write_field("")?,
-                Value::Text(text) => self.file.write_field(text)?,
+                Value::Text(text) => self.file.write_field(sheet::cell(text).as_bytes())?,
                 Value::Binary(_) | Value::Time(_) => {
                     // As in JSON, without the quotes.
                     let json = serde_json::to_string(&cell)?;

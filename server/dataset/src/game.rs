@@ -1,13 +1,12 @@
 //! The game of a row, from the header and footer of its record.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use chefshat_engine::RuleSet;
 use chefshat_proto::v1::{self, record_line::Line};
 
 use chefshat_record::convert::{has_real_cards, kind_name, rules_from_proto};
 use chefshat_record::replay::{ReplayError, replay};
-use chefshat_record::signature::PublicKey;
 
 /// The origin of imported games.
 pub(super) const IMPORTED: &str = "imported";
@@ -33,7 +32,7 @@ pub(super) struct GameInfo {
     /// Where it belongs in a study.
     pub(super) study: Option<v1::StudyRecord>,
     /// The public key of the record's signature, which the replay verifies.
-    pub(super) signed_by: Option<String>,
+    pub(super) signed_by: OnceLock<String>,
     /// The participants at the start of the game, by seat.
     pub(super) seats: Vec<Arc<SeatInfo>>,
 }
@@ -71,15 +70,6 @@ impl SeatInfo {
         }
     }
 
-    /// The same participant, whose name has a key with this fingerprint unless it is empty.
-    pub(super) fn with_fingerprint(self, fingerprint: &str) -> Self {
-        let given = Some(fingerprint).filter(|it| !it.is_empty());
-        Self {
-            name_fingerprint: given.map(str::to_owned),
-            ..self
-        }
-    }
-
     fn of(seat: &v1::Participant) -> Self {
         let info = match seat.shown_kind() {
             v1::ParticipantKind::Unspecified => {
@@ -87,7 +77,11 @@ impl SeatInfo {
             }
             shown => Self::wizard(&seat.name, shown),
         };
-        info.with_fingerprint(&seat.name_fingerprint)
+        let fingerprint = Some(&seat.name_fingerprint).filter(|it| !it.is_empty());
+        Self {
+            name_fingerprint: fingerprint.cloned(),
+            ..info
+        }
     }
 }
 
@@ -128,10 +122,6 @@ fn game_info(lines: &[v1::RecordLine]) -> Result<GameInfo, ReplayError> {
         Some(Line::Footer(footer)) => Some(footer),
         _ => None,
     };
-    let signed_by = footer
-        .and_then(|footer| footer.signature.as_ref())
-        .and_then(|signature| signature.public_key.as_slice().try_into().ok())
-        .map(|key| PublicKey(key).to_string());
     Ok(GameInfo {
         game_id: header.game_id.clone(),
         room_name: header.room_name.clone(),
@@ -156,7 +146,7 @@ fn game_info(lines: &[v1::RecordLine]) -> Result<GameInfo, ReplayError> {
         rule_set,
         server_version: header.server_version.clone(),
         study: header.study.clone(),
-        signed_by,
+        signed_by: OnceLock::new(),
         seats: (header.seats.iter())
             .map(SeatInfo::of)
             .map(Arc::new)

@@ -14,7 +14,8 @@ use super::expressions::{ExpressionRow, LatestExpression};
 use super::game::{GameInfo, IMPORTED, SeatInfo, checked_info};
 use super::markers::MarkerRow;
 use chefshat_record::convert::PERSON_TIME_KEY;
-use chefshat_record::replay::{Moment, ReplayError, walk};
+use chefshat_record::jsonl::Record;
+use chefshat_record::replay::{Moment, ReplayError, walk_file};
 
 /// The rows of one game.
 #[derive(Debug)]
@@ -29,10 +30,13 @@ pub(super) struct GameRows {
 ///
 /// # Errors
 /// The first wrong line.
-pub(super) fn gather(lines: &[v1::RecordLine]) -> Result<GameRows, ReplayError> {
-    let game = Arc::new(checked_info(lines)?);
-    let mut gatherer = Gatherer::new(game);
-    walk(lines, |moment| gatherer.take(moment))?;
+pub(super) fn gather(record: &Record) -> Result<GameRows, ReplayError> {
+    let game = Arc::new(checked_info(&record.lines)?);
+    let mut gatherer = Gatherer::new(Arc::clone(&game));
+    let replayed = walk_file(record, |moment| gatherer.take(moment))?;
+    if let Some(key) = replayed.signed_by {
+        game.signed_by.get_or_init(|| key.to_string());
+    }
     match gatherer.problem {
         Some(problem) => Err(problem),
         None => Ok(gatherer.rows),

@@ -22,25 +22,16 @@ use chefshat_record::files::RecordFile;
 use chefshat_record::jsonl;
 use chefshat_record::jsonl::RecordFileError;
 
-/// The most damaged records listed in an error.
-const NAMED_DAMAGES: usize = 10;
-
 /// A failed export.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// All games were filtered or skipped.
-    #[error("none of {records} records is left to export")]
+    #[error("none of {records} records is left to export{}", damages(.damaged))]
     NothingLeft {
         /// The number of records read.
         records: usize,
-    },
-    /// Some records are damaged.
-    #[error("{}", damages(.named, *.more))]
-    Damaged {
-        /// The first of them.
-        named: Vec<Skipped>,
-        /// The number of further ones.
-        more: u64,
+        /// The first that was skipped, if any was.
+        damaged: Option<Skipped>,
     },
     /// The target folder is unsuitable.
     #[error(transparent)]
@@ -55,19 +46,16 @@ pub enum ExportError {
     },
 }
 
-fn damages(named: &[Skipped], more: u64) -> String {
-    let mut text = String::from("nothing was exported because of damaged records:\n");
-    for Skipped { path, problem } in named {
-        text.push_str(&format!("  {}: {problem}\n", path.display()));
+fn damages(first: &Option<Skipped>) -> String {
+    match first {
+        Some(Skipped { path, problem }) => format!("; skipped: {}: {problem}", path.display()),
+        None => String::new(),
     }
-    if more > 0 {
-        text.push_str(&format!("  and {more} more\n"));
-    }
-    text + "use --skip-damaged to leave them out"
 }
 
 impl Export {
-    /// Exports the records in order. Calls `progress` with the size of each file read.
+    /// Exports the records in order. Calls `progress` with the size of each file read. A damaged record
+    /// is left out and named.
     ///
     /// # Errors
     /// The first failure; the target is then unchanged.
@@ -84,15 +72,12 @@ impl Export {
         let mut sink = Sink::new(folder.path(), self).map_err(write)?;
         let mut exported = Exported::default();
         let mut games: HashMap<String, PathBuf> = HashMap::new();
-        let mut damaged = 0;
         for RecordFile { path, bytes } in records {
             let skipped = match self.read(path) {
                 Err(problem) => {
-                    damaged += 1;
+                    exported.damaged += 1;
                     Some(problem)
                 }
-                // The export has failed: keep looking for damaged records only.
-                Ok(_) if damaged > 0 && !self.skip_damaged => None,
                 Ok(game) if !self.filter.includes(game.info()) => {
                     exported.filtered += 1;
                     None
@@ -114,12 +99,10 @@ impl Export {
             }));
             progress(*bytes);
         }
-        if damaged > 0 && !self.skip_damaged {
-            return Err(damaged_error(exported.skipped));
-        }
         if exported.games == 0 {
             return Err(ExportError::NothingLeft {
                 records: records.len(),
+                damaged: exported.skipped.into_iter().next(),
             });
         }
         exported.files = sink.finish().map_err(write)?;
@@ -133,28 +116,19 @@ impl Export {
 
     /// Reads and verifies a record.
     fn read(&self, path: &Path) -> Result<Game, String> {
-        let lines = jsonl::read(path).map_err(|error| match error {
+        let record = jsonl::read_record(path).map_err(|error| match error {
             // The caller reports the path.
             RecordFileError::Io { source, .. } => source.to_string(),
             RecordFileError::Line { line, problem, .. } => format!("line {line} {problem}"),
         })?;
         let game = match self.layout {
-            Layout::Tables => gather(&lines).map(Game::Rows),
-            Layout::ChefsHatGym => checked_info(&lines).and_then(|info| {
-                let sheet = lay_out(&lines, &info)?;
+            Layout::Tables => gather(&record).map(Game::Rows),
+            Layout::ChefsHatGym => checked_info(&record.lines).and_then(|info| {
+                let sheet = lay_out(&record.lines, &info)?;
                 Ok(Game::Sheet(Box::new(info), sheet))
             }),
         };
         game.map_err(|error| error.to_string())
-    }
-}
-
-fn damaged_error(mut damaged: Vec<Skipped>) -> ExportError {
-    let more = damaged.len().saturating_sub(NAMED_DAMAGES) as u64;
-    damaged.truncate(NAMED_DAMAGES);
-    ExportError::Damaged {
-        named: damaged,
-        more,
     }
 }
 

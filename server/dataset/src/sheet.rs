@@ -2,6 +2,8 @@
 
 use std::io;
 
+use chefshat_record::sheet;
+
 use super::files::{FileSummary, SummedFile};
 
 /// Name of the file.
@@ -61,7 +63,7 @@ impl Sheet {
         let mut csv = csv::Writer::from_writer(file);
         csv.write_record(COLUMNS.map(|(name, _)| name))?;
         for row in &self.rows {
-            csv.write_record(COLUMNS.map(|(_, cell)| cell(row)))?;
+            csv.write_record(COLUMNS.map(|(_, text)| sheet::cell(text(row)).into_owned()))?;
         }
         csv.into_inner()
             .map_err(csv::IntoInnerError::into_error)?

@@ -26,7 +26,7 @@ use tonic::{Request, Response, Status, Streaming};
 use tower::{Service as _, ServiceExt as _};
 
 use super::exam::{Exam, Passed, StreamId};
-use chefshat_server::config::MAX_MESSAGE_BYTES;
+use chefshat_server::access::MAX_MESSAGE_BYTES;
 
 /// Messages queued for one side of a stream.
 const QUEUE: usize = 16;

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, PersistError};
 
 /// A failed write. The target is unchanged.
 #[derive(Debug, thiserror::Error)]
@@ -89,11 +89,26 @@ impl AtomicFile {
     /// # Errors
     /// The file system refused.
     pub fn finish(self) -> Result<(), WriteError> {
+        self.finish_by(|file, path| file.persist(path))
+    }
+
+    /// Like [`finish`](Self::finish), but replaces no file.
+    ///
+    /// # Errors
+    /// The target exists, or the file system refused.
+    pub fn finish_new(self) -> Result<(), WriteError> {
+        self.finish_by(|file, path| file.persist_noclobber(path))
+    }
+
+    fn finish_by(
+        self,
+        persist: impl FnOnce(NamedTempFile, &Path) -> Result<File, PersistError>,
+    ) -> Result<(), WriteError> {
         let Self { path, file } = self;
         let finish = || {
             let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
             file.as_file().sync_all()?;
-            file.persist(&path)?;
+            persist(file, &path)?;
             sync_folder_of(&path)
         };
         finish().map_err(|source| WriteError {

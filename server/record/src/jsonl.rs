@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use chefshat_proto::v1::{RecordLine, record_line::Line};
 
 use crate::atomic_file::{AtomicFile, WriteError};
+use crate::signature::TextHash;
 pub use lists::{Excess, excess};
 
 /// The format version that this crate writes, and the newest it reads.
@@ -126,6 +127,20 @@ pub fn write(path: &Path, lines: &[RecordLine]) -> Result<(), RecordFileError> {
     write_to(AtomicFile::create(path)?, path, lines)
 }
 
+/// Copies the text of a record atomically, creating parent folders.
+///
+/// # Errors
+/// The first error of the file system; `to` is then unchanged.
+pub fn copy(from: &Path, to: &Path) -> Result<(), RecordFileError> {
+    if let Some(folder) = to.parent() {
+        std::fs::create_dir_all(folder).map_err(|source| io_error(to, source))?;
+    }
+    let mut file = AtomicFile::create(to)?;
+    let text = File::open(from).and_then(|mut text| io::copy(&mut text, &mut file));
+    text.map_err(|source| io_error(from, source))?;
+    Ok(file.finish()?)
+}
+
 /// Writes a record into a data directory. Only its owner may look into the folder of the records,
 /// as into the database: they have expressions that were not public.
 ///
@@ -169,19 +184,36 @@ fn io_error(path: &Path, source: io::Error) -> RecordFileError {
     }
 }
 
+/// A record from a file.
+#[derive(Debug, Clone, Default)]
+pub struct Record {
+    /// Its lines.
+    pub lines: Vec<RecordLine>,
+    /// The hash of its text as it stands in the file, which is what was signed.
+    pub text: TextHash,
+}
+
 /// Reads a record.
 ///
 /// # Errors
 /// The first error of the file system, or the first line that is malformed or exceeds a bound.
 pub fn read(path: &Path) -> Result<Vec<RecordLine>, RecordFileError> {
+    read_record(path).map(|record| record.lines)
+}
+
+/// Reads a record with the hash of its text, to verify its signature.
+///
+/// # Errors
+/// See [`read`].
+pub fn read_record(path: &Path) -> Result<Record, RecordFileError> {
     let file = File::open(path).map_err(|source| io_error(path, source))?;
-    let mut lines = Vec::new();
-    match read_lines(BufReader::new(file), MAX_RECORD_BYTES, &mut lines) {
-        Ok(()) => Ok(lines),
+    let mut record = Record::default();
+    match read_lines(BufReader::new(file), MAX_RECORD_BYTES, &mut record) {
+        Ok(()) => Ok(record),
         Err(Stopped::Io(source)) => Err(io_error(path, source)),
         Err(Stopped::Line(problem)) => Err(RecordFileError::Line {
             path: path.to_path_buf(),
-            line: lines.len() + 1,
+            line: record.lines.len() + 1,
             problem,
         }),
     }
@@ -202,11 +234,8 @@ impl From<LineProblem> for Stopped {
 }
 
 /// Reads a record of at most `most_bytes`.
-fn read_lines(
-    mut file: impl BufRead,
-    most_bytes: u64,
-    lines: &mut Vec<RecordLine>,
-) -> Result<(), Stopped> {
+fn read_lines(mut file: impl BufRead, most_bytes: u64, record: &mut Record) -> Result<(), Stopped> {
+    let Record { lines, text } = record;
     let most_of_line = u64::try_from(MAX_LINE_BYTES).expect("a fraction of a mebibyte") + 1;
     let (mut bytes, mut all_bytes) = (Vec::new(), 0u64);
     loop {
@@ -234,6 +263,7 @@ fn read_lines(
             _ => LineProblem::CutOff,
         })?;
         check(&line, lines.is_empty())?;
+        *text = text.and_read(&line, bytes.strip_suffix(b"\n").unwrap_or(&bytes));
         lines.push(line);
     }
     if lines.is_empty() {
@@ -283,9 +313,9 @@ mod tests {
         let text = "{\"footer\":{}}\n".repeat(3);
         let size = u64::try_from(text.len()).expect("a few bytes");
         let read = |most| {
-            let mut lines = Vec::new();
-            let read = read_lines(text.as_bytes(), most, &mut lines);
-            (lines.len(), read)
+            let mut record = Record::default();
+            let read = read_lines(text.as_bytes(), most, &mut record);
+            (record.lines.len(), read)
         };
         assert!(matches!(read(size), (3, Ok(()))));
         let too_large = Err::<(), _>(Stopped::Line(LineProblem::TooLarge));

@@ -11,8 +11,10 @@ pub mod jsonl;
 pub mod outcome;
 pub mod players;
 pub mod pseudonym;
+pub mod rated;
 pub mod replay;
 pub mod samples;
+pub mod sheet;
 pub mod signature;
 pub mod summary;
 #[cfg(feature = "testing")]

@@ -129,6 +129,9 @@ pub enum Unrated {
     /// A person played as another kind of participant.
     #[error("a person played as another kind of participant")]
     Wizard,
+    /// The game has no result, and nobody is known to have broken it off.
+    #[error("the game was not finished")]
+    NotFinished,
 }
 
 impl Unrated {
@@ -141,6 +144,7 @@ impl Unrated {
             Self::SameParticipant => "same_participant",
             Self::RecordedPlayer => "recorded_player",
             Self::Wizard => "wizard",
+            Self::NotFinished => "not_finished",
         }
     }
 }

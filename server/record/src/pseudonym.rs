@@ -1,9 +1,12 @@
 //! Pseudonymizes a participant in a record: replaces the name, also in markers, and drops
 //! expressions and annotations. Decisions stay, so the record still verifies.
 
+use std::sync::Arc;
+
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
 use crate::convert::MAX_LABEL;
+use crate::signature::SigningKey;
 
 /// The longest name of a room, characters.
 const MAX_ROOM_NAME: usize = 64;
@@ -57,12 +60,14 @@ impl Named {
 }
 
 /// A participant and its pseudonym.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct Pseudonym {
     /// Whose name to replace.
     pub of: Named,
     /// The pseudonym, 1..=64 characters.
     pub pseudonym: String,
+    /// Signs again what it had signed before the change.
+    pub key: Option<Arc<SigningKey>>,
 }
 
 /// Numbers of changes to a record.
@@ -84,8 +89,9 @@ impl std::ops::AddAssign for Redactions {
     }
 }
 
-/// The seats of one participant, followed through the events of a game. Records have the fingerprints
-/// of those who played: who left before the game is the participant only if all of a name are meant.
+/// The seats of one participant, followed through the events of a game. Records have the
+/// fingerprints of those who played: who left before the game is the participant only if all of a
+/// name are meant.
 #[derive(Debug, Clone, Default)]
 pub struct ParticipantSeats {
     seats: Vec<u32>,
@@ -159,12 +165,13 @@ impl ParticipantSeats {
 
 impl Pseudonym {
     /// Pseudonymizes a record. Built-in agents of the same name are unaffected. A record that
-    /// changes loses its signature: nobody can vouch for it any longer.
+    /// changes says so, and loses its signature unless it is of the key.
     pub fn redact(&self, lines: &mut Vec<v1::RecordLine>) -> Redactions {
         let mut out = Redactions::default();
         if !self.of.may_be_in(lines) {
             return out;
         }
+        let key = self.key.as_ref().filter(|key| key.has_signed(lines));
         let mut own = ParticipantSeats::at_start(lines, &self.of);
         let mut dropped_events = 0;
         lines.retain_mut(|line| match &mut line.line {
@@ -231,6 +238,10 @@ impl Pseudonym {
             && let Some(Line::Footer(footer)) = lines.last_mut().and_then(|line| line.line.as_mut())
         {
             footer.signature = None;
+            footer.participant_removed = true;
+            if let Some(key) = key {
+                key.sign_in_place(lines);
+            }
         }
         out
     }
@@ -296,6 +307,7 @@ mod tests {
                 fingerprint: None,
             },
             pseudonym: "X".into(),
+            key: None,
         };
         for (text, expected, times) in [
             ("Ana’s table", "X’s table", 1),

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{self, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
-pub use chefshat_engine::MAX_SEATS;
+use chefshat_engine::MAX_SEATS;
 use chefshat_proto::v1::SampleChunk;
 use prost::Message as _;
 
@@ -22,7 +22,8 @@ pub const MAX_NAME: usize = 32;
 /// Largest encoded chunk, bytes. Those that a server accepts are smaller.
 const MAX_CHUNK_BYTES: usize = 256 * 1024;
 /// Ending of the files.
-const ENDING: &str = "samples";
+/// What the name of a file of samples ends with.
+pub const ENDING: &str = "samples";
 
 /// The folder of the samples in a data directory.
 pub fn folder_of(data_dir: &Path) -> PathBuf {
@@ -45,7 +46,12 @@ pub fn beside(record: &Path, game_id: &str, seat: usize) -> Option<PathBuf> {
 /// # Errors
 /// The file system failed.
 pub fn delete(data_dir: &Path, game_id: &str) -> io::Result<()> {
-    (0..MAX_SEATS).try_for_each(|seat| atomic_file::remove(&path_of(data_dir, game_id, seat)))
+    paths_of(data_dir, game_id).try_for_each(|path| atomic_file::remove(&path))
+}
+
+/// The files that the samples of a game's seats may have in a data directory.
+pub fn paths_of(data_dir: &Path, game_id: &str) -> impl Iterator<Item = PathBuf> {
+    (0..MAX_SEATS).map(move |seat| path_of(data_dir, game_id, seat))
 }
 
 /// Checks a chunk.

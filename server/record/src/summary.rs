@@ -1,6 +1,8 @@
 //! The summary of a record, as listings show it.
 
-use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use std::collections::BTreeSet;
+
+use chefshat_proto::v1::{self, AbortReason, DecisionSource, game_event::Kind, record_line::Line};
 
 use crate::replay::Replayed;
 
@@ -12,6 +14,8 @@ pub fn summary(lines: &[v1::RecordLine], replayed: &Replayed) -> Option<v1::Reco
         decisions: replayed.decisions,
         ..v1::RecordSummary::default()
     };
+    // The seats whose participants did not play to the end by themselves.
+    let (mut forfeited, mut away, mut late) = (BTreeSet::new(), BTreeSet::new(), None);
     for line in lines.iter().filter_map(|line| line.line.as_ref()) {
         match line {
             Line::Header(header) => {
@@ -27,13 +31,43 @@ pub fn summary(lines: &[v1::RecordLine], replayed: &Replayed) -> Option<v1::Reco
                 summary.ended_at_ms = summary.created_at_ms.saturating_add(event.elapsed_ms);
                 match &event.kind {
                     Some(Kind::ShiftStarted(shift)) => summary.shifts = shift.shift,
-                    Some(Kind::GameAborted(aborted)) => summary.abort_reason = aborted.reason,
+                    Some(Kind::Disconnected(lost)) => drop(away.insert(lost.seat)),
+                    Some(Kind::Returned(returned)) => drop(away.remove(&returned.seat)),
+                    Some(Kind::ServerRestarted(_)) => away.clear(),
+                    Some(Kind::Substituted(substituted)) => {
+                        summary.substituted = true;
+                        forfeited.insert(substituted.seat);
+                    }
+                    Some(Kind::GameAborted(aborted)) => {
+                        summary.abort_reason = aborted.reason;
+                        match aborted.reason() {
+                            AbortReason::Closed => forfeited.append(&mut away),
+                            AbortReason::ParticipantsLost => {
+                                forfeited.append(&mut away);
+                                forfeited.extend(late);
+                            }
+                            _ => {}
+                        }
+                    }
                     _ => {}
                 }
             }
-            Line::Decision(decision) => summary.hinted |= decision.hints > 0,
+            Line::Decision(decision) => {
+                let is_late = matches!(
+                    decision.source(),
+                    DecisionSource::Timeout | DecisionSource::Disconnected
+                );
+                late = is_late.then_some(decision.seat);
+                if decision.hints > 0 {
+                    summary.hinted = true;
+                    forfeited.insert(decision.seat);
+                }
+            }
             _ => {}
         }
+    }
+    for seat in &mut summary.seats {
+        seat.substituted = forfeited.contains(&seat.seat);
     }
     (summary.shifts > 0).then_some(summary)
 }

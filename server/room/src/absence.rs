@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use chefshat_engine::{Decision, DecisionKind, Event, Seat};
 
+use super::limits::{MAX_SPECIAL_ACTION_TIME, MIN_PACE_OF_PHASE, SPECIAL_ACTION_PACES};
 use super::{Core, OpenDecision, State};
 use crate::journal::Fill;
 use crate::table::RoomGame;
@@ -36,8 +37,14 @@ impl Awaited {
 
 impl Core {
     /// Whom of the participants the game waits for, as everybody may know. In a silence, the answer
-    /// depends only on what everybody has seen: not on which decision is open, nor since when.
+    /// depends only on what everybody has seen: not on which decision is open, nor since when. No
+    /// seat whose participant is hidden: nobody sees that the game waits for a built-in agent.
     pub fn awaited_in_public(&self) -> Option<Awaited> {
+        let awaited = self.awaited_in_sight();
+        awaited.filter(|awaited| !self.header.is_hidden(awaited.seat))
+    }
+
+    fn awaited_in_sight(&self) -> Option<Awaited> {
         let waits = self.state == State::Playing && !self.is_paused();
         let open = self.open.as_ref().filter(|_| waits)?;
         if self.next_taken_over().is_some() {
@@ -106,6 +113,30 @@ impl Core {
         }
     }
 
+    /// When the phase of special actions that has begun ends, unless somebody declares one before.
+    /// `None` if the phase has no fixed time: the pace is too short, or there is at most one
+    /// participant, from whom only built-in agents could hide something.
+    ///
+    /// What the phase brings is asked for when it ends, so that nobody learns from the time whether
+    /// somebody was offered a special action, and declined it or let it run out.
+    pub(super) fn phase_ends_at(&self) -> Option<Duration> {
+        let since = self.silent_since?;
+        let open = self
+            .all_seats()
+            .filter(|seat| matches!(self.seats[seat.index()].fill, Fill::Open { .. }));
+        let pace = self.pace();
+        if pace < MIN_PACE_OF_PHASE || open.count() < 2 {
+            return None;
+        }
+        let time = (SPECIAL_ACTION_PACES * pace).min(MAX_SPECIAL_ACTION_TIME);
+        Some(since + time.min(self.longest_decision_time()?))
+    }
+
+    /// When the default is taken for a silent decision in a phase with a fixed time.
+    pub(super) fn phase_ends_of(&self, open: &OpenDecision) -> Option<Duration> {
+        self.phase_ends_at().filter(|_| open.is_silent())
+    }
+
     /// When the clock of a decision starts, as far as it is known.
     fn starts_at(&self, open: &OpenDecision) -> Duration {
         let recalled_until = self.recalled_until(open.decision.seat);
@@ -115,6 +146,9 @@ impl Core {
 
     /// When the default is taken for a decision, as things stand.
     pub(super) fn runs_out_at(&self, open: &OpenDecision) -> Duration {
+        if let Some(end) = self.phase_ends_of(open) {
+            return end;
+        }
         let seat = open.decision.seat;
         let own = self.starts_at(open) + self.time_allowed(open) + self.seats[seat.index()].grace;
         match self.absence(open) {

@@ -100,6 +100,12 @@ pub enum ExpressError {
     /// The seat has sent too many expressions.
     #[error("a seat may express itself at most {MAX_EXPRESSIONS_PER_SEAT} times in a game")]
     TooMany,
+    /// More is stored in a second than the creator of the room may have stored.
+    #[error("too many bytes to store in a second; send fewer expressions and annotations")]
+    TooFast,
+    /// The disk of the server has no space for it.
+    #[error("the disk of the server is nearly full; the rest is reserved for decisions")]
+    DiskNearlyFull,
 }
 
 /// Why there is no hint.

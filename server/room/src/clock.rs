@@ -37,9 +37,14 @@ impl Core {
         if self.next_taken_over().is_some() {
             return Some(open.released);
         }
+        if let Some(until) = open.held_until {
+            return Some(until);
+        }
         let seat = open.decision.seat;
         Some(if self.is_automatic(seat) {
             self.decided_at(open)
+        } else if let Some(end) = self.phase_ends_of(open) {
+            end
         } else {
             self.runs_out_at(open).max(open.recheck_at)
         })
@@ -84,6 +89,20 @@ impl Core {
     }
 
     /// Ends the game without a result. Does nothing if it has ended.
+    /// Closes the room for its owner, who also has these seats. The owner leaves the game with them,
+    /// so that the record says who broke it off.
+    pub fn close(&mut self, now: Duration, seats: impl IntoIterator<Item = Seat>) {
+        if self.state == State::Playing {
+            for seat in seats {
+                if !self.seats[seat.index()].away {
+                    self.commit(now, Change::Disconnected(seat));
+                }
+            }
+        }
+        self.abort(now, AbortReason::Closed);
+    }
+
+    /// Ends the game without a result, unless it is over.
     pub fn abort(&mut self, now: Duration, reason: AbortReason) {
         if !self.state.is_over() {
             self.commit(now, Change::Aborted(reason));
@@ -168,13 +187,17 @@ impl Core {
     pub(super) fn decision_time(&self, open: &OpenDecision) -> Duration {
         let usual = self.usual_decision_time(open.decision.seat);
         match open.is_silent() {
-            true => (self.all_seats())
-                .filter(|seat| matches!(self.seats[seat.index()].fill, Fill::Open { .. }))
-                .map(|seat| self.usual_decision_time(seat))
-                .max()
-                .unwrap_or(usual),
+            true => self.longest_decision_time().unwrap_or(usual),
             false => usual,
         }
+    }
+
+    /// The longest decision time of a seat that participants can take.
+    pub(super) fn longest_decision_time(&self) -> Option<Duration> {
+        (self.all_seats())
+            .filter(|seat| matches!(self.seats[seat.index()].fill, Fill::Open { .. }))
+            .map(|seat| self.usual_decision_time(seat))
+            .max()
     }
 
     fn usual_decision_time(&self, seat: Seat) -> Duration {
@@ -187,6 +210,9 @@ impl Core {
     /// decision does not use the bank, because what is left of it shows at the seat's later
     /// decisions.
     pub(super) fn time_allowed(&self, open: &OpenDecision) -> Duration {
+        if let Some(end) = self.phase_ends_of(open) {
+            return end.saturating_sub(open.start.unwrap_or(open.released));
+        }
         let bank = match open.is_silent() {
             true => Duration::ZERO,
             false => self.seats[open.decision.seat.index()].bank_left,
@@ -209,6 +235,9 @@ impl Core {
         let Some(open) = &self.open else {
             return (Duration::ZERO, Duration::ZERO);
         };
+        if let Some(end) = self.phase_ends_of(open) {
+            return (end.saturating_sub(now), Duration::ZERO);
+        }
         let now = self.paused_since().map_or(now, |since| since.min(now));
         let used = now.saturating_sub(open.start.unwrap_or(now));
         let bank_left = match open.is_silent() {
@@ -309,12 +338,24 @@ impl Core {
         if self.next_taken_over().is_some() {
             return self.advance(now);
         }
+        if let Some(open) = &mut self.open
+            && let Some(until) = open.held_until
+        {
+            if until <= now {
+                open.held_until = None;
+                self.advance(now);
+            }
+            return;
+        }
         self.settle_start(now, handed);
         if let Some(open) = &self.open {
             let seat = open.decision.seat;
             // The clock is paused while the seat waits for the server.
             let by = open.paused_since.map_or(now, |since| since.min(now));
-            let late = open.start.is_some() && self.runs_out_at(open) <= by;
+            let late = match self.phase_ends_of(open) {
+                Some(end) => end <= now,
+                None => open.start.is_some() && self.runs_out_at(open) <= by,
+            };
             if late && !self.is_automatic(seat) {
                 self.time_out(now);
             }
@@ -388,7 +429,8 @@ impl Core {
     /// Substitutes the seats whose participants have left for good, unless that would reveal
     /// something.
     fn retire_those_who_left(&mut self, now: Duration) {
-        let is_silent = self.open.as_ref().is_some_and(OpenDecision::is_silent);
+        let is_silent = |open: &OpenDecision| open.is_silent() || open.held_until.is_some();
+        let is_silent = self.open.as_ref().is_some_and(is_silent);
         if self.state != State::Playing || is_silent {
             return;
         }

@@ -23,8 +23,8 @@ impl Core {
                 state.bank_left = self.header.policy.bank_of(Some(participant.kind));
                 state.joined_at = at;
                 state.ever_attached = false;
-                self.log
-                    .push(at, RoomEvent::Seated(*seat, participant.clone()));
+                self.seatings += 1;
+                self.log_presence(at, *seat, RoomEvent::Seated(*seat, participant.clone()));
             }
             Change::Vacated(seat) => {
                 let state = &mut self.seats[seat.index()];
@@ -32,23 +32,26 @@ impl Core {
                 state.connection = None;
                 state.away = false;
                 state.entropy = Vec::new();
-                self.log.push(at, RoomEvent::Vacated(*seat));
+                self.log_presence(at, *seat, RoomEvent::Vacated(*seat));
             }
             Change::Started { entropy } => self.begin(at, entropy),
             Change::Disconnected(seat) => {
                 self.seats[seat.index()].away = true;
-                self.log.push(at, RoomEvent::Disconnected(*seat));
+                self.log_presence(at, *seat, RoomEvent::Disconnected(*seat));
             }
             Change::Returned(seat) => {
                 let state = &mut self.seats[seat.index()];
                 state.away = false;
-                state.substituted = false;
-                self.log.push(at, RoomEvent::Returned(*seat));
+                // The substitution was shown to all, so its end is.
+                match std::mem::take(&mut state.substituted) {
+                    true => self.log.push(at, RoomEvent::Returned(*seat)),
+                    false => self.log_presence(at, *seat, RoomEvent::Returned(*seat)),
+                }
                 if let Some(open) = &mut self.open
                     && open.decision.seat == *seat
                     && open.start.is_none()
                 {
-                    open.released = at;
+                    open.released = at.max(open.held_until.unwrap_or_default());
                 }
             }
             Change::Substituted(seat) => {
@@ -103,6 +106,14 @@ impl Core {
         }
     }
 
+    /// Logs that the participant of a seat came or went. A built-in agent never does, so it is not
+    /// shown of a seat of which nobody may know whether one plays there.
+    fn log_presence(&mut self, at: Duration, seat: Seat, event: RoomEvent) {
+        if !self.header.is_hidden(seat) {
+            self.log.push(at, event);
+        }
+    }
+
     /// Disconnects all seats and gives the open decision its full time again.
     fn restart(&mut self, at: Duration) {
         self.restarted = Some(at);
@@ -122,10 +133,12 @@ impl Core {
                 _ => state.away = true,
             }
         }
+        self.silent_since = self.silent_since.map(|_| at);
+        let held_until = self.phase_ends_at();
         if let Some(open) = &mut self.open {
             open.reopen(at);
+            open.hold(held_until);
         }
-        self.silent_since = self.silent_since.map(|_| at);
         self.log.push(at, RoomEvent::ServerRestarted);
     }
 
@@ -290,6 +303,8 @@ impl Core {
 
     /// Opens the next decision of the game, if there is one.
     pub(super) fn open_next(&mut self, at: Duration) {
+        let is_over = |until: &Duration| *until > at && self.next_taken_over().is_none();
+        let held_until = self.phase_ends_at().filter(is_over);
         self.open = self
             .game
             .as_ref()
@@ -297,11 +312,12 @@ impl Core {
             .map(|decision| {
                 let seat = &mut self.seats[decision.seat.index()];
                 seat.decisions += 1;
-                OpenDecision {
+                let mut open = OpenDecision {
                     decision,
                     id: seat.decisions,
                     released: at,
                     announced: false,
+                    held_until: None,
                     start: None,
                     recheck_at: Duration::ZERO,
                     paused_since: None,
@@ -311,7 +327,9 @@ impl Core {
                     search: Search::NotStarted,
                     hints: 0,
                     hint_runs: false,
-                }
+                };
+                open.hold(held_until);
+                open
             });
     }
 

@@ -168,6 +168,12 @@ pub struct RequestKey {
     content: [u8; 32],
 }
 
+/// The id of a request as it counts for a caller with this token: another token with the same id
+/// makes another request, and nobody who lacks the hash can compute what is created for it.
+pub fn request_id_of(id: &[u8; 32], token: &SecretHash) -> [u8; 32] {
+    digest(b"chefshat.v1 request", &[token.bytes(), id])
+}
+
 impl RequestKey {
     /// The key of a request with this id and encoded content.
     pub fn new(id: [u8; 32], content: &[u8]) -> Self {

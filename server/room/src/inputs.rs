@@ -11,7 +11,6 @@ use super::{
     MAX_EXPRESSIONS_PER_SEAT, MAX_GATEWAY_DELAY, MAX_SEATINGS, OpenDecision, State,
 };
 use crate::journal::{AbortReason, Change, Fill, ParticipantKind, SeatedParticipant, Source};
-use crate::log::RoomEvent;
 
 impl Core {
     /// Takes a seat.
@@ -29,9 +28,7 @@ impl Core {
             State::Playing => return Err(JoinError::GameStarted),
             State::Finished | State::Aborted(_) => return Err(JoinError::GameOver),
         }
-        let log = self.log.since(0);
-        let seatings = log.filter(|it| matches!(it.event, RoomEvent::Seated(..)));
-        if seatings.count() >= MAX_SEATINGS {
+        if self.seatings >= MAX_SEATINGS {
             return Err(JoinError::TooManySeatings);
         }
         let seat = match wanted {
@@ -260,7 +257,13 @@ impl Core {
                 Answered::closed(Verdict::Closed)
             };
         }
-        if answer.decision_id == 0 || answer.decision_id > self.seats[seat.index()].decisions {
+        let is_held = |open: &OpenDecision| {
+            open.held_until.is_some() && (open.decision.seat, open.id) == (seat, answer.decision_id)
+        };
+        if answer.decision_id == 0
+            || answer.decision_id > self.seats[seat.index()].decisions
+            || self.open.as_ref().is_some_and(is_held)
+        {
             return Answered::closed(Verdict::Unknown);
         }
         if (self.awaited_from(seat)).is_none_or(|open| open.id != answer.decision_id) {

@@ -115,9 +115,9 @@ pub enum SeatLabels {
     /// Names and kinds.
     #[default]
     AsTheyAre,
-    /// Kinds, and whether a seat is connected: "Agent 1".
+    /// Kinds: "Agent 1".
     Kinds,
-    /// Neither: "Player 1".
+    /// Not even kinds: "Player 1".
     Players,
 }
 
@@ -163,12 +163,21 @@ pub struct GameHeader {
     pub table: Option<SecretHash>,
     /// The study it belongs to, if any.
     pub study: Option<Arc<StudyGame>>,
+    /// Whether a participant was deleted from it after it had ended.
+    pub participant_removed: bool,
 }
 
 impl GameHeader {
     /// What is shown of its participants, other than in its record.
     pub fn labels(&self) -> SeatLabels {
         (self.study.as_ref()).map_or(SeatLabels::AsTheyAre, |game| game.labels)
+    }
+
+    /// Whether a seat's participant is hidden: in a study that shows labels, every seat but that of
+    /// the study's participant. What is shown of such a seat does not depend on what fills it.
+    pub fn is_hidden(&self, seat: Seat) -> bool {
+        (self.study.as_ref())
+            .is_some_and(|game| game.labels != SeatLabels::AsTheyAre && game.seat != seat)
     }
 
     /// The series of games with the same deals.

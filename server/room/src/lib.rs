@@ -104,6 +104,8 @@ pub struct Core {
     /// delayed.
     log_after_decision: Vec<u32>,
     changes: u64,
+    /// How many participants have taken a seat.
+    seatings: usize,
     decisions: u64,
     markers: Vec<Marker>,
     /// When there is space for another marker after a burst of them.
@@ -201,6 +203,9 @@ pub struct OpenDecision {
     /// Whether it has been committed and its seat may learn of it. From then on its release time is
     /// fixed.
     announced: bool,
+    /// Until when nobody learns of it: the phase of special actions lasts as long as if somebody
+    /// were offered one. `None` once that is over.
+    held_until: Option<Duration>,
     /// When its clock started, once determined.
     start: Option<Duration>,
     /// When to check again whether the transport has received the request; zero before the first
@@ -228,6 +233,13 @@ impl OpenDecision {
     /// seat with both jokers is offered. Only a declared one becomes public.
     fn is_silent(&self) -> bool {
         self.decision.kind == DecisionKind::SpecialAction
+    }
+
+    /// Keeps it from its seat until the phase of special actions is over, unless it is part of that
+    /// phase.
+    fn hold(&mut self, until: Option<Duration>) {
+        self.held_until = until.filter(|_| !self.is_silent());
+        self.released = self.released.max(self.held_until.unwrap_or_default());
     }
 
     /// Opens the decision again, with its full time.
@@ -306,6 +318,7 @@ impl Core {
             log_before_deal: 0,
             log_after_decision: Vec::new(),
             changes: 0,
+            seatings: 0,
             decisions: 0,
             markers: Vec::new(),
             marker_free_at: Duration::ZERO,
@@ -365,7 +378,9 @@ impl Core {
     /// substitute.
     pub fn awaited(&self) -> Option<&OpenDecision> {
         self.open.as_ref().filter(|open| {
-            !self.is_automatic(open.decision.seat) && self.next_taken_over().is_none()
+            open.held_until.is_none()
+                && !self.is_automatic(open.decision.seat)
+                && self.next_taken_over().is_none()
         })
     }
 
@@ -393,6 +408,22 @@ impl Core {
     /// Whether a substitute has played for any seat.
     pub fn was_substituted(&self) -> bool {
         self.seats.iter().any(|seat| seat.ever_substituted)
+    }
+
+    /// Whether the participant of a seat did not play to the end by itself: a substitute played for
+    /// it, it was given a hint, or it was gone when the game was broken off.
+    pub fn has_forfeited(&self, seat: Seat) -> bool {
+        let state = &self.seats[seat.index()];
+        // After a restart all are away until they have attached again.
+        let is_away = state.away && !state.recalled;
+        let is_gone = match self.state {
+            State::Aborted(AbortReason::Closed) => is_away,
+            State::Aborted(AbortReason::ParticipantsLost) => {
+                is_away || state.timeouts >= self.header.policy.max_timeouts
+            }
+            _ => false,
+        };
+        state.ever_substituted || state.ever_hinted || (is_gone && state.participant.is_some())
     }
 
     /// Whether any seat was given a hint.
@@ -520,7 +551,7 @@ impl Core {
     /// time it spent waiting for the store.
     pub fn released(&mut self, now: Duration) {
         let Some(open) = &mut self.open else { return };
-        if !open.announced {
+        if !open.announced && open.held_until.is_none() {
             open.announced = true;
             open.released = open.released.max(now);
         }

@@ -25,6 +25,13 @@ pub const MAX_GATEWAY_DELAY: Duration = Duration::from_secs(1);
 /// After a restart of the server, the clock of a decision waits this long for its seat to be
 /// attached.
 pub const RECALL_TIME: Duration = Duration::from_secs(60);
+/// Where built-in agents have a pace, the phase of special actions lasts this many times the pace
+/// in every Shift that has one, whether or not somebody is offered one.
+pub(crate) const SPECIAL_ACTION_PACES: u32 = 10;
+/// Shortest pace for which it does: ten shorter ones would end before a distant agent has answered.
+pub(crate) const MIN_PACE_OF_PHASE: Duration = Duration::from_millis(50);
+/// Longest such phase.
+pub(crate) const MAX_SPECIAL_ACTION_TIME: Duration = Duration::from_secs(10);
 /// A seat that has waited this long for the store gets the time back. Shorter waits are part of
 /// every answer: if they were refunded, invalid answers would gain time.
 pub(crate) const SLOW_STORE: Duration = Duration::from_millis(100);

@@ -10,8 +10,8 @@ use chefshat_engine::{ActionId, Event, Mask, Observation, RuleSet, Seat};
 use rayon::ThreadPool;
 
 use crate::{
-    Allocation, Chance, Estimate, Knowledge, KnowledgeError, Method, RolloutPolicy, Sampler,
-    ShiftHistory, evaluate,
+    Allocation, Chance, Estimate, Knowledge, KnowledgeError, Method, OwnTime, RolloutPolicy,
+    Sampler, ShiftHistory, evaluate,
 };
 
 /// Steps of counting deals that the agent spends on a decision at most.
@@ -159,7 +159,9 @@ impl Choice<'_> {
         Ok(suggested(&estimates))
     }
 
-    /// Estimates of all legal actions within the budget, first that of the prior. `stopped` ends the search early.
+    /// Estimates of all legal actions within the budget, first that of the prior. `stopped` ends the
+    /// search early. A budget in time counts what this thread computes, not what it waits for; with a
+    /// pool, the time that passes.
     ///
     /// # Errors
     /// As [`Choice::search`].
@@ -172,6 +174,11 @@ impl Choice<'_> {
         stopped: impl Fn() -> bool,
     ) -> Result<Vec<Estimate>, KnowledgeError> {
         let start = Instant::now();
+        let own = OwnTime::start();
+        let used = || match pool {
+            None => own.used(),
+            Some(_) => start.elapsed(),
+        };
         let knowledge = Knowledge::new(self.rules, self.observation, self.history)?;
         let sampler = Sampler::new(knowledge, MAX_STEPS)?;
         let others = self.legal.iter().filter(|action| *action != self.prior);
@@ -183,7 +190,7 @@ impl Choice<'_> {
         let progress = |rollouts: u64| match plays.budget {
             _ if stopped() => 1.0,
             Budget::Rollouts(all) => rollouts as f64 / all as f64,
-            Budget::Time(time) => start.elapsed().as_secs_f64() / time.as_secs_f64(),
+            Budget::Time(time) => used().as_secs_f64() / time.as_secs_f64(),
         };
         Ok(evaluate(&sampler, &actions, &method, seed, pool, progress))
     }

@@ -139,63 +139,99 @@ pub fn evaluate(
     pool: Option<&ThreadPool>,
     progress: impl Fn(u64) -> f64,
 ) -> Vec<Estimate> {
-    let watched = |rollouts, _: &[Estimate]| progress(rollouts);
-    evaluate_watched(sampler, actions, method, seed, pool, watched)
+    let mut evaluation = Evaluation::new(actions, method.allocation);
+    while !evaluation.step(sampler, method, seed, pool, &progress) {}
+    evaluation.estimates
 }
 
-/// As [`evaluate`]; `progress` also gets the estimates so far.
-///
-/// # Panics
-/// As [`evaluate`].
-pub fn evaluate_watched(
-    sampler: &Sampler,
-    actions: &[ActionId],
-    method: &Method,
-    seed: [u8; 32],
-    pool: Option<&ThreadPool>,
-    mut progress: impl FnMut(u64, &[Estimate]) -> f64,
-) -> Vec<Estimate> {
-    let mut estimates: Vec<Estimate> = actions.iter().map(|id| Estimate::new(*id)).collect();
-    let mut active: Vec<usize> = (0..actions.len()).collect();
-    let rounds = match method.allocation {
-        Allocation::Uniform => 1,
-        Allocation::Halving => actions.len().next_power_of_two().trailing_zeros().max(1),
-    };
-    let (mut worlds, mut rollouts) = (0u64, 0u64);
-    for round in 1..=rounds {
-        let part = f64::from(round) / f64::from(rounds);
-        while worlds == 0 || progress(rollouts, &estimates) < part {
-            let tried: Vec<ActionId> = active.iter().map(|&index| actions[index]).collect();
-            let batch = worlds..worlds + (worlds / 8).clamp(*BATCH.start(), *BATCH.end());
-            let in_world = |world| evaluate_in(sampler, &tried, &method.policy, seed, world);
-            let merged = |mut all: Vec<Estimate>, more: Vec<Estimate>| {
-                all.iter_mut()
-                    .zip(&more)
-                    .for_each(|(all, more)| all.merge(more));
-                all
-            };
-            let empty = || tried.iter().map(|id| Estimate::new(*id)).collect();
-            let found: Vec<Estimate> = match pool {
-                Some(pool) => pool.install(|| {
-                    batch
-                        .clone()
-                        .into_par_iter()
-                        .map(in_world)
-                        .reduce(empty, merged)
-                }),
-                None => batch.clone().map(in_world).fold(empty(), merged),
-            };
-            for (&index, found) in active.iter().zip(&found) {
-                estimates[index].merge(found);
-                rollouts += found.rollouts;
-            }
-            worlds = batch.end;
-        }
-        if round < rounds {
-            halve(&mut active, &estimates);
+/// An evaluation that can pause between two batches of deals.
+#[derive(Clone, Debug)]
+pub struct Evaluation {
+    estimates: Vec<Estimate>,
+    /// The actions that are still tried, by their index.
+    active: Vec<usize>,
+    /// The round of the allocation, from 1, and how many there are.
+    round: u32,
+    rounds: u32,
+    worlds: u64,
+    rollouts: u64,
+}
+
+impl Evaluation {
+    /// Begins the evaluation of these actions.
+    pub fn new(actions: &[ActionId], allocation: Allocation) -> Evaluation {
+        Evaluation {
+            estimates: actions.iter().map(|id| Estimate::new(*id)).collect(),
+            active: (0..actions.len()).collect(),
+            round: 1,
+            rounds: match allocation {
+                Allocation::Uniform => 1,
+                Allocation::Halving => actions.len().next_power_of_two().trailing_zeros().max(1),
+            },
+            worlds: 0,
+            rollouts: 0,
         }
     }
-    estimates
+
+    /// The estimates so far, in the order of the actions.
+    pub fn estimates(&self) -> &[Estimate] {
+        &self.estimates
+    }
+
+    /// Tries the actions in one more batch of deals, unless the budget is spent; returns whether it
+    /// is. All arguments are those of every other step, and as in [`evaluate`].
+    ///
+    /// # Panics
+    /// As [`evaluate`].
+    pub fn step(
+        &mut self,
+        sampler: &Sampler,
+        method: &Method,
+        seed: [u8; 32],
+        pool: Option<&ThreadPool>,
+        progress: impl Fn(u64) -> f64,
+    ) -> bool {
+        while self.worlds > 0 {
+            let part = f64::from(self.round) / f64::from(self.rounds);
+            if progress(self.rollouts) < part {
+                break;
+            }
+            if self.round >= self.rounds {
+                return true;
+            }
+            halve(&mut self.active, &self.estimates);
+            self.round += 1;
+        }
+        let tried: Vec<ActionId> = (self.active.iter())
+            .map(|&index| self.estimates[index].action)
+            .collect();
+        let batch =
+            self.worlds..self.worlds + (self.worlds / 8).clamp(*BATCH.start(), *BATCH.end());
+        let in_world = |world| evaluate_in(sampler, &tried, &method.policy, seed, world);
+        let merged = |mut all: Vec<Estimate>, more: Vec<Estimate>| {
+            all.iter_mut()
+                .zip(&more)
+                .for_each(|(all, more)| all.merge(more));
+            all
+        };
+        let empty = || tried.iter().map(|id| Estimate::new(*id)).collect();
+        let found: Vec<Estimate> = match pool {
+            Some(pool) => pool.install(|| {
+                batch
+                    .clone()
+                    .into_par_iter()
+                    .map(in_world)
+                    .reduce(empty, merged)
+            }),
+            None => batch.clone().map(in_world).fold(empty(), merged),
+        };
+        for (&index, found) in self.active.iter().zip(&found) {
+            self.estimates[index].merge(found);
+            self.rollouts += found.rollouts;
+        }
+        self.worlds = batch.end;
+        false
+    }
 }
 
 /// Drops the worse half of the actions, but not the first.
@@ -241,20 +277,51 @@ pub fn likely_hands(
     seed: [u8; 32],
     progress: impl Fn(u64) -> f64,
 ) -> Vec<Vec<f64>> {
-    let rules = sampler.knowledge().rules();
-    let mut sums = vec![vec![0u64; usize::from(rules.faces()) + 1]; rules.players()];
-    let mut deals = 0;
-    while deals == 0 || progress(deals) < 1.0 {
-        let game = sampler.game(&mut Chance::stream(seed, deals));
-        deals += 1;
-        for (sums, hand) in sums.iter_mut().zip(game.hands().values()) {
-            for (sum, count) in sums.iter_mut().zip(hand.counts(rules.faces())) {
+    let mut hands = LikelyHands::new(sampler);
+    while hands.deals == 0 || progress(hands.deals) < 1.0 {
+        hands.step(sampler, seed);
+    }
+    hands.mean()
+}
+
+/// The likely hands of a sampler, which can pause between two deals.
+#[derive(Clone, Debug)]
+pub struct LikelyHands {
+    sums: Vec<Vec<u64>>,
+    deals: u64,
+}
+
+impl LikelyHands {
+    /// Begins with no deal.
+    pub fn new(sampler: &Sampler) -> LikelyHands {
+        let rules = sampler.knowledge().rules();
+        LikelyHands {
+            sums: vec![vec![0; usize::from(rules.faces()) + 1]; rules.players()],
+            deals: 0,
+        }
+    }
+
+    /// The number of deals so far.
+    pub fn deals(&self) -> u64 {
+        self.deals
+    }
+
+    /// Counts one more deal. The arguments are those of every other step.
+    pub fn step(&mut self, sampler: &Sampler, seed: [u8; 32]) {
+        let faces = sampler.knowledge().rules().faces();
+        let game = sampler.game(&mut Chance::stream(seed, self.deals));
+        self.deals += 1;
+        for (sums, hand) in self.sums.iter_mut().zip(game.hands().values()) {
+            for (sum, count) in sums.iter_mut().zip(hand.counts(faces)) {
                 *sum += u64::from(count);
             }
         }
     }
-    let mean = |sum: u64| sum as f64 / deals as f64;
-    (sums.into_iter())
-        .map(|sums| sums.into_iter().map(mean).collect())
-        .collect()
+
+    /// The mean number of cards, as [`likely_hands`] returns it; 0 without deals.
+    pub fn mean(&self) -> Vec<Vec<f64>> {
+        let mean = |sum: &u64| *sum as f64 / self.deals.max(1) as f64;
+        let means = |sums: &Vec<u64>| sums.iter().map(mean).collect();
+        self.sums.iter().map(means).collect()
+    }
 }

@@ -7,13 +7,15 @@ mod evaluate;
 mod history;
 mod holders;
 mod knowledge;
+mod own_time;
 mod rollout;
 mod sampler;
 mod table;
 
 pub use agent::{Choice, Decisions, MARGIN, Searchers, named_agent, show_nothing, suggested};
-pub use evaluate::{Allocation, Estimate, Method, evaluate, evaluate_watched, likely_hands};
+pub use evaluate::{Allocation, Estimate, Evaluation, LikelyHands, Method, evaluate, likely_hands};
 pub use history::ShiftHistory;
 pub use knowledge::{Knowledge, KnowledgeError, World};
+pub use own_time::OwnTime;
 pub use rollout::{RolloutPolicy, Worth, rollout};
 pub use sampler::{Chance, Sampler};

@@ -4,7 +4,7 @@ use std::fmt;
 use std::net::IpAddr;
 use std::str::FromStr;
 
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{Id, SecretHash};
 use serde::{Deserialize, Serialize};
 
 use super::secrets::{Secrets, Standing};
@@ -87,6 +87,8 @@ pub struct Caller {
     pub address: Option<IpAddr>,
     /// The token that it sent, if it is valid.
     pub token: Option<TokenId>,
+    /// The hash of that token.
+    pub token_hash: Option<SecretHash>,
     /// What it may do.
     pub role: Role,
     /// The only room or tournament that it may reach, if limited to one.
@@ -123,6 +125,19 @@ impl Caller {
             secrets: self.secrets.with(secret),
             ..self.clone()
         }
+    }
+
+    /// The same caller as its secrets alone make it, without its token and address.
+    pub fn by_secrets(&self) -> Self {
+        Self {
+            secrets: self.secrets.clone(),
+            ..Self::default()
+        }
+    }
+
+    /// Whether the caller is the operator of the server, who sees everything.
+    pub fn is_operator(&self) -> bool {
+        self.role == Role::Admin && self.scope.is_none()
     }
 
     /// What its token makes of it where its scope reaches: the operator is like the owner of

@@ -1,8 +1,28 @@
-//! The minimal role of every call, in one table. A test compares it with the services that the
-//! server has, so no call is forgotten; a call that is not listed is not served.
+//! The minimal role of every call, and what its messages may cost, in one table. A test compares it
+//! with the services that the server has, so no call is forgotten; a call that is not listed is not
+//! served.
+
+use std::collections::HashMap;
+use std::sync::LazyLock;
 
 use super::caller::Role::{self, Admin, Anyone, Host, Player, Spectator};
 use Scoped::{Compared, Refused, Unlimited};
+
+/// Largest message a client may send, bytes.
+pub const MAX_MESSAGE_BYTES: usize = 64 * 1024;
+/// Largest message from a node to the owner of seats, bytes: inputs of one client, each of which was
+/// in a message of its own at most.
+const MAX_PEER_REQUEST_BYTES: usize = MAX_INPUTS_PER_MESSAGE * (MAX_MESSAGE_BYTES + 1024);
+/// Most inputs of a client in one message between nodes.
+pub const MAX_INPUTS_PER_MESSAGE: usize = 64;
+/// Largest message of a vector stream, bytes: large enough for a list of seeds.
+pub const MAX_VECTOR_MESSAGE_BYTES: usize = 1024 * 1024;
+/// Largest request about a study, bytes.
+pub const MAX_STUDY_MESSAGE_BYTES: usize = 1024 * 1024;
+const KIB: usize = 1024;
+const MIB: usize = 1024 * KIB;
+/// Calls that opening a stream counts as.
+pub const COST_OF_STREAM: u64 = 5;
 
 /// What a token that is limited to one room or tournament may do with a call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,6 +33,26 @@ pub enum Scoped {
     Compared,
     /// As much as any other token.
     Unlimited,
+}
+
+/// What one message of a call may be, as it is sent and as it is decoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MessageLimits {
+    /// Bytes of the longest message.
+    pub bytes: usize,
+    /// Most submessages, texts in lists and entries of maps.
+    pub elements: usize,
+    /// Most bytes of memory that decoding takes: the largest permit of a message.
+    pub memory: usize,
+}
+
+impl MessageLimits {
+    /// Names, ids, codes, tickets and a few numbers: what most calls need.
+    pub const USUAL: Self = Self {
+        bytes: 4 * KIB,
+        elements: 64,
+        memory: 128 * KIB,
+    };
 }
 
 /// What a call requires of its caller.
@@ -30,18 +70,62 @@ pub struct Call {
     pub streams: bool,
     /// Whether its request, a single message, may be about a room or tournament of another node.
     pub forwarded: bool,
+    /// Whether its client sends a stream of messages.
+    pub sends_many: bool,
+    /// What each of its messages may be.
+    pub message: MessageLimits,
+    /// Calls that it counts as for its caller. Decoding a large message counts besides.
+    pub charge: u64,
 }
 
 impl Call {
     /// The requirements of the call with this path.
     pub fn find(path: &str) -> Option<&'static Self> {
-        let mut calls = CALLS.iter().chain(CALLS_OF_NODES);
-        calls.find(|call| call.path == path)
+        static BY_PATH: LazyLock<HashMap<&str, &Call>> =
+            LazyLock::new(|| Call::all().map(|call| (call.path, call)).collect());
+        BY_PATH.get(path).copied()
+    }
+
+    /// Every call, those between nodes included.
+    pub fn all() -> impl Iterator<Item = &'static Self> {
+        CALLS.iter().chain(CALLS_OF_NODES)
+    }
+
+    /// The longest message of all calls of a service, such as `chefshat.v1.PlayService`.
+    pub fn longest_message_of(service: &str) -> usize {
+        let calls = Self::all().filter(|call| call.service() == service);
+        calls.map(|call| call.message.bytes).max().unwrap_or(0)
+    }
+
+    /// The full name of its service.
+    fn service(&self) -> &'static str {
+        let path = self.path.trim_start_matches('/');
+        path.split_once('/').map_or(path, |(service, _)| service)
     }
 
     const fn streaming(self) -> Self {
         Self {
             streams: true,
+            charge: COST_OF_STREAM,
+            ..self
+        }
+    }
+
+    /// Its client sends a stream.
+    const fn sending(self) -> Self {
+        Self {
+            sends_many: true,
+            ..self.streaming()
+        }
+    }
+
+    const fn takes(self, bytes: usize, elements: usize, memory: usize) -> Self {
+        Self {
+            message: MessageLimits {
+                bytes,
+                elements,
+                memory,
+            },
             ..self
         }
     }
@@ -62,29 +146,36 @@ const fn call(path: &'static str, role: Role, scoped: Scoped) -> Call {
         reads_records: false,
         streams: false,
         forwarded: false,
+        sends_many: false,
+        message: MessageLimits::USUAL,
+        charge: 1,
     }
 }
 
 const fn records(path: &'static str) -> Call {
     Call {
-        path,
-        role: Role::Spectator,
-        scoped: Scoped::Compared,
         reads_records: true,
-        streams: false,
-        forwarded: false,
+        ..call(path, Role::Spectator, Scoped::Compared)
     }
 }
 
 /// Every call of the server. Those played most often come first.
 pub const CALLS: &[Call] = &[
-    call("/chefshat.v1.PlayService/Act", Player, Compared).forwarded(),
-    call("/chefshat.v1.PlayService/Play", Player, Compared).streaming(),
-    call("/chefshat.v1.PlayService/Watch", Player, Compared).streaming(),
+    call("/chefshat.v1.PlayService/Act", Player, Compared)
+        .forwarded()
+        .takes(MAX_MESSAGE_BYTES, 1_200, MIB),
+    call("/chefshat.v1.PlayService/Play", Player, Compared)
+        .sending()
+        .takes(MAX_MESSAGE_BYTES, 8_192, 3 * MIB),
+    call("/chefshat.v1.PlayService/Watch", Player, Compared)
+        .streaming()
+        .takes(16 * KIB, 256, 512 * KIB),
     call("/chefshat.v1.SpectatorService/Watch", Spectator, Compared)
         .streaming()
         .forwarded(),
-    call("/chefshat.v1.TableService/Report", Player, Compared).forwarded(),
+    call("/chefshat.v1.TableService/Report", Player, Compared)
+        .forwarded()
+        .takes(MAX_MESSAGE_BYTES, 512, 512 * KIB),
     call("/chefshat.v1.TableService/Watch", Player, Compared)
         .streaming()
         .forwarded(),
@@ -101,23 +192,33 @@ pub const CALLS: &[Call] = &[
         Player,
         Compared,
     )
-    .forwarded(),
+    .forwarded()
+    .takes(MAX_MESSAGE_BYTES, 64, 768 * KIB),
     call("/chefshat.v1.RoomService/GetRoom", Spectator, Compared).forwarded(),
     call("/chefshat.v1.RoomService/ListRooms", Spectator, Compared),
     call("/chefshat.v1.RoomService/JoinRoom", Player, Compared).forwarded(),
     call("/chefshat.v1.RoomService/LeaveRoom", Player, Compared).forwarded(),
-    call("/chefshat.v1.RoomService/CreateRoom", Host, Refused).forwarded(),
+    call("/chefshat.v1.RoomService/CreateRoom", Host, Refused)
+        .forwarded()
+        .takes(MAX_MESSAGE_BYTES, 512, 768 * KIB),
     call("/chefshat.v1.RoomService/CloseRoom", Host, Compared).forwarded(),
     call("/chefshat.v1.RoomService/SetNextRoom", Host, Compared).forwarded(),
-    call("/chefshat.v1.StudyService/CreateStudy", Host, Refused).forwarded(),
+    call("/chefshat.v1.StudyService/CreateStudy", Host, Refused)
+        .forwarded()
+        .takes(MAX_STUDY_MESSAGE_BYTES, 20_000, 8 * MIB),
     call("/chefshat.v1.StudyService/GetStudy", Spectator, Refused).forwarded(),
-    call("/chefshat.v1.StudyService/ListStudies", Spectator, Refused),
+    call("/chefshat.v1.StudyService/ListStudies", Spectator, Refused).takes(
+        16 * KIB,
+        256,
+        256 * KIB,
+    ),
     call(
         "/chefshat.v1.StudyService/AddStudyParticipants",
         Host,
         Refused,
     )
-    .forwarded(),
+    .forwarded()
+    .takes(320 * KIB, 2_048, MIB),
     call("/chefshat.v1.StudyService/ListStudyLinks", Host, Refused).forwarded(),
     call("/chefshat.v1.StudyService/FollowStudy", Spectator, Refused)
         .streaming()
@@ -163,7 +264,8 @@ pub const CALLS: &[Call] = &[
         Player,
         Refused,
     )
-    .forwarded(),
+    .forwarded()
+    .takes(MAX_STUDY_MESSAGE_BYTES, 512, 3 * MIB),
     call(
         "/chefshat.v1.ParticipationService/ContinueStudy",
         Player,
@@ -175,7 +277,8 @@ pub const CALLS: &[Call] = &[
         Player,
         Refused,
     )
-    .forwarded(),
+    .forwarded()
+    .takes(192 * KIB, 1_024, MIB),
     call(
         "/chefshat.v1.ParticipationService/WithdrawFromStudy",
         Player,
@@ -228,7 +331,8 @@ pub const CALLS: &[Call] = &[
         Host,
         Refused,
     )
-    .forwarded(),
+    .forwarded()
+    .takes(MAX_MESSAGE_BYTES, 4_096, MIB),
     call(
         "/chefshat.v1.TournamentService/AddTableParticipant",
         Host,
@@ -295,10 +399,15 @@ pub const CALLS: &[Call] = &[
         .streaming()
         .forwarded(),
     records("/chefshat.v1.RecordService/StreamRecords").streaming(),
-    call("/chefshat.v1.RecordService/ImportRecord", Host, Refused).streaming(),
-    call("/chefshat.v1.VectorService/Run", Player, Refused).streaming(),
+    call("/chefshat.v1.RecordService/ImportRecord", Host, Refused)
+        .sending()
+        .takes(MAX_MESSAGE_BYTES, 16_384, 6 * MIB),
+    call("/chefshat.v1.VectorService/Run", Player, Refused)
+        .sending()
+        .takes(MAX_VECTOR_MESSAGE_BYTES, 65_536, 9 * MIB),
     call("/chefshat.v1.AnalysisService/Evaluate", Player, Compared)
         .streaming()
+        .takes(MAX_MESSAGE_BYTES, 8_192, 4 * MIB)
         .forwarded(),
     call(
         "/chefshat.v1.AnalysisService/LegalActions",
@@ -341,14 +450,16 @@ pub const CALLS: &[Call] = &[
         Anyone,
         Unlimited,
     )
-    .streaming(),
+    .sending(),
 ];
 
 /// The calls that only nodes make of each other, on a listener of their own. The rest of the server
 /// does not have them.
 const CALLS_OF_NODES: &[Call] = &[
-    call("/chefshat.peer.v1.PeerService/Play", Player, Compared).streaming(),
-    call("/chefshat.peer.v1.PeerService/Share", Anyone, Unlimited).streaming(),
+    call("/chefshat.peer.v1.PeerService/Play", Player, Compared)
+        .sending()
+        .takes(MAX_PEER_REQUEST_BYTES, 80_000, 9 * MIB),
+    call("/chefshat.peer.v1.PeerService/Share", Anyone, Unlimited).sending(),
 ];
 
 #[cfg(test)]
@@ -359,8 +470,9 @@ mod tests {
 
     use super::*;
 
-    /// The calls of all services, and whether their requests or answers are streams.
-    fn served() -> BTreeSet<(String, bool)> {
+    /// The calls of all services, and whether their requests or answers, and their requests, are
+    /// streams.
+    fn served() -> BTreeSet<(String, bool, bool)> {
         let descriptors = [
             chefshat_proto::DESCRIPTORS,
             tonic_health::pb::FILE_DESCRIPTOR_SET,
@@ -375,7 +487,7 @@ mod tests {
                         let (package, service) = (file.package(), service.name());
                         let path = format!("/{package}.{service}/{}", method.name());
                         let streams = method.client_streaming() || method.server_streaming();
-                        served.insert((path, streams));
+                        served.insert((path, streams, method.client_streaming()));
                     }
                 }
             }
@@ -387,7 +499,7 @@ mod tests {
     fn every_call_of_the_protocol_is_listed_once_with_its_streams() {
         let calls = CALLS
             .iter()
-            .map(|call| (call.path.to_owned(), call.streams));
+            .map(|call| (call.path.to_owned(), call.streams, call.sends_many));
         assert_eq!(calls.collect::<BTreeSet<_>>(), served());
         assert_eq!(served().len(), CALLS.len());
     }

@@ -1,12 +1,15 @@
 //! Decides about each request, and ends what a token started once the token is revoked or expires.
-//! Reads the tokens file again when it changes.
+//! Answers come from memory alone; the tokens file is read again, on a thread for it, when it
+//! changes. A request with a token that is not in memory may wait for one look at the file.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::net::IpAddr;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, RwLock};
 use std::time::Duration;
 
+use tokio::time::{Instant, sleep_until};
 use tokio_util::sync::CancellationToken;
 use tracing::{debug, error, info, warn};
 
@@ -20,6 +23,10 @@ use crate::file_watch::FileWatch;
 
 /// How often the tokens file is looked at, and expired tokens are searched for.
 const INTERVAL: Duration = Duration::from_secs(1);
+/// Least time between looks at the file for tokens that are not in memory.
+const LOOK_INTERVAL: Duration = Duration::from_millis(100);
+/// Most unknown tokens that are remembered, so that each leads to one look.
+const MAX_UNKNOWN: usize = 4_096;
 /// How an `authorization` header with a token starts.
 const BEARER: &[u8] = b"bearer ";
 
@@ -158,6 +165,15 @@ pub struct Access {
     records: Role,
     file: Option<Followed>,
     known: RwLock<HashMap<TokenId, Known>>,
+    /// The hashes of tokens that the file did not have when it was last looked at for them.
+    unknown: Mutex<HashSet<[u8; 32]>>,
+    /// Number of such looks that have begun.
+    looks_begun: AtomicU64,
+    /// The number of the last one that has ended, and when it began. Held while looking.
+    looked: tokio::sync::Mutex<Option<(u64, Instant)>>,
+    /// How often the file was looked at.
+    #[cfg(test)]
+    looks: AtomicU64,
 }
 
 impl Access {
@@ -183,6 +199,11 @@ impl Access {
             records: settings.records,
             file,
             known: RwLock::default(),
+            unknown: Mutex::default(),
+            looks_begun: AtomicU64::default(),
+            looked: tokio::sync::Mutex::default(),
+            #[cfg(test)]
+            looks: AtomicU64::default(),
         };
         access.replace(tokens.unwrap_or_default());
         Ok(access)
@@ -243,12 +264,46 @@ impl Access {
             return Ok(self.without_token(address));
         };
         let token = bearer(value).ok_or(Refusal::TokenUnknown)?;
-        let found = self.find(&token, address).or_else(|| {
-            // It may have been created since the file was looked at.
-            self.read_if_changed();
-            self.find(&token, address)
-        });
+        let found = self.find(&token, address);
         found.unwrap_or(Err(Refusal::TokenUnknown))
+    }
+
+    /// Whether the tokens file may have a token that is not in memory: one that has just been
+    /// created. The request should wait for [`Self::look_again`].
+    pub fn may_be_new(&self, authorization: Option<&[u8]>) -> bool {
+        let token = authorization.filter(|_| self.file.is_some());
+        token.and_then(bearer).is_some_and(|token| {
+            let hash = token.hash();
+            let known = self.known();
+            let is_known = (known.get(&token.id)).is_some_and(|known| known.token.hash.is(&hash));
+            !is_known && !self.unknown().contains(hash.bytes())
+        })
+    }
+
+    /// Looks at the tokens file for a token that is not in memory. Everybody who asks meanwhile
+    /// waits for the same look, and a token that is not in the file then is looked for once.
+    pub async fn look_again(self: &Arc<Self>, authorization: Option<&[u8]>) {
+        let begun_before = self.looks_begun.load(Ordering::SeqCst);
+        let mut looked = self.looked.lock().await;
+        if looked.is_none_or(|(number, _)| number <= begun_before) {
+            if let Some((_, last)) = *looked {
+                sleep_until(last + LOOK_INTERVAL).await;
+            }
+            let number = self.looks_begun.fetch_add(1, Ordering::SeqCst) + 1;
+            let began = Instant::now();
+            self.read_on_thread().await;
+            *looked = Some((number, began));
+        }
+        drop(looked);
+        if self.may_be_new(authorization)
+            && let Some(token) = authorization.and_then(bearer)
+        {
+            let mut unknown = self.unknown();
+            if unknown.len() >= MAX_UNKNOWN {
+                unknown.clear();
+            }
+            unknown.insert(*token.hash().bytes());
+        }
     }
 
     /// What a token grants; `None` if it is unknown.
@@ -272,6 +327,7 @@ impl Access {
             caller: Caller {
                 address,
                 token: Some(token.id),
+                token_hash: Some(token.hash),
                 role,
                 scope: token.scope,
                 secrets: Secrets::default(),
@@ -300,7 +356,7 @@ impl Access {
         let mut open_noted = self.mode == Mode::Tokens;
         loop {
             tokio::time::sleep(INTERVAL).await;
-            self.read_if_changed();
+            self.read_on_thread().await;
             if !open_noted && self.tokens() > 0 {
                 open_noted = true;
                 warn!("the server has tokens but requires none until it is restarted");
@@ -309,12 +365,22 @@ impl Access {
         }
     }
 
-    /// Reads the tokens file again if it has changed.
+    /// Reads the tokens file again if it has changed, on a thread that may block.
+    async fn read_on_thread(self: &Arc<Self>) {
+        let access = Arc::clone(self);
+        let reading = tokio::task::spawn_blocking(move || access.read_if_changed());
+        if let Err(error) = reading.await {
+            error!(%error, "the tokens were not read");
+        }
+    }
+
+    /// Reads the tokens file again if it has changed. Blocks.
     fn read_if_changed(&self) {
         let Some(Followed { file, watch }) = &self.file else {
             return;
         };
-        // Held while reading: a caller that waits for it finds the tokens read.
+        #[cfg(test)]
+        self.looks.fetch_add(1, Ordering::Relaxed);
         let mut watch = (watch.lock()).expect("no code that holds this lock can panic");
         let read = watch.read_changed(|| {
             let tokens = file.read()?.unwrap_or_default();
@@ -347,6 +413,7 @@ impl Access {
             known.insert(token.id, Known { token, ended });
         }
         drop(known);
+        self.unknown().clear();
         for (id, gone) in before {
             info!(token = %id, "a token was revoked");
             gone.ended.cancel();
@@ -360,6 +427,10 @@ impl Access {
                 ended.cancel();
             }
         }
+    }
+
+    fn unknown(&self) -> std::sync::MutexGuard<'_, HashSet<[u8; 32]>> {
+        (self.unknown.lock()).expect("no code that holds this lock can panic")
     }
 
     fn known(&self) -> std::sync::RwLockReadGuard<'_, HashMap<TokenId, Known>> {
@@ -387,7 +458,7 @@ mod tests {
     struct Setup {
         _folder: TempDir,
         file: TokenFile,
-        access: Access,
+        access: Arc<Access>,
     }
 
     impl Setup {
@@ -398,7 +469,7 @@ mod tests {
             Self {
                 file: TokenFile::of(&path),
                 _folder: folder,
-                access,
+                access: Arc::new(access),
             }
         }
 
@@ -409,7 +480,9 @@ mod tests {
                 lifetime,
                 scope,
             });
-            token.expect("written")
+            let token = token.expect("written");
+            self.access.read_if_changed();
+            token
         }
 
         fn check(&self, method: &str, token: Option<&AccessToken>) -> Result<Granted, Refusal> {
@@ -462,7 +535,6 @@ mod tests {
             .map(|_| ());
         let (required, role) = (Role::Host, Role::Player);
         assert_eq!(refused, Err(Refusal::RoleTooLow { required, role }));
-        // Tokens are known as soon as they are created, and strangers' are not.
         let stranger = AccessToken::random(host.id);
         let refused = setup
             .check("RoomService/CreateRoom", Some(&stranger))
@@ -471,6 +543,52 @@ mod tests {
         // What the server is, everybody learns.
         let granted = setup.check("ServerService/GetServerInfo", Some(&stranger));
         assert_eq!(granted.expect("for everybody").caller.role, Role::Anyone);
+    }
+
+    fn header(token: &AccessToken) -> Vec<u8> {
+        format!("Bearer {}", token.to_text()).into_bytes()
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_thousand_unknown_tokens_take_few_looks_at_the_file_and_none_twice() {
+        let setup = Setup::new(&required());
+        let looks = || setup.access.looks.load(Ordering::Relaxed);
+        let unknown: Vec<_> = (0..1_000u32)
+            .map(|id| header(&AccessToken::random(TokenId(id.to_be_bytes()))))
+            .collect();
+        let look = |header: &'_ Vec<u8>| {
+            let (access, header) = (Arc::clone(&setup.access), header.clone());
+            async move {
+                assert!(access.may_be_new(Some(&header)));
+                access.look_again(Some(&header)).await;
+                assert!(!access.may_be_new(Some(&header)), "it was looked for");
+            }
+        };
+        futures::future::join_all(unknown.iter().map(look)).await;
+        // The first waits for one look; those who asked since it began wait for the next.
+        assert_eq!(looks(), 2);
+        let before = looks();
+        for header in &unknown {
+            let call = Call::find("/chefshat.v1.PlayService/Play").expect("a call");
+            let refused = setup.access.check(call, Some(header), None).map(|_| ());
+            assert_eq!(refused, Err(Refusal::TokenUnknown));
+            assert!(!setup.access.may_be_new(Some(header)));
+        }
+        assert_eq!(looks(), before, "answered from memory");
+        // A token is known as soon as it is created.
+        let token = setup.file.create(NewToken {
+            role: Role::Player,
+            label: String::new(),
+            lifetime: None,
+            scope: None,
+        });
+        let token = token.expect("written");
+        let value = header(&token);
+        assert!(setup.access.may_be_new(Some(&value)));
+        setup.access.look_again(Some(&value)).await;
+        setup
+            .check("PlayService/Play", Some(&token))
+            .expect("known");
     }
 
     #[test]

@@ -13,7 +13,10 @@ mod secrets;
 mod token;
 
 pub use caller::{Caller, Role, Scope};
-pub use calls::{CALLS, Call, Scoped};
+pub use calls::{
+    CALLS, COST_OF_STREAM, Call, MAX_INPUTS_PER_MESSAGE, MAX_MESSAGE_BYTES,
+    MAX_STUDY_MESSAGE_BYTES, MAX_VECTOR_MESSAGE_BYTES, MessageLimits, Scoped,
+};
 pub use file::{NewToken, StoredToken, TOKENS_FILE, TokenFile, TokenFileError};
 pub use guard::{Access, AccessSettings, Ended, Granted, Mode, Refusal};
 pub use secrets::{MAX_SECRETS, SECRET_HEADER, Secrets, SecretsRefused, Standing};

@@ -3,10 +3,12 @@
 //! one after another.
 
 use std::collections::BTreeMap;
+use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_cluster::{BeatAnswer, ClaimAnswer, Input, Node, Output, Phase};
+use futures::FutureExt as _;
 use futures::future::pending;
 use tokio::sync::{Semaphore, watch};
 use tokio::task::{JoinHandle, JoinSet};
@@ -19,6 +21,7 @@ use super::turns::Turns;
 use super::units::{Hosted, Resumed, Units};
 use crate::store::StoreError;
 use crate::store::cluster::{ClusterStore, Epoch, NodeId, NodeInfo};
+use crate::tasks::{LongTask, named};
 use chefshat_room::ids::Id;
 
 /// How long an answer of the database is awaited, except to a beat. After that, the next beat says
@@ -82,9 +85,10 @@ impl ClusterNode {
             search: Arc::new(Semaphore::new(1)),
             asked,
             publishes,
+            leaves: false,
         };
         Self {
-            task: tokio::spawn(task.run(drain.clone())),
+            task: tokio::spawn(named(LongTask::Node, task.run(drain.clone()))),
             drain,
             is_asked_to_drain,
             may_publish,
@@ -161,6 +165,8 @@ struct Task {
     search: Arc<Semaphore>,
     asked: watch::Sender<bool>,
     publishes: watch::Sender<bool>,
+    /// Whether it is leaving by itself, after it has handed over everything.
+    leaves: bool,
 }
 
 impl Task {
@@ -208,8 +214,14 @@ impl Task {
                 _ = tidying.tick() => self.tidy(),
                 () = drain.cancelled(), if !is_draining => self.put_in(Input::Drain),
             }
-            if self.node.phase() == Phase::Left && !drain.is_cancelled() {
-                self.rejoin().await;
+            if self.node.phase() == Phase::Left && !self.leaves {
+                // The database has removed it.
+                let rejoined = drain.run_until_cancelled(self.rejoin()).await;
+                if rejoined.is_none() {
+                    // It owns nothing that it could hand over. What it has run stops.
+                    while self.answers.join_next().await.is_some() {}
+                    return;
+                }
             }
         }
     }
@@ -276,8 +288,9 @@ impl Task {
                 // A beat without an answer must not take up the time of the next one, which the
                 // lease may still wait for.
                 let within = Duration::from_millis(store.lease().beat_every_ms());
-                self.answers
-                    .spawn(async move { beat(&*store, within, sent_ms).await });
+                let beating = async move { beat(&*store, within, sent_ms).await };
+                let answer = BeatAnswer::None;
+                self.spawn(beating, Event::Answer(Input::Beat { sent_ms, answer }));
             }
             Output::FindOrphans(count) => self.find_orphans(count),
             Output::Claim(unit, seen) => self.claim(vec![(unit, seen)]),
@@ -286,7 +299,7 @@ impl Task {
                 // One of its rooms may stop before all are resumed.
                 self.running.insert(unit, epoch);
                 let units = Arc::clone(&self.units);
-                self.queue(unit, async move {
+                let resuming = async move {
                     match units.resume(unit, epoch).await {
                         Resumed::Runs => Event::Nothing,
                         Resumed::Nothing => Event::NothingToRun(unit, epoch),
@@ -295,7 +308,9 @@ impl Task {
                             false => Event::Nothing,
                         },
                     }
-                });
+                };
+                // After the next beat it is missed, and resumed again.
+                self.queue(unit, resuming, Event::Nothing);
             }
             Output::Stop(unit) => self.stop(unit),
             Output::Suspend => warn!("the node has no lease; it publishes nothing until it has"),
@@ -303,19 +318,23 @@ impl Task {
             Output::Release(unit, epoch) => {
                 self.units.unwant(unit);
                 let (units, releases) = (Arc::clone(&self.units), Arc::clone(&self.releases));
-                self.queue(unit, async move {
+                let releasing = async move {
                     units.until_ephemeral_over(unit).await;
                     let _permit = releases.acquire().await.expect("it is never closed");
                     let is_released = units.release(unit, epoch).await;
                     Event::Answer(Input::Released(unit, is_released))
-                });
+                };
+                let not_released = Event::Answer(Input::Released(unit, false));
+                self.queue(unit, releasing, not_released);
             }
             Output::Leave => {
-                self.answers.spawn(async move {
+                self.leaves = true;
+                let leaving = async move {
                     // If no answer comes, the node is removed when its lease has expired.
                     answer("leave", ANSWER_TIME, store.leave()).await;
                     Event::Left
-                });
+                };
+                self.spawn(leaving, Event::Left);
             }
         }
     }
@@ -323,8 +342,10 @@ impl Task {
     /// Claims units together.
     fn claim(&mut self, orphans: Vec<(Id, Epoch)>) {
         let store = Arc::clone(&self.store);
-        self.answers.spawn(async move {
-            let units: Vec<Id> = orphans.iter().map(|(unit, _)| *unit).collect();
+        let units: Vec<Id> = orphans.iter().map(|(unit, _)| *unit).collect();
+        let unanswered = units.iter().map(|unit| (*unit, ClaimAnswer::None));
+        let unanswered = Event::Claimed(unanswered.collect());
+        let claiming = async move {
             let claimed = answer("claim", ANSWER_TIME, store.claim_all(orphans)).await;
             let answers = match claimed {
                 Some(claimed) => (claimed.into_iter())
@@ -333,7 +354,8 @@ impl Task {
                 None => vec![ClaimAnswer::None; units.len()],
             };
             Event::Claimed(units.into_iter().zip(answers).collect())
-        });
+        };
+        self.spawn(claiming, unanswered);
     }
 
     fn claimed(&mut self, claims: Vec<(Id, ClaimAnswer)>) {
@@ -366,10 +388,11 @@ impl Task {
             return;
         }
         let store = Arc::clone(&self.store);
-        self.answers.spawn(async move {
+        let tidying = async move {
             answer("tidy up", TIDY_INTERVAL, store.tidy()).await;
             Event::Nothing
-        });
+        };
+        self.spawn(tidying, Event::Nothing);
     }
 
     fn find_orphans(&mut self, count: usize) {
@@ -385,11 +408,12 @@ impl Task {
             .retain(|_, tried| tried.elapsed() < LEFT_ALONE);
         let count = count + self.not_resumable.len();
         let store = Arc::clone(&self.store);
-        self.answers.spawn(async move {
+        let finding = async move {
             let orphans = answer("look for orphans", ANSWER_TIME, store.orphans(count)).await;
             drop(search);
             Event::Found(orphans.unwrap_or_default())
-        });
+        };
+        self.spawn(finding, Event::Nothing);
     }
 
     /// Stops a unit at once.
@@ -397,10 +421,11 @@ impl Task {
         self.units.fence(unit);
         self.running.remove(&unit);
         let units = Arc::clone(&self.units);
-        self.queue(unit, async move {
+        let stopping = async move {
             units.stop(unit).await;
             Event::Nothing
-        });
+        };
+        self.queue(unit, stopping, Event::Nothing);
     }
 
     /// Something of a unit has stopped by itself, so all of it stops. If the node still owns it, it
@@ -413,11 +438,30 @@ impl Task {
     }
 
     /// Does something with a unit after what is done with it already.
-    fn queue(&mut self, unit: Id, work: impl Future<Output = Event> + Send + 'static) {
+    fn queue(
+        &mut self,
+        unit: Id,
+        work: impl Future<Output = Event> + Send + 'static,
+        if_it_panics: Event,
+    ) {
         let mut turn = self.turns.take(unit);
-        self.answers.spawn(async move {
+        let in_turn = async move {
             turn.comes().await;
             work.await
+        };
+        self.spawn(in_turn, if_it_panics);
+    }
+
+    /// Starts work whose event comes in any case: the core keeps a mark for what it waits for, and
+    /// without an answer it would wait forever.
+    fn spawn(&mut self, work: impl Future<Output = Event> + Send + 'static, if_it_panics: Event) {
+        self.answers.spawn(async move {
+            // Nothing that it leaves behind is used again, but by locks that say so.
+            let worked = AssertUnwindSafe(work).catch_unwind().await;
+            worked.unwrap_or_else(|_| {
+                error!("work for the cluster has failed");
+                if_it_panics
+            })
         });
     }
 

@@ -117,7 +117,10 @@ pub fn express_refused(error: ExpressError) -> v1::Refused {
     let (code, reason) = match error {
         ExpressError::GameOver => (FAILED_PRECONDITION, "GAME_OVER"),
         ExpressError::ChatOff => (FAILED_PRECONDITION, "CHAT_OFF"),
-        ExpressError::TooMany => (RESOURCE_EXHAUSTED, "TOO_MANY_EXPRESSIONS"),
+        ExpressError::TooMany | ExpressError::TooFast => {
+            (RESOURCE_EXHAUSTED, "TOO_MANY_EXPRESSIONS")
+        }
+        ExpressError::DiskNearlyFull => (RESOURCE_EXHAUSTED, "DISK_NEARLY_FULL"),
         ExpressError::NoSuchSeat => (INVALID_ARGUMENT, "EXPRESSION_REFUSED"),
     };
     v1::Refused {

@@ -5,13 +5,12 @@ use chefshat_engine::SeedPlan;
 use chefshat_engine::{Game, Seat, Viewer};
 use chefshat_proto::v1::{self, game_event::Kind};
 use chefshat_record::convert::{
-    By, action_space, event_kind, final_table, rules_to_proto, seat_cards, seat_number,
+    action_space, event_kind, final_table, rules_to_proto, seat_cards, seat_number,
 };
 use prost::Message as _;
 
-use super::decision::source_to_proto;
 use super::kind::kind_to_proto;
-use super::labels::{shown_name, shown_policy, shown_substitute};
+use super::labels::{shown_by, shown_name, shown_policy, shown_substitute};
 use super::room::{abort_reason, seed_commitment, shown_participants};
 use super::table::violation_to_proto;
 use chefshat_room::Core;
@@ -64,10 +63,7 @@ fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
             Kind::GameStarted(Box::new(started))
         }
         RoomEvent::Game(game) => {
-            let by = By {
-                source: source_to_proto(game.source),
-                decision_time_us: game.time_us,
-            };
+            let by = shown_by(core, &game.event, (game.source, game.time_us));
             // The engine's final event does not reveal the seed; the room's does.
             event_kind(
                 &game.event.seen_by(viewer),

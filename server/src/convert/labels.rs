@@ -3,11 +3,13 @@
 
 use std::sync::Arc;
 
-use chefshat_engine::Seat;
+use chefshat_engine::{Event, Seat};
 use chefshat_proto::v1;
+use chefshat_record::convert::By;
 use chefshat_room::Core;
-use chefshat_room::journal::{GameHeader, ParticipantKind, SeatLabels, StudyGame};
+use chefshat_room::journal::{Fill, GameHeader, ParticipantKind, SeatLabels, Source, StudyGame};
 
+use super::decision::source_to_proto;
 use super::kind::kind_to_proto;
 use super::policy::policy_of;
 
@@ -18,17 +20,19 @@ pub(super) fn labelled(core: &Core, mut seats: Vec<v1::Participant>) -> Vec<v1::
     }
     for (seat, shown) in core.all_seats().zip(&mut seats) {
         let standing = core.standing(seat);
-        let kind = match (standing.participant, standing.fill.is_built_in()) {
+        let kind = match (standing.participant, standing.fill) {
             (Some(participant), _) => Some(participant.kind),
-            (None, true) => Some(ParticipantKind::Agent),
-            (None, false) => None,
+            // A seat of which nobody may know whether a built-in agent plays there is never free.
+            (None, Fill::Open { reserved_for }) if core.header().is_hidden(seat) => reserved_for,
+            (None, fill) => fill.is_built_in().then_some(ParticipantKind::Agent),
         };
         let (name, kind) = shown_name(core, seat, &shown.name, kind);
         *shown = v1::Participant {
             seat: shown.seat,
             name,
             kind: kind_to_proto(kind),
-            connected: shown.connected,
+            // A built-in agent always is.
+            connected: shown.connected || core.header().is_hidden(seat),
             substituted: shown.substituted,
             ..v1::Participant::default()
         };
@@ -66,8 +70,9 @@ pub(super) fn shown_name(
     match (core.header().labels(), kind) {
         (SeatLabels::AsTheyAre, _) => (name.to_owned(), kind),
         (_, kind) if is_own => (name.to_owned(), kind),
+        (SeatLabels::Players, _) => (format!("Player {number}"), None),
         // The seat is free.
-        (_, None) => (String::new(), None),
+        (SeatLabels::Kinds, None) => (String::new(), None),
         (SeatLabels::Kinds, Some(kind)) => {
             let word = match kind {
                 ParticipantKind::Agent => "Agent",
@@ -77,7 +82,27 @@ pub(super) fn shown_name(
             };
             (format!("{word} {number}"), Some(kind))
         }
-        (SeatLabels::Players, Some(_)) => (format!("Player {number}"), None),
+    }
+}
+
+/// Who or what took the decision that an event states, and in what time. Of a seat whose participant
+/// is hidden neither is shown: the time of a built-in agent is not measured, and none runs out.
+pub(super) fn shown_by(core: &Core, event: &Event, (source, time_us): (Source, u64)) -> By {
+    let seat = match *event {
+        Event::Played { seat, .. }
+        | Event::Passed { seat, .. }
+        | Event::SpecialActionDeclared { seat, .. } => Some(seat),
+        _ => None,
+    };
+    match seat.is_some_and(|seat| core.header().is_hidden(seat)) {
+        true => By {
+            source: source_to_proto(Source::Agent),
+            decision_time_us: 0,
+        },
+        false => By {
+            source: source_to_proto(source),
+            decision_time_us: time_us,
+        },
     }
 }
 

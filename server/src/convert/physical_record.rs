@@ -178,7 +178,7 @@ impl Room {
             state: state_to_proto(self.core.state()).into(),
             events: u64::try_from(log.len()).unwrap_or(u64::MAX),
             decisions: 0,
-            signature: None,
+            ..v1::RecordFooter::default()
         };
         std::iter::once(Line::Header(record_header(&self.core)))
             .chain(events)

@@ -67,7 +67,7 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
         state: state_to_proto(core.state()).into(),
         events: u64::try_from(core.log().len()).unwrap_or(u64::MAX),
         decisions,
-        signature: None,
+        ..v1::RecordFooter::default()
     });
     if !header.wizards.is_empty() {
         body.iter_mut().for_each(|line| by_wizard(header, line));
@@ -101,10 +101,9 @@ pub fn lines_of(stored: &StoredGame) -> Cow<'_, [v1::RecordLine]> {
     match stored {
         StoredGame::Hosted(header, journal, signature) => {
             let mut lines = record_lines(header, journal);
-            if let Some(signature) = signature
-                && let Some(Line::Footer(footer)) = lines.last_mut().and_then(|it| it.line.as_mut())
-            {
-                footer.signature = Some(v1::RecordSignature::clone(signature));
+            if let Some(Line::Footer(footer)) = lines.last_mut().and_then(|it| it.line.as_mut()) {
+                footer.signature = signature.as_deref().cloned();
+                footer.participant_removed = header.participant_removed;
             }
             Cow::Owned(lines)
         }

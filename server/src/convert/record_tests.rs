@@ -1,9 +1,12 @@
 //! Records of games whose seats come and go: they verify, and do not when the time of an absence is
 //! changed.
 
+use std::collections::BTreeMap;
+
 use chefshat_engine::{RuleSetSpec, Seat, Stop};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::replay::replay;
+use chefshat_record::summary::summary;
 use chefshat_room::ConnectionId;
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{AbortPolicy, KindClock, Policy};
@@ -52,11 +55,17 @@ fn policy(chance: &mut Chance) -> Policy {
 
 /// Plays a random game to its end. Seats lose their connections and return at any time.
 fn played(chance: &mut Chance) -> Table {
+    let policy = policy(chance);
+    played_with(chance, policy, 0)
+}
+
+/// As [`played`]. Of a thousand moments, at this many the owner closes the room, who has a seat.
+fn played_with(chance: &mut Chance, policy: Policy, closes: u64) -> Table {
     let rules = RuleSetSpec {
         stop: Stop::Shifts(2),
         ..RuleSetSpec::default()
     };
-    let mut table = Table::with_rules(policy(chance), vec![OPEN; 4], rules);
+    let mut table = Table::with_rules(policy, vec![OPEN; 4], rules);
     for seat in 0..4 {
         let kind = match seat % 2 {
             0 => ParticipantKind::Agent,
@@ -70,6 +79,11 @@ fn played(chance: &mut Chance) -> Table {
     while !table.core.state().is_over() {
         let open = table.core.awaited().map(|open| open.decision.seat);
         let seat = chance.index(4);
+        if chance.below(1_000) < closes {
+            table.core.close(table.now, [Seat::new(seat)]);
+            table.commit();
+            break;
+        }
         match chance.below(12) {
             0 => {
                 if let Some(connection) = connections[seat].take() {
@@ -110,6 +124,44 @@ fn games_with_absences_verify() {
         substituted += lines.iter().filter(|line| is_substitution(line)).count();
     }
     assert!(substituted > 100, "only {substituted} substitutions");
+}
+
+#[test]
+fn a_record_says_who_forfeited_a_game_as_its_summary_does() {
+    let (mut reasons, mut forfeits) = (BTreeMap::new(), 0);
+    for seed in 0..300 {
+        let mut chance = Chance(seed);
+        let policy = Policy {
+            abort: match seed % 3 {
+                0 => AbortPolicy::Never,
+                1 => AbortPolicy::AnyLost,
+                _ => AbortPolicy::AllLost,
+            },
+            ..policy(&mut chance)
+        };
+        let table = played_with(&mut chance, policy, 5);
+        let lines = record_of(&table);
+        let replayed = replay(&lines).unwrap_or_else(|error| panic!("game {seed}: {error}"));
+        let read = summary(&lines, &replayed).expect("something was dealt");
+        let own = super::summary(&table.core);
+        let forfeited = |summary: &v1::RecordSummary| {
+            let seats = summary.seats.iter();
+            seats.map(|seat| seat.substituted).collect::<Vec<_>>()
+        };
+        assert_eq!(forfeited(&read), forfeited(&own), "game {seed}");
+        let of = |it: &v1::RecordSummary| (it.state, it.abort_reason, it.substituted, it.hinted);
+        assert_eq!(of(&read), of(&own), "game {seed}");
+        *reasons.entry(own.abort_reason()).or_insert(0) += 1;
+        forfeits += forfeited(&own).iter().filter(|it| **it).count();
+        if own.abort_reason() != v1::AbortReason::Unspecified {
+            assert!(forfeited(&own).contains(&true), "game {seed}: {own:?}");
+        }
+    }
+    assert!(
+        reasons.len() == 3 && reasons.values().all(|games| *games > 20),
+        "{reasons:?}"
+    );
+    assert!(forfeits > 200, "only {forfeits}");
 }
 
 fn is_substitution(line: &v1::RecordLine) -> bool {

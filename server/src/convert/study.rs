@@ -2,6 +2,7 @@
 //! participants see.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use chefshat_engine::RuleSet;
 use chefshat_proto::v1::{self, rule_set, study_item, study_stage};
@@ -31,7 +32,7 @@ const MAX_ROBOT_BEHAVIOUR: usize = 2000;
 #[derive(Debug)]
 pub struct StudyPlan {
     /// The settings of its core.
-    pub core: Settings,
+    pub core: Arc<Settings>,
     /// Name for researchers.
     pub name: String,
     /// What the core does not know of each condition.
@@ -112,13 +113,13 @@ pub fn complete_settings(
             ..message.clone()
         };
         let plan = study_plan(&probe)?;
-        Study::new(plan.core.clone())?;
+        Study::new(Arc::clone(&plan.core))?;
         let (games, _) = plan.core.games();
         message.seeds = (0..games.max(1)).map(|_| random().to_vec()).collect();
     }
     if message.block_size == 0 {
         let plan = study_plan(&message)?;
-        Study::new(plan.core.clone())?;
+        Study::new(Arc::clone(&plan.core))?;
         message.block_size = number(plan.core.sequences().len());
     }
     Ok(message)
@@ -215,7 +216,7 @@ pub fn study_plan(message: &v1::StudySettings) -> Result<StudyPlan, SettingsProb
         stages.push(stage_of(&format!("stages[{index}]"), stage)?);
     }
     Ok(StudyPlan {
-        core: Settings {
+        core: Arc::new(Settings {
             title: message.title.clone(),
             language: language(&message.language)?,
             participants: message.participants,
@@ -240,7 +241,7 @@ pub fn study_plan(message: &v1::StudySettings) -> Result<StudyPlan, SettingsProb
             traces: message.traces,
             drop_out_after_ms: message.drop_out_after_ms,
             closes_at_ms: Some(message.closes_at_ms).filter(|at_ms| *at_ms > 0),
-        },
+        }),
         name: message.name.clone(),
         conditions: plans,
     })

@@ -75,7 +75,7 @@ pub fn summary(core: &Core) -> v1::RecordSummary {
         created_at_ms: header.created_at_ms,
         ended_at_ms: header.created_at_ms.saturating_add(ended_at_ms),
         rules: Some(rules_to_proto(&header.rules)),
-        seats: recorded_participants(core),
+        seats: summarised_participants(core),
         standings: standings(core),
         shifts: core.game().map_or(0, |game| game.shift()),
         decisions: match core.table() {
@@ -90,6 +90,16 @@ pub fn summary(core: &Core) -> v1::RecordSummary {
         visibility: visibility_to_proto(header.policy.visibility).into(),
         study_id: (header.study.as_ref()).map_or_else(String::new, |game| game.study.to_string()),
     }
+}
+
+/// The seats with those marked whose participants did not play to the end by themselves, which
+/// ratings count.
+fn summarised_participants(core: &Core) -> Vec<v1::Participant> {
+    let mut seats = recorded_participants(core);
+    for (seat, shown) in core.all_seats().zip(&mut seats) {
+        shown.substituted = core.has_forfeited(seat);
+    }
+    seats
 }
 
 /// Number of decisions of a game at a physical table, as its record has them.

@@ -23,7 +23,7 @@ use crate::access::{
     Access, Call, Caller, Ended, Granted, Refusal, SECRET_HEADER, Secrets, SecretsRefused,
 };
 use crate::connections::peer_address;
-use crate::limits::{CallLimits, LogPace};
+use crate::limits::{CallLimits, Held, Key, LogPace};
 
 /// Where the services of this project are.
 const OWN_PACKAGE: &str = "/chefshat.";
@@ -85,9 +85,7 @@ impl<S> WithAccess<S> {
             let ended = None;
             return Ok((Granted { caller, ended }, false));
         };
-        let authorization = request.headers().get(header::AUTHORIZATION);
-        let authorization = authorization.map(|value| value.as_bytes());
-        let checked = self.layer.access.check(call, authorization, address);
+        let checked = (self.layer.access).check(call, authorization(request), address);
         let mut granted = checked.map_err(|refusal| {
             if self.layer.logged.admits() {
                 let address = address.map(tracing::field::display);
@@ -102,21 +100,14 @@ impl<S> WithAccess<S> {
     }
 }
 
-impl<S> Service<Request<Body>> for WithAccess<S>
+impl<S> WithAccess<S>
 where
     S: Service<Request<Body>, Response = Response<Body>>,
     S::Future: Send + 'static,
     S::Error: Send + 'static,
 {
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = Either<S::Future, BoxFuture<'static, Result<Self::Response, Self::Error>>>;
-
-    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
-        self.services.poll_ready(context)
-    }
-
-    fn call(&mut self, mut request: Request<Body>) -> Self::Future {
+    /// Answers a request or refuses it.
+    fn answer(&mut self, mut request: Request<Body>) -> Answering<S::Future, S::Error> {
         let (granted, streams) = match self.decide(&request) {
             Ok(decided) => decided,
             Err(status) => {
@@ -139,6 +130,56 @@ where
                 Either::Right(Box::pin(until_ended(answering, ended)))
             }
         }
+    }
+
+    /// A place to wait in for a look at the tokens file, if this request has a token that may have
+    /// just been created.
+    fn place_to_look(&self, request: &Request<Body>) -> Option<Held> {
+        let authorization = authorization(request);
+        if !self.layer.access.may_be_new(authorization) {
+            return None;
+        }
+        let address = peer_address(request.extensions());
+        self.layer.limits.place_to_wait(Key::of_address(address))
+    }
+}
+
+/// The `authorization` header of a request.
+fn authorization<B>(request: &Request<B>) -> Option<&[u8]> {
+    let value = request.headers().get(header::AUTHORIZATION);
+    value.map(|value| value.as_bytes())
+}
+
+/// An answer of the services, or something that takes longer or refuses.
+type Answering<F, E> = Either<F, BoxFuture<'static, Result<Response<Body>, E>>>;
+
+impl<S> Service<Request<Body>> for WithAccess<S>
+where
+    S: Service<Request<Body>, Response = Response<Body>> + Clone + Send + 'static,
+    S::Future: Send + 'static,
+    S::Error: Send + 'static,
+{
+    type Response = Response<Body>;
+    type Error = S::Error;
+    type Future = Answering<S::Future, S::Error>;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
+        self.services.poll_ready(context)
+    }
+
+    fn call(&mut self, request: Request<Body>) -> Self::Future {
+        let Some(waiting) = self.place_to_look(&request) else {
+            return self.answer(request);
+        };
+        // The clone that is ready serves this call.
+        let clone = self.clone();
+        let mut this = std::mem::replace(self, clone);
+        Either::Right(Box::pin(async move {
+            let value = authorization(&request).map(<[u8]>::to_vec);
+            this.layer.access.look_again(value.as_deref()).await;
+            drop(waiting);
+            this.answer(request).await
+        }))
     }
 }
 
@@ -285,6 +326,7 @@ pub(super) fn refused(refusal: Refusal) -> Status {
 #[cfg(test)]
 mod tests {
     use std::convert::Infallible;
+    use std::sync::Mutex;
 
     use futures::{FutureExt as _, stream};
     use http_body_util::{BodyExt as _, StreamBody};
@@ -313,9 +355,9 @@ mod tests {
         tokio::spawn(Arc::clone(&access).follow());
         let limits = Arc::new(CallLimits::new(Shares::default()));
         let (sender, read) = oneshot::channel();
-        let mut sender = Some(sender);
+        let sender = Arc::new(Mutex::new(Some(sender)));
         let reading = service_fn(move |request: Request<Body>| {
-            let sender = sender.take().expect("one call");
+            let sender = sender.lock().expect("no panic").take().expect("one call");
             tokio::spawn(
                 async move { sender.send(request.into_body().collect().await.map(|_| ())) },
             );

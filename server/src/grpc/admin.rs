@@ -2,20 +2,24 @@
 
 use std::pin::Pin;
 use std::sync::Arc;
-use std::time::UNIX_EPOCH;
+use std::time::{Duration, UNIX_EPOCH};
 
 use chefshat_proto::v1::{
-    self, admin_service_server::AdminService, study_service_client::StudyServiceClient,
+    self, admin_service_client::AdminServiceClient, admin_service_server::AdminService,
+    study_service_client::StudyServiceClient,
 };
 use chefshat_record::convert::FieldProblem;
-use chefshat_record::pseudonym::{Named, is_fingerprint};
+use chefshat_record::pseudonym::{Named, Pseudonym, is_fingerprint};
 use futures::Stream;
+use futures::future::join_all;
 use tokio::sync::mpsc;
+use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
+use tonic::metadata::{Binary, MetadataValue};
 use tonic::{Code, Request, Response, Status};
 use tracing::info;
 
-use super::forward::Gateway;
+use super::forward::{FromPeer, Gateway};
 use super::limits::charged;
 use super::pages;
 use super::reach::Reach;
@@ -35,6 +39,11 @@ use chefshat_room::ids::Id;
 
 /// Most clients in a page.
 const CLIENTS_PER_PAGE: u32 = 1_000;
+/// How long another node may take to remove a participant from its memory.
+const PEER_TIMEOUT: Duration = Duration::from_secs(10);
+/// Metadata of a request of another node that deletes a participant: the pseudonym, or nothing
+/// before there is one.
+const PSEUDONYM: &str = "chefshat-pseudonym-bin";
 
 /// The service.
 #[derive(Debug, Clone)]
@@ -226,23 +235,114 @@ impl AdminService for AdminCalls {
         &self,
         request: Request<v1::DeleteParticipantRequest>,
     ) -> Result<Response<v1::DeleteParticipantResponse>, Status> {
+        let is_from_peer = request.extensions().get::<FromPeer>().is_some();
+        let step = request.metadata().get_bin(PSEUDONYM).cloned();
         let elsewhere = OtherNodes(request.extensions().get::<Gateway>().cloned());
         let request = request.into_inner();
         let who = given(request.name, request.name_fingerprint)?;
         let participants = Arc::clone(&self.participants);
         // Runs to completion even if the client goes.
-        let deleting = tokio::spawn(async move { participants.delete(&who, &elsewhere).await });
+        let deleting = tokio::spawn(async move {
+            match step.filter(|_| is_from_peer) {
+                Some(step) => for_another_node(&participants, who, &step).await,
+                None => everywhere(&participants, who, &elsewhere).await,
+            }
+        });
         let deleted = deleting.await.map_err(|error| {
             tracing::error!(%error, "deleting a participant's data failed");
             store_failed()
         })?;
-        let deleted = deleted.map_err(data_failed)?;
-        Ok(Response::new(deleted.into()))
+        deleted.map(Response::new)
     }
+}
+
+/// Deletes a participant's data here, in the store, and from the memory of all other nodes.
+async fn everywhere(
+    participants: &Participants,
+    who: Named,
+    elsewhere: &OtherNodes,
+) -> Result<v1::DeleteParticipantResponse, Status> {
+    // Ephemeral games are in no database. What cannot be reached is said at the end.
+    for (_, answer) in elsewhere.ask_all(&who, "").await {
+        if let Err(refused) = answer
+            && refused.code() == Code::FailedPrecondition
+        {
+            return Err(refused);
+        }
+    }
+    let deleted = participants.delete(&who, elsewhere).await;
+    let deleted = deleted.map_err(data_failed)?;
+    let mut unreached = Vec::new();
+    for (node, answer) in elsewhere.ask_all(&who, &deleted.pseudonym).await {
+        if let Err(error) = answer {
+            tracing::warn!(%node, %error, "another node may still show a deleted participant");
+            unreached.push(node);
+        }
+    }
+    if unreached.is_empty() {
+        return Ok(deleted.into());
+    }
+    Err(status(
+        Code::Unavailable,
+        "OWNER_UNREACHABLE",
+        format!(
+            "the data are deleted, but these servers could not be told and may still show the name of games that are over: {}; \
+             delete it once more when they can be reached, or restart them",
+            unreached.join(", ")
+        ),
+        [],
+    ))
+}
+
+/// What another node wants, which deletes a participant: to know whether it plays here, or, with the
+/// pseudonym, to remove it from memory.
+async fn for_another_node(
+    participants: &Participants,
+    who: Named,
+    step: &MetadataValue<Binary>,
+) -> Result<v1::DeleteParticipantResponse, Status> {
+    let pseudonym = step.to_bytes().unwrap_or_default();
+    match String::from_utf8_lossy(&pseudonym).into_owned() {
+        none if none.is_empty() => participants.check(&who).await.map_err(data_failed)?,
+        pseudonym => {
+            let who = Pseudonym {
+                of: who,
+                pseudonym,
+                key: None,
+            };
+            participants.forget_here(&who).await;
+        }
+    }
+    Ok(v1::DeleteParticipantResponse::default())
 }
 
 /// The other nodes of a cluster, if there is one, which decide about the operator's token themselves.
 struct OtherNodes(Option<Gateway>);
+
+impl OtherNodes {
+    /// Asks all other nodes that live to do their part of the deletion of a participant. Returns
+    /// their names and answers.
+    async fn ask_all(&self, who: &Named, pseudonym: &str) -> Vec<(String, Result<(), Status>)> {
+        let Some(gateway) = &self.0 else {
+            return Vec::new();
+        };
+        let (_, others) = gateway.directory().nodes().await;
+        let asking = others.into_iter().map(|peer| async move {
+            let mut request = gateway.request(v1::DeleteParticipantRequest {
+                name: who.name.clone(),
+                name_fingerprint: who.fingerprint.clone(),
+            });
+            let step = MetadataValue::from_bytes(pseudonym.as_bytes());
+            request.metadata_mut().insert_bin(PSEUDONYM, step);
+            let mut service = AdminServiceClient::new(gateway.peers().channel(&peer));
+            let asked = timeout(PEER_TIMEOUT, service.delete_participant(request)).await;
+            let late = |_| Status::deadline_exceeded("it did not answer in time");
+            let answer = asked.map_err(late).and_then(|answer| answer.map(drop));
+            (peer.node.to_string(), answer)
+        });
+        join_all(asking).await
+    }
+}
 
 impl StudiesElsewhere for OtherNodes {
     async fn delete_participant(&self, study: Id, number: u32) -> Result<(), DataError> {

@@ -15,8 +15,8 @@ use chefshat_record::convert::{
     FieldProblem, decision_kind, rules_from_proto, seat_number, situation_from_proto,
 };
 use chefshat_search::{
-    Allocation, Estimate, Knowledge, KnowledgeError, Method, RolloutPolicy, Sampler, ShiftHistory,
-    evaluate_watched, likely_hands,
+    Allocation, Estimate, Evaluation, Knowledge, KnowledgeError, LikelyHands, Method, OwnTime,
+    RolloutPolicy, Sampler, ShiftHistory,
 };
 use rayon::ThreadPoolBuildError;
 use tokio::sync::mpsc;
@@ -24,7 +24,6 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
-use super::limits::charged;
 use super::pool::on_pool;
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down};
@@ -33,19 +32,27 @@ use crate::config::{
     ANALYSIS_TIME, MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_STEPS, MAX_ANALYSIS_TIME,
     MIN_ANALYSIS_UPDATE,
 };
-use crate::limits::{Places, Refused};
-use crate::threads::Threads;
+use crate::limits::{Payer, Places, Queued, Refused, SLICE, WorkQueue};
+use crate::threads::{Priority, Threads};
 
 /// Most deals from which the likely hands are averaged.
 const DEALS_FOR_HANDS: u64 = 500;
+/// Deals for them between two looks at the clock.
+const DEALS_AT_A_TIME: u64 = 10;
+/// How long before the client's deadline an analysis ends with what it has, so that the answer
+/// arrives.
+const BEFORE_DEADLINE: Duration = Duration::from_millis(100);
 
 /// The service.
 #[derive(Debug, Clone)]
 pub struct Analyses {
     recorded: Recorded,
-    /// Each analysis takes one thread.
+    /// Each analysis takes one thread at a time.
     pool: Arc<Threads>,
+    queue: Arc<WorkQueue>,
     places: Arc<Places>,
+    /// Those of the tokens of an address together.
+    of_addresses: Arc<Places>,
     closing: CancellationToken,
 }
 
@@ -70,11 +77,16 @@ impl Analyses {
         threads: usize,
         closing: CancellationToken,
     ) -> Result<Self, ThreadPoolBuildError> {
-        let places = Places::new(MAX_ANALYSES, recorded.rooms().shares());
+        let shares = recorded.rooms().shares();
+        let places = Places::new(MAX_ANALYSES, shares);
+        let of_addresses = Places::new(MAX_ANALYSES, shares.of_addresses());
+        let pool = Threads::new("analysis", threads, Priority::Batches)?;
         Ok(Self {
             recorded,
-            pool: Arc::new(Threads::new("analysis", threads, 0)?),
+            queue: WorkQueue::new(pool.number()),
+            pool: Arc::new(pool),
             places,
+            of_addresses,
             closing,
         })
     }
@@ -96,20 +108,33 @@ impl Analyses {
             .ok_or_else(internal)
     }
 
-    /// Runs work on a thread of the pool. `stopped` says whether the client has gone or the server stops.
-    async fn run_on_pool<T: Send + 'static>(
+    /// Computes an analysis, a slice at a time in turns with those of others. `update` gets the
+    /// estimates so far.
+    async fn run(
         &self,
-        work: impl FnOnce(&dyn Fn() -> bool) -> T + Send + 'static,
-    ) -> Result<T, Status> {
-        let gone = CancellationToken::new();
-        let guard = gone.clone().drop_guard();
-        let closing = self.closing.clone();
-        let work = move || work(&|| gone.is_cancelled() || closing.is_cancelled());
-        let value = on_pool(&self.pool, work).await;
-        drop(guard);
-        match self.closing.is_cancelled() {
-            true => Err(shutting_down()),
-            false => value,
+        mut analysis: Analysis,
+        queued: Queued,
+        update: impl Fn(v1::EvaluateResponse) + Clone + Send + 'static,
+    ) -> Result<v1::EvaluateResponse, Status> {
+        let mut ended = None;
+        loop {
+            let slice = queued.slice(ended.take()).await;
+            let (closing, update) = (self.closing.clone(), update.clone());
+            let work = move || {
+                let (own, begun) = (OwnTime::start(), Instant::now());
+                let advanced = analysis.advance(own, &|| closing.is_cancelled(), update);
+                (analysis, advanced, own.used(), begun.elapsed(), slice)
+            };
+            let (advanced, own, passed, slice);
+            (analysis, advanced, own, passed, slice) = on_pool(&self.pool, work).await?;
+            if self.closing.is_cancelled() {
+                return Err(shutting_down());
+            }
+            match advanced.map_err(|error| refused("position", error.to_string()))? {
+                Some(answer) => return Ok(answer),
+                None => queued.computed(own, passed),
+            }
+            ended = Some(slice);
         }
     }
 }
@@ -122,12 +147,22 @@ impl AnalysisService for Analyses {
         &self,
         request: Request<v1::EvaluateRequest>,
     ) -> Result<Response<Self::EvaluateStream>, Status> {
-        let key = charged(request.extensions());
-        let place = (self.places.try_take(key))
-            .ok_or_else(|| Refusal::from(too_many(self.places.share_of(key))))?;
         let caller = Caller::of(request.extensions());
+        let payer = Payer::of_caller(&caller);
+        let place = |places: &Arc<Places>, key| {
+            let refused = || Refusal::from(too_many(places.share_of(key)));
+            places.try_take(key).ok_or_else(refused)
+        };
+        let held = [
+            place(&self.of_addresses, payer.address)?,
+            place(&self.places, payer.key)?,
+        ];
+        let due = client_timeout(&request).and_then(|time| Instant::now().checked_add(time));
         let message = request.into_inner();
         let plan = plan(&message)?;
+        let queued = (self.queue)
+            .admit(payer, plan.time, due.map(Into::into))
+            .map_err(|wait| Refusal::from(too_late(wait)))?;
         let knowledge = match message.position {
             None => return Err(refused("position", "set moment or situation")),
             Some(Position::Situation(situation)) => situation_knowledge(&situation)?,
@@ -135,23 +170,18 @@ impl AnalysisService for Analyses {
                 self.moment(&caller, moment, recorded_knowledge).await?
             }
         };
+        let analysis = Analysis::new(knowledge, plan, due);
         let (responses, stream) = mpsc::channel(1);
         let service = self.clone();
         tokio::spawn(async move {
+            let _held = held;
             let updates = responses.clone();
-            let work = service.run_on_pool(move |stopped| {
-                // Work that was given up keeps its place until it ends.
-                let _place = place;
-                // A client that reads slowly misses some.
-                let update = |so_far| drop(updates.try_send(Ok(so_far)));
-                evaluated(knowledge, &plan, stopped, update)
-            });
+            // A client that reads slowly misses some.
+            let update = move |so_far| drop(updates.try_send(Ok(so_far)));
             let answer = tokio::select! {
-                answer = work => answer,
+                answer = service.run(analysis, queued, update) => answer,
                 () = responses.closed() => return,
             };
-            let answer = answer
-                .and_then(|found| found.map_err(|error| refused("position", error.to_string())));
             // It fails only if the client has gone.
             let _ = responses.send(answer).await;
         });
@@ -179,46 +209,136 @@ impl AnalysisService for Analyses {
     }
 }
 
-/// Evaluates a position. `update` gets the estimates so far, as often as the plan says.
-fn evaluated(
-    knowledge: Knowledge,
-    plan: &Plan,
-    stopped: &dyn Fn() -> bool,
-    update: impl Fn(v1::EvaluateResponse),
-) -> Result<v1::EvaluateResponse, KnowledgeError> {
-    let start = Instant::now();
-    let seat = knowledge.seat();
-    let sampler = Sampler::new(knowledge, MAX_ANALYSIS_STEPS)?;
-    let actions: Vec<ActionId> = sampler.legal_actions().iter().collect();
-    let spent = |done: u64, all: u64, time: Duration| {
-        let elapsed = start.elapsed().as_secs_f64() / time.as_secs_f64();
-        let done = done as f64 / all as f64;
-        if stopped() { 1.0 } else { done.max(elapsed) }
-    };
-    // The hands take at most half of the time.
-    let of_hands = |deals: u64| spent(deals, DEALS_FOR_HANDS, plan.time / 2);
-    let hands: Vec<v1::ExpectedHand> = likely_hands(&sampler, plan.seed, of_hands)
-        .into_iter()
-        .map(|cards| v1::ExpectedHand { cards })
-        .collect();
-    let response = |found: &[Estimate]| v1::EvaluateResponse {
-        seat: seat_number(seat),
-        rollouts: found.iter().map(|estimate| estimate.rollouts).sum(),
-        actions: found.iter().map(estimate_to_proto).collect(),
-        hands: hands.clone(),
-    };
-    let mut updated = start;
-    let progress = |rollouts: u64, found: &[Estimate]| {
-        let due = |every: Duration| rollouts > 0 && updated.elapsed() >= every;
-        if plan.update.is_some_and(due) {
-            updated = Instant::now();
-            update(response(found));
+/// An analysis that pauses between its slices.
+struct Analysis {
+    plan: Plan,
+    /// When the client stops waiting.
+    due: Option<Instant>,
+    /// Processor time of the slices that have ended.
+    used: Duration,
+    updated: Instant,
+    stage: Stage,
+}
+
+/// What an analysis is at.
+enum Stage {
+    /// The possible deals are still to be counted.
+    Begun(Box<Knowledge>),
+    Counted(Box<Evaluating>),
+}
+
+/// The parts of an analysis whose possible deals are counted.
+struct Evaluating {
+    sampler: Sampler,
+    likely: LikelyHands,
+    /// Once they are complete.
+    hands: Option<Vec<v1::ExpectedHand>>,
+    evaluation: Evaluation,
+}
+
+impl Analysis {
+    fn new(knowledge: Knowledge, plan: Plan, due: Option<Instant>) -> Self {
+        Self {
+            plan,
+            due: due.and_then(|due| due.checked_sub(BEFORE_DEADLINE)),
+            used: Duration::ZERO,
+            updated: Instant::now(),
+            stage: Stage::Begun(Box::new(knowledge)),
         }
-        spent(rollouts, plan.rollouts, plan.time)
+    }
+
+    /// Continues for a slice, measured by `own`. Returns the answer at the end.
+    fn advance(
+        &mut self,
+        own: OwnTime,
+        stopped: &dyn Fn() -> bool,
+        update: impl Fn(v1::EvaluateResponse),
+    ) -> Result<Option<v1::EvaluateResponse>, KnowledgeError> {
+        if let Stage::Begun(knowledge) = &self.stage {
+            let sampler = Sampler::new(knowledge.as_ref().clone(), MAX_ANALYSIS_STEPS)?;
+            let actions: Vec<ActionId> = sampler.legal_actions().iter().collect();
+            self.stage = Stage::Counted(Box::new(Evaluating {
+                likely: LikelyHands::new(&sampler),
+                hands: None,
+                evaluation: Evaluation::new(&actions, self.plan.method.allocation),
+                sampler,
+            }));
+        }
+        let Stage::Counted(evaluating) = &mut self.stage else {
+            return Ok(None);
+        };
+        let Evaluating {
+            sampler,
+            likely,
+            hands,
+            evaluation,
+        } = evaluating.as_mut();
+        let (plan, used) = (&self.plan, self.used);
+        let due = self.due;
+        let spent = |done: u64, all: u64, time: Duration| {
+            let elapsed = (used + own.used()).as_secs_f64() / time.as_secs_f64();
+            let is_over = stopped() || due.is_some_and(|due| Instant::now() >= due);
+            let done = done as f64 / all as f64;
+            if is_over { 1.0 } else { done.max(elapsed) }
+        };
+        let hands = loop {
+            if let Some(hands) = hands {
+                break hands;
+            }
+            // They take at most half of the time.
+            let deals = likely.deals();
+            if deals > 0 && spent(deals, DEALS_FOR_HANDS, plan.time / 2) >= 1.0 {
+                let means = likely.mean().into_iter();
+                *hands = Some(means.map(|cards| v1::ExpectedHand { cards }).collect());
+                continue;
+            }
+            if own.used() >= SLICE {
+                self.used += own.used();
+                return Ok(None);
+            }
+            (0..DEALS_AT_A_TIME).for_each(|_| likely.step(sampler, plan.seed));
+        };
+        let seat = seat_number(sampler.knowledge().seat());
+        let response = |found: &[Estimate]| v1::EvaluateResponse {
+            seat,
+            rollouts: found.iter().map(|estimate| estimate.rollouts).sum(),
+            actions: found.iter().map(estimate_to_proto).collect(),
+            hands: hands.clone(),
+        };
+        let progress = |rollouts: u64| spent(rollouts, plan.rollouts, plan.time);
+        loop {
+            if evaluation.step(sampler, &plan.method, plan.seed, None, progress) {
+                return Ok(Some(response(evaluation.estimates())));
+            }
+            let due = |every: Duration| self.updated.elapsed() >= every;
+            if plan.update.is_some_and(due) {
+                self.updated = Instant::now();
+                update(response(evaluation.estimates()));
+            }
+            if own.used() >= SLICE {
+                self.used += own.used();
+                return Ok(None);
+            }
+        }
+    }
+}
+
+/// How long the client of a call waits for its answer, if it says so (`grpc-timeout`).
+fn client_timeout<T>(request: &Request<T>) -> Option<Duration> {
+    let text = request.metadata().get("grpc-timeout")?.to_str().ok()?;
+    let (number, unit) = text.split_at_checked(text.len().checked_sub(1)?)?;
+    // At most 8 digits, so that no product overflows.
+    let number: u32 = number.parse().ok().filter(|_| number.len() <= 8)?;
+    let unit = match unit {
+        "H" => Duration::from_secs(3_600),
+        "M" => Duration::from_secs(60),
+        "S" => Duration::from_secs(1),
+        "m" => Duration::from_millis(1),
+        "u" => Duration::from_micros(1),
+        "n" => Duration::from_nanos(1),
+        _ => return None,
     };
-    let (method, seed) = (&plan.method, plan.seed);
-    let found = evaluate_watched(&sampler, &actions, method, seed, None, progress);
-    Ok(response(&found))
+    Some(unit.saturating_mul(number))
 }
 
 pub(super) fn estimate_to_proto(estimate: &Estimate) -> v1::ActionEstimate {
@@ -303,11 +423,102 @@ fn refused(name: &'static str, words: impl Into<String>) -> Status {
     field("ANALYSIS_REFUSED", &FieldProblem::new(name, words))
 }
 
+/// The refusal of an analysis that could not end by the deadline of its client.
+fn too_late(wait: Duration) -> Refused {
+    Refused {
+        reason: "TOO_MANY_ANALYSES",
+        what: "too many analyses run or wait: this one would end after its deadline; choose a later deadline or a shorter time_ms, or try again later",
+        limit: MAX_ANALYSES as u64,
+        retry_after: wait,
+    }
+}
+
 fn too_many(limit: usize) -> Refused {
     Refused {
         reason: "TOO_MANY_ANALYSES",
         what: "too many analyses at a time; wait until one ends",
         limit: limit as u64,
         retry_after: MAX_ANALYSIS_TIME,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use chefshat_agents::BuiltInAgent;
+    use chefshat_engine::{Game, RuleSetSpec};
+
+    use super::*;
+
+    fn request(timeout: &'static str) -> Request<()> {
+        let mut request = Request::new(());
+        let timeout = timeout.parse().expect("a value");
+        request.metadata_mut().insert("grpc-timeout", timeout);
+        request
+    }
+
+    #[test]
+    fn the_timeout_of_a_client_is_read_in_every_unit() {
+        for (text, time) in [
+            ("2H", Some(Duration::from_secs(7_200))),
+            ("3M", Some(Duration::from_secs(180))),
+            ("4S", Some(Duration::from_secs(4))),
+            ("1500m", Some(Duration::from_millis(1_500))),
+            ("99999999u", Some(Duration::from_micros(99_999_999))),
+            ("7n", Some(Duration::from_nanos(7))),
+            ("999999999S", None),
+            ("-1S", None),
+            ("S", None),
+            ("5", None),
+            ("5x", None),
+        ] {
+            assert_eq!(client_timeout(&request(text)), time, "{text}");
+        }
+        assert_eq!(client_timeout(&Request::new(())), None);
+    }
+
+    /// What the seat of the first decision of a game knows.
+    fn knowledge() -> Knowledge {
+        let rules = RuleSetSpec::default().validate().expect("the standard");
+        let mut events = Vec::new();
+        let mut game = Game::new(rules, Seed([3; 32]), |event| events.push(event));
+        let mut agent = BuiltInAgent::new(AgentKind::Greedy, [1; 32]);
+        // Some cards are laid, so that there are not too many possible deals.
+        for _ in 0..30 {
+            let decision = game.decision().expect("the first Shift goes on");
+            let observation = game.observe(Viewer::Seat(decision.seat));
+            let action = agent.decide(&observation, &game.legal_actions());
+            game.apply(action, |event| events.push(event))
+                .expect("legal");
+        }
+        let seat = game.decision().expect("the first Shift goes on").seat;
+        let history = ShiftHistory::of(seat, &events);
+        Knowledge::new(rules, &game.observe(Viewer::Seat(seat)), &history).expect("known")
+    }
+
+    fn analysis(due: Option<Instant>) -> Analysis {
+        let message = v1::EvaluateRequest {
+            rollouts: 1_000_000,
+            time_ms: 10_000,
+            ..v1::EvaluateRequest::default()
+        };
+        Analysis::new(knowledge(), plan(&message).expect("allowed"), due)
+    }
+
+    #[test]
+    fn an_analysis_pauses_after_its_slice_and_ends_with_what_it_has_at_its_deadline() {
+        let advance = |analysis: &mut Analysis, stopped: bool| {
+            let advanced = analysis.advance(OwnTime::start(), &|| stopped, |_| {});
+            advanced.expect("possible deals")
+        };
+        let mut analysis = analysis(None);
+        assert!(advance(&mut analysis, false).is_none(), "much is left");
+        assert!(analysis.used >= SLICE);
+        analysis.due = Some(Instant::now());
+        // The hands and each action take a few deals even then.
+        let answer = std::iter::from_fn(|| Some(advance(&mut analysis, false))).take(100);
+        let answer = answer.flatten().next().expect("an answer");
+        assert!(answer.rollouts < 1_000_000);
+        assert!(answer.actions.iter().all(|action| action.rollouts >= 4));
+        assert_eq!(answer.hands.len(), 4);
     }
 }

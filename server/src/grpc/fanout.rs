@@ -20,6 +20,7 @@ use tonic::body::Body;
 use super::status::room_gone;
 use crate::limits::{CallLimits, Key};
 use crate::proxies::FORWARDED_FOR;
+use crate::tasks::{LongTask, named};
 use log::{Reader, SharedStream};
 use message::PREFIX;
 
@@ -113,7 +114,8 @@ impl Fanout {
         opening.0.answered(parts.status, parts.headers);
         let receiving = Arc::clone(&opening.0);
         tell(receiving.others());
-        tokio::spawn(async move { receiving.receive(body).await });
+        let receiving = async move { receiving.receive(body).await };
+        tokio::spawn(named(LongTask::SharedStream, receiving));
         let answer = response(own).await;
         Ok(answer.unwrap_or_else(|| room_gone().into_http()))
     }

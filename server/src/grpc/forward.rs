@@ -30,12 +30,12 @@ use tracing::debug;
 use super::fanout::{self, Fanout};
 use super::limits::Charged;
 use super::status::{is_elsewhere, is_not_owner, owner_unreachable};
-use crate::access::{Call, SECRET_HEADER};
+use crate::access::{Call, MAX_STUDY_MESSAGE_BYTES, SECRET_HEADER};
 use crate::cluster::{Directory, Peer, Peers};
-use crate::config::MAX_STUDY_MESSAGE_BYTES;
 use crate::connections::peer_address;
 use crate::limits::{CallLimits, Key};
 use crate::proxies::FORWARDED_FOR;
+use crate::tasks::{LongTask, named};
 use crate::wire::peer::ShareRequest;
 use crate::wire::peer::peer_service_client::PeerServiceClient;
 
@@ -228,7 +228,8 @@ impl Gateway {
                     let channel = self.peers().channel(&elsewhere.peer);
                     let room_id = key.room.clone();
                     let tell = |others| {
-                        tokio::spawn(tell_sharing(channel, room_id, others));
+                        let telling = tell_sharing(channel, room_id, others);
+                        tokio::spawn(named(LongTask::Sharing, telling));
                     };
                     (self.layer.fanout.answer(key, caller, present, sent, tell)).await
                 }

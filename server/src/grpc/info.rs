@@ -1,6 +1,6 @@
 //! `ServerService`: the server's version, limits, action tables and clocks.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use chefshat_agents::{AgentKind, NamedAgent};
@@ -17,14 +17,13 @@ use super::forward::Gateway;
 use super::lists;
 use super::reach::Reach;
 use super::status::{field, room_unknown};
-use crate::access::Caller;
+use crate::access::{Caller, MAX_MESSAGE_BYTES, MAX_VECTOR_MESSAGE_BYTES};
 use crate::clock::since_epoch;
 use crate::config::{
     MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_TIME, MAX_FOLLOWERS, MAX_HOSTED_SHIFTS,
-    MAX_MESSAGE_BYTES, MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH, MAX_STREAMS_PER_CONNECTION,
-    MAX_TOURNAMENTS, MAX_VECTOR_BATCH_BYTES, MAX_VECTOR_MESSAGE_BYTES,
-    MAX_VECTOR_NETWORK_MULTIPLICATIONS, MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEATS_IN_ALL,
-    MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS, SERVER_VERSION, ServerConfig,
+    MAX_SEATS_PER_STREAM, MAX_SEATS_PER_WATCH, MAX_STREAMS_PER_CONNECTION, MAX_TOURNAMENTS,
+    MAX_VECTOR_BATCH_BYTES, MAX_VECTOR_NETWORK_MULTIPLICATIONS, MAX_VECTOR_RECORDED_GAMES,
+    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS, SERVER_VERSION, ServerConfig,
 };
 use crate::convert;
 use crate::limits::CallLimits;
@@ -37,7 +36,7 @@ const STANDARD_FACES: u32 = 11;
 #[derive(Debug, Clone)]
 pub struct Info {
     reach: Reach,
-    limits: HashMap<String, u64>,
+    limits: BTreeMap<String, u64>,
 }
 
 impl Info {

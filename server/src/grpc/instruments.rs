@@ -11,13 +11,14 @@ use chefshat_room::ids::Token;
 use chefshat_room::journal::Marked;
 use chefshat_room::{MARKERS_AT_ONCE, MAX_MARKERS, MarkError};
 use futures::{Stream, stream};
+use prost::Message as _;
 use tokio::time::Instant;
 use tonic::{Code, Request, Response, Status};
 
+use super::limits::charged;
 use super::reach::Reach;
 use super::status::{
-    Refusal, disk_nearly_full, field, internal, owner_token_wrong, room_gone, status,
-    ticket_unknown,
+    Refusal, field, internal, owner_token_wrong, room_gone, status, ticket_unknown,
 };
 use crate::access::Caller;
 use crate::room::{Handle, MarkRequest, MarkerFollower};
@@ -108,6 +109,7 @@ impl InstrumentService for Instruments {
     ) -> Result<Response<v1::AddMarkerResponse>, Status> {
         let arrived = Instant::now();
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let request = request.into_inner();
         let (room, secret) = self
             .find(caller, &request.room_id, &request.owner_token)
@@ -121,6 +123,8 @@ impl InstrumentService for Instruments {
             label: request.label,
             moment,
         };
+        let rooms = self.reach.rooms();
+        (rooms.may_store(key, marked.label.len())).map_err(Refusal::from)?;
         let marker = room.mark(MarkRequest { secret, marked }).await;
         let marker = marker.map_err(Refusal::from)?;
         let marker = marker.ok_or_else(owner_token_wrong)?.map_err(refused)?;
@@ -134,6 +138,7 @@ impl InstrumentService for Instruments {
         request: Request<v1::AddSamplesRequest>,
     ) -> Result<Response<v1::AddSamplesResponse>, Status> {
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let request = request.into_inner();
         let (room, seat, has_started) = match &request.owned_seat {
             Some(owned) => self.owned_seat(&caller, owned).await?,
@@ -149,10 +154,8 @@ impl InstrumentService for Instruments {
                 [],
             ));
         }
-        if !rooms.store().has_space() {
-            return Err(disk_nearly_full("the disk of the server is nearly full"));
-        }
         let chunk = request.chunk.unwrap_or_default();
+        (rooms.may_store(key, chunk.encoded_len())).map_err(Refusal::from)?;
         let now = room.clock().now();
         let adding = Arc::clone(rooms.samples()).add(header.game_id, seat, chunk, now);
         let recorded = adding.await.map_err(samples_refused)?;
@@ -201,6 +204,7 @@ fn samples_refused(error: SampleError) -> Status {
     match error {
         SampleError::Malformed(problem) => field("SAMPLES_REFUSED", &problem),
         SampleError::Off => status(Code::FailedPrecondition, "SAMPLES_OFF", message, []),
+        SampleError::Deleted => ticket_unknown(),
         SampleError::TooManyStreams | SampleError::TooMany => {
             status(Code::ResourceExhausted, "TOO_MANY_SAMPLES", message, [])
         }

@@ -148,7 +148,8 @@ where
         let caller: Option<&Caller> = request.extensions().get();
         let token = caller.and_then(|caller| caller.token);
         let number = (client.as_ref()).map_or(0, |client| client.called(token));
-        let is_stream = Call::find(request.uri().path()).is_some_and(|call| call.streams);
+        let call = Call::find(request.uri().path());
+        let (is_stream, cost) = call.map_or((false, 1), |call| (call.streams, call.charge));
         let mut place = Place {
             limits: Arc::clone(&self.limits),
             key,
@@ -157,7 +158,7 @@ where
             is_stream,
             admitted: None,
         };
-        if let Some(admitted) = self.limits.admit_now(key, is_stream) {
+        if let Some(admitted) = self.limits.admit_now(key, is_stream, cost) {
             place.admit(admitted, &mut request);
             let answering = self.services.call(request);
             return Box::pin(async move { Ok(place.keep(answering.await?)) });
@@ -171,7 +172,7 @@ where
         let mut services = std::mem::replace(&mut self.services, clone);
         let limits = Arc::clone(&self.limits);
         Box::pin(async move {
-            match limits.admit(key, is_stream).await {
+            match limits.admit(key, is_stream, cost).await {
                 Ok(admitted) => {
                     drop(waiting);
                     place.admit(admitted, &mut request);

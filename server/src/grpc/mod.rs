@@ -4,6 +4,7 @@
 mod access;
 mod admin;
 mod analysis;
+mod decoding;
 mod fanout;
 mod follow;
 mod forward;
@@ -31,6 +32,7 @@ mod vector;
 pub use access::AccessLayer;
 pub use admin::AdminCalls;
 pub use analysis::Analyses;
+pub use decoding::DecodingLayer;
 pub use forward::{ForwardLayer, FromPeer};
 pub use info::Info;
 pub use instruments::Instruments;

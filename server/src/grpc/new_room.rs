@@ -37,7 +37,7 @@ pub(super) async fn new_room(
     mut request: v1::CreateRoomRequest,
     charged: Key,
 ) -> Result<NewRoom, Status> {
-    let request_id = request_id(&std::mem::take(&mut request.request_id))?;
+    let request_id = request_id(&std::mem::take(&mut request.request_id), caller)?;
     let request_key = request_id.map(|id| RequestKey::new(id, &request.encode_to_vec()));
     let name = convert::checked_name("name", &request.name, 0)
         .map_err(|problem| field("NAME_REFUSED", &problem))?;

@@ -36,6 +36,7 @@ use crate::metrics::StreamKind;
 use crate::outbox::{Outbox, OutboxStream, StreamEnd};
 use crate::room::SeatAction;
 use crate::rooms::Rooms;
+use crate::tasks::{LongTask, named};
 use crate::tournaments::Tournaments;
 use crate::wire::Updates;
 use crate::wire::peer::peer_service_server::PeerService;
@@ -92,15 +93,16 @@ impl Play {
     ) -> Response<Responses> {
         let failure = Arc::new(OnceLock::new());
         let (closing, outbox) = (self.closing.clone(), Arc::clone(&reader.outbox));
-        tokio::spawn(reader.read(requests, Arc::clone(&failure), closing.clone()));
+        let reading = reader.read(requests, Arc::clone(&failure), closing.clone());
+        tokio::spawn(named(LongTask::PlayReader, reading));
         let counted = self.rooms.metrics().stream(StreamKind::Play);
-        tokio::spawn(async move {
+        tokio::spawn(named(LongTask::PlayEnd, async move {
             let _counted = counted;
             tokio::select! {
                 () = closing.cancelled() => outbox.stop_reading(),
                 () = outbox.abandoned() => {}
             }
-        });
+        }));
         Response::new(Responses { updates, failure })
     }
 }
@@ -175,7 +177,7 @@ impl PlayService for Play {
         let mut reader = self.reader(caller, &outbox, false).with_remote(gateway);
         let closing = self.closing.clone();
         let counted = self.rooms.metrics().stream(StreamKind::Watch);
-        tokio::spawn(async move {
+        tokio::spawn(named(LongTask::Watch, async move {
             let _counted = counted;
             for attach in seats {
                 reader.attach(attach).await;
@@ -203,7 +205,7 @@ impl PlayService for Play {
                 }
             }
             reader.leave_all().await;
-        });
+        }));
         Ok(Response::new(Box::pin(with_heartbeats(updates))))
     }
 
@@ -216,6 +218,8 @@ impl PlayService for Play {
         let executing: Option<Executing> = request.extensions().get().cloned();
         let request = request.into_inner();
         let token = Token::parse(&request.ticket).ok_or_else(ticket_unknown)?;
+        // Before the room is looked for: what is wrong with a command does not depend on the ticket.
+        let command = Command::of(request.command)?;
         if let Some(executing) = executing
             .as_ref()
             .filter(|_| !self.reach.has_in_memory(token.room))
@@ -225,20 +229,14 @@ impl PlayService for Play {
         }
         let room = (self.reach).room_of_ticket(&caller, token.room, ticket_unknown);
         let room = room.await?;
-        let action = match request.command {
-            Some(act_request::Command::Answer(answer)) => {
-                SeatAction::Answer(convert::answer_from_proto(answer))
-            }
-            Some(act_request::Command::Express(expression)) => express_action(&expression)
-                .map_err(|problem| field("EXPRESSION_REFUSED", &problem))?,
-            Some(act_request::Command::Resume(_)) => SeatAction::Resume,
-            Some(act_request::Command::Hint(ask)) => {
+        let action = match command {
+            Command::Perform(action) => action,
+            Command::Hint(decision, request_id) => {
                 // The answers of others do not wait for its search.
                 if let Some(executing) = executing {
                     executing.give_back();
                 }
-                let request_id = request_id(&ask.request_id)?;
-                let hint = room.hint(token.secret, ask.decision_id, request_id).await;
+                let hint = room.hint(token.secret, decision, request_id).await;
                 let hint = hint
                     .map_err(Refusal::from)?
                     .ok_or_else(ticket_unknown)?
@@ -248,12 +246,6 @@ impl PlayService for Play {
                     hint: Some(hint_to_proto(&hint)),
                 }));
             }
-            None => {
-                return Err(field(
-                    "COMMAND_MISSING",
-                    &FieldProblem::new("command", "set a command"),
-                ));
-            }
         };
         let result = room
             .act(token.secret, action, arrived)
@@ -262,6 +254,37 @@ impl PlayService for Play {
             .ok_or_else(ticket_unknown)?
             .map_err(Refusal::from)?;
         Ok(Response::new(v1::ActResponse { result, hint: None }))
+    }
+}
+
+/// A command without a stream that is well formed.
+enum Command {
+    Perform(SeatAction),
+    /// A hint about a decision, with the id of the request.
+    Hint(u64, Option<[u8; 32]>),
+}
+
+impl Command {
+    fn of(command: Option<act_request::Command>) -> Result<Self, Status> {
+        Ok(match command {
+            Some(act_request::Command::Answer(answer)) => {
+                Self::Perform(SeatAction::Answer(convert::answer_from_proto(answer)))
+            }
+            Some(act_request::Command::Express(expression)) => {
+                let action = express_action(&expression);
+                Self::Perform(action.map_err(|problem| field("EXPRESSION_REFUSED", &problem))?)
+            }
+            Some(act_request::Command::Resume(_)) => Self::Perform(SeatAction::Resume),
+            Some(act_request::Command::Hint(ask)) => {
+                // A hint belongs to its ticket, not to who shows that.
+                let request_id = request_id(&ask.request_id, &Caller::default())?;
+                Self::Hint(ask.decision_id, request_id)
+            }
+            None => {
+                let problem = FieldProblem::new("command", "set a command");
+                return Err(field("COMMAND_MISSING", &problem));
+            }
+        })
     }
 }
 
@@ -332,13 +355,14 @@ mod tests {
             command: Some(command),
         });
         let limits = CallLimits::new(Shares::default());
-        let admitted = limits.admit_now(Key::Local, false).expect("the first");
+        let admitted = limits.admit_now(Key::Local, false, 1).expect("the first");
         let executing = admitted.executing().expect("its place").clone();
         request.extensions_mut().insert(executing);
-        let _others: Vec<_> = std::iter::from_fn(|| limits.admit_now(Key::Local, false)).collect();
+        let _others: Vec<_> =
+            std::iter::from_fn(|| limits.admit_now(Key::Local, false, 1)).collect();
         // The room runs on the same thread, and does not until this test waits.
         assert!(futures::poll!(play.act(request)).is_pending());
-        limits.admit_now(Key::Local, false).is_some()
+        limits.admit_now(Key::Local, false, 1).is_some()
     }
 
     #[tokio::test]

@@ -22,10 +22,11 @@ mod tests {
     use tonic::Code;
 
     use crate::grpc::pool::*;
+    use crate::threads::Priority;
 
     #[tokio::test]
     async fn a_panic_ends_only_its_own_work() {
-        let pool = Threads::new("test", 1, 0).unwrap();
+        let pool = Threads::new("test", 1, Priority::Batches).unwrap();
         let failed = on_pool(&pool, || -> u32 { panic!("on purpose") }).await;
         assert_eq!(failed.unwrap_err().code(), Code::Internal);
         assert_eq!(on_pool(&pool, || 7).await.unwrap(), 7);

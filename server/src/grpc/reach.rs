@@ -19,7 +19,7 @@ use crate::cluster::{Elsewhere, FoundBy, Location};
 use crate::limits::Key;
 use crate::room::Handle;
 use crate::rooms::Rooms;
-use crate::store::StoredGame;
+use crate::store::{StoreError, StoredGame};
 use crate::tournaments::{TournamentHandle, Tournaments};
 use chefshat_room::ids::{Id, RequestKey, Token};
 use chefshat_room::journal::{Change, Entry, GameHeader};
@@ -281,6 +281,17 @@ impl Reach {
                 || standing_in_tournament(caller, handle) > Standing::Stranger)
     }
 
+    /// Whether a caller may be one who sees a recorded game, by its summary alone. If not, the game is
+    /// not read at all, so that the time of the answer does not show that it exists.
+    pub(super) fn may_see_record(&self, caller: &Caller, summary: &v1::RecordSummary) -> bool {
+        let is_private = summary.visibility() == v1::Visibility::Private;
+        let ids = [&summary.room_id, &summary.tournament_id, &summary.study_id];
+        let mut ids = ids.into_iter().filter_map(|id| Id::parse(id));
+        let by_token = caller.standing() > Standing::Stranger
+            && reaches_record(caller, &summary.room_id, &summary.tournament_id);
+        !is_private || summary.added || by_token || ids.any(|id| caller.secrets.mention(id))
+    }
+
     /// How much of a recorded game a caller sees. `unknown` answers for a game that it does not see.
     pub(super) fn recorded(
         &self,
@@ -349,7 +360,14 @@ impl Reach {
         let Some(game) = Id::parse(&summary.game_id) else {
             return Ok(false);
         };
-        let stored = (self.rooms.store().finished(game).await).map_err(read_failed)?;
+        let stored = match self.rooms.store().finished(game).await {
+            // One that cannot be read ends no list of others.
+            Err(error @ StoreError::Unreadable(_)) => {
+                read_failed(error);
+                return Ok(false);
+            }
+            stored => stored.map_err(read_failed)?,
+        };
         Ok(match stored {
             Some(StoredGame::Hosted(header, entries, _)) => {
                 self.standing_in_game(caller, &header, &entries) >= least_to_read(&header)
@@ -404,11 +422,7 @@ impl Reach {
 
     /// Whether a caller shows the owner token of a room, or of its tournament or study.
     pub(super) fn is_owner(&self, caller: &Caller, header: &GameHeader) -> bool {
-        let caller = Caller {
-            secrets: caller.secrets.clone(),
-            ..Caller::default()
-        };
-        self.standing_by_header(&caller, header) == Standing::Owner
+        self.standing_by_header(&caller.by_secrets(), header) == Standing::Owner
     }
 
     /// Whether this is the owner token of a room, or of its tournament or study.
@@ -418,16 +432,11 @@ impl Reach {
 
     /// Whether a caller shows a ticket or the owner token of a room.
     pub(super) async fn takes_part(&self, caller: &Caller, handle: &Handle) -> bool {
-        let caller = &Caller {
-            secrets: caller.secrets.clone(),
-            ..Caller::default()
+        let Some(header) = self.rooms.header(handle.id()) else {
+            return false;
         };
-        match self.rooms.header(handle.id()) {
-            None => false,
-            Some(header) => {
-                self.standing_in_room(caller, handle, &header).await > Standing::Stranger
-            }
-        }
+        let caller = caller.by_secrets();
+        self.standing_in_room(&caller, handle, &header).await > Standing::Stranger
     }
 
     /// What a caller is to a game by its token, and by what is known before the game starts.
@@ -438,35 +447,24 @@ impl Reach {
         };
         let secrets = &caller.secrets;
         let by_room = secrets.standing(header.room_id, &header.owner, header.table.into_iter());
-        let by_tournament = tournament_of(header).map(|id| match self.tournaments.get(id) {
-            Some(tournament) => tournament.standing(secrets),
-            // The server keeps the games of a tournament longer than the tournament.
-            None => {
-                let owns = |token: &Token| {
-                    let owner = Token::of_tournament_room(header.room_id, &token.hash());
-                    header.owner.is(&owner.hash())
-                };
-                match secrets.of_id(id).any(owns) {
-                    true => Standing::Owner,
-                    false => Standing::Stranger,
-                }
-            }
-        });
-        let owns_study = header.study.as_ref().is_some_and(|game| {
-            let owns = |token: &Token| {
-                let owner = Token::of_tournament_room(header.room_id, &token.hash());
-                header.owner.is(&owner.hash())
-            };
-            secrets.of_id(game.study).any(owns)
-        });
-        let by_study = match owns_study {
+        // The owner token of a tournament or a study stands for that of each of its rooms.
+        let by_owner_of = |id| match secrets.of_id(id).any(|token| {
+            let owner = Token::of_tournament_room(header.room_id, &token.hash());
+            header.owner.is(&owner.hash())
+        }) {
             true => Standing::Owner,
             false => Standing::Stranger,
         };
+        let by_tournament = tournament_of(header).map(|id| match self.tournaments.get(id) {
+            Some(tournament) => tournament.standing(secrets),
+            // The server keeps the games of a tournament longer than the tournament.
+            None => by_owner_of(id),
+        });
+        let by_study = header.study.as_ref().map(|game| by_owner_of(game.study));
         by_token
             .max(by_room)
             .max(by_tournament.unwrap_or(Standing::Stranger))
-            .max(by_study)
+            .max(by_study.unwrap_or(Standing::Stranger))
     }
 }
 

@@ -17,6 +17,7 @@ use crate::config::{MAX_CONCURRENT_RECORDS, MAX_PEER_MESSAGE_BYTES};
 use crate::convert::lines_of;
 use crate::limits::{Held, Key, Places};
 use crate::rooms::Rooms;
+use crate::store::StoreError;
 use chefshat_room::ids::Id;
 
 /// Reason of the error while games with the same deals are being played.
@@ -71,7 +72,18 @@ impl Recorded {
             )
         };
         let game = Id::parse(game_id).ok_or_else(unknown)?;
-        if let Some(room) = self.rooms().room_of(game) {
+        let room = self.rooms().room_of(game);
+        // The same is read of a game that exists and of one that does not, until it is known that the
+        // caller may see it.
+        let summary = match self.rooms().store().summary(game).await {
+            // Nothing says who else may know that it exists.
+            Err(error @ StoreError::Unreadable(_)) if !caller.is_operator() => {
+                status::read_failed(error);
+                None
+            }
+            summary => summary.map_err(status::read_failed)?,
+        };
+        if let Some(room) = room {
             self.reach.room_or(caller, room, unknown).await?;
             return Err(status(
                 Code::FailedPrecondition,
@@ -81,14 +93,24 @@ impl Recorded {
             ));
         }
         let key = Key::of_caller(caller);
-        let place = self.places.take(key).await;
-        let stored = (self.rooms().store().finished(game).await).map_err(status::read_failed)?;
-        let Some(stored) = stored else {
+        let may_see = |it: &v1::RecordSummary| self.reach.may_see_record(caller, it);
+        let Some(summary) = summary.filter(may_see) else {
             // It may be running at another node.
             let found_by = FoundBy::Game(game);
             let running = self.reach.check_not_elsewhere(&found_by, key, || false);
             return running.await.and(Err(unknown()));
         };
+        let place = self.places.take(key).await;
+        let stored = match self.rooms().store().finished(game).await {
+            // Its header, which says who sees it, cannot be read.
+            Err(error @ StoreError::Unreadable(_)) => {
+                let status = status::read_failed(error);
+                let is_listed = self.reach.lists_record(caller, &summary).await?;
+                return Err(if is_listed { status } else { unknown() });
+            }
+            stored => stored.map_err(status::read_failed)?,
+        };
+        let stored = stored.ok_or_else(unknown)?;
         // While its tournament runs, only the node that has it knows its tickets and which records
         // it withholds.
         if let Some(game) = stored.tournament()
@@ -179,8 +201,9 @@ async fn in_background<T: Send + 'static>(
         let _place = place;
         work()
     });
-    working.await.map_err(|error| {
-        tracing::error!(%error, "work on a record failed");
-        status::internal()
-    })
+    // It folds what is stored, so that a failure means that this cannot be read.
+    let failed = |error| StoreError::Unreadable(format!("work on a record failed: {error}"));
+    working
+        .await
+        .map_err(|error| status::read_failed(failed(error)))
 }

@@ -24,14 +24,17 @@ use super::limits::charged;
 use super::pages;
 use super::reach::Sight;
 use super::recorded::{Recorded, SERIES_OPEN};
-use super::status::{disk_nearly_full, field, has_reason, read_failed, status};
+use super::status::{
+    RECORD_UNREADABLE, Refusal, UNREADABLE, disk_nearly_full, field, has_reason, read_failed,
+    status,
+};
 use crate::access::Caller;
 use crate::config::{
-    IMPORT_IDLE_TIMEOUT, IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORTS,
-    MAX_RECORDS_SENT, RECORD_SEND_TIMEOUT, ServerConfig,
+    IMPORT_IDLE_TIMEOUT, IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORT_MEMORY,
+    MAX_IMPORTS, MAX_RECORDS_SENT, RECORD_SEND_TIMEOUT, ServerConfig,
 };
-use crate::limits::{Key, Places};
-use crate::store::Part;
+use crate::limits::{Held, Key, Places, Shares};
+use crate::store::{Listed, Part, StoreError};
 use crate::tournaments::Tournaments;
 use chefshat_room::ids::Id;
 
@@ -52,6 +55,8 @@ pub struct Records {
     /// Limits the records in memory while clients receive them.
     sending: Arc<Places>,
     receiving: Arc<Places>,
+    /// The memory of records that are being imported, in KiB.
+    imported: Arc<Places>,
     allow_import: bool,
     /// Signs records of which parts are left out.
     key: Option<Arc<SigningKey>>,
@@ -66,6 +71,7 @@ impl Records {
             tournaments,
             sending: Places::new(MAX_RECORDS_SENT, shares),
             receiving: Places::new(MAX_IMPORTS, shares),
+            imported: Places::new(MAX_IMPORT_MEMORY / 1024, Shares::ALL),
             allow_import: config.allow_import,
             key: config.signing_key.clone(),
         }
@@ -76,46 +82,104 @@ impl Records {
         filter: &v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> Result<Vec<(u64, v1::RecordSummary)>, Status> {
+    ) -> Result<Vec<Listed>, Status> {
         let store = self.recorded.rooms().store();
         store.list(filter, part, count).await.map_err(read_failed)
     }
 
     /// Sends all records that match a filter, page by page. Reads the next page when the client has
-    /// received the last one.
+    /// received the last one. What cannot be read is named, and the next follows.
     async fn send_all(
         &self,
         caller: &Caller,
+        request: &v1::StreamRecordsRequest,
         filter: &v1::RecordFilter,
-        key: Key,
-        gateway: Option<&Gateway>,
+        (key, gateway): (Key, Option<&Gateway>),
         sender: &mpsc::Sender<Result<v1::StreamRecordsResponse, Status>>,
     ) -> Result<(), Status> {
         let mut after = 0;
+        // The game after which the stream resumes, until it was found.
+        let mut resumes_after = Some(&request.after).filter(|game| !game.is_empty());
         loop {
             let page = self.page(filter, Part::After(after), STREAM_PAGE).await?;
             let Some((last, _)) = page.last() else {
-                return Ok(());
+                return match resumes_after {
+                    Some(game) => Err(cannot_resume(game)),
+                    None => Ok(()),
+                };
             };
             after = *last;
             for (_, summary) in page {
-                if !self.recorded.reach().lists_record(caller, &summary).await? {
+                let (game, is_listed) = match &summary {
+                    Ok(summary) => {
+                        let is_listed = self.recorded.reach().lists_record(caller, summary).await?;
+                        (summary.game_id.clone(), is_listed)
+                    }
+                    Err(unreadable) => (unreadable.game.to_string(), caller.is_operator()),
+                };
+                if !is_listed {
+                    continue;
+                }
+                if let Some(wanted) = resumes_after {
+                    if *wanted == game {
+                        resumes_after = None;
+                    }
                     continue;
                 }
                 let _place = self.sending.take(key).await;
-                let key = self.key.clone();
-                let shown = move |lines, sight| seen(sight, key.as_deref(), lines);
-                let game = &summary.game_id;
-                let lines = match self.recorded.lines(caller, gateway, game, shown).await {
-                    // Withheld while games with the same deals are being played.
-                    Err(status) if has_reason(&status, SERIES_OPEN) => continue,
-                    lines => lines?,
+                let lines = match summary {
+                    Ok(_) => {
+                        let key = self.key.clone();
+                        let shown = move |lines, sight| seen(sight, key.as_deref(), lines);
+                        self.recorded.lines(caller, gateway, &game, shown).await
+                    }
+                    Err(unreadable) => {
+                        Err(read_failed(StoreError::Unreadable(unreadable.to_string())))
+                    }
                 };
-                let response = |lines| v1::StreamRecordsResponse { lines };
-                send(sender, lines, response).await?;
+                let response = |lines| v1::StreamRecordsResponse {
+                    lines,
+                    unreadable: None,
+                };
+                match lines {
+                    Ok(lines) => send(sender, lines, response).await?,
+                    // Withheld while games with the same deals are being played, or deleted since the
+                    // page was read.
+                    Err(status)
+                        if has_reason(&status, SERIES_OPEN)
+                            || has_reason(&status, "GAME_UNKNOWN") => {}
+                    Err(status) if has_reason(&status, RECORD_UNREADABLE) => {
+                        let part = v1::StreamRecordsResponse {
+                            lines: Vec::new(),
+                            unreadable: Some(unreadable(game)),
+                        };
+                        send_part(sender, part).await?;
+                    }
+                    Err(status) => return Err(status),
+                }
             }
         }
     }
+}
+
+/// Names a record that cannot be read. The log says why.
+fn unreadable(game_id: String) -> v1::UnreadableRecord {
+    v1::UnreadableRecord {
+        game_id,
+        problem: UNREADABLE.to_owned(),
+    }
+}
+
+/// A stream cannot resume after a game that is not in its list.
+fn cannot_resume(game: &str) -> Status {
+    status(
+        Code::NotFound,
+        "GAME_UNKNOWN",
+        format!(
+            "the stream has no game {game:?} to resume after; it may have been deleted since: start without it"
+        ),
+        [("field", "after")],
+    )
 }
 
 type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
@@ -153,8 +217,14 @@ impl RecordService for Records {
                     break 'page;
                 }
                 last = Some(number);
-                if reach.lists_record(&caller, &summary).await? {
-                    response.records.push(summary);
+                match summary {
+                    Ok(summary) if reach.lists_record(&caller, &summary).await? => {
+                        response.records.push(summary);
+                    }
+                    Err(bad) if caller.is_operator() => {
+                        response.unreadable.push(unreadable(bad.game.to_string()));
+                    }
+                    Ok(_) | Err(_) => {}
                 }
             }
         }
@@ -192,11 +262,13 @@ impl RecordService for Records {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
         let gateway: Option<Gateway> = request.extensions().get().cloned();
-        let filter = checked(request.into_inner().filter)?;
+        let mut request = request.into_inner();
+        let filter = checked(request.filter.take())?;
         let service = self.clone();
         let (sender, responses) = channel();
         tokio::spawn(async move {
-            let sending = service.send_all(&caller, &filter, key, gateway.as_ref(), &sender);
+            let charged = (key, gateway.as_ref());
+            let sending = service.send_all(&caller, &request, &filter, charged, &sender);
             let sent = sending.await;
             end(&sender, sent).await;
         });
@@ -220,9 +292,9 @@ impl RecordService for Records {
             return Err(disk_nearly_full("the server's disk is nearly full"));
         }
         let _place = self.receiving.take(key).await;
-        let lines = timeout(IMPORT_TIMEOUT, received(request.into_inner()))
-            .await
-            .map_err(|_| import_too_slow())??;
+        let receiving = received(request.into_inner(), &self.imported, key);
+        let receiving = timeout(IMPORT_TIMEOUT, receiving).await;
+        let (lines, _memory) = receiving.map_err(|_| import_too_slow())??;
         let replaying = move || {
             let summary = replay::replay(&lines).map(|replayed| summary(&lines, &replayed));
             (Arc::<[v1::RecordLine]>::from(lines), summary)
@@ -235,6 +307,8 @@ impl RecordService for Records {
             .ok_or_else(|| refused(1, "the game id does not have 32 hexadecimal digits"))?;
         let rooms = self.recorded.rooms();
         let is_ours = rooms.is_running(game) || self.tournaments.has_announced(game);
+        let bytes = lines.iter().map(|line| line.encoded_len()).sum();
+        rooms.may_store(key, bytes).map_err(Refusal::from)?;
         let new = !is_ours
             && (rooms.store().import(game, summary.clone(), lines).await).map_err(import_failed)?;
         if !new {
@@ -259,41 +333,48 @@ fn seen(
     key: Option<&SigningKey>,
     mut lines: Vec<v1::RecordLine>,
 ) -> Vec<v1::RecordLine> {
-    if sight == Sight::Whole {
+    if sight == Sight::Whole || !lines.iter().any(is_withheld_in) {
         return lines;
     }
-    let count = lines.len();
-    let for_the_record_only = |line: &v1::RecordLine| {
-        let line = line.line.as_ref();
-        matches!(line, Some(Line::PrivateExpression(_) | Line::Marker(_)))
-    };
-    lines.retain(|line| !for_the_record_only(line));
-    let mut changed = lines.len() < count;
-    let mut signature = None;
-    for line in &mut lines {
+    let vouches = key.filter(|key| key.has_signed(&lines));
+    lines.retain_mut(|line| {
         match &mut line.line {
-            Some(Line::Decision(decision)) => changed |= decision.annotations.take().is_some(),
+            Some(Line::PrivateExpression(_) | Line::Marker(_)) => return false,
+            Some(Line::Decision(decision)) => decision.annotations = None,
             Some(Line::Event(event)) => {
                 if let Some(Kind::ExpressionShown(shown)) = &mut event.kind
                     && let Some(expression) = &mut shown.expression
                 {
-                    changed |= !std::mem::take(&mut expression.media).is_empty();
+                    expression.media.clear();
                 }
             }
-            Some(Line::Footer(footer)) if changed => signature = footer.signature.take(),
+            Some(Line::Footer(footer)) => {
+                footer.signature = None;
+                footer.parts_withheld = true;
+            }
             _ => {}
         }
-    }
-    let ours = |signed: &v1::RecordSignature| {
-        key.filter(|key| key.public().0.as_slice() == signed.public_key)
-    };
-    if let Some(key) = signature.as_ref().and_then(ours) {
-        let signed = key.sign(&lines);
-        if let Some(Line::Footer(footer)) = lines.last_mut().and_then(|line| line.line.as_mut()) {
-            footer.signature = Some(signed);
-        }
+        true
+    });
+    if let Some(key) = vouches {
+        key.sign_in_place(&mut lines);
     }
     lines
+}
+
+/// Whether players do not see all of a line.
+fn is_withheld_in(line: &v1::RecordLine) -> bool {
+    match &line.line {
+        Some(Line::PrivateExpression(_) | Line::Marker(_)) => true,
+        Some(Line::Decision(decision)) => decision.annotations.is_some(),
+        Some(Line::Event(event)) => match &event.kind {
+            Some(Kind::ExpressionShown(shown)) => {
+                (shown.expression.as_ref()).is_some_and(|it| !it.media.is_empty())
+            }
+            _ => false,
+        },
+        _ => false,
+    }
 }
 
 /// Checks that the enum values of a filter are known.
@@ -317,16 +398,23 @@ fn checked(filter: Option<v1::RecordFilter>) -> Result<v1::RecordFilter, Status>
     }
 }
 
+/// The lines of a record, and the memory that they take.
 async fn received(
     mut requests: Streaming<v1::ImportRecordRequest>,
-) -> Result<Vec<v1::RecordLine>, Status> {
-    let (mut lines, mut bytes) = (Vec::new(), 0);
+    memory: &Arc<Places>,
+    key: Key,
+) -> Result<(Vec<v1::RecordLine>, Vec<Held>), Status> {
+    let (mut parts, mut count, mut bytes, mut taken) = (Vec::new(), 0, 0, Vec::new());
     loop {
         let next = timeout(IMPORT_IDLE_TIMEOUT, requests.message());
         let Some(request) = next.await.map_err(|_| import_too_slow())?? else {
-            return Ok(lines);
+            // At once: a list that grows takes up to three times the memory.
+            let mut lines = Vec::with_capacity(count);
+            lines.extend(parts.into_iter().flatten());
+            return Ok((lines, taken));
         };
-        bytes += request.encoded_len();
+        let encoded = request.encoded_len();
+        bytes += encoded;
         if bytes > MAX_IMPORT_BYTES {
             return Err(status(
                 Code::ResourceExhausted,
@@ -336,10 +424,14 @@ async fn received(
             ));
         }
         // A decoded line can take far more memory than its bytes.
-        for (number, line) in (lines.len() + 1..).zip(&request.lines) {
+        for (number, line) in (count + 1..).zip(&request.lines) {
             check_line(line).map_err(|problem| refused(number, &problem))?;
+            if number == 1 && !matches!(line.line, Some(Line::Header(_))) {
+                return Err(refused(number, "the first line must be the header"));
+            }
         }
-        if lines.len() + request.lines.len() > MAX_IMPORT_LINES {
+        count += request.lines.len();
+        if count > MAX_IMPORT_LINES {
             return Err(status(
                 Code::ResourceExhausted,
                 "RECORD_TOO_LARGE",
@@ -347,8 +439,29 @@ async fn received(
                 [("max_lines", &MAX_IMPORT_LINES.to_string())],
             ));
         }
-        lines.extend(request.lines);
+        let memory_of_part = memory_of(request.lines.len(), encoded);
+        let held = memory.try_take_many(key, memory_of_part.div_ceil(1024));
+        taken.push(held.ok_or_else(too_much_imported)?);
+        parts.push(request.lines);
     }
+}
+
+/// Memory of lines that have this many bytes together: themselves, once more while they are put
+/// together, and what they point to.
+fn memory_of(lines: usize, encoded: usize) -> usize {
+    2 * lines * size_of::<v1::RecordLine>() + 4 * encoded
+}
+
+fn too_much_imported() -> Status {
+    let mib = MAX_IMPORT_MEMORY >> 20;
+    status(
+        Code::ResourceExhausted,
+        "RECORD_TOO_LARGE",
+        format!(
+            "records that are being imported take at most {mib} MiB of memory together; import it alone, or shorter games"
+        ),
+        [("max_memory_bytes", &MAX_IMPORT_MEMORY.to_string())],
+    )
 }
 
 /// Refuses a line that belongs to no record, before more lines are received.
@@ -408,10 +521,14 @@ async fn send<T>(
     let mut lines = lines.into_iter().peekable();
     while lines.peek().is_some() {
         let part = next_part(&mut lines);
-        let sent = sender.send_timeout(Ok(response(part)), RECORD_SEND_TIMEOUT);
-        sent.await.map_err(|_| reader_too_slow())?;
+        send_part(sender, response(part)).await?;
     }
     Ok(())
+}
+
+async fn send_part<T>(sender: &mpsc::Sender<Result<T, Status>>, part: T) -> Result<(), Status> {
+    let sent = sender.send_timeout(Ok(part), RECORD_SEND_TIMEOUT);
+    sent.await.map_err(|_| reader_too_slow())
 }
 
 /// Tells the client why the stream ends. Waits, without anything large in memory, until the status

@@ -298,7 +298,7 @@ impl RoomService for RoomCalls {
             .unwrap_or(ParticipantKind::Agent);
         let name = convert::checked_name("name", &request.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
-        let request_id = request_id(&request.request_id)?;
+        let request_id = request_id(&request.request_id, &caller)?;
         let name_fingerprint = name_fingerprint(&name, &request.name_key)?;
         let joined = handle
             .join(JoinRequest {
@@ -340,6 +340,7 @@ impl RoomService for RoomCalls {
         request: Request<v1::CloseRoomRequest>,
     ) -> Result<Response<v1::CloseRoomResponse>, Status> {
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let request = request.into_inner();
         let caller = caller.showing(&request.owner_token);
         let handle = self.reach().room(&caller, &request.room_id).await?;
@@ -347,7 +348,7 @@ impl RoomService for RoomCalls {
             .filter(|token| token.room == handle.id())
             .ok_or_else(status::owner_token_wrong)?;
         let room = handle
-            .close(token.secret)
+            .close(token.secret, key)
             .await
             .map_err(Refusal::from)?
             .ok_or_else(status::owner_token_wrong)?;

@@ -16,6 +16,7 @@ use crate::limits::Key;
 use crate::metrics::StreamKind;
 use crate::outbox::{Outbox, SPECTATOR_CAPACITY, StreamEnd};
 use crate::room::SpectateRequest;
+use crate::tasks::{LongTask, named};
 use crate::wire::Updates;
 use crate::wire::service::spectator_service_server::SpectatorService;
 
@@ -63,13 +64,13 @@ impl SpectatorService for Spectate {
         let metrics = self.reach.rooms().metrics();
         metrics.add_outbox(&outbox);
         let counted = metrics.stream(StreamKind::Spectate);
-        tokio::spawn(async move {
+        tokio::spawn(named(LongTask::Spectate, async move {
             let _counted = counted;
             tokio::select! {
                 () = outbox.abandoned() => {}
                 () = closing.cancelled() => outbox.end(StreamEnd::Complete),
             }
-        });
+        }));
         Ok(Response::new(Box::pin(with_heartbeats(messages))))
     }
 }

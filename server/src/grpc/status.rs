@@ -11,13 +11,15 @@ use chefshat_vector::RequestError;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
+use crate::access::Caller;
 use crate::cluster::Elsewhere;
 use crate::convert;
-use crate::limits::Refused;
+use crate::limits::{NotStored, Refused};
 use crate::outbox::StreamEnd;
 use crate::room::{ReportRefusal, RoomGone, SpectateError};
 use crate::rooms::CreateError;
 use crate::store::StoreError;
+use chefshat_room::ids::request_id_of;
 use chefshat_room::{ExpressError, HintError, JoinError, LeaveError, ReportError};
 
 /// Domain of every `ErrorInfo`.
@@ -77,7 +79,7 @@ pub fn has_reason(status: &Status, reason: &str) -> bool {
 pub fn refused(request_id: u32, status: &Status) -> v1::Refused {
     let (reason, metadata) = status
         .get_details_error_info()
-        .map(|info| (info.reason, info.metadata))
+        .map(|info| (info.reason, info.metadata.into_iter().collect()))
         .unwrap_or_default();
     v1::Refused {
         request_id,
@@ -101,8 +103,21 @@ pub fn field(reason: &str, problem: &FieldProblem) -> Status {
 /// The status for a client when the store cannot be read.
 pub fn read_failed(error: StoreError) -> Status {
     tracing::error!(%error, "reading a record failed");
-    internal()
+    match error {
+        StoreError::Unreadable(_) => status(
+            Code::DataLoss,
+            RECORD_UNREADABLE,
+            UNREADABLE,
+            [("field", "game_id")],
+        ),
+        _ => internal(),
+    }
 }
+
+/// Reason of the error for a record that cannot be read.
+pub const RECORD_UNREADABLE: &str = "RECORD_UNREADABLE";
+/// Its message.
+pub const UNREADABLE: &str = "the server has this record but cannot read it; its log says why";
 
 /// No tournament has this id.
 pub fn tournament_unknown() -> Status {
@@ -154,18 +169,24 @@ pub fn table_unknown() -> Status {
     )
 }
 
-/// The id of a request, if set.
-pub fn request_id(bytes: &[u8]) -> Result<Option<[u8; 32]>, Status> {
+/// The id of a request, if set, as it counts for its caller: the answer to a repeated request
+/// contains secrets, and another token does not get them. Callers without a token are not told apart
+/// by their addresses, because a client that repeats a request may have another one by then.
+pub fn request_id(bytes: &[u8], caller: &Caller) -> Result<Option<[u8; 32]>, Status> {
     if bytes.is_empty() {
         return Ok(None);
     }
-    bytes.try_into().map(Some).map_err(|_| {
+    let id = bytes.try_into().map_err(|_| {
         let message = format!("{} bytes; give 32 random ones, or none", bytes.len());
         field(
             "REQUEST_ID_REFUSED",
             &FieldProblem::new("request_id", message),
         )
-    })
+    })?;
+    Ok(Some(match &caller.token_hash {
+        Some(token) => request_id_of(id, token),
+        None => *id,
+    }))
 }
 
 /// The fingerprint of a name and its key; empty without a key.
@@ -373,6 +394,15 @@ impl From<ExpressError> for Refusal {
         let refused = convert::express_refused(error);
         let code = Code::from(i32::try_from(refused.code).unwrap_or_default());
         Self(status(code, &refused.reason, refused.message, []))
+    }
+}
+
+impl From<NotStored> for Refusal {
+    fn from(error: NotStored) -> Self {
+        match error {
+            NotStored::DiskNearlyFull => Self(disk_nearly_full(&error.to_string())),
+            NotStored::TooFast(refused) => refused.into(),
+        }
     }
 }
 

@@ -39,6 +39,7 @@ use crate::convert;
 use crate::limits::{COST_OF_TOURNAMENT, CallLimits, Key, Places, Refused};
 use crate::metrics::StreamKind;
 use crate::studies::{CreateProblem, ExportError, ExportedFile, Stopped, Studies, StudyHandle};
+use crate::tasks::{LongTask, named};
 use chefshat_room::ids::{Id, RequestKey};
 
 type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
@@ -117,12 +118,14 @@ impl StudyService for StudyCalls {
         &self,
         request: Request<v1::CreateStudyRequest>,
     ) -> Result<Response<v1::CreateStudyResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
         let request = request.into_inner();
         let settings = request.settings.unwrap_or_default();
         // Levels are a map: their order differs between encodings of the same settings.
         let content = content_of(&settings);
-        let request_key = request_id(&request.request_id)?.map(|id| RequestKey::new(id, &content));
+        let request_key =
+            request_id(&request.request_id, &caller)?.map(|id| RequestKey::new(id, &content));
         self.calls.charge(key, COST_OF_TOURNAMENT);
         if let Some(request) = request_key {
             // Another node may have created it for the same request.
@@ -157,6 +160,8 @@ impl StudyService for StudyCalls {
     ) -> Result<Response<v1::ListStudiesResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let gateway = request.extensions().get::<Gateway>().cloned();
+        // The settings of many studies are large.
+        let _turn = self.calls.list(charged(request.extensions())).await;
         let request = request.into_inner();
         let is_operator = caller.role == Role::Admin && caller.scope.is_none();
         let tokens = &request.owner_tokens;
@@ -263,7 +268,8 @@ impl StudyService for StudyCalls {
             end(&sender, follow(&handle, &studies, &sender).await).await;
         };
         let closing = self.closing.clone();
-        tokio::spawn(closing.run_until_cancelled_owned(following));
+        let following = closing.run_until_cancelled_owned(following);
+        tokio::spawn(named(LongTask::FollowStudy, following));
         Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
     }
 

@@ -41,6 +41,7 @@ use crate::convert;
 use crate::limits::{COST_OF_TOURNAMENT, CallLimits, Key, Places, Refused};
 use crate::metrics::StreamKind;
 use crate::store::StoreError;
+use crate::tasks::{LongTask, named};
 use crate::tournaments::{
     CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem, TournamentHandle,
     Tournaments,
@@ -223,10 +224,11 @@ impl TournamentService for TournamentCalls {
         &self,
         request: Request<v1::CreateTournamentRequest>,
     ) -> Result<Response<v1::CreateTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
         let request = request.into_inner();
         let settings = request.settings.unwrap_or_default();
-        let request_key = request_id(&request.request_id)?
+        let request_key = request_id(&request.request_id, &caller)?
             .map(|id| RequestKey::new(id, &settings.encode_to_vec()));
         let name = convert::checked_name("name", &settings.name, 1)
             .map_err(|problem| field("NAME_REFUSED", &problem))?;
@@ -323,7 +325,7 @@ impl TournamentService for TournamentCalls {
             max_games: usize::try_from(request.max_games.max(1)).unwrap_or(usize::MAX),
             stateless: request.stateless,
             at_table: false,
-            request_id: request_id(&request.request_id)?,
+            request_id: request_id(&request.request_id, &caller)?,
         };
         let (participant, ticket) = handle
             .join(entry)
@@ -357,7 +359,7 @@ impl TournamentService for TournamentCalls {
             max_games: 1,
             stateless: false,
             at_table: true,
-            request_id: request_id(&request.request_id)?,
+            request_id: request_id(&request.request_id, &caller)?,
         };
         let joined = handle.join(entry).await.map_err(stopped)?;
         let (participant, _) = joined.map_err(join_refused)?;
@@ -511,7 +513,8 @@ impl TournamentService for TournamentCalls {
             drop(place);
             end(&sender, followed).await;
         };
-        tokio::spawn(closing.run_until_cancelled_owned(following));
+        let following = closing.run_until_cancelled_owned(following);
+        tokio::spawn(named(LongTask::FollowTournament, following));
         Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
     }
 

@@ -38,7 +38,7 @@ use crate::config::{
 };
 use crate::limits::{Held, Key, Places, Refused};
 use crate::metrics::{Counted, Metrics, StreamKind};
-use crate::threads::{Threads, caught};
+use crate::threads::{Priority, Threads, caught};
 use chefshat_room::ids::random_bytes;
 
 /// Messages queued for a slow client. At most one is a batch; the others are parts of records.
@@ -73,7 +73,7 @@ impl Vectors {
         let shares = recorded.rooms().shares();
         Ok(Self {
             recorded,
-            pool: Arc::new(Threads::new("vector", threads, 0)?),
+            pool: Arc::new(Threads::new("vector", threads, Priority::Batches)?),
             streams: Places::new(MAX_VECTOR_STREAMS, shares),
             seats: Places::new(MAX_VECTOR_SEATS_IN_ALL, shares),
             closing,

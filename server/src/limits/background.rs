@@ -9,14 +9,12 @@ use std::time::Duration;
 use rayon::ThreadPoolBuildError;
 
 use super::{Held, Key, Places, Rate, Shares};
-use crate::threads::Threads;
+use crate::threads::{Priority, Threads};
 
 /// Games of built-in agents that are played at a time; others wait for their first decision.
 pub(super) const MAX_GAMES: usize = 32;
 /// 1/N of the cores play them.
 const CORES: usize = 4;
-/// How much the threads give way to others: as much as the system allows.
-const NICENESS: i32 = 19;
 /// Longest time for which decisions may be made faster than the rate.
 pub(super) const BURST: Duration = Duration::from_secs(60);
 
@@ -53,7 +51,7 @@ impl Background {
                 decisions_per_second,
                 decisions_per_second.saturating_mul(BURST.as_secs()),
             )),
-            threads: Threads::new("background", threads, NICENESS)?,
+            threads: Threads::new("background", threads, Priority::Background)?,
         })
     }
 

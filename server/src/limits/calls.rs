@@ -4,7 +4,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use super::{Held, Key, Places, Rate, Refused, Shares};
+use super::places::{MAX_WAIT, within};
+use super::{Decoding, Held, Key, Places, Rate, Refused, Shares};
 
 /// Most streams of all callers, except those that have limits of their own.
 pub(super) const MAX_STREAMS: usize = 20_000;
@@ -16,7 +17,7 @@ pub(super) const MAX_EXECUTED: usize = 64;
 pub(super) const MAX_HISTORY: usize = 64 * 1024 * 1024;
 /// Bytes that such a stream takes at a time.
 pub const HISTORY_STEP: usize = 16 * 1024;
-/// Most lists of rooms that are made at a time: each asks many rooms.
+/// Most lists of rooms and of studies that are made at a time: each asks many rooms.
 pub(super) const MAX_LISTS: usize = 4;
 /// Most calls of all callers that wait for something.
 pub(super) const MAX_WAITING: usize = 16_384;
@@ -26,16 +27,14 @@ pub(super) const CALLS_PER_SECOND: u64 = 2_000;
 pub(super) const CALLS_AT_ONCE: u64 = 20_000;
 /// Bytes of an answer that cost as much as one call.
 pub const BYTES_PER_CALL: u64 = 512;
-/// Calls that opening a stream counts as.
-pub(super) const COST_OF_STREAM: u64 = 5;
+/// Bytes of a decoded message that cost as much as one call.
+pub const DECODED_BYTES_PER_CALL: u64 = 4 * 1024;
 /// Calls that creating a room counts as: it is written to the disk, with its game and record.
 pub const COST_OF_ROOM: u64 = 20;
 /// The same if the server plays all seats.
 pub const COST_OF_BUILT_IN_GAME: u64 = 100;
 /// Calls that creating a tournament counts as: its games cost far more than the request.
 pub const COST_OF_TOURNAMENT: u64 = 100;
-/// Longest time that a call waits until its caller may make another one.
-pub(super) const MAX_WAIT: Duration = Duration::from_secs(5);
 /// How long a refusal takes: a caller that ignores it and calls again waits each time.
 const REFUSAL_DELAY: Duration = Duration::from_secs(1);
 /// Wrong join codes of one caller in a second, and at once.
@@ -55,6 +54,7 @@ pub struct CallLimits {
     lists: Arc<Places>,
     histories: Arc<Places>,
     waiting: Arc<Places>,
+    decoding: Decoding,
     calls: Rate,
     wrong_codes: Rate,
     all_wrong_codes: Rate,
@@ -115,6 +115,7 @@ impl CallLimits {
             lists: Places::new(MAX_LISTS, shares),
             histories: Places::new(MAX_HISTORY / HISTORY_STEP, shares),
             waiting: Places::new(MAX_WAITING, shares),
+            decoding: Decoding::new(shares),
             calls: Rate::new(CALLS_PER_SECOND, CALLS_AT_ONCE),
             wrong_codes: Rate::new(WRONG_CODES_PER_SECOND, WRONG_CODES_AT_ONCE),
             all_wrong_codes: Rate::new(ALL_WRONG_CODES_PER_SECOND, ALL_WRONG_CODES_AT_ONCE),
@@ -131,8 +132,13 @@ impl CallLimits {
         ]
     }
 
-    /// Admits a call, or a stream, at once, if its caller has made few.
-    pub fn admit_now(&self, key: Key, is_stream: bool) -> Option<Admitted> {
+    /// The memory for messages that are received and decoded.
+    pub fn decoding(&self) -> &Decoding {
+        &self.decoding
+    }
+
+    /// Admits a call that counts as `cost` calls, or a stream, at once, if its caller has made few.
+    pub fn admit_now(&self, key: Key, is_stream: bool, cost: u64) -> Option<Admitted> {
         if !self.calls.wait(key).is_zero() {
             return None;
         }
@@ -144,18 +150,19 @@ impl CallLimits {
             true => None,
             false => Some(Executing::new(self.executed.try_take(key)?)),
         };
-        self.calls.charge(key, cost(is_stream));
+        self.calls.charge(key, cost);
         Some(Admitted {
             executing,
             _kept: kept,
         })
     }
 
-    /// Admits a call, or a stream, as soon as its caller may make another one.
+    /// Admits a call that counts as `cost` calls, or a stream, as soon as its caller may make another
+    /// one.
     ///
     /// # Errors
     /// That would take too long.
-    pub async fn admit(&self, key: Key, is_stream: bool) -> Result<Admitted, Refused> {
+    pub async fn admit(&self, key: Key, is_stream: bool, cost: u64) -> Result<Admitted, Refused> {
         let wait = self.calls.wait(key);
         if wait > MAX_WAIT {
             return Err(Refused {
@@ -165,7 +172,7 @@ impl CallLimits {
                 retry_after: wait,
             });
         }
-        self.calls.charge(key, cost(is_stream));
+        self.calls.charge(key, cost);
         tokio::time::sleep(wait).await;
         let kept = match is_stream {
             true => self.streams.try_take(key).ok_or(Refused {
@@ -199,7 +206,7 @@ impl CallLimits {
         })
     }
 
-    /// Waits for the right to make a list of rooms.
+    /// Waits for the right to make a list of rooms or studies.
     pub async fn list(&self, key: Key) -> Held {
         self.lists.take(key).await
     }
@@ -274,19 +281,6 @@ impl CallLimits {
     }
 }
 
-/// Calls that a call or stream counts as, besides what its answer costs.
-fn cost(is_stream: bool) -> u64 {
-    match is_stream {
-        true => COST_OF_STREAM,
-        false => 1,
-    }
-}
-
-/// Waits at most [`MAX_WAIT`].
-async fn within<T>(waiting: impl Future<Output = T>) -> Option<T> {
-    tokio::time::timeout(MAX_WAIT, waiting).await.ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -303,36 +297,42 @@ mod tests {
     async fn a_caller_with_too_many_calls_waits_and_others_do_not() {
         let limits = limits();
         limits.charge(key(1), CALLS_AT_ONCE + CALLS_PER_SECOND);
-        assert!(limits.admit_now(key(1), false).is_none());
-        assert!(limits.admit_now(key(2), false).is_some());
+        assert!(limits.admit_now(key(1), false, 1).is_none());
+        assert!(limits.admit_now(key(2), false, 1).is_some());
         let begun = tokio::time::Instant::now();
-        limits.admit(key(1), false).await.expect("after a second");
+        limits
+            .admit(key(1), false, 1)
+            .await
+            .expect("after a second");
         assert_eq!(begun.elapsed().as_secs(), 1);
         limits.charge(key(1), 100 * CALLS_PER_SECOND);
         let refused = limits
-            .admit(key(1), false)
+            .admit(key(1), false, 1)
             .await
             .expect_err("it would take long");
         assert_eq!(refused.reason, "TOO_MANY_CALLS");
         assert!(refused.retry_after.as_secs() > 90);
-        assert!(limits.admit(key(1), true).await.is_err());
+        assert!(limits.admit(key(1), true, 1).await.is_err());
     }
 
     #[tokio::test(start_paused = true)]
     async fn unread_answers_hold_back_their_caller_alone() {
         let limits = limits();
         let unread: Vec<_> = std::iter::from_fn(|| {
-            let admitted = limits.admit_now(key(1), false)?;
+            let admitted = limits.admit_now(key(1), false, 1)?;
             admitted.executed();
             Some(admitted)
         })
         .collect();
         assert_eq!(unread.len(), MAX_ANSWERS / 10);
-        let refused = limits.admit(key(1), false).await.expect_err("none is read");
+        let refused = limits
+            .admit(key(1), false, 1)
+            .await
+            .expect_err("none is read");
         assert_eq!(refused.reason, "TOO_MANY_UNREAD_ANSWERS");
-        assert!(limits.admit_now(key(2), false).is_some());
+        assert!(limits.admit_now(key(2), false, 1).is_some());
         drop(unread);
-        assert!(limits.admit_now(key(1), false).is_some());
+        assert!(limits.admit_now(key(1), false, 1).is_some());
     }
 
     #[tokio::test(start_paused = true)]

@@ -68,6 +68,34 @@ impl Key {
     }
 }
 
+/// Who is charged for a computation: a caller, within the share of the address it calls from. Behind
+/// a trusted proxy that is the address of its client.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Payer {
+    /// The address, or the caller if it has none.
+    pub address: Key,
+    /// The caller.
+    pub key: Key,
+}
+
+impl Payer {
+    /// Who is charged for what this caller computes.
+    pub fn of_caller(caller: &Caller) -> Self {
+        let key = Key::of_caller(caller);
+        let address = caller.address.map(|it| Key::of_address(Some(it)));
+        Self {
+            address: address.unwrap_or(key),
+            key,
+        }
+    }
+
+    /// The address and the caller: one of them if they are the same.
+    pub fn keys(self) -> impl Iterator<Item = Key> {
+        let Self { address, key } = self;
+        std::iter::once(address).chain((key != address).then_some(key))
+    }
+}
+
 /// How much of each limit one caller may use, percent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shares {
@@ -92,6 +120,14 @@ impl Shares {
         local: 100,
         remote: 100,
     };
+
+    /// For the tokens of one address together: half, as for the server's machine, or more.
+    pub fn of_addresses(self) -> Self {
+        Self {
+            remote: self.remote.max(Self::default().local),
+            ..self
+        }
+    }
 
     /// How much of `total` a caller may use: at least one.
     pub fn of(self, key: Key, total: usize) -> usize {

@@ -1,9 +1,11 @@
 //! What one caller may take of the server, so that its load neither refuses nor delays others: who
-//! is charged ([`Key`]), places that are shared fairly ([`Places`]), rates ([`Rate`]), and the
-//! games and searches of built-in agents, on threads of their own ([`Background`], [`Searches`]).
+//! is charged ([`Key`]), places that are shared fairly ([`Places`]), rates ([`Rate`]), long
+//! computations with deadlines ([`WorkQueue`]), and the games and searches of built-in agents, on
+//! threads of their own ([`Background`], [`Searches`]).
 
 mod background;
 mod calls;
+mod decoding;
 mod frames;
 mod key;
 mod log_pace;
@@ -12,20 +14,27 @@ mod page;
 mod places;
 mod rate;
 mod searches;
+mod stored;
+mod work_queue;
 
 use std::time::Duration;
 
 pub use background::{Background, Turn};
 pub use calls::{
     Admitted, BYTES_PER_CALL, COST_OF_BUILT_IN_GAME, COST_OF_ROOM, COST_OF_TOURNAMENT, CallLimits,
-    Executing, HISTORY_STEP,
+    DECODED_BYTES_PER_CALL, Executing, HISTORY_STEP,
 };
+#[cfg(test)]
+pub(crate) use decoding::MAX_DECODED;
+pub use decoding::{Decoding, MESSAGE_TIMEOUT, SMALL_DECODED, SMALL_MESSAGE};
 pub use frames::Metered;
-pub use key::{Key, Shares};
+pub use key::{Key, Payer, Shares};
 pub use log_pace::LogPace;
 pub use places::{Held, Places};
 pub use rate::Rate;
 pub use searches::{Hint, Searches};
+pub use stored::{NotStored, StoredBytes};
+pub use work_queue::{Queued, SLICE, Slice, WorkQueue};
 
 /// Why something is refused although the caller may do it: it or others use too much of it now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

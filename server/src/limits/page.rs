@@ -4,16 +4,21 @@ use std::fmt::Display;
 use std::path::Path;
 use std::time::Duration;
 
-use super::{background, calls, frames};
+use super::{background, calls, decoding, frames, places};
+use crate::access::{COST_OF_STREAM, Call, MessageLimits};
 use crate::config::{
     FIRST_MESSAGE_TIMEOUT, IMPORT_IDLE_TIMEOUT, MAX_ANALYSES, MAX_ANALYSIS_TIME,
-    MAX_CONCURRENT_RECORDS, MAX_FOLLOWERS, MAX_IMPORTS, MAX_RECORDS_SENT, MAX_SEARCH_BUDGET,
-    MAX_SEARCH_ROLLOUTS, MAX_STUDIES, MAX_STUDY_STREAMS, MAX_TOURNAMENTS,
-    MAX_VECTOR_NETWORK_MULTIPLICATIONS, MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS,
-    RECORD_SEND_TIMEOUT, ServerConfig, VECTOR_SETUP_TIMEOUT,
+    MAX_CONCURRENT_RECORDS, MAX_FOLLOWERS, MAX_IMPORT_MEMORY, MAX_IMPORTS, MAX_RECORDS_SENT,
+    MAX_SEARCH_BUDGET, MAX_SEARCH_ROLLOUTS, MAX_STUDIES, MAX_STUDY_MEMORY, MAX_STUDY_STREAMS,
+    MAX_TOURNAMENTS, MAX_VECTOR_NETWORK_MULTIPLICATIONS, MAX_VECTOR_SEATS_IN_ALL,
+    MAX_VECTOR_STREAMS, RECORD_SEND_TIMEOUT, ServerConfig, VECTOR_SETUP_TIMEOUT,
 };
 use crate::connections::STALLED_LIMIT;
+use crate::handshakes::{
+    COST_OF_FAILED, HANDSHAKES_AT_ONCE, HANDSHAKES_PER_SECOND, MAX_HANDSHAKES,
+};
 use crate::room::MAX_SPECTATORS;
+use crate::web::{MAX_PREVIEWS, MAX_PREVIEWS_WAITING, PICTURE_PATIENCE};
 use crate::webhooks::MAX_WAITING;
 use chefshat_room::{SEARCH_PATIENCE, SEARCH_PATIENCE_UNATTENDED};
 
@@ -60,6 +65,11 @@ fn of_all() -> String {
             "`--max-connections`",
         ),
         (
+            "TLS handshakes at a time",
+            format!("{}; others wait", number(MAX_HANDSHAKES)),
+            "",
+        ),
+        (
             "rooms that wait or play",
             number(config.max_rooms),
             "`--max-rooms`",
@@ -67,6 +77,11 @@ fn of_all() -> String {
         ("spectators of a room", number(MAX_SPECTATORS), ""),
         ("tournaments that are not over", number(MAX_TOURNAMENTS), ""),
         ("studies", number(MAX_STUDIES), ""),
+        (
+            "memory of the settings of studies",
+            format!("{} MiB; further ones are refused", MAX_STUDY_MEMORY >> 20),
+            "",
+        ),
         (
             "streams (play, watch, follow, read)",
             number(calls::MAX_STREAMS),
@@ -99,7 +114,26 @@ fn of_all() -> String {
             format!(
                 "{}; others wait for {}",
                 number(calls::MAX_EXECUTED),
-                seconds(calls::MAX_WAIT)
+                seconds(places::MAX_WAIT)
+            ),
+            "",
+        ),
+        (
+            "bytes of messages that are received at a time, twice each, without those of up to 4 KiB",
+            format!(
+                "{} MiB; others wait for {}. A message must arrive within {}",
+                decoding::MAX_RECEIVED >> 20,
+                seconds(places::MAX_WAIT),
+                seconds(decoding::MESSAGE_TIMEOUT)
+            ),
+            "",
+        ),
+        (
+            "memory of decoded messages, without those of up to 8 KiB",
+            format!(
+                "{} MiB; others wait for {}",
+                decoding::MAX_DECODED >> 20,
+                seconds(places::MAX_WAIT)
             ),
             "",
         ),
@@ -112,7 +146,7 @@ fn of_all() -> String {
             "",
         ),
         (
-            "lists of rooms that are made at a time",
+            "lists of rooms and of studies that are made at a time",
             number(calls::MAX_LISTS),
             "",
         ),
@@ -131,6 +165,16 @@ fn of_all() -> String {
             "",
         ),
         (
+            "pictures and titles of replays that are made at a time",
+            format!(
+                "{}; {} requests wait for {} at most, further ones are refused",
+                number(MAX_PREVIEWS),
+                number(MAX_PREVIEWS_WAITING),
+                seconds(PICTURE_PATIENCE)
+            ),
+            "",
+        ),
+        (
             "imports at a time",
             format!(
                 "{}; others wait. {} without a part end one",
@@ -140,9 +184,14 @@ fn of_all() -> String {
             "",
         ),
         (
+            "memory of records that are being imported",
+            format!("{} MiB; further ones are refused", MAX_IMPORT_MEMORY >> 20),
+            "",
+        ),
+        (
             "analyses at a time",
             format!(
-                "{}, for {} at most each; those without a thread wait",
+                "{}, for {} at most each; addresses share the threads in turns, and the tokens of an address what it has; one that could not end by its deadline is refused",
                 number(MAX_ANALYSES),
                 seconds(MAX_ANALYSIS_TIME)
             ),
@@ -196,10 +245,11 @@ fn of_each() -> String {
         (
             "calls",
             format!(
-                "{}. An answer costs one more for each {} bytes, a stream {}, a new room {}, one of built-in agents or a tournament {}",
+                "{}. An answer costs one more for each {} bytes, a message for each {} bytes that it takes once it is decoded, a stream {}, a new room {}, one of built-in agents or a tournament {}",
                 rate(calls::CALLS_PER_SECOND, calls::CALLS_AT_ONCE),
                 calls::BYTES_PER_CALL,
-                calls::COST_OF_STREAM,
+                number(calls::DECODED_BYTES_PER_CALL),
+                COST_OF_STREAM,
                 calls::COST_OF_ROOM,
                 calls::COST_OF_BUILT_IN_GAME
             ),
@@ -220,6 +270,14 @@ fn of_each() -> String {
             format!(
                 "{}; it is read more slowly then",
                 rate(frames::PER_SECOND.into(), frames::BURST.into())
+            ),
+        ),
+        (
+            "TLS handshakes",
+            format!(
+                "{}; one that fails or is abandoned counts as {}",
+                rate(HANDSHAKES_PER_SECOND, HANDSHAKES_AT_ONCE),
+                COST_OF_FAILED
             ),
         ),
         (
@@ -245,11 +303,35 @@ fn of_each() -> String {
     )
 }
 
+/// What the messages of each call may be, those of most calls in the first row.
+fn of_messages() -> String {
+    let kib = |bytes: usize| format!("{} KiB", number(bytes >> 10));
+    let row = |name: String, limits: &MessageLimits| {
+        let elements = number(limits.elements);
+        [name, kib(limits.bytes), elements, kib(limits.memory)]
+    };
+    let own = Call::all().filter(|call| call.path.starts_with("/chefshat.v1."));
+    let special = own.filter(|call| call.message != MessageLimits::USUAL);
+    let special = special.map(|call| {
+        let name = call.path.trim_start_matches("/chefshat.v1.");
+        row(format!("`{}`", name.replace('/', ".")), &call.message)
+    });
+    let usual = row("all others".to_owned(), &MessageLimits::USUAL);
+    let rows: Vec<_> = std::iter::once(usual).chain(special).collect();
+    let header = [
+        "messages of a call",
+        "longest",
+        "submessages, texts in lists, entries of maps",
+        "memory once decoded",
+    ];
+    table(header, &rows)
+}
+
 #[test]
 fn the_page_has_the_limits() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/hosting.md");
     let page = std::fs::read_to_string(page).expect("the page");
-    for table in [of_all(), of_each()] {
+    for table in [of_all(), of_each(), of_messages()] {
         assert!(
             page.contains(&format!("\n\n{table}\n")),
             "docs/hosting.md should have:\n{table}"

@@ -3,10 +3,14 @@
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
 
 use tokio::sync::oneshot;
 
 use super::{Key, Shares};
+
+/// Longest time that a call waits until its caller may make another one.
+pub(super) const MAX_WAIT: Duration = Duration::from_secs(5);
 
 /// Places for connections, streams, rooms, calls, or turns of work.
 #[derive(Debug)]
@@ -25,14 +29,16 @@ struct State {
     turns: VecDeque<Key>,
     /// Number of the next one that waits.
     next: u64,
+    /// Whether the next turn needs more places than are free. Then nobody else takes any before.
+    reserved: bool,
 }
 
 #[derive(Debug, Default)]
 struct Caller {
     taken: usize,
-    /// Those that wait for one place each, by number. A flood makes this long: nothing may search
-    /// it.
-    waiting: BTreeMap<u64, oneshot::Sender<Held>>,
+    /// Those that wait, by number, and for how many places. A flood makes this long: nothing may
+    /// search it.
+    waiting: BTreeMap<u64, (usize, oneshot::Sender<Held>)>,
 }
 
 impl State {
@@ -76,6 +82,17 @@ impl Places {
         self.try_take_many(key, 1)
     }
 
+    /// Takes a place for what exists already, also if none is free: nobody else gets one until there
+    /// are fewer.
+    pub fn take_anyway(self: &Arc<Self>, key: Key) -> Held {
+        self.take_many_anyway(key, 1)
+    }
+
+    /// Takes this number of places in the same way.
+    pub fn take_many_anyway(self: &Arc<Self>, key: Key, count: usize) -> Held {
+        self.hold(&mut self.lock(), key, count)
+    }
+
     /// Takes this number of places, or none.
     pub fn try_take_many(self: &Arc<Self>, key: Key, count: usize) -> Option<Held> {
         self.take_now(&mut self.lock(), key, count)
@@ -83,9 +100,15 @@ impl Places {
 
     /// Waits for a place.
     pub async fn take(self: &Arc<Self>, key: Key) -> Held {
+        self.take_many(key, 1).await
+    }
+
+    /// Waits for this number of places, or for as many as the caller may have at all.
+    pub async fn take_many(self: &Arc<Self>, key: Key, count: usize) -> Held {
+        let count = count.min(self.share_of(key));
         let (granted, _waiting) = {
             let mut state = self.lock();
-            if let Some(held) = self.take_now(&mut state, key, 1) {
+            if let Some(held) = self.take_now(&mut state, key, count) {
                 return held;
             }
             let (sender, granted) = oneshot::channel();
@@ -93,7 +116,7 @@ impl Places {
             state.next += 1;
             let caller = state.callers.entry(key).or_default();
             let is_first = caller.waiting.is_empty();
-            caller.waiting.insert(number, sender);
+            caller.waiting.insert(number, (count, sender));
             if is_first {
                 state.turns.push_back(key);
             }
@@ -110,12 +133,13 @@ impl Places {
 
     fn take_now(self: &Arc<Self>, state: &mut State, key: Key, count: usize) -> Option<Held> {
         let waits = (state.callers.get(&key)).is_some_and(|caller| !caller.waiting.is_empty());
-        (!waits && self.has_places(state, key, count)).then(|| self.hold(state, key, count))
+        let free = !waits && !state.reserved && state.taken + count <= self.total;
+        (free && self.has_share(state, key, count)).then(|| self.hold(state, key, count))
     }
 
-    fn has_places(&self, state: &State, key: Key, count: usize) -> bool {
+    fn has_share(&self, state: &State, key: Key, count: usize) -> bool {
         let own = state.callers.get(&key).map_or(0, |caller| caller.taken);
-        state.taken + count <= self.total && own + count <= self.share_of(key)
+        own + count <= self.share_of(key)
     }
 
     fn hold(self: &Arc<Self>, state: &mut State, key: Key, count: usize) -> Held {
@@ -130,15 +154,29 @@ impl Places {
 
     /// Gives a free place to the next one that waits.
     fn grant(self: &Arc<Self>, state: &mut State) -> Option<(oneshot::Sender<Held>, Held)> {
-        let mut turns = state.turns.iter();
-        let turn = turns.position(|key| self.has_places(state, *key, 1))?;
-        let key = state.turns.remove(turn)?;
+        state.reserved = false;
+        let first = |key| state.callers.get(key)?.waiting.values().next();
+        let mut turns = (state.turns.iter().enumerate())
+            .filter_map(|(turn, key)| Some((turn, *key, first(key)?.0)));
+        // Those whose share is used up are passed over.
+        let (turn, key, count) =
+            turns.find(|(_, key, count)| self.has_share(state, *key, *count))?;
+        if state.taken + count > self.total {
+            state.reserved = true;
+            return None;
+        }
+        state.turns.remove(turn);
         let caller = state.callers.get_mut(&key)?;
-        let (_, sender) = caller.waiting.pop_first()?;
+        let (_, (_, sender)) = caller.waiting.pop_first()?;
         if !caller.waiting.is_empty() {
             state.turns.push_back(key);
         }
-        Some((sender, self.hold(state, key, 1)))
+        Some((sender, self.hold(state, key, count)))
+    }
+
+    /// Grants places to those that wait as long as there are enough.
+    fn grant_all(self: &Arc<Self>, state: &mut State) -> Vec<(oneshot::Sender<Held>, Held)> {
+        std::iter::from_fn(|| self.grant(state)).collect()
     }
 
     fn free(self: &Arc<Self>, key: Key, count: usize) {
@@ -147,17 +185,21 @@ impl Places {
         if let Some(caller) = state.callers.get_mut(&key) {
             caller.taken -= count;
         }
-        let granted: Vec<_> = std::iter::from_fn(|| self.grant(&mut state)).collect();
+        let granted = self.grant_all(&mut state);
         state.forget_idle(key);
         drop(state);
-        for (sender, held) in granted {
-            // If it has just given up, the place is freed again here.
-            let _ = sender.send(held);
-        }
+        send(granted);
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
         (self.state.lock()).expect("no code that holds this lock can panic")
+    }
+}
+
+fn send(granted: Vec<(oneshot::Sender<Held>, Held)>) {
+    for (sender, held) in granted {
+        // If it has just given up, the places are freed again here.
+        let _ = sender.send(held);
     }
 }
 
@@ -169,6 +211,17 @@ pub struct Held {
     count: usize,
 }
 
+impl Held {
+    /// Gives back all but `count` places.
+    pub fn keep(&mut self, count: usize) {
+        let freed = self.count.saturating_sub(count);
+        if freed > 0 {
+            self.count -= freed;
+            self.places.free(self.key, freed);
+        }
+    }
+}
+
 impl Drop for Held {
     fn drop(&mut self) {
         self.places.free(self.key, self.count);
@@ -177,7 +230,7 @@ impl Drop for Held {
 
 /// One that waits. When dropped, it waits no longer.
 struct Waiting<'a> {
-    places: &'a Places,
+    places: &'a Arc<Places>,
     key: Key,
     number: u64,
 }
@@ -188,11 +241,24 @@ impl Drop for Waiting<'_> {
         let Some(caller) = state.callers.get_mut(&self.key) else {
             return;
         };
-        if caller.waiting.remove(&self.number).is_some() && caller.waiting.is_empty() {
+        let gave_up = caller.waiting.remove(&self.number).is_some();
+        if gave_up && caller.waiting.is_empty() {
             state.turns.retain(|key| *key != self.key);
         }
+        // Others may have waited behind it.
+        let granted = match gave_up && state.reserved {
+            true => self.places.grant_all(&mut state),
+            false => Vec::new(),
+        };
         state.forget_idle(self.key);
+        drop(state);
+        send(granted);
     }
+}
+
+/// Waits at most [`MAX_WAIT`].
+pub(super) async fn within<T>(waiting: impl Future<Output = T>) -> Option<T> {
+    tokio::time::timeout(MAX_WAIT, waiting).await.ok()
 }
 
 #[cfg(test)]
@@ -252,6 +318,38 @@ mod tests {
         drop(held);
         assert!(places.lock().callers.is_empty());
         assert!(places.take(key(1)).now_or_never().is_some());
+    }
+
+    #[tokio::test]
+    async fn many_places_are_waited_for_and_nobody_overtakes() {
+        let places = Places::new(8, SHARES);
+        let mut first = places.try_take_many(key(1), 4).expect("free");
+        let second = places.try_take_many(key(2), 2).expect("free");
+        let mut third = Box::pin(places.take_many(key(3), 4));
+        assert!((&mut third).now_or_never().is_none(), "two are free");
+        drop(places.try_take(key(4)).expect("nothing was given back yet"));
+        assert!(
+            places.try_take(key(4)).is_none(),
+            "the free ones are reserved"
+        );
+        // Beyond its share, a caller gets what it may have at all.
+        let mut fourth = Box::pin(places.take_many(key(4), 100));
+        assert!((&mut fourth).now_or_never().is_none());
+        drop(second);
+        let third = third.now_or_never().expect("four are free");
+        drop(third);
+        drop((&mut fourth).now_or_never().expect("four are free"));
+        // One that gives up no longer reserves what is free.
+        let second = places.try_take_many(key(2), 2).expect("free");
+        let mut third = Box::pin(places.take_many(key(3), 4));
+        assert!((&mut third).now_or_never().is_none());
+        first.keep(3);
+        assert!(places.try_take(key(4)).is_none());
+        drop(third);
+        drop(places.try_take(key(4)).expect("free"));
+        drop((first, second));
+        assert_eq!(places.taken(), 0);
+        assert!(places.lock().callers.is_empty());
     }
 
     #[tokio::test]

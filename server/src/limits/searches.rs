@@ -19,7 +19,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::{Key, Places, Shares};
 use crate::metrics::{Metrics, SearchOutcome};
-use crate::threads::Threads;
+use crate::threads::{Priority, Threads};
 
 /// When a search ends, even if its rollouts are not done.
 const MAX_SEARCH_TIME: Duration = Duration::from_secs(5);
@@ -27,8 +27,6 @@ const MAX_SEARCH_TIME: Duration = Duration::from_secs(5);
 const GIVEN_UP_AFTER: Duration = Duration::from_secs(7);
 /// 1/N of the cores search.
 const CORES: usize = 2;
-/// How much the threads give way to others: participants and spectators wait for what they find.
-const NICENESS: i32 = 5;
 
 /// Runs the searches.
 #[derive(Debug)]
@@ -50,7 +48,7 @@ impl Searches {
         Ok(Self {
             // A caller alone may use all threads: those of others come next.
             turns: Places::new(threads, Shares::ALL),
-            threads: Threads::new("search", threads, NICENESS)?,
+            threads: Threads::new("search", threads, Priority::Searches)?,
             metrics,
         })
     }

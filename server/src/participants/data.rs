@@ -5,6 +5,8 @@ use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use chefshat_record::signature::SigningKey;
+
 use crate::store::{ForgetError, Store, StoreError};
 
 /// Why a participant's data were not exported or deleted completely.
@@ -40,12 +42,23 @@ pub struct ParticipantData {
     pub(super) store: Arc<dyn Store>,
     /// Where files of records are; `None` if there are none.
     pub(super) data_dir: Option<PathBuf>,
+    /// Signs again the records that it had signed and that change.
+    pub(super) key: Option<Arc<SigningKey>>,
 }
 
 impl ParticipantData {
     /// For this store, and the files of records in this data directory.
     pub fn new(store: Arc<dyn Store>, data_dir: Option<PathBuf>) -> Self {
-        Self { store, data_dir }
+        Self {
+            store,
+            data_dir,
+            key: None,
+        }
+    }
+
+    /// Signs records that change again with this key, if it had signed them.
+    pub fn signing_with(self, key: Option<Arc<SigningKey>>) -> Self {
+        Self { key, ..self }
     }
 }
 

@@ -98,6 +98,7 @@ impl ParticipantData {
         let who = Pseudonym {
             of: of.clone(),
             pseudonym: format!("{PSEUDONYM}{letters}"),
+            key: self.key.clone(),
         };
         let forgotten = self.store.forget(&who).await?;
         let files = match self.data_dir.clone() {
@@ -243,8 +244,9 @@ fn pseudonym_of<'s>(
         .find(|there| there.starts_with(PSEUDONYM))
 }
 
-/// The names of a record, with the fingerprints of their keys: at the seats of its header, and then of those who sat down, in order. A
-/// participant who left before the game has no seat in the header.
+/// The names of a record: at the seats of its header, with the fingerprints of their keys, and then
+/// of those who sat down, in order. A participant who left before the game has no seat in the
+/// header.
 fn names_in(lines: &[v1::RecordLine]) -> Vec<(&str, Option<&str>)> {
     let seats = header_of(lines).map_or(&[][..], |header| header.seats.as_slice());
     let seats = seats

@@ -15,8 +15,8 @@ use tokio::sync::mpsc;
 use super::data::{DataError, ParticipantData, blocking};
 use super::files::{Skipped, records_with};
 use crate::convert;
-use crate::store::Part;
 use crate::store::tournaments::TournamentEntry;
+use crate::store::{Part, StoreError};
 
 /// Page size of the list of records.
 const AT_A_TIME: usize = 100;
@@ -67,8 +67,11 @@ impl ParticipantData {
             sender,
             has_begun: false,
         };
-        let known = self.export_games(who, &mut sheet).await?;
-        let skipped = self.export_files(who, known, &mut sheet).await?;
+        let mut skipped = Skipped::default();
+        let known = self.export_games(who, &mut sheet, &mut skipped).await?;
+        let files = self.export_files(who, known, &mut sheet).await?;
+        skipped.named.extend(files.named);
+        skipped.other.extend(files.other);
         for tournament in self.store.tournaments(usize::MAX).await? {
             let mut lines = Vec::new();
             for entry in &tournament.entries {
@@ -88,15 +91,18 @@ impl ParticipantData {
             }
             sheet.send(lines).await?;
         }
-        self.export_studies(who, &mut sheet).await?;
+        self.export_studies(who, &mut sheet, &mut skipped.named)
+            .await?;
         Ok(skipped)
     }
 
-    /// Sends the games of the store. Returns their ids.
+    /// Sends the games of the store. Returns their ids. One that cannot be read is named, and the
+    /// others follow.
     async fn export_games(
         &self,
         who: &Named,
         sheet: &mut Sheet<'_>,
+        skipped: &mut Skipped,
     ) -> Result<BTreeSet<String>, DataError> {
         let mut known = BTreeSet::new();
         let filter = v1::RecordFilter {
@@ -111,10 +117,25 @@ impl ParticipantData {
             let Some((last, _)) = found.last() else { break };
             after = *last;
             for (_, summary) in found {
+                let summary = match summary {
+                    Ok(summary) => summary,
+                    Err(unreadable) => {
+                        skipped.named.push(unreadable.to_string());
+                        continue;
+                    }
+                };
                 known.insert(summary.game_id.clone());
-                if let Some(game) = Id::parse(&summary.game_id)
-                    && let Some(stored) = self.store.finished(game).await?
-                {
+                let Some(game) = Id::parse(&summary.game_id) else {
+                    continue;
+                };
+                let stored = match self.store.finished(game).await {
+                    Err(StoreError::Unreadable(problem)) => {
+                        skipped.named.push(problem);
+                        continue;
+                    }
+                    stored => stored?,
+                };
+                if let Some(stored) = stored {
                     let seats = seats_of(&summary, who).map(|seat| seat.seat).collect();
                     let who = who.clone();
                     let reading = blocking(move || {

@@ -1,6 +1,6 @@
-//! The data of a participant, known by its name and, if it has one, the fingerprint of its key: exports and deletes what is stored about it.
-//! [`ParticipantData`] does so with a store and a data directory; [`Participants`] also with what a
-//! running server has in memory.
+//! The data of a participant, known by its name and, if it has one, the fingerprint of its key:
+//! exports and deletes what is stored about it. [`ParticipantData`] does so with a store and a data
+//! directory; [`Participants`] also with what a running server has in memory.
 
 mod data;
 mod delete;
@@ -8,6 +8,7 @@ mod export;
 mod files;
 mod stored_studies;
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -22,7 +23,7 @@ pub use files::Skipped;
 use chefshat_room::ids::Id;
 
 use crate::rooms::Rooms;
-use crate::store::ForgetError;
+use crate::store::{ForgetError, StoreError};
 use crate::studies::Studies;
 use crate::tournaments::Tournaments;
 
@@ -51,7 +52,8 @@ impl Participants {
     pub fn new(rooms: Arc<Rooms>, tournaments: Arc<Tournaments>, studies: Arc<Studies>) -> Self {
         let data_dir = rooms.record_writer().data_dir().map(PathBuf::from);
         Self {
-            data: ParticipantData::new(Arc::clone(rooms.store()), data_dir),
+            data: ParticipantData::new(Arc::clone(rooms.store()), data_dir)
+                .signing_with(rooms.signer().key()),
             rooms,
             tournaments,
             studies,
@@ -83,12 +85,7 @@ impl Participants {
         elsewhere: &impl StudiesElsewhere,
     ) -> Result<Deleted, DataError> {
         let _deleting = self.deleting.lock().await;
-        if self.plays(who).await {
-            return Err(ForgetError::GameRunning(who.name.clone()).into());
-        }
-        if self.tournaments.is_playing(who) {
-            return Err(ForgetError::TournamentRunning(who.name.clone()).into());
-        }
+        self.check(who).await?;
         let mut studies = 0;
         for (stored, number) in self.data.in_studies(who).await? {
             let id = stored.header.id;
@@ -102,6 +99,10 @@ impl Participants {
             }
             studies += 1;
         }
+        // Samples of games that are over may still be on their way.
+        let games = self.games_with(who).await;
+        let refusing = self.rooms.samples().refuse(games).await;
+        refusing.map_err(|error| StoreError::Failed(error.to_string()))?;
         // No record that was read before is written after.
         let writing = self.rooms.record_writer().pause().await;
         let mut deleted = self.data.delete_from_games(who).await?;
@@ -109,11 +110,12 @@ impl Participants {
         let renamed = Pseudonym {
             of: who.clone(),
             pseudonym: deleted.pseudonym.clone(),
+            key: None,
         };
         let renamed = self.tournaments.forget(&renamed).await;
         deleted.tournaments = deleted.tournaments.max(renamed);
         deleted.studies = studies;
-        self.hide_rooms(who, &deleted).await;
+        self.hide_rooms(who, &deleted.stored_games).await;
         self.rooms.count_forgotten();
         info!(
             games = deleted.games,
@@ -122,6 +124,31 @@ impl Participants {
             "the data of a participant were deleted"
         );
         Ok(deleted)
+    }
+
+    /// Refuses the deletion of a participant who plays here, when another node of the cluster is to
+    /// delete it: only this one knows its ephemeral games.
+    ///
+    /// # Errors
+    /// A game or tournament with the name is not over.
+    pub async fn check(&self, who: &Named) -> Result<(), DataError> {
+        if self.plays(who).await {
+            return Err(ForgetError::GameRunning(who.name.clone()).into());
+        }
+        if self.tournaments.is_playing(who) {
+            return Err(ForgetError::TournamentRunning(who.name.clone()).into());
+        }
+        Ok(())
+    }
+
+    /// Removes a participant from the memory of this node, after another one has put the pseudonym
+    /// into the database.
+    pub async fn forget_here(&self, who: &Pseudonym) {
+        let _deleting = self.deleting.lock().await;
+        self.tournaments.forget(who).await;
+        self.hide_rooms(&who.of, &BTreeSet::new()).await;
+        self.rooms.count_forgotten();
+        info!("a participant that another node deleted is removed from memory");
     }
 
     /// Whether the participant has a seat in a room that is not over, other than those of studies.
@@ -139,11 +166,25 @@ impl Participants {
         false
     }
 
+    /// The games that are over and whose rooms show the participant.
+    async fn games_with(&self, who: &Named) -> Vec<Id> {
+        let mut games = Vec::new();
+        for handle in self.rooms.all(true) {
+            if let Some(header) = self.rooms.header(handle.id())
+                && let Ok(room) = handle.describe().await
+                && has_seat(&room, who)
+            {
+                games.push(header.game_id);
+            }
+        }
+        games
+    }
+
     /// Removes the rooms that are over and show the participant.
-    async fn hide_rooms(&self, who: &Named, deleted: &Deleted) {
+    async fn hide_rooms(&self, who: &Named, changed: &BTreeSet<Id>) {
         for handle in self.rooms.all(true) {
             let header = self.rooms.header(handle.id());
-            let is_changed = header.is_some_and(|it| deleted.stored_games.contains(&it.game_id));
+            let is_changed = header.is_some_and(|it| changed.contains(&it.game_id));
             let shows = match handle.describe().await {
                 Ok(room) => has_seat(&room, who),
                 Err(_) => false,

@@ -1,6 +1,8 @@
 //! A participant's data in stored studies. Deleting them while no server runs does what its
 //! withdrawal does while one runs.
 
+use std::sync::Arc;
+
 use chefshat_record::pseudonym::Named;
 use chefshat_room::ids::Id;
 use chefshat_study::{Answer, Change, Study, Task};
@@ -49,8 +51,9 @@ impl ParticipantData {
             }
             // A server completes what is interrupted between these two.
             let id = stored.header.id;
-            self.store.rewrite_study(id, changes, number).await?;
-            let samples = Samples::new(self.data_dir.clone());
+            let forgotten = vec![number];
+            self.store.rewrite_study(id, changes, forgotten).await?;
+            let samples = Arc::new(Samples::new(self.data_dir.clone()));
             samples.delete(games.clone()).await?;
             self.store.delete(games).await?;
             count += 1;
@@ -63,8 +66,9 @@ impl ParticipantData {
         &self,
         who: &Named,
         sheet: &mut Sheet<'_>,
+        unreadable: &mut Vec<String>,
     ) -> Result<(), DataError> {
-        for (stored, number) in self.in_studies(who).await? {
+        for (stored, number) in self.in_readable_studies(who, unreadable).await? {
             let id = stored.header.id;
             let Some(study) = folded(&stored) else {
                 continue;
@@ -133,11 +137,31 @@ impl ParticipantData {
         &self,
         who: &Named,
     ) -> Result<Vec<(StoredStudy, u32)>, StoreError> {
+        let mut unreadable = Vec::new();
+        let found = self.in_readable_studies(who, &mut unreadable).await?;
+        // What is to be changed everywhere must be readable everywhere.
+        match unreadable.pop() {
+            Some(problem) => Err(StoreError::Unreadable(problem)),
+            None => Ok(found),
+        }
+    }
+
+    /// As [`Self::in_studies`]. Studies that cannot be read are named.
+    async fn in_readable_studies(
+        &self,
+        who: &Named,
+        unreadable: &mut Vec<String>,
+    ) -> Result<Vec<(StoredStudy, u32)>, StoreError> {
         let mut found = Vec::new();
         for id in self.store.studies().await? {
-            let Some(stored) = self.store.study(id).await? else {
-                continue;
+            let stored = match self.store.study(id).await {
+                Err(StoreError::Unreadable(problem)) => {
+                    unreadable.push(problem);
+                    continue;
+                }
+                stored => stored?,
             };
+            let Some(stored) = stored else { continue };
             let number = stored.changes.iter().find_map(|change| match change {
                 Change::Added { number, pseudonym } if who.is(pseudonym, "") => Some(*number),
                 _ => None,

@@ -1,5 +1,6 @@
 //! The clients that took seats in a room: a policy may admit each to one seat only.
 
+use chefshat_engine::Seat;
 use chefshat_room::{Core, JoinError};
 
 use crate::limits::Key;
@@ -12,6 +13,14 @@ impl Clients {
     /// Adds a client, if it is known, that took a seat.
     pub(super) fn add(&mut self, client: Option<Key>, ticket_secret: [u8; 32]) {
         (self.0).extend(client.map(|client| (client, ticket_secret)));
+    }
+
+    /// The seats that these clients took and did not leave.
+    pub(super) fn seats_of(&self, core: &Core, clients: [Key; 2]) -> Vec<Seat> {
+        (self.0.iter())
+            .filter(|(seated, _)| clients.contains(seated))
+            .filter_map(|(_, secret)| core.seat_of_ticket(secret))
+            .collect()
     }
 
     /// Checks that a client may take a seat, by those it took and did not leave.

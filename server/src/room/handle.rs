@@ -17,6 +17,7 @@ use super::message::{
 use super::resting::Resting;
 use super::task::{self, Room, TaskContext};
 use crate::clock::RoomClock;
+use crate::limits::Key;
 use crate::store::Journal;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::AbortReason;
@@ -73,7 +74,15 @@ pub fn spawn_room(
 ) -> Handle {
     let id = core.header().room_id;
     let fence = CancellationToken::new();
-    let (mailbox, resting) = task::spawn(core, clock, over_since, journal, fence.clone(), context);
+    let room_clock = clock.clone();
+    let (mailbox, resting) = task::spawn(
+        core,
+        room_clock,
+        over_since,
+        journal,
+        fence.clone(),
+        context,
+    );
     Handle {
         id,
         mailbox,
@@ -98,8 +107,8 @@ impl Handle {
     }
 
     /// Its clock, which measures the times of its events.
-    pub fn clock(&self) -> RoomClock {
-        self.clock
+    pub fn clock(&self) -> &RoomClock {
+        &self.clock
     }
 
     /// Whether the room has stopped: it has ended, or its game resumes elsewhere or later.
@@ -316,12 +325,14 @@ impl Handle {
         self.ask(|reply| Message::Leave(secret, reply)).await
     }
 
-    /// Closes the room; `None` if the token is not its owner's.
+    /// Closes the room; `None` if the token is not its owner's. `client`: who asks for it, and has
+    /// broken the game off for the seats that it took.
     ///
     /// # Errors
     /// The room is gone.
-    pub async fn close(&self, secret: [u8; 32]) -> Result<Option<v1::Room>, RoomGone> {
-        self.ask(|reply| Message::Close(secret, reply)).await
+    pub async fn close(&self, secret: [u8; 32], client: Key) -> Result<Option<v1::Room>, RoomGone> {
+        self.ask(|reply| Message::Close(secret, client, reply))
+            .await
     }
 
     /// Ends the room because the server stops, unless its game is over: suspends a durable game,

@@ -7,12 +7,10 @@ use chefshat_agents::AgentKind;
 use chefshat_engine::{Seat, Viewer};
 use chefshat_proto::v1;
 use chefshat_room::Core;
-use chefshat_room::ids::{Id, SecretHash};
-use chefshat_room::journal::{
-    Fill, GameHeader, ParticipantKind, SeatLabels, SeatedParticipant, StudyGame,
-};
+use chefshat_room::ids::SecretHash;
+use chefshat_room::journal::{Fill, GameHeader, ParticipantKind, SeatLabels, SeatedParticipant};
 use chefshat_room::policy::Policy;
-use chefshat_room::testing::{OPEN, Table, ms};
+use chefshat_room::testing::{OPEN, Table, ms, study_game};
 use prost::Message as _;
 
 use super::subscriber::snapshot;
@@ -29,21 +27,7 @@ fn playing(labels: SeatLabels) -> Table {
     let mut table = Table::empty(policy, fills);
     let header = GameHeader {
         display_names: [(2, "Dora".to_owned())].into(),
-        study: Some(Arc::new(StudyGame {
-            study: Id([9; 16]),
-            name: "study".into(),
-            condition: "condition".into(),
-            levels: [("factor".to_owned(), "level".to_owned())].into(),
-            number: 1,
-            participant: "Ana".into(),
-            session: 1,
-            step: 0,
-            practice: false,
-            seed_index: Some(0),
-            seat: Seat::new(0),
-            attempt: 1,
-            labels,
-        })),
+        study: Some(Arc::new(study_game(labels))),
         ..GameHeader::clone(table.core.header())
     };
     table.core = Core::new(Arc::new(header));

@@ -224,7 +224,7 @@ pub(super) enum Message {
     SeatOf([u8; 32], oneshot::Sender<Option<(Seat, bool)>>),
     /// Whether the game has started.
     HasStarted(oneshot::Sender<bool>),
-    Close([u8; 32], oneshot::Sender<Option<v1::Room>>),
+    Close([u8; 32], Key, oneshot::Sender<Option<v1::Room>>),
     Leave(
         [u8; 32],
         oneshot::Sender<Option<Result<v1::Room, LeaveError>>>,

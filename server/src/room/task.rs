@@ -39,15 +39,18 @@ use super::observed::Observed;
 use super::resting::Resting;
 use super::subscriber::{MAX_SPECTATORS, PublicEvents, Subscriber};
 use super::table_view::TableView;
-use crate::clock::RoomClock;
+use crate::clock::{ProcessClock, RoomClock};
 use crate::cluster::{News, NodeLease};
 use crate::config::{HINT_TIME, ROOM_MAILBOX};
-use crate::limits::{Background, Held, Hint, Key, Places, Searches, Shares, Turn};
+use crate::limits::{
+    Background, Held, Hint, Key, NotStored, Places, Searches, Shares, StoredBytes, Turn,
+};
 use crate::metrics::Metrics;
 use crate::outbox::{OnSpace, StreamEnd};
 use crate::record_writer::RecordWriter;
 use crate::signing::Signer;
 use crate::store::{Journal, Store};
+use crate::tasks::{LongTask, named};
 use crate::webhooks::Webhooks;
 
 /// Most inputs that are applied before one commit.
@@ -82,8 +85,26 @@ pub struct TaskContext {
     pub webhooks: Webhooks,
     /// Who created the room.
     pub owner: Key,
+    /// What callers have written to the disk.
+    pub stored: Arc<StoredBytes>,
     /// How much of each limit one caller may use.
     pub shares: Shares,
+    /// The time that the process has run.
+    pub process_clock: Arc<ProcessClock>,
+}
+
+impl TaskContext {
+    /// Charges a caller for something of this size that is stored, but that no game needs.
+    ///
+    /// # Errors
+    /// It must not be stored.
+    pub fn may_store(&self, key: Key, bytes: usize) -> Result<(), NotStored> {
+        match self.store.outlives_server() {
+            true => self.stored.admit(key, bytes, self.store.has_space()),
+            // What ends with the process is bounded as memory.
+            false => Ok(()),
+        }
+    }
 }
 
 /// Maintains the list of rooms.
@@ -139,7 +160,7 @@ pub(super) fn spawn(
         context: context.clone(),
     });
     let running = run(room, Arc::clone(&resting), inbox).instrument(span);
-    context.tracker.spawn(running);
+    context.tracker.spawn(named(LongTask::Room, running));
     (mailbox, resting)
 }
 

@@ -89,6 +89,7 @@ async fn room_of_node(
         .expect("a valid rule set"),
         rules_version: RULES_VERSION,
         server_version: "0.0.1".into(),
+        participant_removed: false,
         policy,
         display_names: BTreeMap::new(),
         wizards: std::collections::BTreeSet::new(),
@@ -111,9 +112,10 @@ async fn room_of_node(
     let background = Background::new(Shares::default(), 1_000_000).expect("threads");
     let background = Arc::new(background);
     let searches = Searches::new(Arc::clone(&metrics)).expect("threads");
+    let process_clock = Arc::default();
     spawn_room(
         Core::new(header),
-        RoomClock::of_age(Duration::ZERO),
+        RoomClock::of_age(Duration::ZERO, &process_clock),
         None,
         change(journal),
         TaskContext {
@@ -134,8 +136,10 @@ async fn room_of_node(
             background,
             searches: Arc::new(searches),
             webhooks: Webhooks::default(),
+            stored: Arc::default(),
             owner: Key::Local,
             shares: Shares::default(),
+            process_clock,
         },
     )
 }
@@ -320,6 +324,82 @@ async fn deadlines_fire_without_any_input() {
     let longest = 4 * (patience.bank + 3 * patience.decision_time);
     assert!(begun.elapsed() <= longest + Duration::from_secs(1));
     assert!(begun.elapsed() >= patience.bank + patience.decision_time);
+}
+
+/// What one seat's stream received: its first update of this kind.
+async fn update<T>(seat: &mut AttachedSeat, wanted: impl Fn(Update) -> Option<T>) -> T {
+    while let Some(updates) = seat.updates.next().await {
+        let written = updates.expect("no error").encode_to_vec();
+        let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
+        let mut updates = response.updates.into_iter().filter_map(|it| it.update);
+        if let Some(found) = updates.find_map(&wanted) {
+            return found;
+        }
+    }
+    panic!("the stream ended")
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_pause_of_the_process_costs_a_seat_no_time() {
+    const SECOND: Duration = Duration::from_secs(1);
+    const MINUTE: Duration = Duration::from_mins(1);
+    let accepted = v1::AnswerStatus::Accepted;
+    let too_late = v1::AnswerStatus::Closed;
+    for (is_watched, pauses, status, longest_ms) in [
+        (true, vec![6 * SECOND], accepted, 600),
+        // Of each pause, at most a tenth of a second counts.
+        (true, vec![6 * SECOND; 3], accepted, 800),
+        (true, vec![10 * MINUTE], accepted, 600),
+        // At most ten minutes of one.
+        (true, vec![10 * MINUTE + 2 * SECOND], too_late, 0),
+        // The process is slow, but runs.
+        (true, vec![SECOND * 9 / 10; 7], too_late, 0),
+        (false, vec![6 * SECOND], too_late, 0),
+    ] {
+        let policy = Policy {
+            decision_time: 2 * SECOND,
+            bank: Duration::ZERO,
+            abort: AbortPolicy::Never,
+            ..Policy::default()
+        };
+        let built_in = Fill::BuiltIn("greedy".parse().expect("an agent"));
+        let mut fills = vec![built_in; 4];
+        fills[0] = FREE;
+        let room = room_of(fills, policy, 1, Arc::default(), |journal| journal).await;
+        let watching = is_watched.then(|| tokio::spawn(room.clock().process().clone().watch()));
+        let mut seat = take_seat(&room).await;
+        let decision = update(&mut seat, |update| match update {
+            Update::Decision(decision) => Some(decision),
+            _ => None,
+        });
+        let decision = decision.await;
+        tokio::time::sleep(SECOND / 2).await;
+        for pause in &pauses {
+            // Nothing runs meanwhile: then the timer of the room and the watcher are both due.
+            tokio::time::advance(*pause).await;
+        }
+        let answer = Answer::new(decision.decision_id, first_legal(&decision));
+        let action = SeatAction::Answer(answer);
+        room.perform(seat.seat, seat.connection, action, Instant::now())
+            .await
+            .expect("the room exists");
+        let result = update(&mut seat, |update| match update {
+            Update::Result(result) => Some(result),
+            _ => None,
+        });
+        let result = result.await;
+        assert_eq!(result.status(), status, "{pauses:?}");
+        if status == accepted {
+            let time_ms = result.decision_time_us / 1_000;
+            assert!(
+                (500..=longest_ms).contains(&time_ms),
+                "{pauses:?}: {time_ms}"
+            );
+        }
+        if let Some(watching) = watching {
+            watching.abort();
+        }
+    }
 }
 
 #[tokio::test]

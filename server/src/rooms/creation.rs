@@ -160,7 +160,9 @@ impl Rooms {
                 Claim::InProgress => created.await,
             }
         };
-        if !self.context.store.has_space() {
+        // An ephemeral game can be played without a disk.
+        let durable = new.policy.durability == Durability::Durable;
+        if durable && !self.context.store.has_space() {
             return Err(CreateError::DiskNearlyFull);
         }
         // Runs to completion even if the caller is cancelled: a half-created room would be stored
@@ -259,7 +261,7 @@ impl Reservation {
         let owner = self.owner;
         let room_id = owner.room;
         // Before the commit, which takes time: the room's clock starts at `created_at_ms`.
-        let clock = RoomClock::of_age(Duration::ZERO);
+        let clock = RoomClock::of_age(Duration::ZERO, &rooms.context.process_clock);
         let mut header = Arc::new(GameHeader {
             room_id,
             game_id: seating.map_or_else(Id::random, |seating| seating.game_id),
@@ -268,6 +270,7 @@ impl Reservation {
             policy: new.policy,
             rules_version: RULES_VERSION,
             server_version: SERVER_VERSION.into(),
+            participant_removed: false,
             fills: new.fills,
             wizards: new.wizards,
             display_names: new.display_names,

@@ -19,9 +19,10 @@ use tokio::sync::Notify;
 use tokio::sync::futures::Notified;
 use tokio_util::task::TaskTracker;
 
+use crate::clock::ProcessClock;
 use crate::cluster::{Directory, NodeLease, SingleServer};
 use crate::config::ServerConfig;
-use crate::limits::{Background, Key, Places, Searches, Shares};
+use crate::limits::{Background, Key, NotStored, Places, Searches, Shares};
 use crate::metrics::Metrics;
 use crate::record_writer::RecordWriter;
 use crate::room::{Handle, RoomWatcher, TaskContext};
@@ -48,9 +49,7 @@ pub struct Rooms {
     changed: Notify,
     /// Notified when the creation of a room has ended.
     created: Notify,
-    /// Number of games that have ended since the server was started.
-    ended: AtomicU64,
-    /// Number of participants whose data were deleted since the server was started.
+    /// Number of deletions since the server was started, of participants' data or of old games.
     forgotten: AtomicU64,
     context: TaskContext,
     /// Where the rooms and tournaments of other nodes are.
@@ -104,7 +103,6 @@ impl Rooms {
             closed: Mutex::default(),
             changed: Notify::new(),
             created: Notify::new(),
-            ended: AtomicU64::new(0),
             forgotten: AtomicU64::new(0),
             context: TaskContext {
                 record_writer: RecordWriter::new(
@@ -125,7 +123,9 @@ impl Rooms {
                 lease,
                 webhooks,
                 owner: Key::Resumed,
+                stored: Arc::default(),
                 shares: config.shares,
+                process_clock: Arc::default(),
             },
             directory,
             max_rooms: config.max_rooms,
@@ -135,14 +135,36 @@ impl Rooms {
         }))
     }
 
+    /// Charges a caller for something of this size that is stored, but that no game needs.
+    ///
+    /// # Errors
+    /// It must not be stored.
+    pub fn may_store(&self, key: Key, bytes: usize) -> Result<(), NotStored> {
+        self.context.may_store(key, bytes)
+    }
+
     /// Deletes finished games from the store, with the samples of their seats.
     ///
     /// # Errors
     /// The store or the file system failed; doing it again completes it.
     pub async fn delete_games(&self, games: Vec<Id>) -> Result<(), StoreError> {
-        let deleting = self.samples.delete(games.clone()).await;
-        deleting.map_err(|error| StoreError::Failed(format!("deleting samples: {error}")))?;
+        self.delete_samples(&games).await?;
         self.context.store.delete(games).await
+    }
+
+    /// Deletes those of these finished games that no tournament or study needs, with the samples of
+    /// their seats.
+    ///
+    /// # Errors
+    /// The store or the file system failed; doing it again completes it.
+    pub async fn prune_games(&self, games: Vec<Id>) -> Result<(), StoreError> {
+        self.delete_samples(&games).await?;
+        self.context.store.prune(games).await
+    }
+
+    async fn delete_samples(&self, games: &[Id]) -> Result<(), StoreError> {
+        let deleting = self.samples.delete(games.to_vec()).await;
+        deleting.map_err(|error| StoreError::Failed(format!("deleting samples: {error}")))
     }
 
     /// The samples of seats.
@@ -153,6 +175,11 @@ impl Rooms {
     /// What announces rooms, games and tournaments.
     pub fn webhooks(&self) -> &Webhooks {
         &self.context.webhooks
+    }
+
+    /// What signs records.
+    pub fn signer(&self) -> &Signer {
+        &self.context.signer
     }
 
     /// The public key that signs records, if the server has one.
@@ -214,10 +241,7 @@ impl Rooms {
 
     /// The room in which a game is running or waiting to start.
     pub fn room_of(&self, game: Id) -> Option<Id> {
-        let table = self.lock();
-        let mut open = table.by_number.values().filter(|entry| !entry.over);
-        let entry = open.find(|entry| entry.header.game_id == game)?;
-        Some(entry.handle.id())
+        Some(self.lock().of_game(game)?.handle.id())
     }
 
     /// Whether a game is running or waiting to start here.
@@ -251,17 +275,13 @@ impl Rooms {
         self.changed.notified()
     }
 
-    /// Number of ended games. Each of them has been committed.
-    pub fn ended(&self) -> u64 {
-        self.ended.load(Ordering::Acquire)
-    }
-
-    /// Number of participants whose data were deleted: what was computed before shows their names.
+    /// Number of deletions, of participants' data or of old games: what was computed before shows
+    /// them.
     pub fn forgotten(&self) -> u64 {
         self.forgotten.load(Ordering::Acquire)
     }
 
-    /// Counts a participant whose data were deleted.
+    /// Counts a deletion of a participant's data or of old games.
     pub fn count_forgotten(&self) {
         self.forgotten.fetch_add(1, Ordering::AcqRel);
     }
@@ -324,6 +344,11 @@ impl Rooms {
     /// What the server counts.
     pub fn metrics(&self) -> &Arc<Metrics> {
         &self.context.metrics
+    }
+
+    /// The time that the process has run, by which all times of participants are measured.
+    pub fn process_clock(&self) -> &Arc<ProcessClock> {
+        &self.context.process_clock
     }
 
     /// Number of messages in the mailbox of each room.
@@ -426,7 +451,6 @@ impl RoomWatcher for Watcher {
                 entry.place = None;
             }
             drop(table);
-            rooms.ended.fetch_add(1, Ordering::AcqRel);
             rooms.changed.notify_waiters();
         }
     }

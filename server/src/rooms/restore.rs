@@ -112,7 +112,7 @@ impl Rooms {
             .await
             .map_err(|problem| problem.to_string())?
             .map_err(|problem| problem.to_string())?;
-        let clock = RoomClock::of_age(age);
+        let clock = RoomClock::of_age(age, &self.context.process_clock);
         let mut table = self.lock();
         if table.get(header.room_id).is_some() {
             // A node shows the end of a game that it has played and resumes the rest of its unit.

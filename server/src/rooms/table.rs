@@ -40,6 +40,8 @@ pub(super) struct Table {
     pub(super) by_number: BTreeMap<u64, Entry>,
     pub(super) numbers: HashMap<Id, u64>,
     pub(super) codes: HashMap<String, u64>,
+    /// The rooms of games, by the ids of the games.
+    games: HashMap<Id, u64>,
     /// Rooms that are being created, for which space is reserved, with their units.
     pub(super) in_creation: HashMap<Id, Id>,
     pub(super) shutting_down: bool,
@@ -140,7 +142,14 @@ impl Table {
         if !(entry.over && taken_by.is_some_and(|other| !other.over)) {
             self.codes.insert(code, number);
         }
+        self.games.insert(entry.header.game_id, number);
         self.by_number.insert(number, entry);
+    }
+
+    /// The room of a game that is not over.
+    pub(super) fn of_game(&self, game: Id) -> Option<&Entry> {
+        let entry = self.by_number.get(self.games.get(&game)?)?;
+        (!entry.over).then_some(entry)
     }
 
     /// Removes ended rooms if their space is needed.
@@ -182,6 +191,9 @@ impl Table {
     pub(super) fn remove(&mut self, number: u64) {
         if let Some(entry) = self.by_number.remove(&number) {
             self.numbers.remove(&entry.handle.id());
+            if self.games.get(&entry.header.game_id) == Some(&number) {
+                self.games.remove(&entry.header.game_id);
+            }
             if self.codes.get(&entry.header.join_code) == Some(&number) {
                 self.codes.remove(&entry.header.join_code);
             }

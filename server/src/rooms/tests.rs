@@ -80,6 +80,36 @@ async fn a_room_that_is_over_takes_no_join_code_from_an_open_one() {
     assert_eq!(found.id(), open);
 }
 
+#[tokio::test]
+async fn the_room_of_a_game_is_found_until_the_game_is_over() {
+    let store = Arc::new(MemoryStore::default());
+    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+    let rooms = rooms.expect("threads");
+    let mut made = Vec::new();
+    for _ in 0..3 {
+        let room = rooms.create(NewRoom::for_tests()).await.expect("a room");
+        let game = rooms.header(room.handle.id()).expect("listed").game_id;
+        made.push((room.handle.id(), game));
+    }
+    for (room, game) in &made {
+        assert_eq!(rooms.room_of(*game), Some(*room));
+    }
+    assert_eq!(rooms.room_of(Id([0; 16])), None);
+    let [(first, ended), (_, removed), (third, other)] = made[..] else {
+        unreachable!("three were made");
+    };
+    {
+        let mut table = rooms.lock();
+        let number = table.numbers[&first];
+        table.by_number.get_mut(&number).expect("listed").over = true;
+    }
+    assert_eq!(rooms.room_of(ended), None);
+    let number = rooms.lock().numbers[&made[1].0];
+    rooms.lock().remove(number);
+    assert_eq!(rooms.room_of(removed), None);
+    assert_eq!(rooms.room_of(other), Some(third));
+}
+
 /// A room that ends looks into the table, so it must not end while the table is locked.
 #[test]
 fn a_room_may_end_with_the_handle_that_the_table_removes() {

@@ -1,7 +1,8 @@
 //! The journal of a game that a database stores when it ends. Until then its entries are in memory,
 //! encoded, which takes a small part of the space.
 
-use std::sync::Arc;
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, MutexGuard};
 
 use chefshat_proto::v1;
 use futures::FutureExt as _;
@@ -10,7 +11,40 @@ use tracing::error;
 
 use super::form;
 use super::{Journal, StoreError};
+use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
+
+/// The ids of games that are stored when they end, of records that are being imported, and of games
+/// that are being created. Nothing else can take them meanwhile.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Reservations(Arc<Mutex<BTreeSet<Id>>>);
+
+/// A reserved id, free again when this is dropped.
+#[derive(Debug)]
+pub(super) struct Reserved {
+    all: Reservations,
+    game: Id,
+}
+
+impl Reservations {
+    /// Reserves the id of a game, unless it is reserved.
+    pub(super) fn take(&self, game: Id) -> Option<Reserved> {
+        self.lock().insert(game).then(|| Reserved {
+            all: self.clone(),
+            game,
+        })
+    }
+
+    fn lock(&self) -> MutexGuard<'_, BTreeSet<Id>> {
+        (self.0.lock()).expect("no code that holds this lock can panic")
+    }
+}
+
+impl Drop for Reserved {
+    fn drop(&mut self) {
+        self.all.lock().remove(&self.game);
+    }
+}
 
 /// Stores one game when it has ended.
 pub(super) trait StoreWhole: Send + Sync + 'static {

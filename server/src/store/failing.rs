@@ -1,7 +1,8 @@
-//! A store that fails on request, for tests: simulates a full disk.
+//! A store that fails on request, for tests: simulates a full disk. It also says what was read from
+//! it, so that a test sees whether a call reads more of what exists than of what does not.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 use chefshat_proto::v1;
 use chefshat_record::pseudonym::Pseudonym;
@@ -11,8 +12,8 @@ use tokio::sync::{Semaphore, watch};
 
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{
-    ForgetError, Forgotten, Journal, Keep, MemoryStore, Part, ResumableGame, Store, StoreError,
-    StoredGame,
+    ForgetError, Forgotten, Journal, Keep, Listed, MemoryStore, Part, ResumableGame, Store,
+    StoreError, StoredGame,
 };
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
@@ -23,6 +24,7 @@ pub struct FailingStore {
     inner: MemoryStore,
     appends_left: Arc<AtomicU64>,
     has_failed: watch::Sender<bool>,
+    reads: Mutex<Vec<Read>>,
     /// Permits for commits of tournaments; each commit uses one.
     pub tournament_commits: Arc<Semaphore>,
 }
@@ -34,8 +36,35 @@ impl FailingStore {
             inner: MemoryStore::default(),
             appends_left: Arc::new(AtomicU64::new(appends)),
             has_failed: watch::Sender::new(false),
+            reads: Mutex::default(),
             tournament_commits: Arc::new(Semaphore::new(Semaphore::MAX_PERMITS)),
         }
+    }
+}
+
+/// What was read from a store.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Read {
+    /// The summary of a game, which is small.
+    Summary,
+    /// A game with its journal, which was found.
+    Game,
+    /// A part of the list of games.
+    List,
+    /// Tournaments with their journals.
+    Tournaments,
+}
+
+impl FailingStore {
+    /// What was read since the last call of this.
+    pub fn take_reads(&self) -> Vec<Read> {
+        let mut reads = self.reads.lock().expect("no code that holds it can panic");
+        std::mem::take(&mut *reads)
+    }
+
+    fn count(&self, read: Read) {
+        let mut reads = self.reads.lock().expect("no code that holds it can panic");
+        reads.push(read);
     }
 }
 
@@ -74,8 +103,19 @@ impl Store for FailingStore {
         self.inner.resumable_games(ended_since_ms)
     }
 
+    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
+        self.count(Read::Summary);
+        self.inner.summary(game)
+    }
+
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
-        self.inner.finished(game)
+        let finished = self.inner.finished(game);
+        let counted = |found: &Result<Option<_>, _>| {
+            if let Ok(Some(_)) = found {
+                self.count(Read::Game);
+            }
+        };
+        finished.inspect(counted).boxed()
     }
 
     fn list<'a>(
@@ -83,7 +123,8 @@ impl Store for FailingStore {
         filter: &'a v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>> {
+    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>> {
+        self.count(Read::List);
         self.inner.list(filter, part, count)
     }
 
@@ -107,6 +148,10 @@ impl Store for FailingStore {
         count: usize,
     ) -> BoxFuture<'_, Result<Vec<(u64, Id)>, StoreError>> {
         self.inner.prunable(keep, after, count)
+    }
+
+    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.inner.prune(games)
     }
 
     fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
@@ -152,6 +197,7 @@ impl Store for FailingStore {
         &self,
         newest_over: usize,
     ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
+        self.count(Read::Tournaments);
         self.inner.tournaments(newest_over)
     }
 

@@ -7,12 +7,14 @@ use std::sync::Arc;
 use chefshat_proto::v1;
 use chefshat_record::convert::seat_number;
 use chefshat_record::pseudonym::{Named, ParticipantSeats, Pseudonym, Redactions};
+use chefshat_record::signature::SigningKey;
 use chefshat_tournament::Change as TournamentChange;
 use prost::Message as _;
 
 use super::form::{self, Unreadable};
 use super::tournaments::TournamentEntry;
 use super::{ForgetError, Forgotten, StoredGame};
+use crate::convert;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry, Fill, GameHeader, StudyGame};
 
@@ -27,6 +29,8 @@ pub(super) struct GameRows {
     pub(super) summary: Option<Vec<u8>>,
     /// The record of an imported game.
     pub(super) record: Option<Vec<u8>>,
+    /// The signature of a hosted game.
+    pub(super) signature: Option<Vec<u8>>,
     /// The rows of its journal by their keys, in order.
     pub(super) journal: Vec<(i64, Vec<u8>)>,
 }
@@ -41,6 +45,8 @@ pub(super) struct GameRewrite {
     /// The seats of the participant in the summary.
     pub(super) seats: Vec<i64>,
     pub(super) record: Option<Vec<u8>>,
+    /// The signature of what is left, if the server had signed the whole.
+    pub(super) signature: Option<Vec<u8>>,
     pub(super) journal: Vec<(i64, Vec<u8>)>,
 }
 
@@ -138,13 +144,35 @@ fn unreadable(game: Id, problem: Unreadable) -> ForgetError {
     }
 }
 
-/// Removes a participant from a game in memory that is over, which loses its signature if it
-/// changes.
+/// The key for which a pseudonym is signed, if it has signed the game as it is stored.
+fn key_of<'w>(who: &'w Pseudonym, stored: &StoredGame) -> Option<&'w SigningKey> {
+    // Records are made only for those that it may have signed.
+    let may_have = |key: &&SigningKey| match stored {
+        StoredGame::Hosted(.., Some(signature)) => signature.public_key == key.public().0,
+        StoredGame::Hosted(.., None) | StoredGame::Imported(_) => false,
+    };
+    let key = who.key.as_deref().filter(may_have)?;
+    key.has_signed(&convert::lines_of(stored)).then_some(key)
+}
+
+/// The signature of a game without the participant.
+fn signature_of(
+    key: &SigningKey,
+    header: Arc<GameHeader>,
+    entries: Arc<[Entry]>,
+) -> v1::RecordSignature {
+    let left = StoredGame::Hosted(header, entries, None);
+    key.sign(&convert::lines_of(&left))
+}
+
+/// Removes a participant from a game in memory that is over. If it changes, it is signed again by who
+/// had signed it.
 pub(super) fn forget_stored(
     stored: &mut StoredGame,
     summary: &mut v1::RecordSummary,
     who: &Pseudonym,
 ) -> Redactions {
+    let key = key_of(who, stored);
     let redactions = match stored {
         StoredGame::Hosted(header, entries, signature) => {
             let is_in = is_in_header(header, &who.of) || is_seated(entries, &who.of);
@@ -157,7 +185,9 @@ pub(super) fn forget_stored(
             if is_in || redactions != Redactions::default() {
                 redactions.names += forget_header(Arc::make_mut(header), who);
                 *entries = changed.into();
-                *signature = None;
+                let signed =
+                    key.map(|key| signature_of(key, Arc::clone(header), Arc::clone(entries)));
+                *signature = signed.map(Arc::new);
             }
             redactions
         }
@@ -174,8 +204,7 @@ pub(super) fn forget_stored(
     redactions
 }
 
-/// Removes a participant from a game, which loses its signature if it changes; `None` if it does
-/// not.
+/// Removes a participant from a game, which is signed again if it changes; `None` if it does not.
 fn rewrite_game(
     rows: GameRows,
     who: &Pseudonym,
@@ -186,8 +215,12 @@ fn rewrite_game(
         summary: None,
         seats: Vec::new(),
         record: None,
+        signature: None,
         journal: Vec::new(),
     };
+    let key = key_of_rows(&rows, who)?;
+    // What is left of the journal, if it is signed.
+    let mut left = Vec::new();
     let header = rows.header.as_deref().map(form::header_from_bytes);
     let mut header = header.transpose()?;
     let mut is_in = header.as_ref().is_some_and(|it| is_in_header(it, &who.of));
@@ -199,14 +232,17 @@ fn rewrite_game(
     }
     let (mut own, mut redactions) = (ParticipantSeats::default(), Redactions::default());
     // Row by row, because a long decoded game is much larger.
-    for (key, bytes) in rows.journal {
+    for (row, bytes) in rows.journal {
         let mut entries = Vec::new();
         form::read_entries(&bytes, &mut entries)?;
         let of_row = forget_entries(&mut entries, &mut own, who);
+        if key.is_some() {
+            left.extend_from_slice(&entries);
+        }
         if of_row != Redactions::default() {
             redactions += of_row;
             game.journal
-                .push((key, form::entries_to_bytes(&mut entries)));
+                .push((row, form::entries_to_bytes(&mut entries)));
         }
     }
     if let Some(record) = rows.record {
@@ -220,6 +256,8 @@ fn rewrite_game(
     if let Some(header) = &mut header {
         redactions.names += forget_header(header, who);
         game.header = Some(form::header_to_bytes(header));
+        let signature = key.map(|key| signature_of(key, Arc::new(header.clone()), left.into()));
+        game.signature = signature.as_ref().map(form::signature_to_bytes);
     }
     if let Some(summary) = rows.summary {
         let mut summary = v1::RecordSummary::decode(summary.as_slice())?;
@@ -231,6 +269,28 @@ fn rewrite_game(
         game.summary = Some((summary.encode_to_vec(), summary.room_name));
     }
     Ok(Some((game, redactions)))
+}
+
+/// As [`key_of`], for the rows of a game. A game of the key is decoded as a whole.
+fn key_of_rows<'w>(
+    rows: &GameRows,
+    who: &'w Pseudonym,
+) -> Result<Option<&'w SigningKey>, Unreadable> {
+    let signature = rows.signature.as_deref().map(form::signature_from_bytes);
+    let (Some(signature), Some(key)) = (signature.transpose()?, &who.key) else {
+        return Ok(None);
+    };
+    if signature.public_key != key.public().0 {
+        return Ok(None);
+    }
+    let header = form::stored_header(rows.header.as_deref())?;
+    let mut entries = Vec::new();
+    for (_, bytes) in &rows.journal {
+        form::read_entries(bytes, &mut entries)?;
+    }
+    let signature = Some(Arc::new(signature));
+    let stored = StoredGame::Hosted(Arc::new(header), entries.into(), signature);
+    Ok(key_of(who, &stored))
 }
 
 /// Whether the header of a game names the participant: at its physical table, or in its study.
@@ -270,6 +330,7 @@ fn is_seated_in_rows(rows: &[(i64, Vec<u8>)], who: &Named) -> Result<bool, Unrea
 
 /// Removes a participant from the header of its game; returns the number of replacements.
 fn forget_header(header: &mut GameHeader, who: &Pseudonym) -> u64 {
+    header.participant_removed = true;
     let mut names = who.in_text(&mut header.name);
     for (seat, name) in &mut header.display_names {
         if is_at_table(&header.fills, *seat) && who.of.is(name, "") {

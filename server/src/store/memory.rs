@@ -1,6 +1,6 @@
 //! Stores games in memory until the process ends.
 
-use std::collections::{BTreeMap, btree_map};
+use std::collections::{BTreeMap, BTreeSet, btree_map};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use chefshat_proto::v1;
@@ -9,12 +9,13 @@ use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending, ready};
 
+use super::ephemeral::{Reservations, Reserved};
 use super::forget::forget_stored;
 use super::studies::{StoredStudy, StoredTraces, StudyHeader};
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{
-    ForgetError, Forgotten, Journal, Keep, Part, ResumableGame, Store, StoreError, StoredGame,
-    matches_filter,
+    ForgetError, Forgotten, Journal, Keep, Listed, Part, ResumableGame, Store, StoreError,
+    StoredGame, matches_filter,
 };
 use crate::clock::since_epoch_ms;
 use chefshat_room::ids::Id;
@@ -31,6 +32,24 @@ pub const MAX_FINISHED_ENTRIES: usize = 10_000_000;
 pub struct MemoryStore {
     finished: Arc<Mutex<Finished>>,
     studies: Mutex<BTreeMap<Id, StudyInMemory>>,
+    /// The ids of running games.
+    reserved: Reservations,
+    /// Tournaments that are not over.
+    tournaments: Mutex<BTreeSet<Id>>,
+}
+
+impl MemoryStore {
+    /// Whether a tournament that is not over, or a study, needs the record of a game.
+    fn is_needed(&self, game: &StoredGame) -> bool {
+        match game {
+            StoredGame::Hosted(header, ..) => {
+                let unit = header.unit();
+                lock_studies(&self.studies).contains_key(&unit)
+                    || lock_tournaments(&self.tournaments).contains(&unit)
+            }
+            StoredGame::Imported(_) => false,
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -92,9 +111,9 @@ impl Finished {
         }
     }
 
-    fn get(&self, game: Id) -> Option<&StoredGame> {
+    fn get(&self, game: Id) -> Option<&FinishedGame> {
         let number = self.numbers.get(&game)?;
-        self.games.get(number).map(|game| &game.stored)
+        self.games.get(number)
     }
 }
 
@@ -108,10 +127,14 @@ impl Store for MemoryStore {
         header: Arc<GameHeader>,
         entries: Vec<Entry>,
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
-        if lock(&self.finished).get(header.game_id).is_some() {
-            return ready(Err(StoreError::Taken(header.game_id))).boxed();
-        }
+        let game = header.game_id;
+        let reserved = self.reserved.take(game);
+        let is_known = lock(&self.finished).get(game).is_some();
+        let Some(reserved) = reserved.filter(|_| !is_known) else {
+            return ready(Err(StoreError::Taken(game))).boxed();
+        };
         let journal = MemoryJournal {
+            _reserved: reserved,
             header,
             entries,
             finished: Arc::clone(&self.finished),
@@ -126,8 +149,14 @@ impl Store for MemoryStore {
         ready(Ok(Vec::new())).boxed()
     }
 
+    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
+        let finished = lock(&self.finished);
+        ready(Ok(finished.get(game).map(|game| game.summary.clone()))).boxed()
+    }
+
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
-        ready(Ok(lock(&self.finished).get(game).cloned())).boxed()
+        let finished = lock(&self.finished);
+        ready(Ok(finished.get(game).map(|game| game.stored.clone()))).boxed()
     }
 
     fn list<'a>(
@@ -135,7 +164,7 @@ impl Store for MemoryStore {
         filter: &'a v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>> {
+    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>> {
         let finished = lock(&self.finished);
         let games = &finished.games;
         let listed = match part {
@@ -152,6 +181,9 @@ impl Store for MemoryStore {
         lines: Arc<[v1::RecordLine]>,
     ) -> BoxFuture<'_, Result<bool, StoreError>> {
         summary.added = true;
+        let Some(_reserved) = self.reserved.take(game) else {
+            return ready(Ok(false)).boxed();
+        };
         let mut finished = lock(&self.finished);
         let new = finished.get(game).is_none();
         if new {
@@ -184,10 +216,24 @@ impl Store for MemoryStore {
                 keep.ended_since_ms
                     .is_none_or(|since| game.ended_at_ms < since)
             })
+            .filter(|(_, game)| !self.is_needed(&game.stored))
             .take(count)
             .map(|(number, game)| (*number, game.id))
             .collect();
         ready(Ok(found)).boxed()
+    }
+
+    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+        let mut finished = lock(&self.finished);
+        for game in games {
+            if finished
+                .get(game)
+                .is_some_and(|it| !self.is_needed(&it.stored))
+            {
+                finished.remove(game);
+            }
+        }
+        ready(Ok(())).boxed()
     }
 
     fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
@@ -219,18 +265,24 @@ impl Store for MemoryStore {
 
     fn create_tournament(
         &self,
-        _header: Arc<TournamentHeader>,
-        _entries: Vec<TournamentEntry>,
+        header: Arc<TournamentHeader>,
+        entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
+        if !entries.iter().any(TournamentEntry::is_end) {
+            lock_tournaments(&self.tournaments).insert(header.id);
+        }
         ready(Ok(())).boxed()
     }
 
     fn append_tournament(
         &self,
-        _tournament: Id,
+        tournament: Id,
         _row: u64,
-        _entries: Vec<TournamentEntry>,
+        entries: Vec<TournamentEntry>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
+        if entries.iter().any(TournamentEntry::is_end) {
+            lock_tournaments(&self.tournaments).remove(&tournament);
+        }
         ready(Ok(())).boxed()
     }
 
@@ -279,11 +331,13 @@ impl Store for MemoryStore {
         &self,
         study: Id,
         changes: Vec<StudyChange>,
-        forgotten: u32,
+        forgotten: Vec<u32>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         if let Some(study) = lock_studies(&self.studies).get_mut(&study) {
             (study.changes, study.rows) = (changes, 1);
-            study.traces.retain(|traces| traces.number != forgotten);
+            study
+                .traces
+                .retain(|traces| !forgotten.contains(&traces.number));
         }
         ready(Ok(())).boxed()
     }
@@ -335,6 +389,7 @@ impl Store for MemoryStore {
 }
 
 struct MemoryJournal {
+    _reserved: Reserved,
     header: Arc<GameHeader>,
     entries: Vec<Entry>,
     finished: Arc<Mutex<Finished>>,
@@ -385,11 +440,11 @@ fn listed<'a>(
     games: impl Iterator<Item = (&'a u64, &'a FinishedGame)>,
     filter: &v1::RecordFilter,
     count: usize,
-) -> Vec<(u64, v1::RecordSummary)> {
+) -> Vec<Listed> {
     games
         .filter(|(_, game)| matches_filter(filter, &game.summary))
         .take(count)
-        .map(|(number, game)| (*number, game.summary.clone()))
+        .map(|(number, game)| (*number, Ok(game.summary.clone())))
         .collect()
 }
 
@@ -403,6 +458,12 @@ fn lock_studies(
     studies: &Mutex<BTreeMap<Id, StudyInMemory>>,
 ) -> MutexGuard<'_, BTreeMap<Id, StudyInMemory>> {
     studies
+        .lock()
+        .expect("no code that holds this lock can panic")
+}
+
+fn lock_tournaments(tournaments: &Mutex<BTreeSet<Id>>) -> MutexGuard<'_, BTreeSet<Id>> {
+    tournaments
         .lock()
         .expect("no code that holds this lock can panic")
 }

@@ -22,8 +22,9 @@ use chefshat_record::pseudonym::{Pseudonym, Redactions};
 use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
+use prost::Message as _;
 
-pub use failing::FailingStore;
+pub use failing::{FailingStore, Read};
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
 pub use postgres::{
     DatabaseError, PostgresOptions, PostgresStore, TransferError, Transferred, migrate, transfer,
@@ -47,6 +48,9 @@ pub enum StoreError {
     /// The id of a game or tournament is taken. Nothing was changed, and the store has not failed.
     #[error("the id {0} is taken")]
     Taken(Id),
+    /// A game or study cannot be read. The store has not failed.
+    #[error("{0}")]
+    Unreadable(String),
     /// Another node of the cluster owns the unit of this room or tournament. Nothing was changed,
     /// and the store has not failed; the room or tournament must stop and publish nothing more.
     #[error("another node has taken {0} over")]
@@ -74,6 +78,33 @@ impl StoredGame {
             Self::Imported(_) => None,
         }
     }
+}
+
+/// A finished game in a list: its number, and its summary, or why that cannot be read.
+pub type Listed = (u64, Result<v1::RecordSummary, UnreadableGame>);
+
+/// A finished game whose summary cannot be read.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("the summary of game {game} cannot be read: {problem}")]
+pub struct UnreadableGame {
+    /// The game.
+    pub game: Id,
+    /// The reason.
+    pub problem: String,
+}
+
+/// A row of the list of finished games, of its number, its id and its summary.
+fn listed(number: i64, game: &[u8], summary: &[u8]) -> Listed {
+    let number = u64::try_from(number).unwrap_or_default();
+    let summary = v1::RecordSummary::decode(summary).map_err(|error| {
+        let unreadable = UnreadableGame {
+            game: game.try_into().map_or(Id([0; 16]), Id),
+            problem: error.to_string(),
+        };
+        tracing::error!(number, problem = %unreadable, "a game is not listed");
+        unreadable
+    });
+    (number, summary)
 }
 
 /// A part of the list of finished games, and the order of reading. Games are numbered from 1,
@@ -171,6 +202,8 @@ pub trait Store: Send + Sync + 'static {
     fn has_space(&self) -> bool {
         true
     }
+    /// The server stops: what waits for space on the disk fails.
+    fn stop_waiting(&self) {}
     /// The metrics of its writer, if it has one.
     fn metrics(&self) -> Option<&StoreMetrics> {
         None
@@ -192,16 +225,19 @@ pub trait Store: Send + Sync + 'static {
         &self,
         ended_since_ms: u64,
     ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>>;
+    /// The summary of a finished game, or `None`. Reads little, whatever the length of the game: it
+    /// is read before anything else, to find out who may read the rest.
+    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>>;
     /// A finished game, or `None`.
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>>;
     /// At most `count` finished games of a part of the list that match a filter, in its order, with
-    /// their numbers.
+    /// their numbers. One whose summary cannot be read is named in its place.
     fn list<'a>(
         &'a self,
         filter: &'a v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>>;
+    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>>;
     /// Stores the record of a game played elsewhere. Returns `false` if the id is taken.
     fn import(
         &self,
@@ -216,7 +252,8 @@ pub trait Store: Send + Sync + 'static {
     /// Number of finished games.
     fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>>;
     /// At most `count` finished games that need not be kept, by a number that orders them, after a
-    /// number. Never the newest game, nor one whose record is still to be written.
+    /// number. Never the newest game, one whose record is still to be written, one of a study, one
+    /// of a tournament that is not over or cannot be read, or one that does not say of which it is.
     /// A store that keeps everything returns none.
     fn prunable(
         &self,
@@ -226,7 +263,12 @@ pub trait Store: Send + Sync + 'static {
     ) -> BoxFuture<'_, Result<Vec<(u64, Id)>, StoreError>> {
         ready(Ok(Vec::new())).boxed()
     }
-    /// Deletes games that were prunable and gives their space back.
+    /// Deletes those of these games that a tournament or study does not need, as `prunable` says,
+    /// and gives their space back. The record files of the others count as not written.
+    fn prune(&self, _games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+        ready(Ok(())).boxed()
+    }
+    /// Deletes finished games, whatever needs them, and gives their space back.
     fn delete(&self, _games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
         ready(Ok(())).boxed()
     }
@@ -278,13 +320,13 @@ pub trait Store: Send + Sync + 'static {
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         ready(Err(no_studies())).boxed()
     }
-    /// Replaces the journal of a study by one row, and deletes the interface traces of a
-    /// participant, in one commit.
+    /// Replaces the journal of a study by one row, and deletes the interface traces of these
+    /// participants, in one commit.
     fn rewrite_study(
         &self,
         _study: Id,
         _changes: Vec<StudyChange>,
-        _forgotten: u32,
+        _forgotten: Vec<u32>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         ready(Err(no_studies())).boxed()
     }

@@ -32,16 +32,6 @@ pub struct StoredStudy {
     pub rows: u64,
 }
 
-impl StoredStudy {
-    /// All its games.
-    pub fn games(&self) -> impl Iterator<Item = Id> {
-        self.changes.iter().filter_map(|change| match change {
-            Change::Placed { game, .. } => Some(Id(game.game)),
-            _ => None,
-        })
-    }
-}
-
 /// Interface traces of a game.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredTraces {

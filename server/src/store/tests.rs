@@ -2,6 +2,7 @@
 
 mod forget;
 mod lists;
+mod retained;
 mod studies;
 mod tournaments;
 
@@ -42,6 +43,7 @@ fn header(game: u8, durability: Durability) -> Arc<GameHeader> {
         },
         rules_version: RULES_VERSION,
         server_version: "0.0.1".into(),
+        participant_removed: false,
         fills: vec![Fill::Open { reserved_for: None }; 4],
         display_names: Default::default(),
         wizards: std::collections::BTreeSet::new(),
@@ -93,7 +95,7 @@ async fn listed(store: &dyn Store, after: u64) -> Vec<(String, u64)> {
     let listed = store.list(&all, Part::After(after), 9).await;
     let listed = listed.expect("readable").into_iter();
     listed
-        .map(|(number, summary)| (summary.room_name, number))
+        .map(|(number, summary)| (summary.expect("readable").room_name, number))
         .collect()
 }
 
@@ -135,6 +137,7 @@ async fn a_signature_is_stored_with_the_end_of_its_game() {
     with_each_store(async |store| {
         for (game, durability) in [(1, Durability::Durable), (2, Durability::Ephemeral)] {
             let signature = v1::RecordSignature {
+                text_version: 1,
                 public_key: vec![game; 32],
                 signature: vec![game; 64],
             };
@@ -256,6 +259,45 @@ async fn a_taken_game_id_is_refused_and_the_store_keeps_working() {
     .await;
 }
 
+/// Somebody who watches a game knows its id, and could import a record under it before its end.
+#[tokio::test]
+async fn an_import_does_not_take_the_id_of_a_running_game() {
+    with_each_store(async |store| {
+        for (game, durability) in [(1, Durability::Ephemeral), (2, Durability::Durable)] {
+            let played = header(game, durability);
+            let import = || {
+                let forged = summary(&played);
+                store.import(played.game_id, *forged, Arc::from([]))
+            };
+            let mut journal = created(store, game, durability).await;
+            assert_eq!(import().await, Ok(false), "it runs");
+            finish(&mut journal, game).await;
+            assert_eq!(import().await, Ok(false), "it is stored");
+            drop(journal);
+            assert_eq!(import().await, Ok(false), "it is stored");
+            let stored = store.finished(played.game_id).await;
+            let stored = stored.expect("readable").expect("stored");
+            assert!(matches!(stored, StoredGame::Hosted(..)), "{stored:?}");
+        }
+        // The other way round, the record that is there stays.
+        let imported = header(3, Durability::Ephemeral);
+        let import = store.import(imported.game_id, *summary(&imported), Arc::from([]));
+        assert_eq!(import.await, Ok(true));
+        let refused = store.create(imported, vec![entry()]).await;
+        let refused = refused.err().expect("the id is taken");
+        assert_eq!(refused, StoreError::Taken(Id([3; 16])));
+        // A game that ended without a record leaves its id.
+        let mut journal = created(store, 4, Durability::Ephemeral).await;
+        journal.finish(None, None).await.expect("committed");
+        drop(journal);
+        let abandoned = header(4, Durability::Ephemeral);
+        let import = store.import(abandoned.game_id, *summary(&abandoned), Arc::from([]));
+        assert_eq!(import.await, Ok(true));
+        assert!(store.failed().now_or_never().is_none(), "no failure");
+    })
+    .await;
+}
+
 #[tokio::test]
 async fn a_text_that_no_database_can_search_for_is_stored() {
     with_each_store(async |store| {
@@ -275,7 +317,10 @@ async fn a_text_that_no_database_can_search_for_is_stored() {
         let found = store.list(&by_name, Part::FROM_OLDEST, 9).await;
         let found = found.expect("readable");
         assert_eq!(found.len(), 1);
-        assert_eq!(found[0].1.room_name, strange.name);
+        assert_eq!(
+            found[0].1.as_ref().expect("readable").room_name,
+            strange.name
+        );
     })
     .await;
 }

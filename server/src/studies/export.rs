@@ -1,21 +1,22 @@
 //! The data of a study as files: tables of participants, games, answers and interface traces, the
-//! settings, and the records and samples of games. A file is sent in parts, so that no table is in memory as a
-//! whole.
+//! settings, and the records and samples of games. A file is sent in parts, so that no table is in
+//! memory as a whole.
 
 use std::collections::BTreeMap;
 use std::io;
 
 use chefshat_proto::v1;
-use chefshat_record::outcome;
+use chefshat_record::{outcome, sheet};
 use chefshat_study::{Answer, Outcome, Participant, PlayedGame, Study, Task};
 use tokio::io::AsyncReadExt as _;
 use tokio::sync::mpsc;
+use tracing::error;
 
 use super::handle::StudyHandle;
 use crate::config::STUDY_EXPORT_CHUNK;
 use crate::convert;
 use crate::rooms::Rooms;
-use crate::store::StoreError;
+use crate::store::{StoreError, StoredGame};
 use chefshat_room::ids::Id;
 
 /// A part of a file.
@@ -87,17 +88,12 @@ impl<'s> File<'s> {
     }
 }
 
-/// A cell of a table (RFC 4180). A text that a spreadsheet would execute as a formula gets a leading
-/// apostrophe.
-fn quoted(cell: &str) -> String {
-    let is_number = cell.parse::<f64>().is_ok();
-    let text = match cell.starts_with(['=', '+', '-', '@']) && !is_number {
-        true => format!("'{cell}"),
-        false => cell.to_owned(),
-    };
+/// A cell of a table (RFC 4180).
+fn quoted(text: &str) -> String {
+    let text = sheet::cell(text);
     match text.contains(['"', ',', '\n', '\r']) {
         true => format!("\"{}\"", text.replace('"', "\"\"")),
-        false => text,
+        false => text.into_owned(),
     }
 }
 
@@ -240,7 +236,7 @@ async fn games(
         .map(str::to_owned),
     );
     file.row(&header).await?;
-    let mut records = Vec::new();
+    let (mut records, mut unreadable) = (Vec::new(), Vec::new());
     for (number, participant) in study.participants() {
         for game in &participant.games {
             if !is_in_data(study, participant, game) {
@@ -248,7 +244,15 @@ async fn games(
             }
             let placed = &game.placed;
             let condition = &settings.conditions[placed.condition];
-            let lines = record_of(rooms, Id(placed.game)).await?;
+            let lines = match record_of(rooms, handle.id(), Id(placed.game)).await {
+                // One game that cannot be read ends no export of the others.
+                Err(StoreError::Unreadable(problem)) => {
+                    error!(study = %handle.id(), %problem, "a game is left out of an export");
+                    unreadable.push((Id(placed.game), problem));
+                    None
+                }
+                lines => lines?,
+            };
             let result = lines
                 .as_ref()
                 .and_then(|lines| outcome::outcome(lines).ok());
@@ -293,8 +297,21 @@ async fn games(
         }
     }
     file.end().await?;
+    if !unreadable.is_empty() {
+        let mut file = File::new("unreadable.csv", sender);
+        file.row(&["game_id", "problem"].map(str::to_owned)).await?;
+        for (game, problem) in unreadable {
+            file.row(&[text(game), problem]).await?;
+        }
+        file.end().await?;
+    }
     for game in records {
-        let Some(lines) = record_of(rooms, game).await? else {
+        let lines = match record_of(rooms, handle.id(), game).await {
+            // It could be read a moment ago.
+            Err(StoreError::Unreadable(_)) => None,
+            lines => lines?,
+        };
+        let Some(lines) = lines else {
             continue;
         };
         let mut file = File::new(format!("records/{game}.jsonl"), sender);
@@ -330,15 +347,30 @@ async fn samples(
     Ok(())
 }
 
-async fn record_of(rooms: &Rooms, game: Id) -> Result<Option<Vec<v1::RecordLine>>, StoreError> {
+/// The record of a game of this study. A record from elsewhere that has the game's id is none.
+pub(super) async fn record_of(
+    rooms: &Rooms,
+    study: Id,
+    game: Id,
+) -> Result<Option<Vec<v1::RecordLine>>, StoreError> {
     let Some(stored) = rooms.store().finished(game).await? else {
         return Ok(None);
     };
+    let is_own = match &stored {
+        StoredGame::Hosted(header, ..) => {
+            (header.study.as_ref()).is_some_and(|game| game.study == study)
+        }
+        StoredGame::Imported(_) => false,
+    };
+    if !is_own {
+        return Ok(None);
+    }
     let reading = rooms
         .background()
         .run(move || convert::lines_of(&stored).into_owned());
     let lines = reading.await;
-    (lines.map(Some)).ok_or_else(|| StoreError::Failed("reading a record failed".into()))
+    (lines.map(Some))
+        .ok_or_else(|| StoreError::Unreadable(format!("the record of game {game} cannot be made")))
 }
 
 async fn answers(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<(), ExportError> {
@@ -472,6 +504,8 @@ mod tests {
             ("=1+2", "'=1+2"),
             ("-cmd", "'-cmd"),
             ("@a,b", "\"'@a,b\""),
+            ("\t=1+2", "'\t=1+2"),
+            ("\r=1+2", "\"'\r=1+2\""),
         ] {
             assert_eq!(quoted(cell), expected);
         }

@@ -50,8 +50,8 @@ pub struct StudyHandle {
     pub(super) plan: StudyPlan,
     /// Who is charged for its games.
     pub(super) charged: Key,
-    /// Its place among its creator's studies.
-    pub(super) _place: Option<Held>,
+    /// Its place among its creator's studies, and the memory of its settings.
+    pub(super) _places: [Held; 2],
     /// The state with only committed changes.
     pub(super) committed: Mutex<Study>,
     pub(super) mailbox: mpsc::Sender<Message>,

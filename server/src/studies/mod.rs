@@ -14,8 +14,10 @@ use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
+use chefshat_proto::cost::{Cost, shapes};
 use chefshat_proto::v1;
 use chefshat_study::{SettingsProblem, Study};
+use prost::Message as _;
 use tokio::sync::{Mutex as AsyncMutex, Notify, mpsc, watch};
 use tokio_util::task::TaskTracker;
 use tracing::{error, info};
@@ -26,12 +28,13 @@ pub use message::Stopped;
 
 use crate::clock::{TimeOfDay, since_epoch_ms};
 use crate::cluster::News;
-use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
+use crate::config::{MAX_STUDIES, MAX_STUDY_MEMORY, STUDY_MAILBOX};
 use crate::convert::{self, StudyPlan};
 use crate::limits::{Held, Key, Places, Refused};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::studies::{StoredStudy, StudyHeader};
+use crate::tasks::{LongTask, named};
 use chefshat_room::ids::{Id, RequestKey, Token, random_bytes};
 use task::{Stop, Task};
 
@@ -78,6 +81,8 @@ pub struct Studies {
     /// Notified when the creation of a study has ended.
     created: Notify,
     places: Arc<Places>,
+    /// The memory of their settings, in KiB.
+    memory: Arc<Places>,
 }
 
 #[derive(Debug, Default)]
@@ -104,7 +109,9 @@ impl Studies {
     /// As [`Studies::new`], with this clock.
     fn at(now: TimeOfDay, rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
         let places = Places::new(MAX_STUDIES, rooms.shares());
+        let memory = Places::new(MAX_STUDY_MEMORY / 1024, rooms.shares());
         Arc::new(Self {
+            memory,
             rooms,
             now,
             tracker,
@@ -141,9 +148,16 @@ impl Studies {
             return Err(CreateProblem::NotHosted);
         }
         let durable = store.outlives_server();
-        let settings = convert::complete_settings(settings, random_bytes, durable)?;
-        let plan = convert::study_plan(&settings)?;
-        let core = Study::new(plan.core.clone())?;
+        // Long settings take milliseconds to check.
+        let checked = tokio::task::spawn_blocking(move || {
+            let settings = convert::complete_settings(settings, random_bytes, durable)?;
+            let plan = convert::study_plan(&settings)?;
+            let core = Study::new(Arc::clone(&plan.core))?;
+            let memory = memory_of(&settings);
+            Ok::<_, SettingsProblem>((settings, (plan, core, memory)))
+        });
+        let (settings, checked) = (checked.await)
+            .map_err(|error| StoreError::Failed(format!("checking settings failed: {error}")))??;
         if self.stop.no_more_games.is_cancelled() || self.rooms.is_shutting_down() {
             return Err(CreateProblem::ShuttingDown);
         }
@@ -158,7 +172,7 @@ impl Studies {
         // Runs to completion even if the caller is cancelled: a half-created study would be stored
         // without running.
         let studies = Arc::clone(self);
-        let making = async move { studies.make(settings, (plan, core), owner, charged).await };
+        let making = async move { studies.make(settings, checked, owner, charged).await };
         (self.tracker.spawn(making).await)
             .map_err(|error| StoreError::Failed(format!("creating a study failed: {error}")))?
     }
@@ -166,7 +180,7 @@ impl Studies {
     async fn make(
         &self,
         settings: v1::StudySettings,
-        (plan, core): (StudyPlan, Study),
+        (plan, core, memory): (StudyPlan, Study, usize),
         owner: Token,
         charged: Key,
     ) -> Result<(Arc<StudyHandle>, Token), CreateProblem> {
@@ -178,11 +192,19 @@ impl Studies {
                 false => Err(CreateProblem::RequestIdUsed),
             };
         }
-        let place = self.places.try_take(charged).ok_or(Refused {
+        let refused = |what, limit: usize| Refused {
             reason: "TOO_MANY_STUDIES",
-            what: "too many studies",
-            limit: self.places.share_of(charged) as u64,
+            what,
+            limit: limit as u64,
             retry_after: RETRY_STUDIES,
+        };
+        let place = (self.places.try_take(charged))
+            .ok_or_else(|| refused("too many studies", self.places.share_of(charged)))?;
+        let share = self.memory.share_of(charged);
+        let memory = (self.memory).try_take_many(charged, memory.div_ceil(1024).min(share));
+        let memory = memory.ok_or_else(|| {
+            let what = "studies take too much memory together; delete some, or shorten them";
+            refused(what, share * 1024)
         })?;
         let header = StudyHeader {
             id: owner.room,
@@ -198,7 +220,7 @@ impl Studies {
             if let Some(lease) = self.rooms.lease() {
                 lease.report(header.id, News::Created { ephemeral: false });
             }
-            self.start_task(header, 0, plan, core, (charged, Some(place)))
+            self.start_task(header, 0, plan, core, (charged, [place, memory]))
         });
         self.lock().in_creation = None;
         self.created.notify_waiters();
@@ -238,13 +260,18 @@ impl Studies {
         let problem = |problem: SettingsProblem| problem.to_string();
         let folded = || {
             let plan = convert::study_plan(&stored.header.settings).map_err(problem)?;
-            let mut study = Study::new(plan.core.clone()).map_err(problem)?;
+            let mut study = Study::new(Arc::clone(&plan.core)).map_err(problem)?;
             stored.changes.iter().for_each(|change| study.fold(change));
             Ok::<_, String>((plan, study))
         };
         match folded() {
             Ok((plan, study)) => {
-                let charged = (Key::Study(id), None);
+                // It counts among those of the server; who created it is unknown.
+                let charged = Key::Study(id);
+                let memory = memory_of(&stored.header.settings).div_ceil(1024);
+                let memory = self.memory.take_many_anyway(charged, memory);
+                let places = [self.places.take_anyway(charged), memory];
+                let charged = (charged, places);
                 self.start_task(stored.header, stored.rows, plan, study, charged);
                 true
             }
@@ -336,25 +363,13 @@ impl Studies {
         self.lock().in_order.iter().rev().cloned().collect()
     }
 
-    /// The games of all studies.
-    pub fn games(&self) -> BTreeSet<Id> {
-        let mut games = BTreeSet::new();
-        for handle in self.newest() {
-            handle.read(|study| {
-                let played = study.participants().values().flat_map(|it| &it.games);
-                games.extend(played.map(|game| Id(game.placed.game)));
-            });
-        }
-        games
-    }
-
     fn start_task(
         &self,
         header: StudyHeader,
         rows: u64,
         plan: StudyPlan,
         study: Study,
-        (charged, place): (Key, Option<Held>),
+        (charged, places): (Key, [Held; 2]),
     ) -> Arc<StudyHandle> {
         let (mailbox, inbox) = mpsc::channel(STUDY_MAILBOX);
         let stop = Stop {
@@ -366,7 +381,7 @@ impl Studies {
             header,
             plan,
             charged,
-            _place: place,
+            _places: places,
             committed: Mutex::new(study),
             mailbox,
             changes: watch::Sender::new(0),
@@ -381,13 +396,20 @@ impl Studies {
         table.by_id.insert(handle.id(), Arc::clone(&handle));
         drop(table);
         let task = Task::new(Arc::clone(&handle), Arc::clone(&self.rooms), self.now, rows);
-        self.tracker.spawn(task.run(inbox, stop));
+        let running = named(LongTask::Study, task.run(inbox, stop));
+        self.tracker.spawn(running);
         handle
     }
 
     fn lock(&self) -> MutexGuard<'_, Table> {
         (self.table.lock()).expect("no code that holds this lock can panic")
     }
+}
+
+/// Bytes that settings take in memory, at most.
+fn memory_of(settings: &v1::StudySettings) -> usize {
+    let cost = shapes::STUDY_SETTINGS.cost(&settings.encode_to_vec(), Cost::MAX);
+    cost.expect("what was just encoded is readable").memory
 }
 
 /// An id whose last four bytes are 0, so that links can leave them out.

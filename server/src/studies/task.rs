@@ -58,8 +58,8 @@ pub(super) struct Task {
     pub(super) retry: Option<Instant>,
     /// Whether something visible has changed that is not committed.
     has_changed: bool,
-    /// Who waits for the deletion of the study, once that is requested.
-    deletion: Option<oneshot::Sender<Result<usize, usize>>>,
+    /// Those who wait for the deletion of the study, once that is requested.
+    deletion: Vec<oneshot::Sender<Result<usize, usize>>>,
 }
 
 impl Task {
@@ -93,7 +93,7 @@ impl Task {
             closing: BTreeSet::new(),
             retry: None,
             has_changed: false,
-            deletion: None,
+            deletion: Vec::new(),
             state,
         }
     }
@@ -110,12 +110,15 @@ impl Task {
             if let Err(error) = self.settle(stop.no_more_games.is_cancelled()).await {
                 return self.fail(&error);
             }
-            match self.delete_study().await {
+            match self.delete_study(&mut inbox).await {
                 Ok(false) => {}
                 Ok(true) => return,
                 Err(error) => return self.fail(&error),
             }
-            let wake = self.wake_at();
+            // Nothing that is due is done any more.
+            let wake = self
+                .wake_at()
+                .filter(|_| !stop.no_more_games.is_cancelled());
             let alarm = sleep_until(wake.unwrap_or_else(Instant::now));
             tokio::select! {
                 () = stop.end.cancelled() => return,
@@ -190,7 +193,7 @@ impl Task {
                 if let Some(change) = self.state.close() {
                     self.fold(change);
                 }
-                self.deletion = Some(reply);
+                self.deletion.push(reply);
             }
             Message::Present {
                 number,
@@ -213,7 +216,7 @@ impl Task {
     }
 
     fn execute(&mut self, command: Command) -> Result<u32, Refusal> {
-        if self.deletion.is_some() {
+        if !self.deletion.is_empty() {
             return Err(Refusal::Closed);
         }
         let (changes, number) = command(&self.state, (self.now)())?;
@@ -298,49 +301,65 @@ impl Task {
         }
     }
 
-    /// Deletes the data of participants who want it, once their games are over. Returns whether
-    /// there were any.
+    /// Deletes the data of participants who want it, once their games are over: of all of them
+    /// together, because each time the whole journal is read and written. Returns whether there were
+    /// any.
     async fn delete_data(&mut self) -> Result<bool, StoreError> {
-        let deleting = self.handle.lock_deleting().clone();
-        let mut any = false;
-        for number in deleting {
-            // A commit comes first: the journal is read from the store.
-            if self.playing.contains(&number) || !self.pending.is_empty() {
-                continue;
-            }
-            let handle = Arc::clone(&self.handle);
-            let mut counts = handle.traces.lock().await;
-            let store = self.rooms.store();
-            let Some(stored) = store.study(handle.id()).await? else {
-                continue;
-            };
-            let mut changes = stored.changes;
-            for change in &mut changes {
-                change.forget(number);
-            }
-            store.rewrite_study(handle.id(), changes, number).await?;
-            self.rows = 1;
-            let played = self.state.participant(number).into_iter();
-            let games: Vec<_> = played.flat_map(|it| &it.games).collect();
-            let ids: Vec<Id> = games.iter().map(|game| Id(game.placed.game)).collect();
-            for game in &ids {
-                counts.remove(game);
-            }
-            for game in &games {
-                self.rooms.forget(Id(game.placed.room));
-            }
-            let count = ids.len();
-            self.rooms.delete_games(ids).await?;
-            handle.lock_deleting().remove(&number);
-            info!(study = %handle.id(), number, games = count, "the data of a participant were deleted");
-            any = true;
+        // A commit comes first: the journal is read from the store.
+        if !self.pending.is_empty() {
+            return Ok(false);
         }
-        Ok(any)
+        let mut due = self.handle.lock_deleting().clone();
+        due.retain(|number| !self.playing.contains(number));
+        if due.is_empty() {
+            return Ok(false);
+        }
+        let handle = Arc::clone(&self.handle);
+        let mut counts = handle.traces.lock().await;
+        let store = self.rooms.store();
+        let Some(stored) = store.study(handle.id()).await? else {
+            return Ok(false);
+        };
+        let mut changes = stored.changes;
+        let mut is_changed = false;
+        for change in &mut changes {
+            for number in &due {
+                is_changed |= change.forget(*number);
+            }
+        }
+        // Everybody has a pseudonym to forget, so an unchanged journal was written before, by a
+        // server that ended before its games were deleted. Traces were deleted with it.
+        if is_changed {
+            let forgotten = due.iter().copied().collect();
+            store.rewrite_study(handle.id(), changes, forgotten).await?;
+            self.rows = 1;
+        }
+        let played = due
+            .iter()
+            .filter_map(|number| self.state.participant(*number));
+        let games: Vec<_> = played.flat_map(|it| &it.games).collect();
+        let ids: Vec<Id> = games.iter().map(|game| Id(game.placed.game)).collect();
+        for game in &ids {
+            counts.remove(game);
+        }
+        for game in &games {
+            self.rooms.forget(Id(game.placed.room));
+        }
+        let count = ids.len();
+        self.rooms.delete_games(ids).await?;
+        handle.lock_deleting().retain(|it| !due.contains(it));
+        if is_changed {
+            info!(study = %handle.id(), participants = due.len(), games = count, "the data of participants were deleted");
+        }
+        Ok(true)
     }
 
     /// Deletes the study if that was requested and no game runs any more. Returns whether it did.
-    async fn delete_study(&mut self) -> Result<bool, StoreError> {
-        if self.deletion.is_none() || !self.playing.is_empty() {
+    async fn delete_study(
+        &mut self,
+        inbox: &mut mpsc::Receiver<Message>,
+    ) -> Result<bool, StoreError> {
+        if self.deletion.is_empty() || !self.playing.is_empty() {
             return Ok(false);
         }
         let participants = self.state.participants().values();
@@ -355,7 +374,14 @@ impl Task {
         self.rooms.delete_games(games).await?;
         store.delete_study(self.handle.id()).await?;
         info!(study = %self.handle.id(), games = count, "a study was deleted");
-        if let Some(reply) = self.deletion.take() {
+        // Those who asked while it was deleted get the same answer.
+        inbox.close();
+        while let Ok(message) = inbox.try_recv() {
+            if let Message::Delete { reply, .. } = message {
+                self.deletion.push(reply);
+            }
+        }
+        for reply in self.deletion.drain(..) {
             // The caller may have gone.
             let _ = reply.send(Ok(count));
         }

@@ -8,6 +8,7 @@ use tokio::time::advance;
 use super::*;
 use crate::config::ServerConfig;
 use crate::store::{MemoryStore, Store};
+use crate::tasks::{polls, spinning};
 
 /// How long a participant may be away.
 const LIMIT: Duration = Duration::from_secs(60);
@@ -58,14 +59,19 @@ struct Lab {
     study: Arc<StudyHandle>,
 }
 
+/// The studies of a server with this store.
+fn server(store: &Arc<dyn Store>) -> Arc<Studies> {
+    let tracker = TaskTracker::new();
+    let config = ServerConfig::default();
+    let rooms = Rooms::new(&config, Arc::clone(store), tracker.clone()).expect("threads");
+    Studies::at(stopped_clock, rooms, tracker)
+}
+
 impl Lab {
     /// A new study with two participants.
     async fn new() -> Self {
         let store: Arc<dyn Store> = Arc::new(MemoryStore::default());
-        let tracker = TaskTracker::new();
-        let config = ServerConfig::default();
-        let rooms = Rooms::new(&config, Arc::clone(&store), tracker.clone()).expect("threads");
-        let studies = Studies::at(stopped_clock, rooms, tracker);
+        let studies = server(&store);
         let created = studies.create(settings(), None, Key::Local).await;
         let (study, _) = created.expect("valid settings");
         let added = study.add(vec![String::new(); 2]).await;
@@ -136,6 +142,24 @@ async fn a_participant_who_is_away_for_long_gives_its_slot_to_the_next() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_study_sleeps_while_the_server_ends_although_something_is_due() {
+    let lab = Lab::new().await;
+    assert_eq!(lab.study.open(1).await.expect("it runs"), Ok(1));
+    drop(lab.study.present(1, 1).await);
+    let mut changes = lab.study.changes();
+    while lab.study.read(|study| study.is_connected(1)) {
+        changes.changed().await.expect("the study runs");
+    }
+    lab.studies.stop();
+    lab.settled().await;
+    let before = polls()[&LongTask::Study];
+    tokio::time::sleep(LIMIT * 60).await;
+    assert_eq!(spinning(), [].into());
+    assert!(polls()[&LongTask::Study] <= before + 1);
+    assert_eq!(lab.status(1), Status::Active, "the next start decides");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_study_is_deleted_once_nobody_is_in_the_middle_of_it() {
     let lab = Lab::new().await;
     let id = lab.study.id();
@@ -168,4 +192,152 @@ async fn a_study_is_deleted_once_nobody_is_in_the_middle_of_it() {
     assert!(studies.newest().is_empty());
     assert!(study.open(1).await.is_err(), "its task has ended");
     assert!(study.is_over());
+}
+
+#[tokio::test(start_paused = true)]
+async fn all_who_delete_a_study_are_answered() {
+    let lab = Lab::new().await;
+    assert_eq!(lab.study.open(1).await.expect("it runs"), Ok(1));
+    let delete = || lab.studies.delete(Arc::clone(&lab.study), true);
+    let (first, second) = tokio::join!(delete(), delete());
+    assert_eq!(first.expect("it is deleted"), Ok((2, 0)));
+    assert_eq!(second.expect("it is deleted"), Ok((2, 0)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn studies_count_after_a_restart_too() {
+    let lab = Lab::new().await;
+    let studies = server(&lab.store);
+    studies.restore().await.expect("readable");
+    assert_eq!(studies.newest().len(), 1);
+    let mut created = 1;
+    // Two callers, because none may have all places.
+    for caller in [Key::Local, Key::Resumed] {
+        while studies.create(settings(), None, caller).await.is_ok() {
+            created += 1;
+        }
+    }
+    assert_eq!(created, MAX_STUDIES);
+
+    // More than there may be, as an earlier version let there be, are all resumed.
+    let studies = server(&lab.store);
+    let one_more = lab.studies.create(settings(), None, Key::Local).await;
+    one_more.expect("this server has one");
+    studies.restore().await.expect("readable");
+    assert_eq!(studies.newest().len(), MAX_STUDIES + 1);
+    let newest = Arc::clone(&studies.newest()[0]);
+    let deleted = studies.delete(newest, true).await;
+    assert_eq!(deleted.expect("it runs"), Ok((0, 0)));
+    let refused = studies.create(settings(), None, Key::Local).await;
+    assert!(
+        matches!(refused, Err(CreateProblem::Refused(_))),
+        "still full"
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
+    let lab = Lab::new().await;
+    let id = lab.study.id();
+    let rows = async || {
+        let stored = lab.store.study(id).await.expect("readable");
+        stored.expect("it exists").rows
+    };
+    for number in [1, 2] {
+        let withdrawn = lab.study.withdraw(number, true).await;
+        assert_eq!(withdrawn.expect("it runs"), Ok(()));
+    }
+    assert_eq!(rows().await, 1, "rewritten");
+    let added = lab.study.add(vec!["Ada".into()]).await;
+    assert_eq!(added.expect("it runs"), Ok(3));
+    assert_eq!(rows().await, 2);
+    lab.studies.end();
+
+    let studies = server(&lab.store);
+    studies.restore().await.expect("readable");
+    let study = studies.get(id).expect("it is resumed");
+    let unknown = study.open(99).await.expect("it runs");
+    assert_eq!(unknown, Err(chefshat_study::Refusal::Unknown));
+    assert_eq!(rows().await, 2, "nothing is left to delete");
+
+    // A server that ended right after the withdrawals.
+    let added = study.add(vec!["Bo".into()]).await;
+    assert_eq!(added.expect("it runs"), Ok(4));
+    studies.end();
+    let withdrew = |number| chefshat_study::Change::Withdrew {
+        number,
+        delete_data: true,
+        at_ms: 1,
+    };
+    let appended = lab
+        .store
+        .append_study(id, 3, vec![withdrew(3), withdrew(4)]);
+    appended.await.expect("committed");
+    let studies = server(&lab.store);
+    studies.restore().await.expect("readable");
+    let study = studies.get(id).expect("it is resumed");
+    let unknown = study.open(99).await.expect("it runs");
+    assert_eq!(unknown, Err(chefshat_study::Refusal::Unknown));
+    assert_eq!(rows().await, 1, "rewritten");
+    let stored = lab.store.study(id).await.expect("readable");
+    let stored = format!("{:?}", stored.expect("it exists").changes);
+    assert!(
+        !stored.contains("Ada") && !stored.contains("Bo"),
+        "{stored}"
+    );
+}
+
+/// Who imports a record under the id of a study's game adds nothing to the study's data.
+#[tokio::test]
+async fn a_record_from_elsewhere_is_no_data_of_a_study() {
+    let lab = Lab::new().await;
+    let game = Id([9; 16]);
+    let summary = v1::RecordSummary::default();
+    let imported = lab.store.import(game, summary, Arc::from([])).await;
+    assert_eq!(imported, Ok(true));
+    let record = super::export::record_of(lab.studies.rooms(), lab.study.id(), game).await;
+    assert_eq!(record, Ok(None));
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_settings_of_all_studies_of_a_caller_take_its_share_of_memory() {
+    use v1::study_stage::Stage;
+    let studies = server(&(Arc::new(MemoryStore::default()) as Arc<dyn Store>));
+    let remote = Key::Address([192, 0, 2, 1].into());
+    let mut long = settings();
+    let text = v1::StudyText {
+        text: "x".repeat(20_000),
+        ..v1::StudyText::default()
+    };
+    let text = v1::StudyStage {
+        stage: Some(Stage::Text(text)),
+    };
+    long.stages.splice(1..1, vec![text; 45]);
+    let create = async || studies.create(long.clone(), None, remote).await;
+    let mut created = Vec::new();
+    let refused = loop {
+        match create().await {
+            Ok((study, _)) => created.push(study),
+            Err(refused) => break refused,
+        }
+        assert!(created.len() < 10, "there is no limit");
+    };
+    // A tenth of 48 MiB.
+    assert_eq!(created.len(), 5);
+    let CreateProblem::Refused(refused) = refused else {
+        panic!("{refused}");
+    };
+    assert_eq!(refused.reason, "TOO_MANY_STUDIES");
+    assert_eq!(refused.limit, 48 * 1024 * 1024 / 10 / 1024 * 1024);
+    let small = studies.create(settings(), None, remote).await;
+    small.expect("a small one still fits");
+    let other = Key::Address([192, 0, 2, 2].into());
+    let other = studies.create(long.clone(), None, other).await;
+    other.expect("the memory of another caller");
+    let deleted = created.pop().expect("one");
+    let deleting = studies.delete(deleted, true).await.expect("it runs");
+    deleting.expect("nobody is in it");
+    tokio::task::yield_now().await;
+    create().await.expect("its memory is free again");
+    assert!(matches!(create().await, Err(CreateProblem::Refused(_))));
 }

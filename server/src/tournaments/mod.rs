@@ -25,7 +25,7 @@ use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
 pub use handle::{TableProblem, TournamentHandle};
-pub use leaderboard::Leaderboard;
+pub use leaderboard::{Leaderboard, finish};
 pub use message::{
     ByHand, ByHandRefusal, Call, Connection, Entry, JoinRefusal, Newcomer, Stopped, Who,
 };
@@ -39,6 +39,7 @@ use crate::limits::{Held, Key, Places, Refused};
 use crate::rooms::{CODES_TRIED, Rooms};
 use crate::store::StoreError;
 use crate::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use crate::tasks::{LongTask, named};
 use chefshat_room::ids::{Id, RequestKey, Token, join_code, normal_code, random_bytes};
 use handle::TournamentState;
 use shared::Shared;
@@ -257,19 +258,6 @@ impl Tournaments {
         all.iter().any(announces)
     }
 
-    /// Whether a tournament that is not over has announced a game with this id: its result may
-    /// still be read.
-    pub fn needs(&self, game: Id) -> bool {
-        let all: Vec<_> = (self.lock().earlier(None))
-            .map(|(_, handle)| Arc::clone(handle))
-            .collect();
-        let needs = |handle: &Arc<TournamentHandle>| {
-            !handle.is_over()
-                && (handle.committed().placed.values()).any(|(_, announced)| *announced == game)
-        };
-        all.iter().any(needs)
-    }
-
     /// The newest `count` tournaments in this state, or in any; only those created before number
     /// `before`, if set. With their numbers, newest first.
     pub fn newest(
@@ -346,7 +334,8 @@ impl Tournaments {
             return handle;
         }
         let task = Task::new(Arc::clone(&handle), Arc::clone(&self.rooms), rows, place);
-        self.tracker.spawn(task.run(inbox, stop));
+        let running = named(LongTask::Tournament, task.run(inbox, stop));
+        self.tracker.spawn(running);
         handle
     }
 

@@ -13,7 +13,7 @@ use tracing::{error, info, warn};
 
 use super::handle::{TournamentHandle, TournamentState};
 use super::message::{Call, Connection, Entry, JoinRefusal, Message};
-use crate::clock::since_epoch_ms;
+use crate::clock::{RoomClock, since_epoch_ms};
 use crate::cluster::News;
 use crate::config::{TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
 use crate::limits::{Held, Key};
@@ -71,7 +71,8 @@ pub(super) struct Task {
     pub(super) retry: Option<Instant>,
     /// Answers that wait for a commit.
     pub(super) replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
-    began: Instant,
+    /// Times of the core: a pause of the process makes no participant late.
+    clock: RoomClock,
     /// Its place among its creator's tournaments.
     _place: Option<Held>,
 }
@@ -94,6 +95,7 @@ impl Task {
             retired: BTreeSet::new(),
             state,
             handle,
+            clock: RoomClock::of_age(Duration::ZERO, rooms.process_clock()),
             rooms,
             rows,
             pending: Vec::new(),
@@ -105,7 +107,6 @@ impl Task {
             joined_at: Instant::now(),
             retry: None,
             replies: Vec::new(),
-            began: Instant::now(),
             _place: place,
         }
     }
@@ -129,7 +130,7 @@ impl Task {
             let wake = self
                 .wake_at()
                 .filter(|_| !stop.no_more_games.is_cancelled());
-            let alarm = sleep_until(wake.unwrap_or(self.began));
+            let alarm = sleep_until(wake.unwrap_or(self.joined_at));
             tokio::select! {
                 () = stop.end.cancelled() => return self.end_streams(),
                 received = inbox.recv_many(&mut messages, MESSAGES_AT_A_TIME) => {
@@ -189,7 +190,7 @@ impl Task {
 
     fn wake_at(&self) -> Option<Instant> {
         let core = self.state.core.wake_at();
-        let core = core.map(|ms| self.began + Duration::from_millis(ms));
+        let core = core.map(|ms| self.clock.instant(Duration::from_millis(ms)));
         core.into_iter()
             .chain(self.retry)
             .chain(self.open_until())
@@ -244,7 +245,7 @@ impl Task {
     }
 
     fn now_ms(&self) -> u64 {
-        u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
+        u64::try_from(self.clock.now().as_millis()).unwrap_or(u64::MAX)
     }
 
     async fn receive(&mut self, message: Message) -> Result<(), StoreError> {

@@ -3,6 +3,7 @@
 
 use bytes::Bytes;
 use http::{HeaderMap, HeaderName, HeaderValue, Method, Request, Response, StatusCode, header};
+use sha2::{Digest as _, Sha256};
 
 /// A built file.
 #[derive(Debug, Clone)]
@@ -13,6 +14,17 @@ pub(super) struct File {
     pub(super) hash: String,
     /// Its content.
     pub(super) bytes: Bytes,
+}
+
+impl File {
+    /// A generated file.
+    pub(super) fn new(media_type: &str, bytes: Bytes) -> Self {
+        Self {
+            media_type: media_type.to_owned(),
+            hash: hex::encode(&Sha256::digest(&bytes)[..16]),
+            bytes,
+        }
+    }
 }
 
 /// The document, which draws the page named by the path.
@@ -26,6 +38,8 @@ const ABSENT: &[u8] = include_bytes!("absent.html");
 const IMMUTABLE: HeaderValue = HeaderValue::from_static("public, max-age=31536000, immutable");
 /// Cached, but revalidated each time.
 const REVALIDATE: HeaderValue = HeaderValue::from_static("no-cache");
+/// When it is worth trying again, seconds.
+const RETRY_AFTER: HeaderValue = HeaderValue::from_static("5");
 /// The page loads everything from its own server, sends nothing elsewhere, and cannot be framed.
 const RULES: [(HeaderName, HeaderValue); 3] = [
     (
@@ -52,20 +66,24 @@ pub(super) fn answer<B>(
     finished(chosen(find, request), request.method())
 }
 
-/// The answer with content generated for this request; `None`: not found.
-pub(super) fn generated(
-    media_type: &'static str,
-    bytes: Option<Bytes>,
-    method: &Method,
-) -> Response<Bytes> {
-    let response = match bytes {
-        Some(bytes) => {
-            let mut response = plain(StatusCode::OK, media_type, b"");
-            *response.body_mut() = bytes;
-            response
-        }
-        None => plain(StatusCode::NOT_FOUND, "text/plain", b"no such file\n"),
-    };
+/// The answer with a file generated for this request.
+pub(super) fn generated<B>(file: File, request: &Request<B>) -> Response<Bytes> {
+    let tag = format!("\"{}\"", file.hash);
+    let response = tagged(request, &tag, REVALIDATE, &file.media_type, file.bytes);
+    finished(response, request.method())
+}
+
+/// The answer if the file does not exist.
+pub(super) fn absent(method: &Method) -> Response<Bytes> {
+    finished(not_found(), method)
+}
+
+/// The answer if too many others wait for such a file.
+pub(super) fn busy(method: &Method) -> Response<Bytes> {
+    let text = b"too many requests for pictures; try again later\n";
+    let mut response = plain(StatusCode::SERVICE_UNAVAILABLE, "text/plain", text);
+    let headers = response.headers_mut();
+    headers.insert(header::RETRY_AFTER, RETRY_AFTER);
     finished(response, method)
 }
 
@@ -88,7 +106,7 @@ fn chosen<B>(find: impl Fn(&str) -> Option<File>, request: &Request<B>) -> Respo
     let asset = path.starts_with(ASSETS);
     let name = match find(path) {
         Some(_) => path,
-        None if asset => return plain(StatusCode::NOT_FOUND, "text/plain", b"no such file\n"),
+        None if asset => return not_found(),
         None => DOCUMENT,
     };
     let Some(file) = find(name) else {
@@ -107,26 +125,44 @@ fn chosen<B>(find: impl Fn(&str) -> Option<File>, request: &Request<B>) -> Respo
         file.hash,
         if packed.is_some() { "-gzip" } else { "" }
     );
+    let caching = if asset { IMMUTABLE } else { REVALIDATE };
+    let is_packed = packed.is_some();
+    let bytes = packed.map_or(file.bytes, |packed| packed.bytes);
+    let mut response = tagged(request, &tag, caching, &file.media_type, bytes);
+    let is_sent = response.status() == StatusCode::OK;
+    let headers = response.headers_mut();
+    headers.insert(header::VARY, header::ACCEPT_ENCODING.into());
+    if is_sent && is_packed {
+        headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
+    }
+    response
+}
+
+/// The answer with bytes, or without them if the browser has those of this tag.
+fn tagged<B>(
+    request: &Request<B>,
+    tag: &str,
+    caching: HeaderValue,
+    media_type: &str,
+    bytes: Bytes,
+) -> Response<Bytes> {
     let mut response = Response::new(Bytes::new());
     let headers = response.headers_mut();
-    headers.insert(
-        header::CACHE_CONTROL,
-        if asset { IMMUTABLE } else { REVALIDATE },
-    );
-    headers.insert(header::VARY, header::ACCEPT_ENCODING.into());
-    headers.insert(header::ETAG, word(&tag));
+    headers.insert(header::CACHE_CONTROL, caching);
+    headers.insert(header::ETAG, word(tag));
     let known = (request.headers().get(header::IF_NONE_MATCH))
         .is_some_and(|tags| tags.as_bytes() == tag.as_bytes());
     if known {
         *response.status_mut() = StatusCode::NOT_MODIFIED;
         return response;
     }
-    headers.insert(header::CONTENT_TYPE, word(&with_charset(&file.media_type)));
-    if packed.is_some() {
-        headers.insert(header::CONTENT_ENCODING, HeaderValue::from_static("gzip"));
-    }
-    *response.body_mut() = packed.unwrap_or(file).bytes;
+    headers.insert(header::CONTENT_TYPE, word(&with_charset(media_type)));
+    *response.body_mut() = bytes;
     response
+}
+
+fn not_found() -> Response<Bytes> {
+    plain(StatusCode::NOT_FOUND, "text/plain", b"no such file\n")
 }
 
 fn plain(status: StatusCode, media_type: &'static str, text: &'static [u8]) -> Response<Bytes> {

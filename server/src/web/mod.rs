@@ -1,57 +1,56 @@
 //! The page for people: serves the built browser client (`clients/web`) on the port of gRPC. All
-//! gRPC calls are POST, so every GET is for the page. A release embeds the files; a debug build
-//! reads them on each request, so that the page can be edited while a server runs.
-//! `clients/web/vite.config.ts` decides which files there are.
+//! gRPC calls are POST, so every GET is for the page. `clients/web/vite.config.ts` decides which
+//! files there are.
 
 mod answer;
+mod cache;
+mod files;
 mod origin;
 mod preview;
+#[cfg(test)]
+mod tests;
 
-use std::borrow::Cow;
+use std::sync::Arc;
 use std::task::{Context, Poll};
 
 use bytes::Bytes;
 use futures::future::{BoxFuture, Either};
 use http::{Method, Request, Response, header};
-use rust_embed::RustEmbed;
+use rayon::ThreadPoolBuildError;
 use tonic::body::Body;
 use tower::{BoxError, Layer, Service};
 
-use answer::{DOCUMENT, File, answer, generated};
+use answer::{DOCUMENT, absent, answer, busy, generated};
+use files::find;
 pub use origin::{OriginLayer, Origins};
-use preview::Link;
+use preview::{Link, Previews, Unshown};
+#[cfg(test)]
+pub(crate) use preview::{MAX_PREVIEWS, MAX_PREVIEWS_WAITING, PICTURE_PATIENCE};
 
-#[derive(RustEmbed)]
-#[folder = "../clients/web/dist"]
-struct Dist;
+use crate::limits::Shares;
 
-/// Whether the page is built in.
-pub fn is_built_in() -> bool {
+/// Whether the page was built.
+pub fn is_built() -> bool {
     find(DOCUMENT).is_some()
 }
 
-/// A built file; `None` for hidden ones, which belong to the source tree.
-fn find(name: &str) -> Option<File> {
-    if name.starts_with('.') {
-        return None;
-    }
-    let file = Dist::get(name)?;
-    let bytes = match file.data {
-        Cow::Borrowed(bytes) => Bytes::from_static(bytes),
-        Cow::Owned(bytes) => bytes.into(),
-    };
-    Some(File {
-        media_type: file.metadata.mimetype().to_owned(),
-        hash: hex::encode(&file.metadata.sha256_hash()[..16]),
-        bytes,
-    })
+/// Puts the page in front of the services.
+#[derive(Debug, Clone)]
+pub struct PageLayer {
+    tls: bool,
+    previews: Arc<Previews>,
 }
 
-/// Puts the page in front of the services.
-#[derive(Debug, Clone, Copy)]
-pub struct PageLayer {
-    /// Whether browsers reach this server with TLS.
-    pub tls: bool,
+impl PageLayer {
+    /// Creates the page. `tls`: whether browsers reach this server with TLS. `shares`: how many
+    /// previews of games one caller may ask for at a time.
+    ///
+    /// # Errors
+    /// The operating system cannot start the thread that paints them.
+    pub fn new(tls: bool, shares: Shares) -> Result<Self, ThreadPoolBuildError> {
+        let previews = Arc::new(Previews::new(shares)?);
+        Ok(Self { tls, previews })
+    }
 }
 
 impl<S> Layer<S> for PageLayer {
@@ -59,7 +58,7 @@ impl<S> Layer<S> for PageLayer {
 
     fn layer(&self, services: S) -> Self::Service {
         WithPage {
-            layer: *self,
+            layer: self.clone(),
             services,
         }
     }
@@ -93,46 +92,42 @@ where
         // The clone that is ready serves this request.
         let clone = self.services.clone();
         let services = std::mem::replace(&mut self.services, clone);
-        let tls = self.layer.tls;
+        let page = self.layer.clone();
         Either::Right(Box::pin(async move {
             let request = request.map(drop);
             let answer = match Link::of(request.uri().path()) {
                 None => answer(find, &request),
-                Some(link) => previewed(link, services, &request, tls).await,
+                Some(link) => page.previewed(link, services, &request).await,
             };
             Ok(answer.map(|bytes| Body::new(axum::body::Body::from(bytes))))
         }))
     }
 }
 
-/// The answer to a request for the replay of a game or its picture.
-async fn previewed<S>(
-    link: Link<'_>,
-    services: S,
-    request: &Request<()>,
-    tls: bool,
-) -> Response<Bytes>
-where
-    S: Service<Request<Body>, Response = Response<Body>>,
-    S::Error: Into<BoxError>,
-{
-    let lines = preview::record(services, link.game(), request.extensions().clone()).await;
-    match link {
-        Link::Picture(_) => {
-            let picture = match lines {
-                Some(lines) => preview::picture(lines).await,
-                None => None,
-            };
-            generated("image/png", picture, request.method())
-        }
-        Link::Replay(_) => {
-            let tagged = lines.and_then(|lines| {
-                let origin = preview::origin(request, tls)?;
-                preview::document(&find(DOCUMENT)?.bytes, &lines, &origin)
-            });
-            match tagged {
-                Some(_) => generated("text/html; charset=utf-8", tagged, request.method()),
-                None => answer(find, request),
+impl PageLayer {
+    /// The answer to a request for the replay of a game or its picture.
+    async fn previewed<S>(&self, link: Link, services: S, request: &Request<()>) -> Response<Bytes>
+    where
+        S: Service<Request<Body>, Response = Response<Body>>,
+        S::Error: Into<BoxError>,
+    {
+        let (previews, extensions) = (&self.previews, request.extensions());
+        match link {
+            Link::Picture(game) => match previews.picture(game, services, extensions).await {
+                Ok(picture) => generated(picture, request),
+                Err(Unshown::Unknown) => absent(request.method()),
+                Err(Unshown::Busy) => busy(request.method()),
+            },
+            Link::Replay(game) => {
+                let title = previews.title(game, services, extensions).await.ok();
+                let tagged = title.and_then(|title| {
+                    let origin = preview::origin(request, self.tls)?;
+                    preview::document(&find(DOCUMENT)?.bytes, game, &title, &origin)
+                });
+                match tagged {
+                    Some(tagged) => generated(tagged, request),
+                    None => answer(find, request),
+                }
             }
         }
     }

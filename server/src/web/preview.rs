@@ -2,8 +2,12 @@
 //! The document of the page gets them as Open Graph tags (ogp.me). The record comes from
 //! `RecordService.GetRecord` of this server, called without a token: so only what everybody with the
 //! link may read is shown, within the limits of the caller's address.
+//!
+//! Records are large and pictures take long, so few are read at a time, for callers in turns, and
+//! what was made of a game is kept for those that ask next.
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
+use std::time::Duration;
 
 use bytes::Bytes;
 use chefshat_proto::v1::{self, record_line::Line, record_service_client::RecordServiceClient};
@@ -11,15 +15,37 @@ use chefshat_record::outcome::outcome;
 use chefshat_render::{Painter, Perspective, last_scene};
 use chefshat_room::ids::Id;
 use http::uri::{Authority, Scheme};
-use http::{Extensions, Request, Uri, header};
+use http::{Extensions, Request, Response, Uri, header};
 use minijinja::{AutoEscape, Environment, Value, context};
-use tokio::sync::Semaphore;
+use prost::Message as _;
+use rayon::ThreadPoolBuildError;
+use tokio::time::timeout;
 use tonic::body::Body;
-use tonic::client::GrpcService;
 use tonic::metadata::MetadataMap;
+use tower::{BoxError, Service};
 
+use super::answer::File;
+use super::cache::Cache;
+use crate::connections::peer_address;
+use crate::limits::{Key, Places, Shares};
+use crate::threads::{Priority, Threads};
+
+/// Most records that are in memory at a time, those being painted included.
+pub(crate) const MAX_PREVIEWS: usize = 2;
+/// Most requests that wait for that; further ones are refused.
+pub(crate) const MAX_PREVIEWS_WAITING: usize = 1_024;
+/// Longest time until a picture is sent.
+pub(crate) const PICTURE_PATIENCE: Duration = Duration::from_secs(10);
+/// Longest time until the document is sent, if necessary without tags: people wait for it.
+const DOCUMENT_PATIENCE: Duration = Duration::from_secs(1);
+/// Pictures that are kept, each some hundred kilobytes.
+const PICTURES_KEPT: usize = 16;
+/// Titles that are kept.
+const TITLES_KEPT: usize = 256;
 /// Most lines of a record that is shown: a game of some hundred Shifts.
 const MAX_LINES: usize = 50_000;
+/// Most bytes of a record that is shown, as encoded.
+const MAX_BYTES: usize = 16 * 1024 * 1024;
 /// Width of a picture, in pixels.
 const WIDTH: u32 = 1200;
 /// How a proxy that ends TLS says so.
@@ -27,83 +53,196 @@ const FORWARDED_PROTO: &str = "x-forwarded-proto";
 /// The tags of a replay.
 const TAGS: &str = include_str!("preview.html");
 
-/// Draws all pictures, one at a time: they are large, and nobody waits for them at a table.
 static PAINTER: LazyLock<Painter> = LazyLock::new(Painter::new);
-static PAINTING: Semaphore = Semaphore::const_new(1);
 
 /// What a path shows of a game.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Link<'a> {
+pub(super) enum Link {
     /// The page of its replay.
-    Replay(&'a str),
+    Replay(Id),
     /// The picture of its end.
-    Picture(&'a str),
+    Picture(Id),
 }
 
-impl<'a> Link<'a> {
+impl Link {
     /// What a path names, if it is the replay of a game.
-    pub(super) fn of(path: &'a str) -> Option<Self> {
+    pub(super) fn of(path: &str) -> Option<Self> {
         let name = path.strip_prefix("/replay/")?;
-        let (game, link) = match name.strip_suffix(".png") {
-            Some(game) => (game, Self::Picture(game)),
-            None => (name, Self::Replay(name)),
-        };
-        Id::parse(game).map(|_| link)
-    }
-
-    /// The game.
-    pub(super) fn game(self) -> &'a str {
-        match self {
-            Self::Replay(game) | Self::Picture(game) => game,
+        match name.strip_suffix(".png") {
+            Some(game) => Id::parse(game).map(Self::Picture),
+            None => Id::parse(name).map(Self::Replay),
         }
     }
 }
 
+/// Why a game is not shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unshown {
+    /// The game does not exist, not everybody may see it, it is not over, or it is too long.
+    Unknown,
+    /// Too many others are being shown.
+    Busy,
+}
+
+/// What the tags of a game say.
+#[derive(Debug, Clone)]
+pub(super) struct Title {
+    room: String,
+    result: String,
+}
+
+/// Shows games.
+#[derive(Debug)]
+pub(super) struct Previews {
+    places: Arc<Places>,
+    waiting: Arc<Places>,
+    threads: Threads,
+    pictures: Cache<File>,
+    titles: Cache<Title>,
+}
+
+impl Previews {
+    /// Starts the thread that paints.
+    ///
+    /// # Errors
+    /// The operating system cannot start the thread.
+    pub(super) fn new(shares: Shares) -> Result<Self, ThreadPoolBuildError> {
+        Ok(Self {
+            places: Places::new(MAX_PREVIEWS, shares),
+            waiting: Places::new(MAX_PREVIEWS_WAITING, shares),
+            threads: Threads::new("previews", 1, Priority::Batches)?,
+            pictures: Cache::new(PICTURES_KEPT),
+            titles: Cache::new(TITLES_KEPT),
+        })
+    }
+
+    /// The picture of the end of a game, as PNG.
+    ///
+    /// # Errors
+    /// It is not shown.
+    pub(super) async fn picture<S>(
+        &self,
+        game: Id,
+        services: S,
+        extensions: &Extensions,
+    ) -> Result<File, Unshown>
+    where
+        S: Service<Request<Body>, Response = Response<Body>>,
+        S::Error: Into<BoxError>,
+    {
+        let (kept, patience) = (&self.pictures, PICTURE_PATIENCE);
+        let shown = self.shown(kept, patience, game, services, extensions, |lines| {
+            Some(File::new("image/png", painted(lines)?))
+        });
+        shown.await
+    }
+
+    /// What the tags of a game say.
+    ///
+    /// # Errors
+    /// It is not shown.
+    pub(super) async fn title<S>(
+        &self,
+        game: Id,
+        services: S,
+        extensions: &Extensions,
+    ) -> Result<Title, Unshown>
+    where
+        S: Service<Request<Body>, Response = Response<Body>>,
+        S::Error: Into<BoxError>,
+    {
+        let (kept, patience) = (&self.titles, DOCUMENT_PATIENCE);
+        (self.shown(kept, patience, game, services, extensions, title)).await
+    }
+
+    /// What is kept of a game, or what `make` makes of its record.
+    async fn shown<T, S>(
+        &self,
+        kept: &Cache<T>,
+        patience: Duration,
+        game: Id,
+        services: S,
+        extensions: &Extensions,
+        make: impl FnOnce(&[v1::RecordLine]) -> Option<T> + Send + 'static,
+    ) -> Result<T, Unshown>
+    where
+        T: Clone + Send + 'static,
+        S: Service<Request<Body>, Response = Response<Body>>,
+        S::Error: Into<BoxError>,
+    {
+        if let Some(value) = kept.find(game) {
+            return Ok(value);
+        }
+        let key = Key::of_address(peer_address(extensions));
+        let _waiting = self.waiting.try_take(key).ok_or(Unshown::Busy)?;
+        let showing = async {
+            // First: the game of another caller does not wait behind those of this one.
+            let place = self.places.take(key).await;
+            let making = async {
+                let lines = record(services, game, extensions.clone()).await;
+                let lines = lines.ok_or(Unshown::Unknown)?;
+                // The work keeps its place when its request is cancelled.
+                let work = move || (make(&lines), place);
+                let made = self.threads.run(work).await;
+                made.and_then(|(made, _)| made).ok_or(Unshown::Unknown)
+            };
+            kept.get(game, making).await
+        };
+        timeout(patience, showing)
+            .await
+            .unwrap_or(Err(Unshown::Busy))
+    }
+}
+
 /// The record of a game, if everybody may read it and it is not too long.
-pub(super) async fn record<S>(
-    services: S,
-    game: &str,
-    extensions: Extensions,
-) -> Option<Vec<v1::RecordLine>>
+async fn record<S>(services: S, game: Id, extensions: Extensions) -> Option<Vec<v1::RecordLine>>
 where
-    S: GrpcService<Body>,
-    S::ResponseBody: http_body::Body<Data = Bytes> + Send + 'static,
-    <S::ResponseBody as http_body::Body>::Error:
-        Into<Box<dyn std::error::Error + Send + Sync>> + Send,
+    S: Service<Request<Body>, Response = Response<Body>>,
+    S::Error: Into<BoxError>,
 {
     let mut service = RecordServiceClient::with_origin(services, Uri::from_static("http://page"));
     let message = v1::GetRecordRequest {
-        game_id: game.to_owned(),
+        game_id: game.to_string(),
     };
     let request = tonic::Request::from_parts(MetadataMap::new(), extensions, message);
     let mut responses = service.get_record(request).await.ok()?.into_inner();
-    let mut lines = Vec::new();
+    let (mut lines, mut bytes) = (Vec::new(), 0);
     while let Some(response) = responses.message().await.ok()? {
+        bytes += response.encoded_len();
         lines.extend(response.lines);
-        if lines.len() > MAX_LINES {
+        if lines.len() > MAX_LINES || bytes > MAX_BYTES {
             return None;
         }
     }
     Some(lines)
 }
 
-/// The document with the tags of a game. `origin`: where this server is reached.
-pub(super) fn document(document: &[u8], lines: &[v1::RecordLine], origin: &str) -> Option<Bytes> {
-    let document = std::str::from_utf8(document).ok()?;
-    let (head, rest) = document.split_once("</head>")?;
+/// What the tags of a game say.
+fn title(lines: &[v1::RecordLine]) -> Option<Title> {
     let Some(Line::Header(header)) = lines.first().and_then(|line| line.line.as_ref()) else {
         return None;
     };
+    Some(Title {
+        room: header.room_name.clone(),
+        result: result(lines),
+    })
+}
+
+/// The document with the tags of a game. `origin`: where this server is reached.
+pub(super) fn document(document: &[u8], game: Id, title: &Title, origin: &str) -> Option<File> {
+    let document = std::str::from_utf8(document).ok()?;
+    let (head, rest) = document.split_once("</head>")?;
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
     let tags = context! {
-        room => header.room_name.as_str(),
-        result => result(lines),
+        room => title.room.as_str(),
+        result => title.result.as_str(),
         origin => Value::from_safe_string(origin.to_owned()),
-        game => header.game_id.as_str(),
+        game => game.to_string(),
     };
     let tags = environment.render_str(TAGS, tags).ok()?;
-    Some(format!("{head}{tags}</head>{rest}").into())
+    let tagged = format!("{head}{tags}</head>{rest}");
+    Some(File::new("text/html", tagged.into()))
 }
 
 /// The result of a game in words.
@@ -120,16 +259,10 @@ fn result(lines: &[v1::RecordLine]) -> String {
 }
 
 /// The picture of the end of a game, as PNG.
-pub(super) async fn picture(lines: Vec<v1::RecordLine>) -> Option<Bytes> {
-    let place = PAINTING.acquire().await.ok()?;
-    let painting = move || {
-        let _place = place;
-        let scene = last_scene(&lines, Perspective::All).ok()?;
-        let pixels = PAINTER.pixels(&PAINTER.table(&scene), WIDTH).ok()?;
-        PAINTER.png(&pixels).ok()
-    };
-    let painted = tokio::task::spawn_blocking(painting).await;
-    painted.ok().flatten().map(Bytes::from)
+fn painted(lines: &[v1::RecordLine]) -> Option<Bytes> {
+    let scene = last_scene(lines, Perspective::All).ok()?;
+    let pixels = PAINTER.pixels(&PAINTER.table(&scene), WIDTH).ok()?;
+    PAINTER.png(&pixels).ok().map(Bytes::from)
 }
 
 /// Where a client reaches this server; `None` if it does not say. Has no characters that HTML escapes.
@@ -154,6 +287,17 @@ mod tests {
     use super::*;
 
     const GAME: &str = "0123456789abcdef0123456789abcdef";
+
+    fn game() -> Id {
+        Id::parse(GAME).expect("an id")
+    }
+
+    /// The page with the tags of a game.
+    fn tagged(page: &[u8], lines: &[v1::RecordLine], origin: &str) -> String {
+        let title = title(lines).expect("a header");
+        let made = document(page, game(), &title, origin).expect("a document");
+        String::from_utf8(made.bytes.into()).expect("text")
+    }
 
     fn record(name: &str, kind: Kind) -> Vec<v1::RecordLine> {
         let seat = |name: &str| v1::Participant {
@@ -195,9 +339,9 @@ mod tests {
     #[test]
     fn only_the_replay_of_a_game_is_previewed() {
         let path = format!("/replay/{GAME}");
-        assert_eq!(Link::of(&path), Some(Link::Replay(GAME)));
+        assert_eq!(Link::of(&path), Some(Link::Replay(game())));
         let picture = format!("{path}.png");
-        assert_eq!(Link::of(&picture), Some(Link::Picture(GAME)));
+        assert_eq!(Link::of(&picture), Some(Link::Picture(game())));
         for other in [
             "/",
             "/replay",
@@ -217,8 +361,7 @@ mod tests {
         };
         let lines = record("\"><script>", Kind::GameEnded(ended.into()));
         let page = b"<html><head><title>t</title></head><body></body></html>";
-        let made = document(page, &lines, "https://chef.example.org").expect("a document");
-        let made = String::from_utf8(made.into()).expect("text");
+        let made = tagged(page, &lines, "https://chef.example.org");
         assert!(made.starts_with("<html><head><title>t</title>\n"), "{made}");
         assert!(made.ends_with("</head><body></body></html>"), "{made}");
         let picture = format!("content=\"https://chef.example.org/replay/{GAME}.png\"");
@@ -235,8 +378,7 @@ mod tests {
     #[test]
     fn a_game_without_a_result_says_so() {
         let lines = record("Rosa", Kind::GameAborted(Box::default()));
-        let made = document(b"<head></head>", &lines, "http://127.0.0.1:1").expect("a document");
-        let made = String::from_utf8(made.into()).expect("text");
+        let made = tagged(b"<head></head>", &lines, "http://127.0.0.1:1");
         assert!(made.contains("The game ended without a result."), "{made}");
     }
 

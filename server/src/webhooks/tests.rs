@@ -1,15 +1,19 @@
 //! Real receivers that fail, hang or cannot be reached.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
 use axum::Router;
 use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode};
 use axum::routing::post;
+use bytes::Bytes;
+use hmac::{Hmac, KeyInit as _, Mac as _};
+use sha2::Sha256;
 use tokio::net::TcpListener;
 
 use super::*;
-use crate::post::Target;
+use crate::post::{PostError, Target};
 
 const SECRET: &[u8] = b"a secret of the operator";
 /// How long a test waits for something that must happen.
@@ -105,7 +109,7 @@ async fn an_event_is_sent_until_it_is_received_and_signed_each_time() {
         seen.push(event["type"].as_str().expect("text").to_owned());
     }
     let (started, ended) = ("tournament.started", "tournament.ended");
-    assert_eq!(seen, [started, started, started, ended]);
+    assert_eq!(seen, [started, started, started, ended], "in order");
     closing.cancel();
     delivering.await.expect("it ends");
     assert_eq!(metrics.webhooks(WebhookOutcome::Delivered), 2);
@@ -113,7 +117,7 @@ async fn an_event_is_sent_until_it_is_received_and_signed_each_time() {
 }
 
 #[tokio::test]
-async fn what_nobody_receives_is_given_up_and_what_has_no_space_is_dropped() {
+async fn what_has_no_space_is_dropped_and_what_waits_at_the_end_is_tried_once_more() {
     let (port, mut requests) = receiver(usize::MAX).await;
     let metrics = Arc::new(Metrics::default());
     let webhooks = Webhooks::new(settings(port), Arc::clone(&metrics));
@@ -125,19 +129,122 @@ async fn what_nobody_receives_is_given_up_and_what_has_no_space_is_dropped() {
     assert_eq!(metrics.webhooks(WebhookOutcome::Dropped), 3);
     let closing = CancellationToken::new();
     let delivering = tokio::spawn(webhooks.clone().deliver(closing.clone()));
-    let (first, _) = next(&mut requests).await;
-    for _ in 1..MAX_ATTEMPTS {
-        let (again, _) = next(&mut requests).await;
-        assert_eq!(again["chefshat-delivery"], first["chefshat-delivery"]);
-    }
-    let (second, _) = next(&mut requests).await;
-    assert_ne!(second["chefshat-delivery"], first["chefshat-delivery"]);
-    assert_eq!(metrics.webhooks(WebhookOutcome::Failed), 1);
+    let id = |(headers, _): (HeaderMap, Bytes)| headers["chefshat-delivery"].clone();
+    let first = id(next(&mut requests).await);
+    assert_ne!(
+        id(next(&mut requests).await),
+        first,
+        "another comes before it is sent again"
+    );
     closing.cancel();
     delivering.await.expect("it ends");
     assert_eq!(webhooks.waiting(), 0, "the rest was tried once more");
     let settled = metrics.webhooks(WebhookOutcome::Failed);
     assert_eq!(settled, u64::try_from(MAX_WAITING).expect("small"));
+}
+
+#[tokio::test]
+async fn what_is_not_received_in_any_attempt_is_given_up() {
+    let (port, mut requests) = receiver(usize::MAX).await;
+    let metrics = Arc::new(Metrics::default());
+    let webhooks = Webhooks::new(settings(port), Arc::clone(&metrics));
+    let closing = CancellationToken::new();
+    webhooks.tournament_started(Id::random(), "Coppa", 8);
+    let delivering = tokio::spawn(webhooks.clone().deliver(closing.clone()));
+    for _ in 0..MAX_ATTEMPTS {
+        assert_eq!(names(&mut requests, 1).await, ["Coppa"]);
+    }
+    while webhooks.waiting() > 0 {
+        tokio::task::yield_now().await;
+    }
+    closing.cancel();
+    delivering.await.expect("it ends");
+    assert_eq!(metrics.webhooks(WebhookOutcome::Failed), 1);
+    assert!(requests.try_recv().is_err(), "it is not sent any more");
+}
+
+/// Answers requests whose body contains a text with this status, and others with 204.
+async fn picky(text: &'static str, status: StatusCode) -> (u16, Received) {
+    let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+    let port = listener.local_addr().expect("bound").port();
+    let (received, requests) = mpsc::unbounded_channel();
+    let answer = async move |headers: HeaderMap, body: Bytes| {
+        let is_it = String::from_utf8_lossy(&body).contains(text);
+        received.send((headers, body)).expect("the test waits");
+        match is_it {
+            true => status,
+            false => StatusCode::NO_CONTENT,
+        }
+    };
+    let router = Router::new().route("/hooks/chefshat", post(answer));
+    tokio::spawn(async move { axum::serve(listener, router).await });
+    (port, requests)
+}
+
+/// The names of tournaments in requests, in order.
+async fn names(requests: &mut Received, count: usize) -> Vec<String> {
+    let mut names = Vec::new();
+    for _ in 0..count {
+        let (_, body) = next(requests).await;
+        let event: Value = serde_json::from_slice(&body).expect("JSON");
+        names.push(event["data"]["name"].as_str().expect("text").to_owned());
+    }
+    names
+}
+
+#[tokio::test]
+async fn a_refused_event_is_not_repeated_and_delays_nothing() {
+    for status in [400, 401, 404, 410, 422] {
+        let status = StatusCode::from_u16(status).expect("a status");
+        let (port, mut requests) = picky("Refused", status).await;
+        let metrics = Arc::new(Metrics::default());
+        // Whatever is repeated waits for longer than the test.
+        let patient = settings(port).pausing(PATIENCE * 10);
+        let webhooks = Webhooks::new(patient, Arc::clone(&metrics));
+        let closing = CancellationToken::new();
+        let cup = Id::random();
+        webhooks.tournament_started(cup, "Refused", 8);
+        webhooks.tournament_ended(cup, "Next of it", true);
+        webhooks.tournament_started(Id::random(), "Other", 8);
+        let delivering = tokio::spawn(webhooks.clone().deliver(closing.clone()));
+        let sent = names(&mut requests, 3).await;
+        assert_eq!(sent, ["Refused", "Other", "Next of it"], "{status}");
+        closing.cancel();
+        delivering.await.expect("it ends");
+        assert_eq!(metrics.webhooks(WebhookOutcome::Refused), 1, "{status}");
+        assert_eq!(webhooks.waiting(), 0);
+    }
+}
+
+#[tokio::test]
+async fn an_event_that_is_sent_again_is_overtaken_by_others_and_not_by_the_next_of_its_tournament()
+{
+    for status in [408, 425, 429, 500, 503] {
+        let status = StatusCode::from_u16(status).expect("a status");
+        let (port, mut requests) = picky("Failing", status).await;
+        let metrics = Arc::new(Metrics::default());
+        let webhooks = Webhooks::new(settings(port), Arc::clone(&metrics));
+        let closing = CancellationToken::new();
+        let cup = Id::random();
+        webhooks.tournament_started(cup, "Failing", 8);
+        webhooks.tournament_ended(cup, "Next of it", true);
+        for other in ["One", "Two", "Three"] {
+            webhooks.tournament_started(Id::random(), other, 8);
+        }
+        let delivering = tokio::spawn(webhooks.clone().deliver(closing.clone()));
+        let sent = names(&mut requests, 4).await;
+        assert_eq!(sent, ["Failing", "One", "Two", "Three"], "{status}");
+        let again = usize::try_from(MAX_ATTEMPTS).expect("few") - 1;
+        let sent = names(&mut requests, again + 1).await;
+        assert!(
+            sent[..again].iter().all(|name| name == "Failing"),
+            "{sent:?}"
+        );
+        assert_eq!(sent[again], "Next of it", "{status}");
+        closing.cancel();
+        delivering.await.expect("it ends");
+        assert_eq!(metrics.webhooks(WebhookOutcome::Failed), 1, "{status}");
+    }
 }
 
 #[tokio::test]

@@ -5,15 +5,16 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_engine::{ActionId, BySeat, Cards, Seat, SeedPlan, Stop, Viewer};
+use chefshat_agents::AgentKind;
+use chefshat_engine::{ActionId, BySeat, Cards, RuleSetSpec, Seat, SeedPlan, Stop, Viewer};
 use chefshat_proto::v1;
 use chefshat_record::convert::{decision_kind, observation_to_proto};
 use chefshat_referee::counts::JOKER;
 use chefshat_referee::{Report, SeenCards};
-use chefshat_room::journal::{Fill, GameHeader, ParticipantKind};
+use chefshat_room::journal::{Change, Fill, GameHeader, ParticipantKind, SeatLabels};
 use chefshat_room::policy::Policy;
 use chefshat_room::testing::real_table::{PERSON, policy, shifts};
-use chefshat_room::testing::{OPEN, Table, ms};
+use chefshat_room::testing::{OPEN, Table, ms, study_game};
 use chefshat_room::{Core, OpenDecision, ReportVerdict, Verdict};
 use prost::Message as _;
 
@@ -176,6 +177,192 @@ fn a_person_who_plays_as_an_agent_does_not_change_what_is_sent() {
         };
         assert_eq!((seat.kind(), seat.shown_kind()), (kind, shown));
     }
+}
+
+/// A room of a study whose participant has seat 0, with these other seats.
+fn studied(labels: SeatLabels, others: Fill) -> Table {
+    let policy = Policy {
+        pace: Some(ms(300)),
+        ..Policy::default()
+    };
+    let fills = vec![OPEN, others, others, others];
+    // Special actions are declined in silence: `silent_tests` compares those.
+    let rules = RuleSetSpec {
+        stop: Stop::Shifts(2),
+        special_actions: false,
+        ..RuleSetSpec::default()
+    };
+    let mut table = Table::with_rules(policy, fills, rules);
+    let mut header = GameHeader::clone(table.core.header());
+    header.study = Some(Arc::new(study_game(labels)));
+    table.core = Core::new(Arc::new(header));
+    table
+}
+
+/// What is shown: its class, and its bytes.
+type Shown = Vec<(&'static str, Vec<u8>)>;
+
+/// Everything that anybody but the owner of a study may learn about one of its rooms.
+fn shown_of(table: &Table) -> Shown {
+    let core = &table.core;
+    let own = Seat::new(0);
+    let awaited = core.awaited_in_public();
+    let mut shown = vec![
+        (
+            "the room",
+            convert::describe_at(core, table.now).encode_to_vec(),
+        ),
+        ("the start", convert::game_started(core).encode_to_vec()),
+        (
+            "whom it waits for",
+            convert::awaited_to_proto(awaited, table.now).encode_to_vec(),
+        ),
+        (
+            "what spectators see",
+            core.visible_to_spectators().to_be_bytes().to_vec(),
+        ),
+    ];
+    for see in [Viewer::Seat(own), Viewer::Spectator, Viewer::Everything] {
+        shown.push((
+            "a snapshot",
+            crate::room::subscriber::snapshot(core, see).encode_to_vec(),
+        ));
+        let messages = sent_to(table, own, see).into_iter();
+        shown.extend(messages.map(|message| ("a message", message)));
+    }
+    shown
+}
+
+/// Plays a game with built-in agents in the other seats, and the same game with programs that decide
+/// the same at the same times. Returns the games, and what was shown at every moment of them.
+fn with_both_fills(labels: SeatLabels) -> [(Table, Shown); 2] {
+    let built_in = studied(labels, Fill::BuiltIn(AgentKind::Greedy.into()));
+    let agents = Fill::Open {
+        reserved_for: Some(ParticipantKind::Agent),
+    };
+    let mut both = [
+        (built_in, Vec::new()),
+        (studied(labels, agents), Vec::new()),
+    ];
+    let note = |both: &mut [(Table, Vec<_>); 2]| {
+        for (table, shown) in both {
+            shown.extend(shown_of(table));
+        }
+    };
+    // Before and after the programs have come.
+    note(&mut both);
+    for seat in 1..4 {
+        assert_eq!(both[1].0.join(ParticipantKind::Agent), Ok(Seat::new(seat)));
+        both[1].0.attach(Seat::new(seat));
+        note(&mut both);
+    }
+    for (table, _) in &mut both {
+        table.now += ms(40);
+        assert_eq!(table.join(ParticipantKind::Human), Ok(Seat::new(0)));
+        table.attach(Seat::new(0));
+    }
+    let mut read = both[0].0.journal.len();
+    for turn in 0.. {
+        note(&mut both);
+        if both[0].0.core.state().is_over() {
+            break;
+        }
+        if both[0].0.open().0 == Seat::new(0) {
+            for (table, _) in &mut both {
+                table.pass_time(ms(50));
+                let ((seat, id), action) = (table.open(), table.legal(turn));
+                assert_eq!(table.answer(seat, id, action).verdict, Verdict::Accepted);
+            }
+        } else {
+            both.iter_mut()
+                .for_each(|(table, _)| table.pass_time(ms(10)));
+        }
+        let [(built_in, _), (programs, _)] = &mut both;
+        for entry in &built_in.journal[read..] {
+            if let Change::Decided(decided) = &entry.change
+                && decided.seat != Seat::new(0)
+            {
+                let (seat, id) = programs.open();
+                assert_eq!(seat, decided.seat);
+                let answered = programs.answer(seat, id, decided.action.index().into());
+                assert_eq!(answered.verdict, Verdict::Accepted);
+            }
+        }
+        read = built_in.journal.len();
+    }
+    assert!(both[1].0.core.state().is_over(), "the same game");
+    both
+}
+
+#[test]
+fn what_fills_a_hidden_seat_of_a_study_does_not_change_what_is_shown() {
+    for labels in [SeatLabels::Kinds, SeatLabels::Players] {
+        let [(built_in, shown), (programs, other)] = with_both_fills(labels);
+        assert!(shown.len() > 2_000, "only {} messages", shown.len());
+        assert_eq!(shown.len(), other.len());
+        for ((what, one), (_, other)) in shown.iter().zip(&other) {
+            assert!(
+                one == other,
+                "{what} differs with {labels:?}:\n{one:?}\n{other:?}"
+            );
+        }
+        // The record has what is true, for the owner of the study.
+        let times = |table: &Table| {
+            let lines = convert::record_lines(table.core.header(), &table.journal);
+            let events = lines.into_iter().filter_map(|line| match line.line {
+                Some(v1::record_line::Line::Event(event)) => event.kind,
+                _ => None,
+            });
+            let plays = events.filter_map(|kind| match kind {
+                v1::game_event::Kind::Play(play) if play.seat > 0 => Some(play.decision_time_us),
+                _ => None,
+            });
+            plays.collect::<Vec<_>>()
+        };
+        assert!(times(&built_in).iter().all(|time| *time == 0));
+        assert!(times(&programs).iter().all(|time| *time > 0));
+        assert_eq!(times(&built_in).len(), times(&programs).len());
+    }
+    // The comparison finds what is shown where nothing is hidden.
+    let [(_, shown), (_, other)] = with_both_fills(SeatLabels::AsTheyAre);
+    for what in [
+        "the room",
+        "the start",
+        "whom it waits for",
+        "a snapshot",
+        "a message",
+    ] {
+        let of = |shown: &[(&str, Vec<u8>)]| {
+            let messages = shown.iter().filter(|(name, _)| *name == what);
+            messages
+                .map(|(_, message)| message.clone())
+                .collect::<Vec<_>>()
+        };
+        assert_ne!(of(&shown), of(&other), "{what}");
+    }
+}
+
+#[test]
+fn of_a_hidden_seat_only_a_substitution_is_shown() {
+    let agents = Fill::Open {
+        reserved_for: Some(ParticipantKind::Agent),
+    };
+    let mut table = studied(SeatLabels::Players, agents);
+    for _ in 1..4 {
+        table.join(ParticipantKind::Agent).expect("a free seat");
+    }
+    table.join(ParticipantKind::Human).expect("a free seat");
+    let connections = [0, 1, 2, 3].map(|seat| table.attach(Seat::new(seat)));
+    let before = shown_of(&table);
+    let hidden = Seat::new(2);
+    table.lost(hidden, connections[2]);
+    assert_eq!(shown_of(&table), before);
+    table.attach(hidden);
+    assert_eq!(shown_of(&table), before);
+    // The participant of the study sees its own.
+    let length = table.core.log().len();
+    table.lost(Seat::new(0), connections[0]);
+    assert_eq!(table.core.log().len(), length + 1);
 }
 
 /// The open decision as a message: the expected encoding.

@@ -1,6 +1,7 @@
 //! Updates that another node has encoded: a gateway passes them on as they are, and reads no more
 //! of them than it must know of their seats.
 
+use chefshat_proto::v1;
 use prost::encoding::{WireType, decode_key, decode_varint};
 
 use super::{
@@ -16,13 +17,21 @@ const UPDATE_ENTERED: u32 = 9;
 /// Field of the number in a `DecisionRequest`.
 const DECISION_ID: u32 = 1;
 
+/// Field of the reason in a `Detached`.
+const DETACHED_REASON: u32 = 1;
+/// The reason if the server stops.
+const STOPPING: u64 = v1::DetachReason::ServerStopping as u64;
+
 /// What an update says about its seat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Received {
     /// The seat or participant is attached.
     Attached,
     /// The seat or participant is detached.
-    Detached,
+    Detached {
+        /// The node stops: what it has continues at another one.
+        stops: bool,
+    },
     /// A command was refused.
     Refused,
     /// This decision is open.
@@ -79,7 +88,12 @@ fn read(update: &[u8]) -> (u32, Received) {
         match field {
             UPDATE_HANDLE => handle = value.handle(),
             UPDATE_ATTACHED | UPDATE_ENTERED => received = Received::Attached,
-            UPDATE_DETACHED => received = Received::Detached,
+            UPDATE_DETACHED => {
+                let mut fields = Fields(value.bytes());
+                let reason = fields.find(|(field, _)| *field == DETACHED_REASON);
+                let stops = reason.is_some_and(|(_, reason)| reason.number() == STOPPING);
+                received = Received::Detached { stops };
+            }
             UPDATE_REFUSED => received = Received::Refused,
             UPDATE_DECISION => {
                 let mut fields = Fields(value.bytes());
@@ -151,7 +165,7 @@ impl<'a> Iterator for Fields<'a> {
 
 #[cfg(test)]
 mod tests {
-    use chefshat_proto::v1::{self, seat_update::Update};
+    use chefshat_proto::v1::seat_update::Update;
     use prost::Message as _;
 
     use super::*;
@@ -186,7 +200,14 @@ mod tests {
             (
                 3,
                 Update::Detached(v1::Detached::default()),
-                Received::Detached,
+                Received::Detached { stops: false },
+            ),
+            (
+                4,
+                Update::Detached(v1::Detached {
+                    reason: v1::DetachReason::ServerStopping.into(),
+                }),
+                Received::Detached { stops: true },
             ),
         ];
         let mut updates = Updates::default();

@@ -2,7 +2,8 @@
 //! special action and keeps quiet or lets it run out. Random policies, clocks, paces, answers and
 //! faults, the same in both games: everything sent to a viewer who holds no joker must be the same,
 //! to the byte, and sent at the same time. Other pairs differ in whether somebody is offered a special
-//! action at all, and takes time to decline it. The same comparison detects deliberate leaks.
+//! action at all, and takes time to decline it or lets it run out. The same comparison detects
+//! deliberate leaks.
 
 use std::time::Duration;
 
@@ -469,9 +470,10 @@ fn nothing_that_is_sent_depends_on_a_silent_decision() {
     println!("{pairs} pairs, {messages} messages");
 }
 
-/// Plays the start of a Shift in a pair of which in one game alone somebody is offered a special
-/// action. It thinks before it declines; the first who gives takes as much longer in the other game.
-/// Returns the number of messages compared with those of everybody who is asked in neither.
+/// Plays the start of a Shift in a pair of which in one game a participant is offered a special
+/// action, and in the other nobody, a built-in agent or another participant. Each thinks before it
+/// declines, or lets it run out. Where the phase has a fixed time, the first who gives is asked at the
+/// same time; elsewhere it is not compared. Returns the number of messages compared.
 fn play_offered(number: u64, leak: Leak) -> Result<usize, String> {
     let mut chance = Chance(number);
     let mut plan = Plan::random(&mut chance);
@@ -486,23 +488,32 @@ fn play_offered(number: u64, leak: Leak) -> Result<usize, String> {
     policy.absence_time = policy.absence_time.map(|_| ms(9_000));
     policy.spectator_delay_decisions = 0;
     policy.pace = policy.pace.or(Some(ms(100)));
+    let has_pace = policy.pace != Some(ms(0));
+    let seats_of_participants = plan.fills.iter().filter(|fill| **fill == OPEN);
+    let is_fixed = has_pace && seats_of_participants.count() > 1;
     let rules = plan.rules.validate().expect("a valid rule set");
-    let Some(mut worlds) = plan.worlds(&rules, plan.holders, &mut chance) else {
+    let others = match is_fixed {
+        true => chance.pick(&[plan.holders, [plan.holders[1]; 2]]),
+        false => plan.holders,
+    };
+    let Some(mut worlds) = plan.worlds(&rules, others, &mut chance) else {
         return Ok(0);
     };
     let awaited = |world: &World| world.table.core.awaited_in_public();
-    let (offered, Some(giver)) = (worlds[0].is_silent(), awaited(&worlds[1])) else {
+    let (offered, Some(giver)) = (worlds[0].is_silent(), awaited(&worlds[0])) else {
         return Ok(0);
     };
-    // Where built-in agents give first, their gifts show that nothing was offered.
+    // Without a fixed time, gifts of built-in agents show that nothing was offered.
     let gives = matches!(worlds[1].asked(), Some((_, DecisionKind::Exchange)));
-    if !offered || !gives {
+    if !offered || !(gives || is_fixed) {
         return Ok(0);
     }
     let mut messages = 0;
-    let (declines, gives) = (chance.index(8), 20 + chance.index(8));
+    let latest = if is_fixed { 40 } else { 8 };
+    let (declines, gives) = ([0; 2].map(|_| chance.index(latest)), 32 + chance.index(8));
+    let except = Some(giver.seat).filter(|_| !is_fixed);
     let gift = chance.index(2);
-    for tick in 0..30 {
+    for tick in 0..45 {
         let seat = Seat::new(chance.index(plan.fills.len()));
         let (lost, found) = (chance.below(4) == 0, chance.below(4) == 0);
         for world in worlds.iter_mut() {
@@ -513,17 +524,19 @@ fn play_offered(number: u64, leak: Leak) -> Result<usize, String> {
                 world.attach(seat);
             }
         }
-        if tick == declines {
-            let decline = worlds[0].table.core.header().rules.actions().decline();
-            worlds[0].answer_after(ms(0), decline.index().into());
+        for (world, declines) in worlds.iter_mut().zip(declines) {
+            if tick == declines && world.is_silent() {
+                let decline = world.table.core.header().rules.actions().decline();
+                world.answer_after(ms(0), decline.index().into());
+            }
         }
-        if tick == gives {
+        let is_asked = |world: &World| world.asked() == Some((giver.seat, DecisionKind::Exchange));
+        if tick == gives && worlds.iter().all(is_asked) {
             // One that is legal in both games: the giver may hold jokers.
             let [one, other] = [&worlds[0], &worlds[1]].map(|it| it.table.core.legal_actions());
             let both: Vec<ActionId> = one.iter().filter(|it| other.contains(*it)).collect();
             for world in worlds.iter_mut() {
                 let (seat, id) = world.table.open();
-                assert_eq!(seat, giver.seat, "the first who gives is shown");
                 let action = both[gift % both.len()];
                 world.table.answer(seat, id, action.index().into());
             }
@@ -532,7 +545,7 @@ fn play_offered(number: u64, leak: Leak) -> Result<usize, String> {
         if !agree(&mut worlds) {
             break;
         }
-        messages += compare(&plan, &mut worlds, Some(giver.seat), leak)
+        messages += compare(&plan, &mut worlds, except, leak)
             .map_err(|problem| format!("pair {number}, tick {tick}: {problem}"))?;
         for world in worlds.iter_mut() {
             world.table.pass_time(ms(100));

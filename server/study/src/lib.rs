@@ -47,6 +47,7 @@ pub mod testing;
 mod view;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 pub use assignment::Order;
 pub use change::{Change, ConsentGiven, Outcome, PlacedGame};
@@ -76,7 +77,7 @@ use state::StudyState;
 /// matter.
 #[derive(Debug, Clone)]
 pub struct Study {
-    settings: Settings,
+    settings: Arc<Settings>,
     assignment: Assignment,
     step_count: usize,
     state: StudyState,
@@ -90,11 +91,12 @@ impl PartialEq for Study {
 }
 
 impl Study {
-    /// A study without participants.
+    /// A study without participants. Its copies share its settings.
     ///
     /// # Errors
     /// Returns the first invalid setting.
-    pub fn new(settings: Settings) -> Result<Self, SettingsProblem> {
+    pub fn new(settings: impl Into<Arc<Settings>>) -> Result<Self, SettingsProblem> {
+        let settings = settings.into();
         settings.check()?;
         let (sequences, block_size) = (settings.sequences(), settings.slots_of_block());
         let step_count = settings.steps(&sequences[0]).len();

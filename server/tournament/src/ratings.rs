@@ -73,6 +73,33 @@ pub struct Rated {
     pub places: Vec<u32>,
 }
 
+/// How a participant finished a game.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Finish {
+    /// With this place from 1.
+    Place(u32),
+    /// The game was broken off by others. It is compared only with those who forfeited it.
+    Unplaced,
+    /// It has lost to all others, also to those who forfeited the game, too.
+    Forfeited,
+}
+
+impl Finish {
+    /// What a finish is against another; `None` if the two are not compared.
+    fn against(self, other: Self) -> Option<Outcomes> {
+        Some(match (self, other) {
+            (Self::Forfeited, _) => Outcomes::LOSS,
+            (_, Self::Forfeited) => Outcomes::WIN,
+            (Self::Place(place), Self::Place(other)) => match place.cmp(&other) {
+                std::cmp::Ordering::Less => Outcomes::WIN,
+                std::cmp::Ordering::Equal => Outcomes::DRAW,
+                std::cmp::Ordering::Greater => Outcomes::LOSS,
+            },
+            (Self::Unplaced, _) | (_, Self::Unplaced) => return None,
+        })
+    }
+}
+
 /// Ratings of all participants, updated game by game. The order matters slightly: to reproduce the
 /// numbers, fold games by their time of ending, then by game id.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,6 +137,16 @@ impl<Who: Ord + Clone> Ratings<Who> {
     /// # Errors
     /// If the game cannot be rated. The ratings are then unchanged.
     pub fn fold(&mut self, game: &[(Who, u32)]) -> Result<(), GameProblem> {
+        let placed = game.iter().cloned();
+        let placed: Vec<_> = placed.map(|(who, it)| (who, Finish::Place(it))).collect();
+        self.fold_finishes(&placed)
+    }
+
+    /// Adds a game that participants may have forfeited.
+    ///
+    /// # Errors
+    /// If the game cannot be rated. The ratings are then unchanged.
+    pub fn fold_finishes(&mut self, game: &[(Who, Finish)]) -> Result<(), GameProblem> {
         let players = game.len();
         if !(2..=MAX_SEATS).contains(&players) {
             return Err(GameProblem::Players(players));
@@ -125,21 +162,29 @@ impl<Who: Ord + Clone> Ratings<Who> {
         }
         let index = |place: u32| usize::try_from(place).ok()?.checked_sub(1);
         let fits = |place| index(place).is_some_and(|index| index < players);
-        if let Some((_, place)) = game.iter().find(|(_, place)| !fits(*place)) {
-            return Err(GameProblem::Place(*place));
+        let mut places = game.iter().filter_map(|(_, finish)| match finish {
+            Finish::Place(place) => Some(*place),
+            Finish::Unplaced | Finish::Forfeited => None,
+        });
+        if let Some(place) = places.find(|place| !fits(*place)) {
+            return Err(GameProblem::Place(place));
         }
         // Sorted by place, so that the order of the seats does not affect rounding.
         let mut game = game.to_vec();
-        game.sort_by_key(|(_, place)| *place);
-        let before: Vec<(Rating, u32)> = game
+        game.sort_by_key(|(_, finish)| *finish);
+        let before: Vec<(Rating, Finish)> = game
             .iter()
-            .map(|(who, place)| (self.rating(who), *place))
+            .map(|(who, finish)| (self.rating(who), *finish))
             .collect();
-        for ((who, place), rating) in game.iter().zip(after_game(&before)) {
+        for ((who, finish), rating) in game.iter().zip(after_finishes(&before)) {
             let rated = self.rated.entry(who.clone()).or_default();
             rated.rating = rating;
             rated.games = rated.games.saturating_add(1);
-            let index = index(*place).expect("all places were checked");
+            let index = match finish {
+                Finish::Place(place) => index(*place).expect("all places were checked"),
+                Finish::Forfeited => players - 1,
+                Finish::Unplaced => continue,
+            };
             if rated.places.len() <= index {
                 rated.places.resize(index + 1, 0);
             }
@@ -190,6 +235,12 @@ pub const BETA: f64 = 25.0 / 6.0;
 /// of a pair (the paper's γ is 1). The library's γ, deviation / c, slows that down more the more
 /// certain a rating is: after hundreds of games it would state half of what is known.
 pub fn after_game(players: &[(Rating, u32)]) -> Vec<Rating> {
+    let placed = players.iter();
+    let placed: Vec<_> = (placed.map(|(rating, place)| (*rating, Finish::Place(*place)))).collect();
+    after_finishes(&placed)
+}
+
+fn after_finishes(players: &[(Rating, Finish)]) -> Vec<Rating> {
     let config = WengLinConfig {
         beta: BETA,
         // Too small to have an effect.
@@ -198,18 +249,16 @@ pub fn after_game(players: &[(Rating, u32)]) -> Vec<Rating> {
     let weight = pair_weight(players.len());
     let library: Vec<WengLinRating> = players.iter().map(|(rating, _)| rating.into()).collect();
     let mut after = Vec::with_capacity(players.len());
-    for (index, (rating, place)) in players.iter().enumerate() {
+    for (index, (rating, finish)) in players.iter().enumerate() {
         let variance = rating.deviation * rating.deviation;
         // Change of the mean, and the share of the variance that is removed.
         let (mut moved, mut shed) = (0.0, 0.0);
-        for (other_index, (other, other_place)) in players.iter().enumerate() {
+        for (other_index, (other, other_finish)) in players.iter().enumerate() {
             if other_index == index {
                 continue;
             }
-            let outcome = match place.cmp(other_place) {
-                std::cmp::Ordering::Less => Outcomes::WIN,
-                std::cmp::Ordering::Equal => Outcomes::DRAW,
-                std::cmp::Ordering::Greater => Outcomes::LOSS,
+            let Some(outcome) = finish.against(*other_finish) else {
+                continue;
             };
             let (new, _) = weng_lin(&library[index], &library[other_index], &outcome, &config);
             let c = (2.0 * BETA * BETA + variance + other.deviation * other.deviation).sqrt();

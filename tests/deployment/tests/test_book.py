@@ -40,7 +40,7 @@ NOT_RUN = {
     r"npx @modelcontextprotocol/inspector ": "fetches the inspector; tests/tests/system/mcp_http.rs has another client",
     r"chefshat (agent|tournament join --agent) llm ": "needs a server of language models; tests/tests/system/llm.rs scripts one",
     r"chefshat check-agent ": "agent.py is the reader's; tests/tests/system/examiner.rs examines agents",
-    r"chefshat (play|watch) |cargo run --release -- play": "needs a terminal; tests/tests/system/terminal.rs has one",
+    r"chefshat (play|watch) |cargo run -- play": "needs a terminal; tests/tests/system/terminal.rs has one",
     r"chefshat table --ticket TICKET$": "needs a person who types; tests/tests/system/attendant.rs",
     r"chefshat-robot (calibrate|bridge|perceive 0)": "needs a camera",
     r"chefshat-robot perceive --replay recording": "a recording of a camera",
@@ -53,7 +53,7 @@ NOT_RUN = {
     r"~/club/bin/|python -m chefshat\.players_club ": "needs ChefsHatGym 2; clients/python/tests has such players",
     r"for seed in |done$|chefshat compare (trained|exploiter|seed|deep_q)": "half an hour or more, or networks learned for hours",
     r"chefshat participant delete P07 --data-dir": "the server would have to be stopped; server/cli/tests/cli/participant.rs",
-    r"target/release/chefshat render .*\.mp4": "needs ffmpeg; server/cli/tests/cli/render.rs makes films",
+    r"target/debug/chefshat render .*\.mp4": "needs ffmpeg; server/cli/tests/cli/render.rs makes films",
     r"chefshat admin disconnect 17": "the number of a connection; tests/tests/system/operator.rs",
     r"chefshat import table-3\.csv|chefshat records import table-3": "the reader's table; server/record/tests has the page's",
     r"chefshat verify game\.jsonl --key ": "a key of the reader; server/cli/tests/cli/verify.rs",
@@ -68,7 +68,7 @@ NOT_RUN = {
 
 #: Commands that end with a game or tournament, while the page goes on.
 BESIDE_OTHERS = re.compile(r"chefshat tournament join |.* --tournament ")
-SERVE = re.compile(r"(chefshat|target/release/chefshat|cargo run --release --) serve\b")
+SERVE = re.compile(r"(chefshat|target/debug/chefshat|cargo run --) serve\b")
 CODES = re.compile(r"\b(JOINCODE|JOIN-CODE|BCDF2345)\b")
 
 
@@ -186,7 +186,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def reader(tmp_path: Path, record: Path) -> Iterator[Reader]:
     """A reader with a server and its data directory."""
-    values = {"cargo run --release --": "chefshat", "target/release/chefshat": "chefshat"}
+    values = {"cargo run --": "chefshat", "target/debug/chefshat": "chefshat"}
     values |= {"DIR": "./chefshat-data", "NEW": "./restored", "/backups/": "./", "GAME-ID": record.stem}
     machine = Machine(tmp_path / "reader", values, {"CHEFSHAT_DATA_DIR": "chefshat-data"})
     server = Machine(machine.folder, dict(values), {"CHEFSHAT_DATA_DIR": "chefshat-data", "CHEFSHAT_LISTEN": "127.0.0.1:0"})

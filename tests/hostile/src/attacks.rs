@@ -1,34 +1,27 @@
 //! The attacks: each is one client without any right, at an address of its own, that does something
 //! for the time of the attack and holds on to what it gets.
 
-use std::net::{IpAddr, Ipv4Addr, SocketAddr};
-use std::sync::Arc;
+use std::net::SocketAddr;
 use std::time::Duration;
 
-use bytes::Bytes;
+use chefshat_client::Connection;
 use chefshat_proto::v1::{
     self, record_service_client::RecordServiceClient, room_service_client::RoomServiceClient,
-    rule_set::Stop, seat_config::FilledBy, tournament_service_client::TournamentServiceClient,
+    rule_set::Stop, tournament_service_client::TournamentServiceClient,
 };
 use futures::future::BoxFuture;
 use futures::{FutureExt as _, StreamExt as _, stream};
 use rand::RngExt as _;
-use tokio::task::JoinSet;
-use tokio::time::{Instant, sleep_until, timeout_at};
+use tokio::time::{sleep_until, timeout_at};
 use tonic::Status;
-use tonic::transport::Channel;
 
-use crate::honest;
-use crate::probe::{Probe, newest_record};
+use crate::acts;
+use crate::largest;
+use crate::probe::Probe;
 use crate::raw;
-use crate::tally::Tally;
-
-/// The attacker's address.
-const ATTACKER: IpAddr = IpAddr::V4(Ipv4Addr::new(127, 0, 0, 2));
-/// Shifts of a long game: the most that a server allows.
-const LONG: u32 = 1_000;
-/// Calls that an attacker has in flight.
-const IN_FLIGHT: usize = 64;
+use crate::server::{PLAIN, Setup};
+use crate::target::{ATTACKER, IN_FLIGHT, LONG, Target, newest_record, room};
+use crate::webhooks::REFUSED;
 
 /// An attack.
 #[derive(Debug, Clone, Copy)]
@@ -39,10 +32,8 @@ pub(crate) struct Attack {
     pub(crate) what: &'static str,
     /// What others want meanwhile.
     pub(crate) probe: Probe,
-    /// Options of the server that make the attack possible.
-    pub(crate) flags: &'static [&'static str],
-    /// Most file descriptors of the server, if it has fewer than usual.
-    pub(crate) descriptors: Option<u32>,
+    /// What the server is started with.
+    pub(crate) setup: Setup,
     /// What the server is filled with before the honest room starts.
     pub(crate) prepare: Option<Act>,
     /// The attack itself.
@@ -51,137 +42,6 @@ pub(crate) struct Attack {
 
 /// Something an attacker does.
 pub(crate) type Act = fn(Target) -> BoxFuture<'static, Result<(), Status>>;
-
-/// What is attacked, and for how long.
-#[derive(Debug, Clone)]
-pub(crate) struct Target {
-    /// The server.
-    pub(crate) address: SocketAddr,
-    /// The end of the attack. What was granted is held until then.
-    pub(crate) until: Instant,
-    /// All counts are divided by this.
-    pub(crate) divide: u32,
-    /// What comes of it.
-    pub(crate) tally: Arc<Tally>,
-}
-
-impl Target {
-    fn count(&self, of: u32) -> u32 {
-        (of / self.divide).max(1)
-    }
-
-    async fn channel(&self) -> Result<Channel, Status> {
-        let url = format!("http://{}", self.address);
-        let connecting = honest::channel(&url, Some(ATTACKER));
-        match timeout_at(self.until, connecting).await {
-            Ok(Ok(channel)) => Ok(channel),
-            _ => {
-                self.tally.lost();
-                Err(Status::unavailable("no connection"))
-            }
-        }
-    }
-
-    /// Makes calls one after another until the end of the attack, on each of several connections.
-    async fn call_all<F, T>(
-        &self,
-        connections: u32,
-        calls: u32,
-        call: impl Fn(Channel) -> F + Clone + Send + Sync + 'static,
-    ) where
-        F: Future<Output = Result<T, Status>> + Send,
-        T: Send,
-    {
-        let mut callers = JoinSet::new();
-        for _ in 0..self.count(connections) {
-            let (target, call) = (self.clone(), call.clone());
-            callers.spawn(async move {
-                let Ok(channel) = target.channel().await else {
-                    return;
-                };
-                let calls = stream::iter(0..target.count(calls)).map(|_| {
-                    let called = call(channel.clone());
-                    target.tally.tried(1);
-                    async {
-                        target.tally.outcome(&called.await);
-                    }
-                });
-                let all = calls.buffer_unordered(IN_FLIGHT).for_each(|()| async {});
-                // Those that are still waited for at the end are neither granted nor refused.
-                let _ = timeout_at(target.until, all).await;
-            });
-        }
-        let _ = timeout_at(self.until, async {
-            while callers.join_next().await.is_some() {}
-        })
-        .await;
-        sleep_until(self.until).await;
-    }
-
-    /// Opens many streams on many connections, whose windows stay closed, and holds them.
-    async fn hold_streams(
-        &self,
-        connections: u32,
-        streams: u32,
-        method: &'static str,
-        body: Option<Bytes>,
-    ) {
-        let mut opening = JoinSet::new();
-        for _ in 0..self.count(connections) {
-            let (target, body) = (self.clone(), body.clone());
-            opening.spawn(async move {
-                let window = 0;
-                let connected = raw::http2(target.address, ATTACKER, window);
-                let Ok(Ok(sender)) = timeout_at(target.until, connected).await else {
-                    return target.tally.lost();
-                };
-                let opened = (0..target.count(streams))
-                    .map(|_| raw::open(&sender, method, body.clone(), &target.tally));
-                let opened: Vec<_> = opened.map(|open| timeout_at(target.until, open)).collect();
-                let _held = futures::future::join_all(opened).await;
-                sleep_until(target.until).await;
-            });
-        }
-        let _ = opening.join_all().await;
-    }
-
-    /// Floods the server with frames on several connections, which are opened again when the
-    /// server closes them.
-    async fn flood(&self, next: fn(u32) -> Vec<u8>) {
-        let mut floods = JoinSet::new();
-        for _ in 0..self.count(4) {
-            let target = self.clone();
-            floods.spawn(async move {
-                let flooding = async {
-                    loop {
-                        raw::flood(target.address, ATTACKER, &target.tally, next).await;
-                        tokio::time::sleep(Duration::from_millis(10)).await;
-                    }
-                };
-                let _ = timeout_at(target.until, flooding).await;
-            });
-        }
-        floods.join_all().await;
-    }
-}
-
-/// A room whose seats are all filled by this agent, or open.
-fn room(built_in: bool, shifts: u32) -> v1::CreateRoomRequest {
-    v1::CreateRoomRequest {
-        name: "hostile".into(),
-        rules: Some(v1::RuleSet {
-            stop: Some(Stop::TargetShifts(shifts)),
-            ..v1::RuleSet::default()
-        }),
-        seats: (0..4)
-            .map(|_| v1::SeatConfig {
-                filled_by: built_in.then(|| FilledBy::BuiltInAgent("random".into())),
-                ..v1::SeatConfig::default()
-            })
-            .collect(),
-        ..v1::CreateRoomRequest::default()
-    }
-}
 
 fn tournament(built_in: usize) -> v1::CreateTournamentRequest {
     v1::CreateTournamentRequest {
@@ -209,7 +69,7 @@ async fn create_rooms(target: &Target, connections: u32, each: u32, built_in: bo
     target.call_all(connections, each, call).await;
 }
 
-async fn list_rooms(channel: Channel) -> Result<(), Status> {
+async fn list_rooms(channel: Connection) -> Result<(), Status> {
     let request = v1::ListRoomsRequest {
         page_size: 100,
         ..v1::ListRoomsRequest::default()
@@ -221,7 +81,7 @@ async fn list_rooms(channel: Channel) -> Result<(), Status> {
 /// Rooms to be listed.
 fn some_rooms(target: Target) -> BoxFuture<'static, Result<(), Status>> {
     async move {
-        let channel = target.channel().await?;
+        let channel = target.connection().await?;
         for _ in 0..100 {
             let request = room(false, 1);
             RoomServiceClient::new(channel.clone())
@@ -235,27 +95,33 @@ fn some_rooms(target: Target) -> BoxFuture<'static, Result<(), Status>> {
 
 /// A long record to be read.
 fn a_record(target: Target) -> BoxFuture<'static, Result<(), Status>> {
-    async move {
-        let channel = target.channel().await?;
-        RoomServiceClient::new(channel.clone())
-            .create_room(room(true, target.count(50)))
-            .await?;
-        let mut records = RecordServiceClient::new(channel);
-        loop {
-            match newest_record(&mut records, "hostile").await {
-                Ok(_) => return Ok(()),
-                Err(_) => tokio::time::sleep(Duration::from_millis(50)).await,
-            }
+    record_of(target, 50).boxed()
+}
+
+/// A record of so many decisions that their annotations can make it as large as is legal.
+fn a_long_record(target: Target) -> BoxFuture<'static, Result<(), Status>> {
+    record_of(target, 150).boxed()
+}
+
+async fn record_of(target: Target, shifts: u32) -> Result<(), Status> {
+    let channel = target.connection().await?;
+    RoomServiceClient::new(channel.clone())
+        .create_room(room(true, target.count(shifts)))
+        .await?;
+    let mut records = RecordServiceClient::new(channel);
+    loop {
+        match newest_record(&mut records, "hostile").await {
+            Ok(_) => return Ok(()),
+            Err(_) => tokio::time::sleep(Duration::from_millis(50)).await,
         }
     }
-    .boxed()
 }
 
 /// Connections that send one byte and hold their socket.
-async fn one_byte_connections(target: &Target, connections: u32) {
+async fn one_byte_connections(target: &Target, to: SocketAddr, connections: u32) {
     let opening = stream::iter(0..target.count(connections)).map(|_| async {
         target.tally.tried(1);
-        match raw::connect(target.address, ATTACKER).await {
+        match raw::connect(to, ATTACKER).await {
             Ok(mut stream) => {
                 use tokio::io::AsyncWriteExt as _;
                 let _ = stream.write_all(b"P").await;
@@ -306,8 +172,7 @@ macro_rules! attack {
                 name: $name,
                 what: $what,
                 probe: Probe::$probe,
-                flags: &[],
-                descriptors: None,
+                setup: PLAIN,
                 prepare: None,
                 act: |_| async { Ok(()) }.boxed(),
             }
@@ -401,7 +266,7 @@ pub(crate) static ATTACKS: &[Attack] = &[
         "256 readers of a long record with a window of 0",
         ReadRecord,
         |target| {
-            let mut records = RecordServiceClient::new(target.channel().await?);
+            let mut records = RecordServiceClient::new(target.connection().await?);
             let game_id = newest_record(&mut records, "hostile").await?;
             let body = raw::framed(&v1::GetRecordRequest { game_id });
             target.hold_streams(4, 64, "RecordService/GetRecord", Some(body)).await
@@ -413,20 +278,20 @@ pub(crate) static ATTACKS: &[Attack] = &[
         "64 imports that send nothing",
         ImportRecord,
         |target| target.hold_streams(4, 16, "RecordService/ImportRecord", None).await,
-        flags: &["--allow-import"]
+        setup: Setup { flags: &["--allow-import"], ..PLAIN }
     ),
     attack!(
         "one-byte-connections",
         "15,000 connections that send one byte",
         ListRooms,
-        |target| one_byte_connections(&target, 15_000).await
+        |target| one_byte_connections(&target, target.address, 15_000).await
     ),
     attack!(
         "few-descriptors",
         "1,000 connections that send one byte, to a server with 256 file descriptors",
         ListRooms,
-        |target| one_byte_connections(&target, 1_000).await,
-        descriptors: Some(256)
+        |target| one_byte_connections(&target, target.address, 1_000).await,
+        setup: Setup { descriptors: Some(256), ..PLAIN }
     ),
     attack!(
         "join-codes",
@@ -468,5 +333,136 @@ pub(crate) static ATTACKS: &[Attack] = &[
         "streams that are reset at once on 4 connections as fast as possible",
         ListRooms,
         |target| target.flood(reset_at_once).await
+    ),
+    attack!(
+        "study-elements",
+        "CreateStudy of 1 MiB of the submessages that cost the most, 32 at once",
+        CreateStudy,
+        |target| {
+            let valid = v1::CreateStudyRequest::default();
+            acts::worst_messages(&target, "StudyService/CreateStudy", &valid).await
+        }
+    ),
+    attack!(
+        "answer-elements",
+        "AnswerQuestionnaire of 1 MiB of the submessages that cost the most, 32 at once, by a participant",
+        CreateStudy,
+        |target| acts::worst_answers(&target).await?
+    ),
+    attack!(
+        "vector-elements",
+        "vector setups of 1 MiB of the submessages that cost the most, 32 at once",
+        StartVector,
+        |target| {
+            let valid = v1::RunRequest::default();
+            acts::worst_messages(&target, "VectorService/Run", &valid).await
+        }
+    ),
+    attack!(
+        "import-elements",
+        "imports of 1.5 million decisions without content, two at once",
+        ImportRecord,
+        |target| acts::empty_decisions(&target).await,
+        setup: Setup { flags: &["--allow-import"], ..PLAIN }
+    ),
+    attack!(
+        "largest-studies",
+        "the largest studies that are accepted, 32 at once",
+        CreateStudy,
+        |target| largest::studies(&target).await
+    ),
+    attack!(
+        "largest-vectors",
+        "32 vector streams of 4,096 games that begin with 5,000 listed hands",
+        StartVector,
+        |target| largest::vectors(&target).await?
+    ),
+    attack!(
+        "largest-imports",
+        "imports of records as large as their memory allows, 32 at once",
+        ImportRecord,
+        |target| largest::imports(&target).await?,
+        setup: Setup { flags: &["--allow-import"], ..PLAIN },
+        prepare: Some(a_long_record)
+    ),
+    attack!(
+        "replay-pictures",
+        "the picture of a long game 1,000 times over two connections",
+        ReadRecord,
+        |target| acts::replay_pictures(&target).await?,
+        prepare: Some(a_record)
+    ),
+    attack!(
+        "mcp-sessions",
+        "sessions of MCP over HTTP as fast as possible; the memory is that of chefshat mcp",
+        McpSession,
+        |target| acts::mcp_sessions(&target).await,
+        setup: Setup { mcp: true, ..PLAIN }
+    ),
+    attack!(
+        "tls-hellos",
+        "the same ClientHello on new connections as fast as possible",
+        ListRooms,
+        |target| acts::tls_hellos(&target).await,
+        setup: Setup { tls: true, ..PLAIN }
+    ),
+    attack!(
+        "evaluations",
+        "analyses of 10 s by eight tokens, 16 at once each",
+        Evaluate,
+        |target| acts::evaluations(&target).await?,
+        setup: Setup { tokens: 8, ..PLAIN },
+        prepare: Some(a_record)
+    ),
+    attack!(
+        "full-disk",
+        "251 rooms with 4 KB of annotations for each decision on a disk of 110 MiB",
+        ListRooms,
+        |target| acts::annotated_games(&target, 251).await?,
+        setup: Setup { disk_mib: Some(110), ..PLAIN }
+    ),
+    attack!(
+        "samples",
+        "samples of 16 seats as fast as possible on a disk of 256 MiB",
+        ListRooms,
+        |target| acts::samples(&target).await?,
+        setup: Setup { disk_mib: Some(256), ..PLAIN }
+    ),
+    attack!(
+        "unknown-tokens",
+        "ListRooms with unknown tokens as fast as possible on 8 connections",
+        ListRooms,
+        |target| acts::unknown_tokens(&target).await,
+        setup: Setup { tokens: 1, ..PLAIN }
+    ),
+    attack!(
+        "refused-webhook",
+        "one room whose events the receiver of webhooks refuses",
+        Webhook,
+        |target| {
+            let call = |channel| async move {
+                let request = v1::CreateRoomRequest { name: REFUSED.into(), ..room(false, 1) };
+                RoomServiceClient::new(channel).create_room(request).await
+            };
+            target.call_all(1, 1, call).await
+        },
+        setup: Setup { webhooks: true, ..PLAIN }
+    ),
+    attack!(
+        "long-stream",
+        "seats of another node attached and detached on one stream as fast as possible",
+        ListRooms,
+        |target| acts::long_stream(&target).await?,
+        setup: Setup { nodes: 2, ..PLAIN }
+    ),
+    attack!(
+        "peer-connections",
+        "1,000 connections to the listener for nodes, of a node with 256 file descriptors",
+        ListRooms,
+        |target| {
+            let peers = target.peers.expect("it is a node");
+            one_byte_connections(&target, peers, 1_000).await
+        },
+        setup: Setup { nodes: 1, descriptors: Some(256), ..PLAIN }
     ),
 ];

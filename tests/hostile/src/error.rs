@@ -19,6 +19,9 @@ pub(crate) enum HostileError {
     /// The server did not start.
     #[error("the server did not start: {0}")]
     Start(String),
+    /// This machine lacks what an attack needs.
+    #[error("this machine lacks what the attack needs: {0}")]
+    Lacks(String),
     /// The honest room could not play before the attack began.
     #[error("the honest room did not play on the quiet server: {0}")]
     Quiet(String),

@@ -2,9 +2,14 @@
 
 use std::io;
 use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
 
 use rustix::process::{Resource, Rlimit, getrlimit, nice, setrlimit};
+use tokio_util::task::AbortOnDropHandle;
 
+/// Time between two looks at a process that is followed.
+const SAMPLE_INTERVAL: Duration = Duration::from_millis(100);
 /// How much the threads of an attack give way to the server and the honest room. An attacker has a
 /// machine of its own; here it shares one with what is measured.
 const ATTACKER_NICENESS: i32 = 15;
@@ -33,6 +38,49 @@ pub(crate) fn memory(pid: u32) -> io::Result<Memory> {
             "the process has no memory: it has ended",
         )),
     }
+}
+
+/// Follows the memory of a process, which may end meanwhile.
+pub(crate) struct Watched {
+    pid: u32,
+    last: Arc<Mutex<Memory>>,
+    sampling: AbortOnDropHandle<()>,
+}
+
+impl Watched {
+    /// Follows it from now on.
+    ///
+    /// # Errors
+    /// There is no such process.
+    pub(crate) fn new(pid: u32) -> io::Result<Self> {
+        let last = Arc::new(Mutex::new(memory(pid)?));
+        let sampled = Arc::clone(&last);
+        let sampling = AbortOnDropHandle::new(tokio::spawn(async move {
+            while let Ok(memory) = memory(pid) {
+                *lock(&sampled) = memory;
+                tokio::time::sleep(SAMPLE_INTERVAL).await;
+            }
+        }));
+        Ok(Self {
+            pid,
+            last,
+            sampling,
+        })
+    }
+
+    /// Its memory now, or when it was last seen.
+    pub(crate) fn memory(&self) -> Memory {
+        memory(self.pid).unwrap_or_else(|_| *lock(&self.last))
+    }
+
+    /// Whether the process still runs.
+    pub(crate) fn is_alive(&self) -> bool {
+        !self.sampling.is_finished() && memory(self.pid).is_ok()
+    }
+}
+
+fn lock(memory: &Mutex<Memory>) -> MutexGuard<'_, Memory> {
+    memory.lock().expect("nothing panics under this lock")
 }
 
 /// Bytes of all files of a folder.

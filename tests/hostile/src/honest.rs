@@ -3,12 +3,13 @@
 //! server's fault, and the time from an answer to the room's next decision is the server's.
 
 use std::net::IpAddr;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use chefshat_client::{
-    ActionId, Agent, Backoff, Client, Ending, Error, PlayOptions, RandomAgent, v1,
+    ActionId, Agent, Backoff, Client, ConnectOptions, Ending, Error, PlayOptions, RandomAgent, v1,
 };
 use hdrhistogram::Histogram;
 use tokio::task::{JoinHandle, JoinSet};
@@ -31,6 +32,36 @@ const CALL_LIMIT: Duration = Duration::from_secs(5);
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
 /// Longest latency that is distinguished, microseconds.
 const LONGEST_US: u64 = 600_000_000;
+
+/// How a client reaches a server.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Access {
+    /// The server's URL.
+    pub(crate) url: String,
+    /// The client's token, if the server requires one.
+    pub(crate) token: Option<String>,
+    /// The authority that certifies the server, if connections are encrypted.
+    pub(crate) ca: Option<PathBuf>,
+}
+
+impl Access {
+    /// Without a token and encryption.
+    pub(crate) fn open(url: String) -> Self {
+        Self {
+            url,
+            ..Self::default()
+        }
+    }
+
+    /// A client on a new connection.
+    pub(crate) async fn connect(&self) -> Result<Client, Error> {
+        let options = ConnectOptions {
+            token: self.token.clone(),
+            ca: self.ca.clone(),
+        };
+        Client::connect_with(&self.url, &options).await
+    }
+}
 
 /// What the honest room noticed in one phase.
 #[derive(Debug, Clone)]
@@ -82,7 +113,7 @@ pub(crate) struct HonestRoom {
 }
 
 struct Shared {
-    url: String,
+    access: Access,
     /// Shifts of a game.
     shifts: u32,
     /// The id of the current room, empty before the first.
@@ -97,9 +128,9 @@ struct Shared {
 
 impl HonestRoom {
     /// Starts to play games of this length.
-    pub(crate) fn start(url: String, shifts: u32) -> Self {
+    pub(crate) fn start(access: Access, shifts: u32) -> Self {
         let shared = Arc::new(Shared {
-            url,
+            access,
             shifts,
             room_id: Mutex::default(),
             leaving: AtomicBool::new(false),
@@ -192,9 +223,9 @@ impl Shared {
     }
 
     async fn connect(&self) -> Result<Client, String> {
-        let connecting = tokio::time::timeout(CALL_LIMIT, channel(&self.url, None));
+        let connecting = tokio::time::timeout(CALL_LIMIT, self.access.connect());
         match connecting.await {
-            Ok(Ok(channel)) => Ok(Client::from_channel(channel)),
+            Ok(Ok(client)) => Ok(client),
             Ok(Err(error)) => Err(error.to_string()),
             Err(_) => Err("a connection took too long".into()),
         }

@@ -2,17 +2,23 @@
 //! honest room notices and what the server pays. This file only parses and wires; the crate's
 //! README explains the figures.
 
+mod acts;
 mod attacks;
+mod bodies;
 mod error;
 mod gauge;
 mod honest;
+mod largest;
 mod options;
 mod probe;
 mod raw;
 mod report;
 mod run;
 mod scenarios;
+mod server;
 mod tally;
+mod target;
+mod webhooks;
 
 use std::process::ExitCode;
 
@@ -26,16 +32,19 @@ use scenarios::Scenario;
 fn main() -> ExitCode {
     let options = Options::parse();
     let measured = match options.scenario {
-        Some(scenario) => measure_scenario(scenario, &options),
+        Some(scenario) => measure_scenario(scenario, &options).map(|text| (text, true)),
         None => measure(&options).map(|report| match options.json {
-            true => report.to_json(),
-            false => report.to_markdown(),
+            true => (report.to_json(), report.is_complete()),
+            false => (report.to_markdown(), report.is_complete()),
         }),
     };
     match measured {
-        Ok(text) => {
+        Ok((text, is_complete)) => {
             println!("{}", text.trim_end());
-            ExitCode::SUCCESS
+            match is_complete {
+                true => ExitCode::SUCCESS,
+                false => ExitCode::FAILURE,
+            }
         }
         Err(error) => {
             eprintln!("chefshat-hostile: {error}");
@@ -64,10 +73,21 @@ fn measure(options: &Options) -> Result<Report, HostileError> {
     gauge::raise_descriptor_limit();
     let server = options.server()?;
     let runtimes = run::Runtimes::new()?;
-    let mut rows = Vec::new();
-    for attack in options.attacks() {
-        eprintln!("{} ...", attack.name);
-        rows.push(run::run(&runtimes, &server, attack, options)?);
+    let mut report = Report::default();
+    let attacks = options.attacks();
+    for (number, attack) in (1..).zip(&attacks) {
+        eprintln!("[{number}/{}] {} ...", attacks.len(), attack.name);
+        match run::run(&runtimes, &server, attack, options) {
+            Ok(row) => {
+                eprintln!("    {}", row.verdict());
+                report.add(row);
+            }
+            // The others still run: together they take many minutes.
+            Err(error) => {
+                eprintln!("    NOT MEASURED: {error}");
+                report.miss(attack, &error);
+            }
+        }
     }
-    Ok(Report::new(rows))
+    Ok(report)
 }

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use bytes::{BufMut as _, Bytes, BytesMut};
 use h2::client::SendRequest;
 use h2::{RecvStream, SendStream};
-use http::{HeaderMap, Method, Request};
+use http::header::AUTHORIZATION;
+use http::{HeaderMap, Method, Request, StatusCode};
 use prost::Message;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::{TcpSocket, TcpStream};
@@ -73,17 +74,10 @@ pub(crate) async fn open(
     body: Option<Bytes>,
     tally: &Arc<Tally>,
 ) -> Option<OpenStream> {
-    let request = Request::builder()
-        .method(Method::POST)
-        .uri(format!("http://localhost/chefshat.v1.{method}"))
-        .header("content-type", "application/grpc")
-        .header("te", "trailers")
-        .body(())
-        .expect("a request");
     tally.tried(1);
     let opened = async {
         let mut ready = sender.clone().ready().await?;
-        let (response, mut sending) = ready.send_request(request, false)?;
+        let (response, mut sending) = ready.send_request(grpc(method), false)?;
         if let Some(body) = body {
             sending.send_data(body, true)?;
         }
@@ -102,14 +96,97 @@ pub(crate) async fn open(
             })
         }
         Err(error) => {
-            match error
-                .reason()
-                .filter(|_| error.is_reset() && error.is_remote())
-            {
-                Some(reason) => tally.refusal(reason.description()),
-                None => tally.lost(),
-            }
+            reset(&error, tally);
             None
+        }
+    }
+}
+
+/// A request over HTTP/2 with its bytes as they are sent.
+#[derive(Debug, Clone)]
+pub(crate) struct RawRequest {
+    head: Request<()>,
+    body: Vec<Bytes>,
+}
+
+impl RawRequest {
+    /// A call of gRPC with framed messages.
+    pub(crate) fn grpc(method: &str, messages: Vec<Bytes>) -> Self {
+        Self {
+            head: grpc(method),
+            body: messages,
+        }
+    }
+
+    /// A request for a page.
+    pub(crate) fn get(path: &str) -> Self {
+        let head = Request::get(format!("http://localhost{path}"));
+        Self {
+            head: head.body(()).expect("a request"),
+            body: Vec::new(),
+        }
+    }
+
+    /// The same with a token.
+    pub(crate) fn with_token(mut self, token: &str) -> Self {
+        let value = format!("Bearer {token}").parse().expect("a header");
+        self.head.headers_mut().insert(AUTHORIZATION, value);
+        self
+    }
+}
+
+fn grpc(method: &str) -> Request<()> {
+    Request::builder()
+        .method(Method::POST)
+        .uri(format!("http://localhost/chefshat.v1.{method}"))
+        .header("content-type", "application/grpc")
+        .header("te", "trailers")
+        .body(())
+        .expect("a request")
+}
+
+/// Sends a request, reads the whole answer and counts what became of it. Returns whether the
+/// connection can still be used.
+pub(crate) async fn call(sender: &SendRequest<Bytes>, request: RawRequest, tally: &Tally) -> bool {
+    tally.tried(1);
+    let answered = async {
+        let mut ready = sender.clone().ready().await?;
+        let last = request.body.len();
+        let (response, mut sending) = ready.send_request(request.head, last == 0)?;
+        for (number, part) in (1..).zip(request.body) {
+            // A server that refuses a call early does not read the rest of it.
+            if sending.send_data(part, number == last).is_err() {
+                break;
+            }
+        }
+        let (head, mut body) = response.await?.into_parts();
+        while let Some(part) = body.data().await {
+            body.flow_control().release_capacity(part?.len())?;
+        }
+        let trailers = body.trailers().await?.unwrap_or_default();
+        Ok::<_, h2::Error>(match head.status {
+            StatusCode::OK => refusal(&head.headers).or_else(|| refusal(&trailers)),
+            status => Some(format!("HTTP {}", status.as_u16())),
+        })
+    };
+    match answered.await {
+        Ok(None) => tally.granted(1),
+        Ok(Some(reason)) => tally.refusal(&reason),
+        Err(error) => return reset(&error, tally),
+    }
+    true
+}
+
+/// Counts the end of a stream without an answer. Returns whether the connection is still there.
+fn reset(error: &h2::Error, tally: &Tally) -> bool {
+    match (error.reason()).filter(|_| error.is_reset() && error.is_remote()) {
+        Some(reason) => {
+            tally.refusal(reason.description());
+            true
+        }
+        None => {
+            tally.lost();
+            false
         }
     }
 }

@@ -1,27 +1,29 @@
 //! One attack: a new server, the honest room in quiet, the attack beside it, and the time after.
 
-use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_tests::Launch;
 use tokio::runtime::{Builder, Runtime};
 use tokio::time::Instant;
 
-use crate::attacks::{Act, Attack, Target};
+use crate::attacks::{Act, Attack};
 use crate::error::HostileError;
-use crate::gauge::{self, folder_bytes};
-use crate::honest::{HonestRoom, SHORT};
+use crate::gauge::{self, Memory, Watched, folder_bytes};
+use crate::honest::{Access, HonestRoom, SHORT};
 use crate::options::Options;
-use crate::probe;
-use crate::report::Row;
+use crate::probe::{self, Called};
+use crate::report::{Burden, MEMORY_GROWTH, Phases, Row};
+use crate::server::AttackedServer;
 use crate::tally::Tally;
+use crate::target::Target;
 
 /// How long a preparation may take.
 const PREPARE_LIMIT: Duration = Duration::from_secs(120);
 /// How long the last honest game may take to end once the attack is over.
 const LAST_GAME_LIMIT: Duration = Duration::from_secs(60);
+/// How often the memory is looked at until it has been given back.
+const LOOK_AGAIN: Duration = Duration::from_millis(250);
 /// Threads of the attacker.
 const ATTACKER_THREADS: usize = 2;
 
@@ -64,30 +66,25 @@ pub(crate) fn run(
 
 async fn attacked(
     attacker: &Runtime,
-    server: &Path,
+    binary: &Path,
     attack: &'static Attack,
     options: &Options,
 ) -> Result<Row, HostileError> {
-    let folder = tempfile::tempdir().map_err(HostileError::io("making a temporary folder"))?;
-    let mut launch = Launch::new(folder.path())
-        .binary(server)
-        .flags(attack.flags);
-    if let Some(descriptors) = attack.descriptors {
-        let limited = format!("ulimit -n {descriptors}; exec \"$@\"");
-        launch = launch.through(["sh", "-c", &limited, "sh"]);
-    }
-    let process = launch.start().await;
-    let process = process.map_err(|ended| HostileError::Start(ended.said))?;
-    let pid = process.id();
-    let memory = || gauge::memory(pid).map_err(HostileError::io("reading the server's memory"));
-    let url = launch.url();
-    let address: SocketAddr = url["http://".len()..]
-        .parse()
-        .expect("the server printed it");
+    let server = AttackedServer::start(binary, &attack.setup).await?;
+    let watched = Watched::new(server.pid());
+    let watched = watched.map_err(HostileError::io("reading the server's memory"))?;
     let tally = Arc::new(Tally::default());
     let act = |act: Act, tally: &Arc<Tally>, time: Duration| {
         let target = Target {
-            address,
+            address: server.address(),
+            access: Access {
+                token: None,
+                ..server.access.clone()
+            },
+            tokens: server.tokens.clone().into(),
+            mcp: server.mcp(),
+            peers: server.peers,
+            other_node: server.other_node(),
             until: Instant::now() + time,
             divide: options.divide,
             tally: Arc::clone(tally),
@@ -103,33 +100,71 @@ async fn attacked(
             other => return Err(HostileError::Prepare(format!("{other:?}"))),
         }
     }
-    let honest = HonestRoom::start(url.clone(), SHORT);
+    let honest = HonestRoom::start(server.access.clone(), SHORT);
     tokio::time::sleep(options.quiet).await;
     let quiet = honest.take();
     if quiet.latencies.is_empty() {
         return Err(HostileError::Quiet(honest.last_problem()));
     }
-    let (before, disk_before) = (memory()?, folder_bytes(folder.path()));
+    let (before, disk_before) = (watched.memory(), folder_bytes(&server.data()));
 
-    let until = Instant::now() + options.seconds;
-    let probing = tokio::spawn(probe::run(attack.probe, url, until));
+    let begun = Instant::now();
+    let until = begun + options.seconds;
+    let called = Called {
+        access: server.access.clone(),
+        mcp: server.mcp(),
+        announced: (server.webhooks.as_ref()).map(|receiver| receiver.announced.clone()),
+    };
+    let probing = tokio::spawn(probe::run(attack.probe, called, until));
     let acting = act(attack.act, &tally, options.seconds);
     // It ends soon after its time; one that panicked counts what it did before.
-    let _ = acting.await;
+    let acted = acting.await;
+    if let Ok(Err(status)) = &acted {
+        tally.outcome::<()>(&Err(status.clone()));
+    }
+    tokio::time::sleep_until(until).await;
     let attacked = honest.take();
+    let attack_time = begun.elapsed();
     let served = probing.await.unwrap_or_default();
-    tokio::time::sleep(options.rest).await;
-    let after = memory()?;
-    let disk_after = folder_bytes(folder.path());
-    let last = honest.finish(LAST_GAME_LIMIT).await;
-    let ended = process.kill().await;
+    let after = settled(&watched, before, options.rest).await;
+    let is_alive = watched.is_alive();
+    let disk = folder_bytes(&server.data()).saturating_sub(disk_before);
+    let limit = match is_alive {
+        true => LAST_GAME_LIMIT,
+        false => Duration::ZERO,
+    };
+    let last = honest.finish(limit).await;
+    let (log_lines, starts_again) = server.restart().await;
     Ok(Row::new(
         attack,
-        (&quiet, &attacked, last.as_ref()),
+        Phases {
+            quiet,
+            quiet_time: options.quiet,
+            attacked,
+            attack_time,
+            last,
+        },
         served,
         tally.counts(),
-        [before.resident, after.peak, after.resident],
-        disk_after.saturating_sub(disk_before),
-        ended.said.lines().count(),
+        Burden {
+            memory: [before.resident, after.peak, after.resident],
+            disk,
+            log_lines,
+            is_alive,
+            starts_again,
+        },
     ))
+}
+
+/// Waits until memory has been given back, for `rest` at most. Returns the memory then.
+async fn settled(watched: &Watched, before: Memory, rest: Duration) -> Memory {
+    let until = Instant::now() + rest;
+    loop {
+        let memory = watched.memory();
+        let is_back = memory.resident <= before.resident + MEMORY_GROWTH;
+        if is_back || Instant::now() >= until || !watched.is_alive() {
+            return memory;
+        }
+        tokio::time::sleep(LOOK_AGAIN).await;
+    }
 }

@@ -18,7 +18,7 @@ use tonic::transport::Channel;
 
 use crate::error::HostileError;
 use crate::gauge;
-use crate::honest::{self, HonestRoom, LONG, Noticed, SHORT};
+use crate::honest::{self, Access, HonestRoom, LONG, Noticed, SHORT};
 use crate::raw;
 use crate::report::{MIB, round};
 use crate::tally::{Counts, Tally};
@@ -33,6 +33,8 @@ const OTHERS: u32 = 100;
 const PATIENCE: Duration = Duration::from_secs(60);
 /// Number of memory samples of a soak.
 const SAMPLES: u32 = 360;
+/// Number of lines about the progress of a soak.
+const REPORTS: u32 = 20;
 
 /// Maximum length of a phase, seconds.
 const MAX_SECONDS: f64 = 600.0;
@@ -220,7 +222,7 @@ impl Spectators {
         let most = self.spectators + OTHERS;
         let server = Running::start(server, &[("--max-connections", most)]).await?;
         let rooms: Vec<_> = (0..self.rooms)
-            .map(|_| HonestRoom::start(server.url.clone(), LONG))
+            .map(|_| HonestRoom::start(Access::open(server.url.clone()), LONG))
             .collect();
         all_play(&rooms).await?;
         let noticed = |rooms: &[HonestRoom]| {
@@ -336,7 +338,7 @@ impl Soak {
         let server = Running::start(server, &[]).await?;
         let memory_start = server.memory_mib()?;
         let rooms: Vec<_> = (0..self.rooms)
-            .map(|_| HonestRoom::start(server.url.clone(), SHORT))
+            .map(|_| HonestRoom::start(Access::open(server.url.clone()), SHORT))
             .collect();
         all_play(&rooms).await?;
         let begun = Instant::now();
@@ -344,7 +346,12 @@ impl Soak {
         let mut samples = Vec::new();
         for number in 1..=SAMPLES {
             tokio::time::sleep_until(begun + time * number / SAMPLES).await;
-            samples.push((begun.elapsed().as_secs_f64(), server.memory_mib()?));
+            let memory = server.memory_mib()?;
+            samples.push((begun.elapsed().as_secs_f64(), memory));
+            if number.is_multiple_of(SAMPLES / REPORTS) {
+                let percent = 100 * number / SAMPLES;
+                eprintln!("{percent} % of {} s: {memory:.0} MiB", self.seconds);
+            }
         }
         let listed_rooms = listed(&server.url).await;
         let mut noticed = Noticed::new();

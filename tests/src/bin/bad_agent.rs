@@ -194,7 +194,8 @@ impl Agent {
         };
         voice.say(0, Command::Attach(attach)).await;
         if self.fault == "unasked" {
-            voice.answer(0, 1, 0).await;
+            // The second decision is requested when the first one has been answered.
+            voice.answer(0, 2, 0).await;
         }
         let mut open: BTreeMap<u32, v1::DecisionRequest> = BTreeMap::new();
         loop {

@@ -10,7 +10,7 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry, GameHeader};
 use chefshat_server::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use chefshat_server::store::{
-    Journal, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame,
+    Journal, Listed, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame,
 };
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
@@ -31,6 +31,7 @@ struct OnDisk {
     header: Arc<GameHeader>,
     entries: Vec<Entry>,
     finished: bool,
+    summary: Option<v1::RecordSummary>,
 }
 
 impl Disk {
@@ -106,6 +107,7 @@ impl Store for DiskStore {
                 header,
                 entries,
                 finished: false,
+                summary: None,
             };
             self.disk
                 .commit(|games| drop(games.insert(game, on_disk)))
@@ -140,6 +142,11 @@ impl Store for DiskStore {
         async move { Ok(finished) }.boxed()
     }
 
+    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
+        let summary = (self.disk.games().get(&game)).and_then(|game| game.summary.clone());
+        async move { Ok(summary) }.boxed()
+    }
+
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         let games = self.disk.games();
         let stored = (games.get(&game).filter(|game| game.finished)).map(|game| {
@@ -153,7 +160,7 @@ impl Store for DiskStore {
         filter: &'a v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>> {
+    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>> {
         self.rest.list(filter, part, count)
     }
 
@@ -246,6 +253,7 @@ impl Journal for DiskJournal {
                 (game.entries.iter()).any(|entry| matches!(entry.change, Change::Aborted(_)));
             assert!(!aborted || closed, "a game without a record was aborted");
             game.finished = true;
+            game.summary = summary.map(|summary| *summary);
         };
         async move {
             self.disk.commit(finish).await;

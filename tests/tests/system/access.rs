@@ -7,7 +7,10 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use chefshat_client::{Client, ConnectOptions, Error};
-use chefshat_proto::v1::{self, spectator_service_client::SpectatorServiceClient};
+use chefshat_proto::v1::{
+    self, room_service_client::RoomServiceClient, spectator_service_client::SpectatorServiceClient,
+    study_service_client::StudyServiceClient, tournament_service_client::TournamentServiceClient,
+};
 use chefshat_record::replay::replay;
 use chefshat_record::signature::{self, SigningKey};
 use chefshat_room::ids::Id;
@@ -112,6 +115,93 @@ impl Guarded {
         ];
         ours.contains(&reason.as_str()).then_some(reason)
     }
+}
+
+#[tokio::test]
+async fn a_repeated_request_is_answered_to_its_own_token_alone() {
+    let server = Guarded::start().await;
+    let (_, first) = server.caller(Role::Host, None).await;
+    let (_, second) = server.caller(Role::Host, None).await;
+    let request_id = vec![7; 32];
+    let open = v1::CreateRoomRequest {
+        rules: Some(one_shift()),
+        seats: vec![v1::SeatConfig::default(); 4],
+        request_id: request_id.clone(),
+        ..v1::CreateRoomRequest::default()
+    };
+    let create = async |client: &Client| {
+        let mut service = RoomServiceClient::new(client.channel());
+        let created = service.create_room(open.clone()).await;
+        created.expect("a room").into_inner()
+    };
+    let room = create(&first).await;
+    assert_eq!(
+        create(&first).await.owner_token,
+        room.owner_token,
+        "repeated"
+    );
+    let other = create(&second).await;
+    assert_ne!(other.owner_token, room.owner_token);
+    let id_of = |room: &v1::CreateRoomResponse| room.room.as_ref().expect("a room").room_id.clone();
+    assert_ne!(id_of(&other), id_of(&room));
+    let join = async |client: &Client| {
+        let mut service = RoomServiceClient::new(client.channel());
+        let joined = service.join_room(v1::JoinRoomRequest {
+            room_id: id_of(&room),
+            join_code: room.join_code.clone(),
+            name: "Ada".to_owned(),
+            request_id: request_id.clone(),
+            ..v1::JoinRoomRequest::default()
+        });
+        joined.await.expect("a seat").into_inner().ticket
+    };
+    let ticket = join(&first).await;
+    assert_eq!(join(&first).await, ticket, "repeated");
+    assert_ne!(join(&second).await, ticket);
+    let settings = v1::TournamentSettings {
+        name: "Cup".to_owned(),
+        format: v1::TournamentFormat::RoundRobin.into(),
+        max_participants: 8,
+        ..v1::TournamentSettings::default()
+    };
+    let hold = async |client: &Client| {
+        let mut service = TournamentServiceClient::new(client.channel());
+        let created = service.create_tournament(v1::CreateTournamentRequest {
+            settings: Some(settings.clone()),
+            request_id: request_id.clone(),
+        });
+        created
+            .await
+            .expect("a tournament")
+            .into_inner()
+            .owner_token
+    };
+    let owner = hold(&first).await;
+    assert_eq!(hold(&first).await, owner, "repeated");
+    assert_ne!(hold(&second).await, owner);
+}
+
+#[tokio::test]
+async fn a_study_of_empty_stages_is_refused_before_it_is_decoded() {
+    let server = Guarded::start().await;
+    let (_, host) = server.caller(Role::Host, None).await;
+    let stages = vec![v1::StudyStage::default(); 500_000];
+    let settings = v1::StudySettings {
+        stages,
+        ..v1::StudySettings::default()
+    };
+    let mut studies = StudyServiceClient::new(host.channel());
+    let created = studies.create_study(v1::CreateStudyRequest {
+        settings: Some(settings),
+        ..v1::CreateStudyRequest::default()
+    });
+    let status = created.await.expect_err("too many");
+    let info = status.get_details_error_info().expect("a reason");
+    assert_eq!(
+        (status.code(), info.reason.as_str()),
+        (Code::OutOfRange, "TOO_MANY_ELEMENTS")
+    );
+    assert!(info.metadata.contains_key("max_elements"), "{info:?}");
 }
 
 fn http_client() -> HttpClient<HttpConnector, Full<Bytes>> {

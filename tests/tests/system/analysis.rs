@@ -1,6 +1,7 @@
 //! Estimates of recorded decisions and of situations that a client describes.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use chefshat_client::Client;
 use chefshat_engine::{Seed, Viewer};
@@ -244,6 +245,43 @@ async fn a_client_that_goes_away_frees_the_thread_and_the_place() {
         }
     })
     .await;
+    server.stop().await;
+}
+
+#[tokio::test]
+async fn an_analysis_that_could_not_end_by_its_deadline_is_refused_at_once() {
+    let one_thread = |config: &mut ServerConfig| config.vector_threads = 1;
+    let server = TestServer::with(one_thread, Arc::new(MemoryStore::default())).await;
+    let client = server.client().await;
+    let game = original(&client).await;
+    let limits = client.server_info().await.expect("information").limits;
+    let longest = |deadline: Option<Duration>| {
+        let mut request = tonic::Request::new(v1::EvaluateRequest {
+            rollouts: limits["max_analysis_rollouts"],
+            time_ms: u32::try_from(limits["max_analysis_ms"]).expect("milliseconds"),
+            agent: "trained".into(),
+            ..request(Position::Moment(moment(game.game_id(), points(&game)[0])))
+        });
+        if let Some(deadline) = deadline {
+            request.set_timeout(deadline);
+        }
+        request
+    };
+    let mut service = AnalysisServiceClient::new(client.channel());
+    let first = service.evaluate(longest(None)).await.expect("a place");
+    // A second one would get half of the thread, and less if another caller came.
+    let twice = Duration::from_millis(limits["max_analysis_ms"]) * 3 / 2;
+    let refused = service.evaluate(longest(Some(twice))).await;
+    let status = refused.expect_err("it could not end");
+    let details = status.get_details_error_info().expect("details");
+    assert_eq!(
+        (status.code(), details.reason.as_str()),
+        (Code::ResourceExhausted, "TOO_MANY_ANALYSES")
+    );
+    assert!(status.get_details_retry_info().is_some(), "{status}");
+    let patient = service.evaluate(longest(None)).await;
+    patient.expect("those without a deadline wait");
+    drop(first);
     server.stop().await;
 }
 

@@ -7,7 +7,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_client::Client;
-use chefshat_proto::v1::{self, record_line::Line, seat_update::Update};
+use chefshat_proto::v1::{
+    self, instrument_service_client::InstrumentServiceClient, record_line::Line,
+    seat_update::Update,
+};
 use chefshat_record::{jsonl, replay};
 use chefshat_tests::{
     BusyRooms, Ended, Launch, Ledger, Process, RoomKind, SmallDisk, StreamSeat, first_legal,
@@ -16,6 +19,7 @@ use chefshat_tests::{
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{Connection as _, Executor as _};
 use tokio::process::Command;
+use tonic_types::StatusExt as _;
 
 /// Name of the database in a data directory.
 const DATABASE: &str = "games.sqlite3";
@@ -125,25 +129,103 @@ async fn execute(connection: &mut SqliteConnection, statement: &'static str) {
     connection.execute(statement).await.expect("executed");
 }
 
+async fn connected(launch: &Launch) -> Client {
+    Client::connect(launch.url())
+        .await
+        .expect("the server listens")
+}
+
+/// Checks that new durable rooms are refused because of the disk.
+async fn assert_refuses_rooms(client: &Client) {
+    let refused = client
+        .create_room(v1::CreateRoomRequest::default())
+        .await
+        .expect_err("no space");
+    assert_eq!(refused.reason(), Some("DISK_NEARLY_FULL"), "{refused}");
+}
+
+/// Takes a decision in a room that needs no disk.
+async fn assert_plays_in_memory(client: &Client) {
+    let policy = v1::RoomPolicy {
+        durability: v1::Durability::Ephemeral.into(),
+        ..unhurried()
+    };
+    let (_, tickets) = room_of_four(client, one_shift(), policy).await;
+    let mut seats = Vec::new();
+    for ticket in tickets {
+        let mut seat = StreamSeat::open(client.channel()).await;
+        let attach = v1::Attach {
+            ticket,
+            delivery: v1::EventDelivery::AtOnce.into(),
+            ..v1::Attach::default()
+        };
+        seat.attach(attach).await;
+        assert!(matches!(seat.next().await, Update::Attached(_)));
+        seats.push(seat);
+    }
+    let (Update::Decision(decision), asked) = first_update(&mut seats).await else {
+        panic!("the first update is a decision");
+    };
+    let action = first_legal(&decision);
+    seats[asked].answer(decision.decision_id, action).await;
+    let result = seats[asked].result().await;
+    assert_eq!(result.status(), v1::AnswerStatus::Accepted);
+}
+
 #[tokio::test(flavor = "multi_thread")]
-async fn a_full_disk_ends_the_server_and_loses_nothing() {
+async fn a_full_disk_holds_games_up_and_loses_nothing() {
     let disk = match SmallDisk::new(DISK_KIB).await {
         Ok(disk) => disk,
-        Err(why) => return skip("a_full_disk_ends_the_server_and_loses_nothing", &why),
+        Err(why) => return skip("a_full_disk_holds_games_up_and_loses_nothing", &why),
     };
     let mut launch = Launch::new(disk.mounted_at()).through(disk.enter());
     let server = launch.start().await.expect("the server starts");
     let busy_rooms = BusyRooms::start(&launch.url(), rooms(4, unhurried()));
     patiently("decisions", busy_rooms.ledger.reaches(50)).await;
     disk.fill("filler");
-    assert_failed(&server.ended().await, "the disk is full: free some space");
-    // A restart while the disk is full fails again: at once, or a little later when its space runs
-    // out.
-    let ended = match launch.start().await {
-        Ok(server) => server.ended().await,
-        Err(ended) => ended,
+    let client = connected(&launch).await;
+    assert_refuses_rooms(&client).await;
+    assert_plays_in_memory(&client).await;
+    // It recovers by itself.
+    std::fs::remove_file(disk.path().join("filler")).expect("removed");
+    let ledger = Arc::clone(&busy_rooms.ledger);
+    patiently("decisions", ledger.reaches(ledger.count() + 50)).await;
+    // Or it dies, and starts although there is no space.
+    disk.fill("filler");
+    server.kill().await;
+    let server = launch.start().await.expect("the server restarts");
+    let client = connected(&launch).await;
+    assert_refuses_rooms(&client).await;
+    assert_plays_in_memory(&client).await;
+    std::fs::remove_file(disk.path().join("filler")).expect("removed");
+    assert_continues(&launch, server, busy_rooms, &disk.path()).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_with_a_full_disk_starts_and_ends() {
+    let disk = match SmallDisk::new(DISK_KIB).await {
+        Ok(disk) => disk,
+        Err(why) => return skip("a_server_with_a_full_disk_starts_and_ends", &why),
     };
-    assert_failed(&ended, "free some space");
+    let mut launch = Launch::new(disk.mounted_at()).through(disk.enter());
+    let server = launch.start().await.expect("the server starts");
+    assert!(server.stop().await.status.success());
+    disk.fill("filler");
+    let server = launch.start().await.expect("it starts on what it has kept");
+    let client = connected(&launch).await;
+    client.server_info().await.expect("information");
+    assert_refuses_rooms(&client).await;
+    assert_plays_in_memory(&client).await;
+    std::fs::remove_file(disk.path().join("filler")).expect("removed");
+    let busy_rooms = BusyRooms::start(&launch.url(), rooms(4, unhurried()));
+    patiently("decisions", busy_rooms.ledger.reaches(50)).await;
+    disk.fill("filler");
+    assert_refuses_rooms(&client).await;
+    // What was not committed is not acknowledged, and nobody waits for it when the server stops.
+    let ended = server.stop().await;
+    if !ended.status.success() {
+        assert_failed(&ended, "the disk is full: free some space");
+    }
     std::fs::remove_file(disk.path().join("filler")).expect("removed");
     let server = launch.start().await.expect("the server restarts");
     assert_continues(&launch, server, busy_rooms, &disk.path()).await;
@@ -153,35 +235,65 @@ async fn a_full_disk_ends_the_server_and_loses_nothing() {
 async fn a_nearly_full_disk_is_reserved_for_running_games() {
     let disk = match SmallDisk::new(DISK_KIB).await {
         Ok(disk) => disk,
-        Err(why) => {
-            return skip(
-                "a_disk_that_is_nearly_full_is_left_to_games_that_go_on",
-                &why,
-            );
-        }
+        Err(why) => return skip("a_nearly_full_disk_is_reserved_for_running_games", &why),
     };
     let mut launch = Launch::new(disk.mounted_at()).through(disk.enter());
     let server = launch.start().await.expect("the server starts");
-    let client = Client::connect(launch.url())
-        .await
-        .expect("the server listens");
-    client
+    let client = connected(&launch).await;
+    let created = client
         .create_room(v1::CreateRoomRequest::default())
         .await
         .expect("a new room");
     disk.fill("filler");
-    let refused = client
-        .create_room(v1::CreateRoomRequest::default())
-        .await
-        .expect_err("no space");
-    assert_eq!(refused.reason(), Some("DISK_NEARLY_FULL"), "{refused}");
+    assert_refuses_rooms(&client).await;
+    // Nor is anything stored that no game needs.
+    let mut instruments = InstrumentServiceClient::new(client.channel());
+    let marker = v1::AddMarkerRequest {
+        room_id: created.room.expect("a room").room_id,
+        owner_token: created.owner_token,
+        label: "fixation".into(),
+        ..v1::AddMarkerRequest::default()
+    };
+    let refused = instruments.add_marker(marker.clone()).await;
+    let refused = refused.expect_err("no space");
+    let details = refused.get_details_error_info().expect("details");
+    assert_eq!(details.reason, "DISK_NEARLY_FULL");
     std::fs::remove_file(disk.path().join("filler")).expect("removed");
+    let marked = instruments.add_marker(marker).await;
+    marked.expect("there is space again");
     client
         .create_room(v1::CreateRoomRequest::default())
         .await
         .expect("there is space again");
     let ended = server.stop().await;
     assert!(ended.status.success(), "{ended:?}");
+}
+
+/// Each running game reserves what it may still write, so that rooms are refused long before the disk
+/// is full.
+#[tokio::test(flavor = "multi_thread")]
+async fn rooms_reserve_the_space_that_they_may_need() {
+    let disk = match SmallDisk::new(DISK_KIB).await {
+        Ok(disk) => disk,
+        Err(why) => return skip("rooms_reserve_the_space_that_they_may_need", &why),
+    };
+    let mut launch = Launch::new(disk.mounted_at()).through(disk.enter());
+    let server = launch.start().await.expect("the server starts");
+    let client = connected(&launch).await;
+    let mut created = 0;
+    let refused = loop {
+        match client.create_room(v1::CreateRoomRequest::default()).await {
+            Ok(_) => created += 1,
+            Err(refused) => break refused,
+        }
+        assert!(
+            created < DISK_KIB / 128,
+            "{created} rooms on {DISK_KIB} KiB"
+        );
+    };
+    assert_eq!(refused.reason(), Some("DISK_NEARLY_FULL"), "{refused}");
+    assert!(created > DISK_KIB / 512, "only {created} rooms");
+    server.kill().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -2,17 +2,19 @@
 //! Python SDK play whole games over HTTP.
 
 use std::process::Stdio;
+use std::time::Duration;
 
 use bytes::Bytes;
 use chefshat_client::v1;
-use chefshat_tests::{TestServer, patiently, set_up};
+use chefshat_tests::{Held, Link, TestServer, patiently, set_up};
 use http::{Request, StatusCode};
 use http_body_util::{BodyExt as _, Full};
 use hyper_util::client::legacy::Client as HttpClient;
 use hyper_util::client::legacy::connect::HttpConnector;
 use hyper_util::rt::TokioExecutor;
 use serde_json::{Value, json};
-use tokio::io::{AsyncBufReadExt as _, BufReader};
+use tokio::io::{AsyncBufReadExt as _, AsyncReadExt as _, AsyncWriteExt as _, BufReader};
+use tokio::net::TcpStream;
 use tokio::process::{Child, Command};
 
 /// The current revision of the protocol.
@@ -30,8 +32,12 @@ struct Listening {
 
 impl Listening {
     async fn start(server: &TestServer, arguments: &[&str]) -> Self {
+        Self::start_at(&server.url(), arguments).await
+    }
+
+    async fn start_at(server: &str, arguments: &[&str]) -> Self {
         let mut command = Command::new(set_up("CHEFSHAT_BIN"));
-        command.args(["mcp", "--server", &server.url(), "--listen", "127.0.0.1:0"]);
+        command.args(["mcp", "--server", server, "--listen", "127.0.0.1:0"]);
         command.args(arguments).env_remove("CHEFSHAT_TICKET");
         command.stdout(Stdio::piped()).kill_on_drop(true);
         let mut child = command.spawn().expect("the program starts");
@@ -46,9 +52,8 @@ impl Listening {
         }
     }
 
-    /// Sends a request of the current revision, which needs no session; returns its status and the
-    /// message of the answer.
-    async fn post(&self, headers: Headers<'_>, method: &str, params: Value) -> (StatusCode, Value) {
+    /// A request of the current revision, which needs no session.
+    fn request(&self, headers: Headers<'_>, method: &str, params: Value) -> Request<String> {
         let mut params = params;
         params["_meta"] = json!({
             "io.modelcontextprotocol/protocolVersion": REVISION,
@@ -68,9 +73,12 @@ impl Listening {
         for (name, value) in headers {
             request = request.header(*name, *value);
         }
-        let request = request
-            .body(Full::from(body.to_string()))
-            .expect("a request");
+        request.body(body.to_string()).expect("a request")
+    }
+
+    /// Sends a request; returns its status and the message of the answer.
+    async fn post(&self, headers: Headers<'_>, method: &str, params: Value) -> (StatusCode, Value) {
+        let request = self.request(headers, method, params).map(Full::from);
         let response = patiently(method, self.client.request(request)).await;
         let (head, body) = response.expect("an answer").into_parts();
         let body = patiently("the answer", body.collect())
@@ -86,6 +94,24 @@ impl Listening {
             .filter_map(|line| serde_json::from_str(line.trim()).ok())
             .next_back();
         (head.status, message.unwrap_or(Value::Null))
+    }
+
+    /// Sends a request over a connection of its own.
+    async fn send(&self, request: Request<String>) -> TcpStream {
+        let (head, body) = request.into_parts();
+        let address = head.uri.authority().expect("an address").as_str();
+        let mut connection = TcpStream::connect(address).await.expect("it listens");
+        let path = head.uri.path();
+        let length = body.len();
+        let mut text =
+            format!("POST {path} HTTP/1.1\r\nhost: {address}\r\ncontent-length: {length}\r\n");
+        for (name, value) in &head.headers {
+            text += &format!("{name}: {}\r\n", value.to_str().expect("text"));
+        }
+        text += &format!("\r\n{body}");
+        let written = connection.write_all(text.as_bytes()).await;
+        written.expect("it is read");
+        connection
     }
 
     async fn tool(&self, name: &str, arguments: Value) -> (String, bool) {
@@ -176,4 +202,87 @@ async fn a_table_is_reached_with_its_handle_alone() {
         handles.iter().all(|handle| !listed.contains(handle)),
         "{listed}"
     );
+}
+
+#[tokio::test]
+async fn clients_of_older_revisions_leave_no_session_behind() {
+    let server = TestServer::start().await;
+    let program = Listening::start(&server, &[]).await;
+    let client = json!({"name": "test", "version": "1"});
+    for revision in ["2025-03-26", "2025-06-18"] {
+        let send = async |method: &str, params: Value| {
+            let body = json!({"jsonrpc": "2.0", "id": 1, "method": method, "params": params});
+            let request = Request::post(&program.url)
+                .header("content-type", "application/json")
+                .header("accept", "application/json, text/event-stream")
+                .header("mcp-protocol-version", revision)
+                .body(Full::from(body.to_string()))
+                .expect("a request");
+            let answer = patiently(method, program.client.request(request)).await;
+            let (head, body) = answer.expect("an answer").into_parts();
+            let body = patiently("the answer", body.collect())
+                .await
+                .expect("its end");
+            let text = String::from_utf8_lossy(&body.to_bytes()).into_owned();
+            assert_eq!(head.status, StatusCode::OK, "{text}");
+            (head.headers, text)
+        };
+        for _ in 0..100 {
+            let params =
+                json!({"protocolVersion": revision, "capabilities": {}, "clientInfo": client});
+            let (headers, text) = send("initialize", params).await;
+            assert!(text.contains(revision), "{text}");
+            // What it would have to remember, somebody could ask for again and again.
+            assert!(!headers.contains_key("mcp-session-id"), "{headers:?}");
+        }
+        let (_, text) = send("tools/list", json!({})).await;
+        assert!(text.contains("join_room"), "{text}");
+    }
+}
+
+#[tokio::test]
+async fn the_seat_of_a_client_that_has_gone_is_given_back() {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let made = client
+        .create_room(v1::CreateRoomRequest::default())
+        .await
+        .expect("a new room");
+    let room = made.room.expect("a room").room_id;
+    let seats_taken = async || {
+        let room = client.get_room(room.clone()).await.expect("the room");
+        room.seats
+            .iter()
+            .filter(|seat| !seat.name.is_empty())
+            .count()
+    };
+    let address = server.url().trim_start_matches("http://").parse();
+    let link = Link::to(address.expect("an address")).await;
+    let program = Listening::start_at(&format!("http://{}", link.address), &[]).await;
+    let (_, error) = program.tool("list_rooms", json!({})).await;
+    assert!(!error, "it is connected");
+    link.way().hold(Held::Answers);
+    let arguments = json!({"join_code": made.join_code});
+    let params = json!({"name": "join_room", "arguments": arguments});
+    let mut connection = program
+        .send(program.request(&[], "tools/call", params))
+        .await;
+    patiently("the seat to be taken", async {
+        while seats_taken().await == 0 {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    })
+    .await;
+    // The client leaves, and the program closes the connection too.
+    connection.shutdown().await.expect("open");
+    let read = patiently("the end", connection.read_to_end(&mut Vec::new())).await;
+    read.expect("the end");
+    // The client has gone before the program knew its seat.
+    link.way().hold(Held::Nothing);
+    patiently("the seat to be given back", async {
+        while seats_taken().await > 0 {
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+    })
+    .await;
 }

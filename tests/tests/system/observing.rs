@@ -14,6 +14,7 @@ use chefshat_server::config::ServerConfig;
 use chefshat_server::scrape;
 use chefshat_server::serve::Server;
 use chefshat_server::store::SqliteStore;
+use chefshat_server::web::Origins;
 use chefshat_tests::{
     Launch, StreamSeat, one_shift, own_address, patiently, random_agents, room_of_four, skip,
 };
@@ -46,7 +47,8 @@ impl Observed {
         let scraped = TcpListener::bind("127.0.0.1:0").await.expect("a port");
         let address = listener.local_addr().expect("bound");
         let metrics = scraped.local_addr().expect("bound");
-        tokio::spawn(scrape::serve(scraped, Arc::clone(server.metrics())));
+        let names = Origins::new(Vec::new(), Some(Vec::new()));
+        tokio::spawn(scrape::serve(scraped, Arc::clone(server.metrics()), names));
         tokio::spawn(server.serve(listener, std::future::pending()));
         Self {
             url: format!("http://{address}"),

@@ -9,8 +9,10 @@ use chefshat_proto::v1::{
     self, record_line::Line, record_service_client::RecordServiceClient,
     tournament_service_client::TournamentServiceClient,
 };
+use chefshat_record::pseudonym::Named;
 use chefshat_record::signature::SigningKey;
 use chefshat_server::config::ServerConfig;
+use chefshat_server::participants::ParticipantData;
 use chefshat_server::store::{MemoryStore, SqliteStore, Store};
 use chefshat_tests::{TestServer, one_shift, patiently, play_out, room_of_four};
 use futures::TryStreamExt as _;
@@ -318,6 +320,7 @@ async fn unknown_and_unwanted_records_are_refused() {
             kind: 77,
             ..v1::RecordFilter::default()
         }),
+        ..v1::StreamRecordsRequest::default()
     };
     let refused = service
         .stream_records(request)
@@ -325,6 +328,47 @@ async fn unknown_and_unwanted_records_are_refused() {
         .expect_err("not a kind");
     assert_eq!(reason(&refused), "FILTER_REFUSED");
     server.stop().await;
+}
+
+#[tokio::test]
+async fn a_record_without_a_participant_says_so_and_is_signed_again() {
+    for (store, folder) in stores().await {
+        let (server, games) = server_with_games(Arc::clone(&store)).await;
+        let mut service = service(&server).await;
+        let whole = record(&mut service, &games[0]).await.expect("a record");
+        let replayed = chefshat_record::replay::replay(&whole).expect("it fits");
+        assert_eq!(
+            (replayed.signed_by, replayed.redacted),
+            (Some(key().public()), false)
+        );
+        let name = match &whole[0].line {
+            Some(Line::Header(header)) => header.seats[0].name.clone(),
+            other => panic!("{other:?}"),
+        };
+        let data =
+            ParticipantData::new(Arc::clone(&store), None).signing_with(Some(Arc::new(key())));
+        let who = Named {
+            name: name.clone(),
+            fingerprint: None,
+        };
+        let deleted = data.delete(&who).await.expect("all games are over");
+        assert_eq!(deleted.games, GAMES as u64, "{name}");
+        for game in &games {
+            let lines = record(&mut service, game).await.expect("a record");
+            let replayed = chefshat_record::replay::replay(&lines).expect("it fits");
+            assert_eq!(
+                (replayed.signed_by, replayed.redacted),
+                (Some(key().public()), true)
+            );
+            assert!(!serde_json::to_string(&lines).expect("JSON").contains(&name));
+            let Some(Line::Footer(footer)) = lines.last().and_then(|it| it.line.as_ref()) else {
+                panic!("a footer");
+            };
+            assert!(footer.participant_removed && !footer.parts_withheld);
+        }
+        server.stop().await;
+        drop(folder);
+    }
 }
 
 #[tokio::test]

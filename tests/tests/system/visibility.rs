@@ -11,15 +11,19 @@ use std::time::Duration;
 use chefshat_client::{Client, ConnectOptions, RandomAgent};
 use chefshat_proto::v1::analysis_service_client::AnalysisServiceClient;
 use chefshat_proto::v1::instrument_service_client::InstrumentServiceClient;
+use chefshat_proto::v1::participation_service_client::ParticipationServiceClient;
+use chefshat_proto::v1::play_service_client::PlayServiceClient;
 use chefshat_proto::v1::record_service_client::RecordServiceClient;
 use chefshat_proto::v1::room_service_client::RoomServiceClient;
 use chefshat_proto::v1::server_service_client::ServerServiceClient;
 use chefshat_proto::v1::spectator_service_client::SpectatorServiceClient;
+use chefshat_proto::v1::study_service_client::StudyServiceClient;
+use chefshat_proto::v1::table_service_client::TableServiceClient;
 use chefshat_proto::v1::tournament_service_client::TournamentServiceClient;
 use chefshat_proto::v1::vector_service_client::VectorServiceClient;
 use chefshat_proto::v1::{
-    self, Visibility, create_room_request::Start, record_line::Line, run_request, seat_config,
-    vector_setup,
+    self, Visibility, act_request, create_room_request::Start, record_line::Line, run_request,
+    seat_command, seat_config, seat_update::Update, vector_setup,
 };
 use chefshat_room::ids::{Id, Token};
 use chefshat_server::access::{
@@ -27,12 +31,17 @@ use chefshat_server::access::{
 };
 use chefshat_server::config::ServerConfig;
 use chefshat_server::host::Host;
-use chefshat_server::store::SqliteStore;
+use chefshat_server::store::{FailingStore, Read, SqliteStore, Store};
 use chefshat_tests::{one_shift, patiently, random_agents, room_of_four};
+use prost::Message as _;
+use prost_types::field_descriptor_proto::Type;
+use prost_types::{DescriptorProto, FileDescriptorSet};
 use tempfile::TempDir;
 use tokio_stream::iter;
-use tonic::{Code, Request, Response, Status};
+use tonic::{Code, Request, Response, Status, Streaming};
 use tonic_types::StatusExt as _;
+
+use crate::studies::settings;
 
 const VISIBILITIES: [Visibility; 3] = [
     Visibility::Public,
@@ -309,6 +318,8 @@ struct Answer {
     reason: Option<String>,
     details: Vec<u8>,
     headers: BTreeMap<String, String>,
+    /// What the call has read from the store, if that is counted.
+    reads: Vec<Read>,
 }
 
 impl Answer {
@@ -341,6 +352,7 @@ fn answer<T>(result: Result<Response<T>, Status>, ids: &Ids) -> Answer {
         headers: headers
             .map(|(name, value)| (name.to_string(), format!("{value:?}")))
             .collect(),
+        reads: Vec::new(),
     }
 }
 
@@ -355,6 +367,15 @@ fn branch_point(ids: &Ids) -> v1::BranchPoint {
 
 /// Every call that names something by its id, with the answers.
 async fn asked(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
+    asked_counting(client, ids, &Vec::new).await
+}
+
+/// As [`asked`]; `take_reads` says what was read from the store since it was called last.
+async fn asked_counting(
+    client: &Client,
+    ids: &Ids,
+    take_reads: &dyn Fn() -> Vec<Read>,
+) -> BTreeMap<&'static str, Answer> {
     let mut rooms = RoomServiceClient::new(client.channel());
     let mut records = RecordServiceClient::new(client.channel());
     let mut tournaments = TournamentServiceClient::new(client.channel());
@@ -363,8 +384,14 @@ async fn asked(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
     let (room_id, tournament_id) = (&ids.room, &ids.tournament);
     macro_rules! ask {
         ($name:literal, $call:expr) => {
+            take_reads();
             let called = patiently($name, $call).await;
-            answers.insert($name, answer(called, ids));
+            let reads = take_reads();
+            let answer = Answer {
+                reads,
+                ..answer(called, ids)
+            };
+            assert!(answers.insert($name, answer).is_none(), $name);
         };
     }
     ask!(
@@ -375,7 +402,7 @@ async fn asked(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
         })
     );
     ask!(
-        "CloseRoom",
+        "RoomService/CloseRoom",
         rooms.close_room(v1::CloseRoomRequest {
             room_id: room_id.clone(),
             owner_token: wrong(room_id),
@@ -422,9 +449,83 @@ async fn asked(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
             chunk: Some(v1::SampleChunk::default()),
         })
     );
+    ask!(
+        "LeaveRoom",
+        rooms.leave_room(v1::LeaveRoomRequest {
+            ticket: wrong(room_id),
+        })
+    );
+    let mut play = PlayServiceClient::new(client.channel());
+    let act = |command| {
+        let ticket = wrong(room_id);
+        let request = v1::ActRequest { ticket, command };
+        let mut play = play.clone();
+        async move { play.act(request).await }
+    };
+    ask!(
+        "Act",
+        act(Some(act_request::Command::Answer(v1::Answer::default())))
+    );
+    ask!("Act, no command", act(None));
+    let wizard = v1::Expression {
+        source: v1::ExpressionSource::Wizard.into(),
+        ..Default::default()
+    };
+    ask!(
+        "Act, malformed expression",
+        act(Some(act_request::Command::Express(wizard)))
+    );
+    let hint = v1::AskHint {
+        request_id: vec![1],
+        ..Default::default()
+    };
+    ask!(
+        "Act, malformed hint",
+        act(Some(act_request::Command::Hint(hint)))
+    );
+    ask!(
+        "Act, hint",
+        act(Some(act_request::Command::Hint(v1::AskHint::default())))
+    );
+    let attach = |id: &str| v1::Attach {
+        ticket: wrong(id),
+        ..Default::default()
+    };
+    let seats = vec![attach(room_id), attach(tournament_id)];
+    let request = v1::PlayServiceWatchRequest { seats };
+    ask!("PlayService/Watch", async {
+        let watching = play.watch(request).await;
+        refused(watching, 2).await
+    });
+    let commands = [attach(room_id), attach(tournament_id)].map(|attach| v1::SeatCommand {
+        command: Some(seat_command::Command::Attach(attach)),
+        ..Default::default()
+    });
+    let request = v1::PlayRequest {
+        commands: commands.into(),
+    };
+    ask!("Play", async {
+        let requests = tokio_stream::StreamExt::chain(iter([request]), tokio_stream::pending());
+        let playing = play.play(requests).await;
+        refused(playing, 2).await
+    });
+    let mut tables = TableServiceClient::new(client.channel());
+    ask!(
+        "Report",
+        tables.report(v1::ReportRequest {
+            table_ticket: wrong(room_id),
+            ..Default::default()
+        })
+    );
+    ask!(
+        "TableService/Watch",
+        tables.watch(v1::TableServiceWatchRequest {
+            table_ticket: wrong(room_id),
+        })
+    );
     let mut spectators = SpectatorServiceClient::new(client.channel());
     ask!(
-        "Watch",
+        "SpectatorService/Watch",
         spectators.watch(v1::SpectatorServiceWatchRequest {
             room_id: room_id.clone(),
             ..Default::default()
@@ -511,7 +612,7 @@ async fn asked(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
         })
     );
     ask!(
-        "CloseTournament",
+        "TournamentService/CloseTournament",
         tournaments.close_tournament(v1::CloseTournamentRequest {
             tournament_id: tournament_id.clone(),
             owner_token: wrong(tournament_id),
@@ -588,6 +689,43 @@ async fn asked(client: &Client, ids: &Ids) -> BTreeMap<&'static str, Answer> {
         })
     );
     answers
+}
+
+/// What a stream of seats is answered: the refusals of so many seats.
+async fn refused<T: Seats>(
+    answered: Result<Response<Streaming<T>>, Status>,
+    seats: usize,
+) -> Result<Response<()>, Status> {
+    let mut responses = answered?.into_inner();
+    let mut refusals = Vec::new();
+    while refusals.len() < seats {
+        let response = responses.message().await?;
+        let updates = response.expect("the stream is open").updates();
+        refusals.extend(
+            (updates.into_iter()).filter_map(|update| match update.update {
+                Some(Update::Refused(refused)) => Some((refused.reason, refused.message)),
+                _ => None,
+            }),
+        );
+    }
+    Err(Status::unauthenticated(format!("{refusals:?}")))
+}
+
+/// A response of a stream of seats.
+trait Seats {
+    fn updates(self) -> Vec<v1::SeatUpdate>;
+}
+
+impl Seats for v1::PlayResponse {
+    fn updates(self) -> Vec<v1::SeatUpdate> {
+        self.updates
+    }
+}
+
+impl Seats for v1::PlayServiceWatchResponse {
+    fn updates(self) -> Vec<v1::SeatUpdate> {
+        self.updates
+    }
 }
 
 /// Starts a batch of games from a recorded one; the first message says whether that is allowed.
@@ -668,6 +806,14 @@ async fn asked_with_codes(client: &Client, ids: &Ids) -> BTreeMap<&'static str, 
     ])
 }
 
+/// A request that uses [`USED`] for another room.
+fn used() -> v1::CreateRoomRequest {
+    v1::CreateRoomRequest {
+        request_id: USED.to_vec(),
+        ..Default::default()
+    }
+}
+
 /// The ids that each list has.
 async fn lists(client: &Client) -> BTreeMap<&'static str, BTreeSet<String>> {
     let rooms = client.list_rooms(v1::ListRoomsRequest::default()).await;
@@ -709,6 +855,8 @@ async fn check(server: &Server, subjects: &[Subject], ids_of: impl Fn(usize) -> 
         let other = &subjects[(index + 1) % subjects.len()];
         for (name, client, belongs) in callers(server, subject, other).await {
             let who = format!("{name}, {:?}, {when}", subject.visibility);
+            // Each token has request ids of its own. Those that may create no room are refused.
+            let _ = client.create_room(used()).await;
             let ids = ids_of(index);
             let reached = belongs || subject.visibility != Visibility::Private;
             let twin = match reached {
@@ -743,11 +891,7 @@ async fn everything_for_everybody(mode: AccessSettings) {
         _ => None,
     };
     let client = server.client(host.as_deref(), &[]).await;
-    let used = v1::CreateRoomRequest {
-        request_id: USED.to_vec(),
-        ..Default::default()
-    };
-    client.create_room(used).await.expect("a room");
+    client.create_room(used()).await.expect("a room");
     let mut subjects = Vec::new();
     for visibility in VISIBILITIES {
         subjects.push(Subject::new(&client, visibility).await);
@@ -804,6 +948,304 @@ async fn a_wrong_join_code_does_not_tell_whether_an_id_is_private_or_unknown() {
     let known = asked_with_codes(&own, &private.ids).await;
     assert_eq!(known, asked_with_codes(&own, &public.ids).await);
     assert_ne!(known, stranger);
+}
+
+/// The calls that name something by an id or a secret and are not in [`asked`] or
+/// [`asked_with_codes`], and why.
+const ASKED_ELSEWHERE: [(&str, &str); 4] = [
+    ("AdminService/CloseRoom", "operators see everything"),
+    ("AdminService/CloseTournament", "operators see everything"),
+    (
+        "CreateStudy",
+        "no seat of a study replays a recorded player",
+    ),
+    (
+        "ImportRecord",
+        "an id belongs to one game: a record with it is refused",
+    ),
+];
+
+/// The calls about a study, whose ids and secrets nobody else may know.
+const OF_STUDIES: [&str; 17] = [
+    "AddStudyParticipants",
+    "AnswerQuestionnaire",
+    "CloseStudy",
+    "ContinueStudy",
+    "DeleteStudy",
+    "DeleteStudyParticipant",
+    "ExportStudy",
+    "FollowParticipation",
+    "FollowStudy",
+    "GetStudy",
+    "GiveConsent",
+    "ListStudies",
+    "ListStudyLinks",
+    "OpenStudy",
+    "RecordTraces",
+    "RemoveStudyParticipant",
+    "WithdrawFromStudy",
+];
+
+/// The calls of the protocol whose request names something by an id or a secret: its method, with
+/// the service if several have one of this name.
+fn naming() -> BTreeSet<String> {
+    let set = FileDescriptorSet::decode(chefshat_proto::DESCRIPTORS).expect("descriptors");
+    let messages: BTreeMap<String, &DescriptorProto> = (set.file.iter())
+        .flat_map(|file| {
+            let named = |it| {
+                (
+                    format!(".{}.{}", file.package(), DescriptorProto::name(it)),
+                    it,
+                )
+            };
+            file.message_type.iter().map(named)
+        })
+        .collect();
+    let services = || {
+        let services = set.file.iter().flat_map(|file| &file.service);
+        services.flat_map(|service| service.method.iter().map(move |it| (service, it)))
+    };
+    let is_unique = |name| {
+        services()
+            .filter(|(_, method)| method.name() == name)
+            .count()
+            == 1
+    };
+    services()
+        .filter(|(_, method)| names_something(method.input_type(), &messages, &mut BTreeSet::new()))
+        .map(|(service, method)| match is_unique(method.name()) {
+            true => method.name().to_owned(),
+            false => format!("{}/{}", service.name(), method.name()),
+        })
+        .collect()
+}
+
+fn names_something(
+    message: &str,
+    messages: &BTreeMap<String, &DescriptorProto>,
+    seen: &mut BTreeSet<String>,
+) -> bool {
+    const WORDS: [&str; 7] = [
+        "_id", "ticket", "token", "tokens", "code", "link", "session",
+    ];
+    // A place in a list, and what a request is recognised by.
+    const OTHERS: [&str; 2] = ["page_token", "request_id"];
+    let Some(descriptor) = messages.get(message) else {
+        return false;
+    };
+    seen.insert(message.to_owned())
+        && descriptor.field.iter().any(|field| {
+            let name = field.name();
+            let is_name = field.r#type() == Type::String
+                && WORDS.iter().any(|word| name.ends_with(word))
+                && !OTHERS.contains(&name);
+            is_name || names_something(field.type_name(), messages, seen)
+        })
+}
+
+fn check_same(answers: &BTreeMap<&str, Answer>, expected: &BTreeMap<&str, Answer>) {
+    for (call, answer) in answers {
+        assert_eq!(answer, &expected[call], "{call}");
+    }
+}
+
+#[tokio::test]
+async fn no_more_is_read_of_what_is_private_than_of_what_does_not_exist() {
+    let store = Arc::new(FailingStore::after(u64::MAX));
+    let config = ServerConfig {
+        grace: Duration::ZERO,
+        access: mode(Mode::Open),
+        ..ServerConfig::default()
+    };
+    let host = Host::start(config, Arc::clone(&store) as Arc<dyn Store>).await;
+    let host = host.expect("a free port");
+    let client = Client::connect(host.url()).await.expect("it listens");
+    let public = Subject::new(&client, Visibility::Public).await;
+    let private = Subject::new(&client, Visibility::Private).await;
+    let take_reads = || store.take_reads();
+    let unknown = asked_counting(&client, &Ids::unknown(), &take_reads).await;
+
+    // While they run, and when they have ended.
+    let running = asked_counting(&client, &private.ids, &take_reads).await;
+    check_same(&running, &unknown);
+    let public_game = public.play(&client).await;
+    let private_game = private.play(&client).await;
+    for ids in [&private.ids, &private_game] {
+        let hidden = asked_counting(&client, ids, &take_reads).await;
+        check_same(&hidden, &unknown);
+    }
+    // The reads are counted: whoever may see a record reads it.
+    for (client, ids) in [
+        (&client, &public.ids),
+        (&client, &public_game),
+        (
+            &client.with_secrets([&private.owners[0]]).expect("a secret"),
+            &private.ids,
+        ),
+    ] {
+        let shown = asked_counting(client, ids, &take_reads).await;
+        for call in ["GetRecord", "LegalActions", "Evaluate", "Run, branch"] {
+            assert_eq!(shown[call].reads, [Read::Summary, Read::Game], "{call}");
+            assert_eq!(unknown[call].reads, [Read::Summary], "{call}");
+        }
+    }
+
+    // No call is forgotten.
+    let with_codes = asked_with_codes(&client, &Ids::unknown()).await;
+    let asked = unknown.keys().chain(with_codes.keys());
+    let elsewhere = ASKED_ELSEWHERE.iter().map(|(call, _)| call);
+    let all: BTreeSet<String> = (asked.chain(elsewhere).chain(&OF_STUDIES))
+        .filter_map(|name| name.split(", ").next().map(str::to_owned))
+        .collect();
+    assert_eq!(naming(), all);
+}
+
+/// The calls about a study with these, with the answers.
+async fn asked_of_study(
+    client: &Client,
+    (study_id, link, session): (&str, &str, &str),
+) -> BTreeMap<&'static str, Answer> {
+    let mut owner = StudyServiceClient::new(client.channel());
+    let mut participant = ParticipationServiceClient::new(client.channel());
+    let ids = Ids {
+        room: study_id.to_owned(),
+        ..Ids::unknown()
+    };
+    let mut answers = BTreeMap::new();
+    macro_rules! ask {
+        ($name:literal, $service:ident.$call:ident($request:ident { $($field:ident: $value:expr),* })) => {
+            #[allow(clippy::needless_update, reason = "some requests have more fields")]
+            let request = v1::$request {
+                $($field: $value.to_owned(),)*
+                ..Default::default()
+            };
+            let called = patiently($name, $service.$call(request)).await;
+            answers.insert($name, answer(called, &ids));
+        };
+    }
+    macro_rules! ask_owner {
+        ($name:literal, $call:ident, $request:ident) => {
+            let owner_token = Token::random(Id::parse(study_id).expect("an id")).to_text();
+            ask!(
+                $name,
+                owner.$call($request {
+                    study_id: study_id,
+                    owner_token: owner_token
+                })
+            );
+        };
+    }
+    ask_owner!("GetStudy", get_study, GetStudyRequest);
+    ask_owner!(
+        "AddStudyParticipants",
+        add_study_participants,
+        AddStudyParticipantsRequest
+    );
+    ask_owner!("ListStudyLinks", list_study_links, ListStudyLinksRequest);
+    ask_owner!("FollowStudy", follow_study, FollowStudyRequest);
+    ask_owner!(
+        "RemoveStudyParticipant",
+        remove_study_participant,
+        RemoveStudyParticipantRequest
+    );
+    ask_owner!("CloseStudy", close_study, CloseStudyRequest);
+    ask_owner!("ExportStudy", export_study, ExportStudyRequest);
+    ask_owner!(
+        "DeleteStudyParticipant",
+        delete_study_participant,
+        DeleteStudyParticipantRequest
+    );
+    ask_owner!("DeleteStudy", delete_study, DeleteStudyRequest);
+    ask!(
+        "OpenStudy",
+        participant.open_study(OpenStudyRequest { link: link })
+    );
+    ask!(
+        "WithdrawFromStudy",
+        participant.withdraw_from_study(WithdrawFromStudyRequest { link: link })
+    );
+    ask!(
+        "FollowParticipation",
+        participant.follow_participation(FollowParticipationRequest { session: session })
+    );
+    ask!(
+        "GiveConsent",
+        participant.give_consent(GiveConsentRequest { session: session })
+    );
+    ask!(
+        "AnswerQuestionnaire",
+        participant.answer_questionnaire(AnswerQuestionnaireRequest { session: session })
+    );
+    ask!(
+        "ContinueStudy",
+        participant.continue_study(ContinueStudyRequest { session: session })
+    );
+    ask!(
+        "RecordTraces",
+        participant.record_traces(RecordTracesRequest { session: session })
+    );
+    let request = v1::ListStudiesRequest {
+        owner_tokens: vec![Token::random(Id::parse(study_id).expect("an id")).to_text()],
+    };
+    let mut listed = owner.list_studies(request).await.expect("a list");
+    assert_eq!(std::mem::take(&mut listed.get_mut().studies), []);
+    answers.insert("ListStudies", answer(Ok(listed), &ids));
+    assert!(answers.keys().copied().eq(OF_STUDIES), "{answers:?}");
+    answers
+}
+
+#[tokio::test]
+async fn a_wrong_secret_of_a_study_is_answered_like_an_unknown_study() {
+    let server = Server::start(mode(Mode::Open)).await;
+    let client = server.client(None, &[]).await;
+    let mut studies = StudyServiceClient::new(client.channel());
+    let request = v1::CreateStudyRequest {
+        settings: Some(settings()),
+        ..Default::default()
+    };
+    let created = studies
+        .create_study(request)
+        .await
+        .expect("valid")
+        .into_inner();
+    let study = created.study.expect("a study");
+    let request = v1::AddStudyParticipantsRequest {
+        study_id: study.study_id.clone(),
+        owner_token: created.owner_token,
+        count: 1,
+        ..Default::default()
+    };
+    let added = studies
+        .add_study_participants(request)
+        .await
+        .expect("added");
+    let link = &added.into_inner().links[0].link;
+    let mut participants = ParticipationServiceClient::new(client.channel());
+    let request = v1::OpenStudyRequest { link: link.clone() };
+    let opened = participants.open_study(request).await.expect("opened");
+    let session = opened.into_inner().session;
+    // The first characters name the study, the last ones are the secret.
+    let with = |text: &str, at: usize| {
+        let mut bytes = text.as_bytes().to_vec();
+        bytes[at] = if bytes[at] == b'A' { b'B' } else { b'A' };
+        String::from_utf8(bytes).expect("ASCII")
+    };
+    let (middle, end) = (link.len() - 4, session.len() - 4);
+    let wrong = (
+        &*study.study_id,
+        &*with(link, middle),
+        &*with(&session, end),
+    );
+    let unknown = (
+        &*Id::random().to_string(),
+        &*with(link, 0),
+        &*with(&session, 0),
+    );
+    let wrong = asked_of_study(&client, wrong).await;
+    check_same(&wrong, &asked_of_study(&client, unknown).await);
+    for (call, answer) in wrong {
+        assert_eq!(answer.code == Code::Ok, call == "ListStudies", "{call}");
+    }
 }
 
 #[tokio::test]

@@ -147,7 +147,7 @@ async fn a_link_to_a_replay_has_a_title_and_a_picture_unless_the_game_is_private
             assert_eq!((status.as_u16(), media_type.as_str()), (200, "image/png"));
             // The width stands behind the signature and the head of the first chunk.
             assert_eq!(picture[16..20], 1200_u32.to_be_bytes());
-            if chefshat_server::web::is_built_in() {
+            if chefshat_server::web::is_built() {
                 let tag = format!("content=\"{}{path}.png\"", server.url());
                 assert!(document.contains(&tag), "{document}");
                 assert!(document.contains("1. agent "), "{document}");
@@ -180,7 +180,7 @@ async fn every_path_serves_the_page_in_both_http_versions_and_calls_still_work()
                 .await
                 .expect("the server answers");
             // Without a build of the page the answer is a page with instructions.
-            let wanted = status.unwrap_or(match chefshat_server::web::is_built_in() {
+            let wanted = status.unwrap_or(match chefshat_server::web::is_built() {
                 true => http::StatusCode::OK,
                 false => http::StatusCode::SERVICE_UNAVAILABLE,
             });

@@ -110,7 +110,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("chefshat-tests", &["*"]),
     (
         "chefshat-hostile",
-        &["chefshat-proto", "chefshat-client", "chefshat-tests"],
+        &[
+            "chefshat-proto",
+            "chefshat-client",
+            "chefshat-postgres",
+            "chefshat-tests",
+        ],
     ),
     (
         "chefshat-load",

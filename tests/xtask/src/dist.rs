@@ -109,7 +109,14 @@ impl Release<'_> {
     fn static_binary(&self) -> Command {
         let mut build = tool(self.places, "cargo-zigbuild", "");
         build.args(["zigbuild", "--locked", "--profile", "dist"]);
-        build.args(["--target", TARGET, "--bin", "chefshat"]);
+        build.args([
+            "--target",
+            TARGET,
+            "--bin",
+            "chefshat",
+            "--features",
+            "chefshat/dist",
+        ]);
         build
     }
 

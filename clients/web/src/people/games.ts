@@ -79,8 +79,10 @@ export function unratedBecause(record: RecordSummary): Unrated | null {
   if (record.added) return "added";
   if (record.origin !== GameOrigin.DEALT) return "notDealt";
   if (record.seats.some(({ replay }) => replay !== undefined)) return "recorded";
-  if (record.substituted) return "substituted";
-  if (record.hinted) return "hinted";
+  // Who was substituted or given a hint has lost the game; records of earlier versions do not say who.
+  const lost = record.seats.filter(({ substituted }) => substituted).length;
+  if (record.substituted && (lost === 0 || lost === record.seats.length)) return "substituted";
+  if (record.hinted && lost === 0) return "hinted";
   const participants = record.seats.map(({ kind, name, builtInAgent, nameFingerprint }) => {
     return builtInAgent ? `built-in ${builtInAgent}` : `${kind} ${name} ${nameFingerprint}`;
   });

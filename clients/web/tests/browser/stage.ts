@@ -16,6 +16,8 @@ FLAGS.push("--disable-background-networking", "--disable-component-update", "--d
 // a context would not apply to service workers.
 FLAGS.push("--ignore-certificate-errors");
 
+/** Whether the tests use a server that they did not start. */
+const GIVEN = process.env.CHEFSHAT_URL !== undefined;
 /** How many times slower than this machine the pages run: no test may depend on their speed. */
 const SLOWDOWN = Number(process.env.CHEFSHAT_SLOWDOWN ?? 1);
 
@@ -108,7 +110,8 @@ export async function startBrowser(): Promise<Browser> {
 }
 
 /**
- * A person's page, in English by default. Page errors and console errors are collected in `faults`.
+ * A person's page, in English by default. Page errors and console errors are collected in `faults`;
+ * not connections that a given server or its proxy ended, which the page opens again.
  */
 export async function person(
   browser: Browser,
@@ -128,7 +131,8 @@ export async function person(
   const faults: string[] = [];
   page.on("pageerror", (error) => faults.push(error.message));
   page.on("console", (message) => {
-    if (message.type() === "error") faults.push(message.text());
+    if (message.type() !== "error" || (GIVEN && message.text().includes("net::ERR_"))) return;
+    faults.push(`${message.text()} (${message.location().url})`);
   });
   return { page, faults };
 }

@@ -1,11 +1,19 @@
-//! Streamable HTTP, for clients that do not start this program themselves. The current revision of
-//! the protocol has no sessions; older ones do. Both see the same seats, by their handles.
+//! Streamable HTTP, for clients that do not start this program themselves. There are no sessions,
+//! which the current revision of the protocol does not have and older ones do not require: seats
+//! are found by their handles, and a client that has said `initialize` costs nothing more.
 
+use std::io;
 use std::net::SocketAddr;
+use std::pin::Pin;
 use std::sync::Arc;
 
 use axum::Router;
-use rmcp::transport::streamable_http_server::session::local::LocalSessionManager;
+use axum::serve::Listener;
+use chefshat_server::connections::{self, Connection, Connections, Limits};
+use chefshat_server::limits::Shares;
+use chefshat_server::proxies::TrustedProxies;
+use futures::{Stream, StreamExt as _};
+use rmcp::transport::streamable_http_server::session::never::NeverSessionManager;
 use rmcp::transport::streamable_http_server::{StreamableHttpServerConfig, StreamableHttpService};
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
@@ -17,6 +25,9 @@ use crate::{CommandError, say};
 const PATH: &str = "/mcp";
 /// Maximum bytes of a request.
 const MAX_REQUEST_BYTES: usize = 64 * 1024;
+/// Maximum number of connections, each of which makes one request at a time. One address has a share
+/// of them, as on a game server.
+const MAX_CONNECTIONS: usize = 256;
 
 /// Which requests are answered, besides those for this computer by programs.
 pub(super) struct Checks {
@@ -52,10 +63,11 @@ pub(super) async fn serve(
         .with_allowed_origins(checks.origins)
         .enforce_origin_validation()
         .with_max_request_body_bytes(MAX_REQUEST_BYTES)
+        .with_legacy_session_mode(false)
         .with_cancellation_token(stop.child_token());
     let service = StreamableHttpService::new(
         move || Ok(Server::new(settings.clone())),
-        Arc::new(LocalSessionManager::default()),
+        Arc::new(NeverSessionManager::default()),
         config,
     );
     let router = Router::new().route_service(PATH, service);
@@ -66,8 +78,50 @@ pub(super) async fn serve(
         }
         stop.cancel();
     };
-    axum::serve(listener, router)
+    axum::serve(Limited::new(listener, address), router)
         .with_graceful_shutdown(stopped)
         .await?;
     Ok(())
+}
+
+/// A listener with a limited number of connections.
+struct Limited<S> {
+    accepted: Pin<Box<S>>,
+    address: SocketAddr,
+}
+
+impl Limited<()> {
+    fn new(
+        listener: TcpListener,
+        address: SocketAddr,
+    ) -> Limited<impl Stream<Item = io::Result<Connection>>> {
+        let limits = Limits {
+            max_connections: MAX_CONNECTIONS,
+            shares: Shares::default(),
+            trusted_proxies: TrustedProxies::default(),
+        };
+        let connections = Connections::new(limits, Arc::default());
+        let accepted = Box::pin(connections::accept(listener.into(), connections));
+        Limited { accepted, address }
+    }
+}
+
+impl<S: Stream<Item = io::Result<Connection>> + Send + 'static> Listener for Limited<S> {
+    type Io = Connection;
+    type Addr = SocketAddr;
+
+    async fn accept(&mut self) -> (Connection, SocketAddr) {
+        loop {
+            match self.accepted.next().await {
+                Some(Ok(connection)) => return (connection, self.address),
+                // It tries again by itself, and has no end.
+                Some(Err(_)) => {}
+                None => std::future::pending().await,
+            }
+        }
+    }
+
+    fn local_addr(&self) -> io::Result<SocketAddr> {
+        Ok(self.address)
+    }
 }

@@ -17,7 +17,7 @@ use crate::narration::view::GameView;
 /// Longest wait of a call. Clients give up on calls after about a minute.
 pub(super) const LONGEST_WAIT: Duration = Duration::from_secs(25);
 /// How long a seat that has just been taken waits for the answer of the server.
-const ATTACH_TIMEOUT: Duration = Duration::from_secs(10);
+pub(super) const ATTACH_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// A seat, followed until it is dropped.
 pub(super) struct Seat {

@@ -2,12 +2,14 @@
 //! ticket in what a language model reads: it is worth nothing outside of this process.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use chefshat_client::{Client, v1};
-use tokio::sync::OnceCell;
+use tokio::sync::{OnceCell, OwnedSemaphorePermit, Semaphore, oneshot};
+use tokio::time::timeout;
+use tokio_util::task::TaskTracker;
 
-use super::seat::Seat;
+use super::seat::{ATTACH_TIMEOUT, Seat};
 use crate::CommandError;
 use crate::connect::ServerArg;
 use crate::language::live::Live;
@@ -33,17 +35,50 @@ pub(super) struct Seats {
     server: ServerArg,
     client: OnceCell<Client>,
     handles: Handles,
-    taken: Mutex<BTreeMap<String, Arc<Seat>>>,
+    taken: Mutex<BTreeMap<String, Taken>>,
+    places: Arc<Semaphore>,
+    /// Seats that are being taken or given back.
+    working: TaskTracker,
+}
+
+/// A seat and its place among [`MAX_SEATS`].
+struct Taken {
+    seat: Arc<Seat>,
+    _place: OwnedSemaphorePermit,
+}
+
+/// A seat that was taken for a call which has not heard of it yet. Given back when dropped: nobody
+/// else knows its handle.
+struct Unclaimed {
+    seats: Arc<Seats>,
+    handle: Option<String>,
+}
+
+impl Unclaimed {
+    fn claim(mut self) -> String {
+        self.handle.take().expect("it is claimed once")
+    }
+}
+
+impl Drop for Unclaimed {
+    fn drop(&mut self) {
+        let seat = (self.handle.take()).and_then(|handle| self.seats.taken().remove(&handle));
+        if let Some(Taken { seat, .. }) = seat {
+            self.seats.working.spawn(give_back(seat));
+        }
+    }
 }
 
 impl Seats {
-    pub(super) fn new(server: ServerArg, handles: Handles) -> Self {
-        Self {
+    pub(super) fn new(server: ServerArg, handles: Handles) -> Arc<Self> {
+        Arc::new(Self {
             server,
             client: OnceCell::new(),
             handles,
             taken: Mutex::default(),
-        }
+            places: Arc::new(Semaphore::new(MAX_SEATS)),
+            working: TaskTracker::new(),
+        })
     }
 
     /// Whether each call has to name its table.
@@ -64,29 +99,55 @@ impl Seats {
     /// # Errors
     /// The server does not answer or refuses the ticket; too many seats are taken.
     pub(super) async fn resume(&self, ticket: String) -> Result<String, CommandError> {
-        self.follow(ticket, GameView::default(), None).await
+        let place = self.place()?;
+        let seat = Seat::follow(self.client().await?, ticket, GameView::default(), None);
+        seat.attached().await?;
+        Ok(self.insert(seat, place))
     }
 
-    /// Joins a room; returns the handle of the seat.
+    /// Joins a room; returns the handle of the seat. If it fails after the seat was taken, or nobody
+    /// waits for it any more, the seat is given back.
     ///
     /// # Errors
     /// The server does not answer or refuses; too many seats are taken.
-    pub(super) async fn join(&self, request: v1::JoinRoomRequest) -> Result<String, CommandError> {
-        self.check_space()?;
-        let joined = self.client().await?.join(request).await?;
-        let view = GameView::of_room(&joined.room.unwrap_or_default());
-        self.follow(joined.ticket, view, Some(joined.seat)).await
+    pub(super) async fn join(
+        self: &Arc<Self>,
+        request: v1::JoinRoomRequest,
+    ) -> Result<String, CommandError> {
+        let place = self.place()?;
+        let (sender, joined) = oneshot::channel();
+        let seats = Arc::clone(self);
+        // The server may have given the seat away when this call is cancelled.
+        self.working.spawn(async move {
+            let joined = seats.take(request, place).await;
+            let unclaimed = joined.map(|handle| Unclaimed {
+                seats,
+                handle: Some(handle),
+            });
+            // It fails only if nobody waits.
+            let _ = sender.send(unclaimed);
+        });
+        let joined = joined.await.map_err(|_| "joining failed")?;
+        joined.map(Unclaimed::claim)
     }
 
-    async fn follow(
+    async fn take(
         &self,
-        ticket: String,
-        view: GameView,
-        me: Option<u32>,
+        request: v1::JoinRoomRequest,
+        place: OwnedSemaphorePermit,
     ) -> Result<String, CommandError> {
-        self.check_space()?;
-        let seat = Seat::follow(self.client().await?, ticket, view, me);
-        seat.attached().await?;
+        let client = self.client().await?;
+        let joined = client.join(request).await?;
+        let view = GameView::of_room(&joined.room.unwrap_or_default());
+        let seat = Seat::follow(client, joined.ticket, view, Some(joined.seat));
+        if let Err(error) = seat.attached().await {
+            give_back(seat).await;
+            return Err(error.into());
+        }
+        Ok(self.insert(seat, place))
+    }
+
+    fn insert(&self, seat: Arc<Seat>, place: OwnedSemaphorePermit) -> String {
         let mut taken = self.taken();
         let handle = match self.handles {
             Handles::Counted => {
@@ -96,21 +157,23 @@ impl Seats {
             }
             Handles::Random => hex::encode(rand::random::<[u8; HANDLE_BYTES]>()),
         };
-        taken.insert(handle.clone(), seat);
-        Ok(handle)
+        let _place = place;
+        taken.insert(handle.clone(), Taken { seat, _place });
+        handle
     }
 
-    /// Removes a seat of a game that is over if there is no space.
-    fn check_space(&self) -> Result<(), CommandError> {
-        let mut taken = self.taken();
-        if taken.len() < MAX_SEATS {
-            return Ok(());
+    /// A place for a seat. Removes one of a game that is over if there is none.
+    fn place(&self) -> Result<OwnedSemaphorePermit, CommandError> {
+        let place = || Arc::clone(&self.places).try_acquire_owned().ok();
+        if let Some(place) = place() {
+            return Ok(place);
         }
-        let over = taken.iter().find(|(_, seat)| seat.read(Live::is_over));
-        let over = over.map(|(handle, _)| handle.clone());
-        let handle = over.ok_or_else(|| format!("{MAX_SEATS} seats are taken; leave one"))?;
-        taken.remove(&handle);
-        Ok(())
+        let mut taken = self.taken();
+        let over = taken.iter().find(|(_, it)| it.seat.read(Live::is_over));
+        if let Some(handle) = over.map(|(handle, _)| handle.clone()) {
+            taken.remove(&handle);
+        }
+        Ok(place().ok_or_else(|| format!("{MAX_SEATS} seats are taken; leave one"))?)
     }
 
     /// A seat by its handle. Without one: the only seat that is taken, or whose game runs.
@@ -120,7 +183,7 @@ impl Seats {
     pub(super) fn get(&self, handle: Option<&str>) -> Result<Arc<Seat>, String> {
         let taken = self.taken();
         if let Some(handle) = handle {
-            let seat = taken.get(handle).cloned();
+            let seat = taken.get(handle).map(|it| Arc::clone(&it.seat));
             return seat.ok_or_else(|| {
                 "There is no such table: join_room returns the handle of the seat.".to_owned()
             });
@@ -128,10 +191,11 @@ impl Seats {
         if self.must_be_named() {
             return Err("Give `table`, the handle that join_room returned.".to_owned());
         }
-        let running = || taken.values().filter(|seat| !seat.read(Live::is_over));
+        let all = || taken.values().map(|it| &it.seat);
+        let running = || all().filter(|seat| !seat.read(Live::is_over));
         match (taken.len(), running().count()) {
             (0, _) => Err("You have no seat: call join_room.".to_owned()),
-            (1, _) => Ok(taken.values().next().expect("there is one").clone()),
+            (1, _) => Ok(all().next().expect("there is one").clone()),
             (_, 1) => Ok(running().next().expect("there is one").clone()),
             _ => {
                 let handles: Vec<&str> = taken.keys().map(String::as_str).collect();
@@ -142,14 +206,16 @@ impl Seats {
 
     /// Forgets a seat.
     pub(super) fn forget(&self, seat: &Arc<Seat>) {
-        self.taken().retain(|_, other| !Arc::ptr_eq(other, seat));
+        (self.taken()).retain(|_, other| !Arc::ptr_eq(&other.seat, seat));
     }
 
     /// The seats with their handles, for a client that has them all; none where several clients may
     /// share this process.
     pub(super) fn listed(&self) -> Vec<(String, Arc<Seat>)> {
         match self.handles {
-            Handles::Counted => self.taken().clone().into_iter().collect(),
+            Handles::Counted => (self.taken().iter())
+                .map(|(handle, it)| (handle.clone(), Arc::clone(&it.seat)))
+                .collect(),
             Handles::Random => Vec::new(),
         }
     }
@@ -170,16 +236,25 @@ impl Seats {
 
     /// Gives back the seats of games that have not begun, when the program ends.
     pub(super) async fn leave_all(&self) {
+        self.working.close();
+        if timeout(ATTACH_TIMEOUT, self.working.wait()).await.is_err() {
+            tracing::warn!("a seat may have been taken just now and not given back");
+        }
         let seats = std::mem::take(&mut *self.taken());
-        for seat in seats.into_values() {
-            if let Err(error) = seat.leave().await {
-                tracing::warn!("a seat was not given back: {error}");
-            }
+        for taken in seats.into_values() {
+            give_back(taken.seat).await;
         }
     }
 
-    fn taken(&self) -> std::sync::MutexGuard<'_, BTreeMap<String, Arc<Seat>>> {
+    fn taken(&self) -> MutexGuard<'_, BTreeMap<String, Taken>> {
         // A panic while the map was locked has left it whole: each change is one call.
         self.taken.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Gives a seat back if its game has not begun, and follows it no longer.
+async fn give_back(seat: Arc<Seat>) {
+    if let Err(error) = seat.leave().await {
+        tracing::warn!("a seat was not given back: {error}");
     }
 }

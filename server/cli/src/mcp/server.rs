@@ -33,7 +33,7 @@ const DEFAULT_NAME: &str = "model";
 
 /// What every connection shares.
 pub(super) struct Settings {
-    pub(super) seats: Seats,
+    pub(super) seats: Arc<Seats>,
     /// The join code for a client that gives none.
     pub(super) join_code: Option<String>,
     /// The name for a client that gives none.
@@ -56,7 +56,7 @@ impl Server {
         Self { settings }
     }
 
-    fn seats(&self) -> &Seats {
+    fn seats(&self) -> &Arc<Seats> {
         &self.settings.seats
     }
 

@@ -49,12 +49,11 @@ pub(super) struct Delete {
 
 impl Delete {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let who = self.who.named();
-        let name = &who.name;
+        let name = &self.who.name;
         let (deleted, skipped) = match self.who.server() {
             Some(server) => {
                 self.ask()?;
-                on_server(&server, who.clone()).await?
+                on_server(&server, self.who.named()).await?
             }
             None => self.in_folder().await?,
         };
@@ -117,7 +116,7 @@ impl Delete {
         if !io::stdin().is_terminal() {
             return Err("nothing was changed: confirm with --yes".into());
         }
-        let name = self.who.named().name;
+        let name = &self.who.name;
         let mut out = anstream::stderr();
         write!(
             out,

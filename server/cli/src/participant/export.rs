@@ -83,8 +83,7 @@ impl Export {
             let out = self.out.display();
             return Err(format!("{out} exists already; --force replaces it").into());
         }
-        let who = self.who.named();
-        let name = &who.name;
+        let name = &self.who.name;
         let mut sheet = Sheet {
             file: AtomicFile::create(&self.out)?,
             games: 0,
@@ -94,7 +93,7 @@ impl Export {
             expressions: 0,
         };
         let skipped = match self.who.server() {
-            Some(server) => from_server(&server, who.clone(), &mut sheet).await?,
+            Some(server) => from_server(&server, self.who.named(), &mut sheet).await?,
             None => from_folder(&self.who, &mut sheet).await?,
         };
         if !sheet.has_any() {

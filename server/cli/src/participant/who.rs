@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use chefshat_record::pseudonym::{Named, is_fingerprint};
 use chefshat_server::participants::{ParticipantData, Skipped};
+use chefshat_server::signing::key_of;
 use chefshat_server::store::{SqliteStore, Store as _};
 use clap::Args;
 use clap::builder::NonEmptyStringValueParser;
@@ -19,7 +20,7 @@ use crate::error::CommandError;
 pub(super) struct Who {
     /// The exact name the participant played under.
     #[arg(value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
-    name: String,
+    pub(super) name: String,
     /// Of those who played under the name, only the one with this fingerprint of its key: 16
     /// hexadecimal digits, as the participant's page and `chefshat leaderboard --json` show; none:
     /// those without a key. Default: all of the name.
@@ -93,7 +94,8 @@ impl Who {
     ) -> Result<T, CommandError> {
         let data_dir = self.data_dir()?;
         let store = Arc::new(SqliteStore::open(&data_dir).await?);
-        let data = ParticipantData::new(Arc::clone(&store) as _, Some(data_dir));
+        let key = key_of(&data_dir)?.map(Arc::new);
+        let data = ParticipantData::new(Arc::clone(&store) as _, Some(data_dir)).signing_with(key);
         let done = work(&data).await;
         drop(data);
         store.close().await;

@@ -17,7 +17,7 @@ use super::super::{CommandError, admin, say};
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat records prune --older-than 90d\n  chefshat records prune --older-than 30d --keep 1000\n\n\
-                  Games of tournaments that are not over are kept. `chefshat serve --keep-games 90d` prunes by itself."
+                  Games of studies, and of tournaments that are not over, are kept. `chefshat serve --keep-games 90d` prunes by itself."
 )]
 pub(super) struct Prune {
     #[command(flatten)]

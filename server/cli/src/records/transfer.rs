@@ -14,6 +14,7 @@ use indicatif::ProgressBar;
 use prost::Message as _;
 
 use super::super::connect::{SecretArgs, ServerArg};
+use super::super::numbers::counted;
 use super::super::{CommandError, progress, say};
 use super::filter::FilterArgs;
 use super::list::in_a_line;
@@ -45,7 +46,9 @@ pub(super) struct Get {
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  chefshat records stream --state finished --out-dir ./games\n  \
-                  chefshat records stream --room-name friday > friday.jsonl"
+                  chefshat records stream --room-name friday > friday.jsonl\n  \
+                  chefshat records stream --out-dir ./games --after 5f0c6a4de2b14b7f8a3d9c1e7b60425d\n\n\
+                  Exit code 0: all records arrived. 1: the server could not read some, which are named, or the download broke off."
 )]
 pub(super) struct Stream {
     #[command(flatten)]
@@ -58,6 +61,15 @@ pub(super) struct Stream {
     /// record after the other.
     #[arg(long, value_name = "FOLDER")]
     out_dir: Option<PathBuf>,
+    /// Resume an interrupted download: only the records after that of this game, the last one that
+    /// arrived.
+    #[arg(
+        long,
+        value_name = "GAME-ID",
+        default_value = "",
+        hide_default_value = true
+    )]
+    after: String,
 }
 
 /// Import records of games played elsewhere: on another server or at a physical table. The server
@@ -73,6 +85,16 @@ pub(super) struct Import {
     /// Print each record's summary as a JSON line.
     #[arg(long)]
     json: bool,
+}
+
+/// What has arrived of a stream.
+#[derive(Default)]
+struct Received {
+    count: u64,
+    /// The game of the last record.
+    last: String,
+    /// What the server could not read.
+    unreadable: Vec<v1::UnreadableRecord>,
 }
 
 impl Get {
@@ -92,41 +114,69 @@ impl Stream {
         let client = self.server.connect_with(&self.secrets).await?;
         let request = v1::StreamRecordsRequest {
             filter: Some(self.filter.message()),
+            after: self.after.clone(),
         };
-        let mut parts = (service(&client).stream_records(request).await)
-            .map_err(Error::from)?
-            .into_inner();
+        let mut received = Received {
+            last: self.after.clone(),
+            ..Received::default()
+        };
         let bar = progress::styled(
             ProgressBar::no_length(),
             "{spinner} {human_pos} records, {per_sec}",
         );
+        let streamed = self.receive(&client, request, &mut received, &bar).await;
+        bar.finish_and_clear();
+        if let Some(folder) = &self.out_dir {
+            let records = counted(received.count, "record");
+            say(format_args!("{records} in {}", folder.display()))?;
+        }
+        for record in &received.unreadable {
+            anstream::eprintln!("not received: {}: {}", record.game_id, record.problem);
+        }
+        if let Err(error) = streamed {
+            return Err(match received.last.as_str() {
+                "" => error,
+                last => format!("{error}\nresume with --after {last}").into(),
+            });
+        }
+        Ok(match received.unreadable.is_empty() {
+            true => ExitCode::SUCCESS,
+            false => ExitCode::FAILURE,
+        })
+    }
+
+    /// Keeps what the server sends, up to the end of the stream.
+    async fn receive(
+        &self,
+        client: &Client,
+        request: v1::StreamRecordsRequest,
+        received: &mut Received,
+        bar: &ProgressBar,
+    ) -> Result<(), CommandError> {
+        let mut parts = (service(client).stream_records(request).await)
+            .map_err(Error::from)?
+            .into_inner();
         let mut record: Vec<RecordLine> = Vec::new();
-        let mut count = 0_u64;
         while let Some(part) = parts.message().await.map_err(Error::from)? {
+            received.unreadable.extend(part.unreadable);
             for line in part.lines {
                 let last = matches!(line.line, Some(Line::Footer(_)));
                 record.push(line);
                 if last {
-                    self.keep(&std::mem::take(&mut record))?;
-                    count += 1;
+                    received.last = self.keep(&std::mem::take(&mut record))?;
+                    received.count += 1;
                     bar.inc(1);
                 }
             }
         }
-        bar.finish_and_clear();
-        if !record.is_empty() {
-            return Err("the server ended the stream in the middle of a record".into());
+        match record.is_empty() {
+            true => Ok(()),
+            false => Err("the server ended the stream in the middle of a record".into()),
         }
-        if let Some(folder) = &self.out_dir {
-            say(format_args!("{count} records in {}", folder.display()))?;
-        }
-        Ok(ExitCode::SUCCESS)
     }
 
-    fn keep(&self, record: &[RecordLine]) -> Result<(), CommandError> {
-        let Some(folder) = &self.out_dir else {
-            return print(record);
-        };
+    /// Writes a record. Returns the id of its game.
+    fn keep(&self, record: &[RecordLine]) -> Result<String, CommandError> {
         let Some(Line::Header(header)) = record.first().and_then(|line| line.line.as_ref()) else {
             return Err("the server sent a record without a header".into());
         };
@@ -136,8 +186,13 @@ impl Stream {
         {
             return Err(format!("the server sent a record of a game {:?}", header.game_id).into());
         }
-        let file = folder.join(format!("{}.jsonl", header.game_id));
-        Ok(jsonl::write(&file, record)?)
+        match &self.out_dir {
+            None => print(record)?,
+            Some(folder) => {
+                jsonl::write(&folder.join(format!("{}.jsonl", header.game_id)), record)?;
+            }
+        }
+        Ok(header.game_id.clone())
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use chefshat_client::v1;
 use chefshat_record::atomic_file::AtomicFile;
+use chefshat_record::sheet;
 use csv::{Terminator, WriterBuilder};
 
 use super::super::CommandError;
@@ -68,7 +69,7 @@ fn write(
         .from_writer(&mut file);
     writer.write_record(header)?;
     for row in rows {
-        writer.write_record(row)?;
+        writer.write_record(row.iter().map(|text| sheet::cell(text).into_owned()))?;
     }
     writer.flush()?;
     drop(writer);

@@ -88,6 +88,8 @@ fn a_damaged_record_is_reported() {
             "origin": "GAME_ORIGIN_DEALT",
             "seed_committed": true,
             "signed_by": null,
+            "signature": "none",
+            "redacted": false,
             "line": null,
             "problem": null,
         })
@@ -133,7 +135,8 @@ fn missing_records_are_reported() {
 #[test]
 fn a_pinned_key_accepts_only_what_it_signed() {
     let key = "ed25519:ea4a6c63e29c520abef5507b132ec5f9954776aebebe7b92421eea691446d22c";
-    let other = format!("ed25519:{}", "00".repeat(32));
+    // The base point.
+    let other = format!("ed25519:58{}", "66".repeat(31));
     let signed = fixture("signed.jsonl");
     let signed = signed.to_str().unwrap();
     let ended = chefshat(&["verify", signed]);
@@ -149,6 +152,8 @@ fn a_pinned_key_accepts_only_what_it_signed() {
     let ended = chefshat(&["verify", unsigned.to_str().unwrap(), "--key", key]).ended_with(1);
     assert!(ended.stdout.contains("unsigned, but a signature"));
     chefshat(&["verify", signed, "--key", "ed25519:12"]).assert_refused("64 hexadecimal digits");
+    let weak = format!("ed25519:{}", "00".repeat(32));
+    chefshat(&["verify", signed, "--key", &weak]).assert_refused("anybody can sign");
 }
 
 #[test]
@@ -161,4 +166,92 @@ fn a_data_directory_without_a_key_says_where_keys_come_from() {
     assert!(created.starts_with("ed25519:"), "{created}");
     assert_eq!(key("show").clean().stdout, created);
     assert_eq!(key("create").clean().stdout, created, "it is created once");
+}
+
+#[test]
+fn a_signature_that_cannot_be_checked_is_no_forgery_and_no_proof() {
+    let records = fixture("unordered/records");
+    let records = records.to_str().unwrap();
+    let known: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(fixture("unordered/known.json")).unwrap())
+            .unwrap();
+    let ended = chefshat(&["verify", records]).ended_with(3);
+    let last: Vec<&str> = ended.stdout.lines().rev().take(2).collect();
+    assert!(last[1].starts_with("3 records fit"), "{}", ended.stdout);
+    assert_eq!(last[0], "1 signature cannot be checked");
+    let large = known["large"].as_str().unwrap();
+    let of_large = ended.stdout.lines().find(|line| line.contains(large));
+    assert!(
+        of_large.unwrap().contains("signature unproven"),
+        "{of_large:?}"
+    );
+    for printed in chefshat(&["verify", "--json", records])
+        .ended_with(3)
+        .json_lines()
+    {
+        let is_large = printed["game_id"] == known["large"];
+        assert_eq!(printed["fits"], true);
+        let (signature, key) = match is_large {
+            true => ("uncheckable", &serde_json::Value::Null),
+            false => ("valid", &known["key"]),
+        };
+        assert_eq!(printed["signature"], signature);
+        assert_eq!(&printed["signed_by"], key);
+    }
+    // It does not pass for a signature of the key.
+    let key = known["key"].as_str().unwrap();
+    let ended = chefshat(&["verify", "--key", key, "--json", records]).ended_with(1);
+    let wrong: Vec<_> = (ended.json_lines().into_iter())
+        .filter(|printed| printed["fits"] == false)
+        .collect();
+    assert_eq!(wrong.len(), 1, "{wrong:?}");
+    assert_eq!(wrong[0]["signature"], "uncheckable");
+    // The folder is exported whole, and says of no row that the key signed it.
+    let out = tempfile::tempdir().unwrap();
+    let out = out.path().join("dataset");
+    let export = [
+        "export",
+        records,
+        "--out",
+        out.to_str().unwrap(),
+        "--format",
+        "jsonl",
+    ];
+    let ended = chefshat(&export).ended_with(0);
+    assert!(ended.stdout.contains(": 3 games, "), "{}", ended.stdout);
+    let rows = std::fs::read_to_string(out.join("decisions.jsonl")).unwrap();
+    for row in rows.lines() {
+        let row: serde_json::Value = serde_json::from_str(row).unwrap();
+        assert_eq!(
+            row["signed_by"].is_null(),
+            row["game_id"] == known["large"],
+            "{row}"
+        );
+    }
+}
+
+#[test]
+fn a_key_for_which_anybody_can_sign_is_refused() {
+    let text = std::fs::read_to_string(fixture("signed.jsonl")).unwrap();
+    let at = text.find(",\"signature\":").unwrap();
+    let zeros = |bytes: usize| {
+        let full = "A".repeat(bytes.div_ceil(3) * 4);
+        let padding = (3 - bytes % 3) % 3;
+        format!("{}{}", &full[..full.len() - padding], "=".repeat(padding))
+    };
+    let forged = format!(
+        "{},\"signature\":{{\"publicKey\":\"{}\",\"signature\":\"{}\"}}}}}}\n",
+        &text[..at],
+        zeros(32),
+        zeros(64)
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("forged.jsonl");
+    std::fs::write(&path, forged).unwrap();
+    let ended = chefshat(&["verify", path.to_str().unwrap()]).ended_with(1);
+    assert!(
+        ended.stdout.contains("anybody can sign"),
+        "{}",
+        ended.stdout
+    );
 }

@@ -190,7 +190,15 @@ impl Cluster {
         let Some(it) = &mut world.servers[server] else {
             return;
         };
-        for output in it.node.handle(input, now) {
+        let is_time = input == Input::Time;
+        let outputs = it.node.handle(input, now);
+        // Otherwise its task would be woken again at once, and again.
+        let wakes_at = it.node.wakes_at_ms();
+        assert!(
+            !is_time || wakes_at.is_none_or(|at| at > now),
+            "still due at {now}"
+        );
+        for output in outputs {
             self.put_out(world, server, output);
         }
     }

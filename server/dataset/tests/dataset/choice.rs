@@ -7,28 +7,28 @@ use chefshat_record::testing::header;
 use super::{Stage, a_record, players};
 
 #[test]
-fn damaged_records_are_reported_and_nothing_is_written() {
+fn damaged_records_are_left_out_and_named() {
     let mut damaged = a_record(2);
     damaged.pop();
-    let stage = Stage::new(&[("a.jsonl", a_record(1)), ("b.jsonl", damaged)]);
+    let stage = Stage::new(&[("a.jsonl", damaged), ("b.jsonl", a_record(1))]);
     std::fs::write(stage.records().join("c.jsonl"), "{}\nno record\n").unwrap();
-    let error = stage.run(&stage.export()).unwrap_err().to_string();
-    assert!(
-        error.contains("b.jsonl: line ") && error.contains("c.jsonl: line "),
-        "{error}"
-    );
-    assert!(
-        !error.contains("a.jsonl") && error.contains("--skip-damaged"),
-        "{error}"
-    );
-    assert_eq!(stage.leftovers(), [""; 0]);
-    let skipping = Export {
-        skip_damaged: true,
+    let exported = stage.run(&stage.export()).unwrap();
+    assert_eq!((exported.games, exported.damaged), (1, 2));
+    let named: Vec<bool> = (exported.skipped.iter().zip(["a.jsonl", "c.jsonl"]))
+        .map(|(skipped, name)| skipped.path.ends_with(name) && skipped.problem.contains("line "))
+        .collect();
+    assert_eq!(named, [true, true]);
+    assert_eq!(stage.leftovers(), ["out"]);
+    std::fs::remove_file(stage.records().join("b.jsonl")).unwrap();
+    let replacing = Export {
+        replace: true,
         ..stage.export()
     };
-    let exported = stage.run(&skipping).unwrap();
-    assert_eq!((exported.games, exported.skipped.len()), (1, 2));
-    assert_eq!(stage.leftovers(), ["out"]);
+    let error = stage.run(&replacing).unwrap_err().to_string();
+    assert!(
+        error.contains("none of 2") && error.contains("a.jsonl: line "),
+        "{error}"
+    );
 }
 
 #[test]
@@ -72,7 +72,7 @@ fn filters_exclude_games() {
     });
     assert!(matches!(
         stage.run(&human),
-        Err(ExportError::NothingLeft { records: 2 })
+        Err(ExportError::NothingLeft { records: 2, .. })
     ));
     // The failed export left the dataset unchanged.
     assert_eq!(
@@ -96,18 +96,15 @@ fn a_time_after_the_year_9999_damages_only_its_own_record() {
         ("b.jsonl", last),
         ("c.jsonl", beyond),
     ]);
-    let error = stage.run(&stage.export()).unwrap_err().to_string();
-    assert!(
-        error.contains("c.jsonl: line 1: createdAtMs is 253402300800000, after the year 9999"),
-        "{error}"
-    );
-    assert!(!error.contains("b.jsonl"), "{error}");
-    let skipping = Export {
-        skip_damaged: true,
-        ..stage.export()
-    };
-    let exported = stage.run(&skipping).unwrap();
+    let exported = stage.run(&stage.export()).unwrap();
     assert_eq!((exported.games, exported.skipped.len()), (2, 1));
+    let skipped = &exported.skipped[0];
+    assert!(skipped.path.ends_with("c.jsonl"), "{skipped:?}");
+    let problem = &skipped.problem;
+    assert!(
+        problem.contains("line 1: createdAtMs is 253402300800000, after the year 9999"),
+        "{problem}"
+    );
     let rows = stage.rows("decisions");
     let of_last = rows.iter().rfind(|row| row["room_name"] == "room 2");
     assert_eq!(

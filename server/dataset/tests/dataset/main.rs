@@ -58,7 +58,6 @@ impl Stage {
             layout: Layout::Tables,
             formats: Format::ALL.to_vec(),
             filter: Filter::default(),
-            skip_damaged: false,
             licence: "CC-BY-4.0".into(),
             version: "test".into(),
         }

@@ -180,7 +180,7 @@ impl Lines {
             state: v1::RoomState::Finished.into(),
             events: self.events,
             decisions: played.decisions.len() as u64,
-            signature: None,
+            ..v1::RecordFooter::default()
         }));
         self.lines
     }

@@ -384,7 +384,7 @@ impl Importer {
             state: state.into(),
             events: self.events,
             decisions: self.decisions.values().sum(),
-            signature: None,
+            ..v1::RecordFooter::default()
         }));
     }
 

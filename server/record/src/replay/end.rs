@@ -8,7 +8,7 @@ use super::fault::Fault;
 use super::game::Replay;
 use super::seed::{check_reveal, dealing_seed, reveal};
 use crate::convert::final_table;
-use crate::signature::signer;
+use crate::signature::check;
 
 const NOT_OVER: &str = "the footer comes here, but the game is not over";
 
@@ -107,12 +107,17 @@ impl Replay<'_> {
             state: state.into(),
             events: self.events,
             decisions: self.decisions,
+            // These say what was done to the record after the game.
             signature: footer.signature.clone(),
+            participant_removed: footer.participant_removed,
+            parts_withheld: footer.parts_withheld,
         };
         if let Some(problem) = difference(footer, &expected) {
             return Err(format!("footer.{problem}").into());
         }
-        self.signed_by = signer(self.lines).map_err(|problem| format!("footer.{problem}"))?;
+        self.signed =
+            check(self.lines, self.text).map_err(|problem| format!("footer.{problem}"))?;
+        self.redacted = footer.participant_removed || footer.parts_withheld;
         self.seats.end(self.header)?;
         self.ended = true;
         Ok(())

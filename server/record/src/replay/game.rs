@@ -17,7 +17,7 @@ use crate::convert::{
     By, LAST_MS, check_marker, event_kind, final_table, seat_number, with_rewards,
 };
 use crate::import::facts_of_record;
-use crate::signature::PublicKey;
+use crate::signature::{PublicKey, Signed, TextHash};
 
 /// The cause of the first deal, which follows from no decision.
 const NO_DECISION: By = By {
@@ -36,8 +36,12 @@ pub struct Replayed {
     pub events: u64,
     /// The final standings, best first; empty for an aborted game.
     pub standings: Vec<v1::Standing>,
-    /// The key that signed it; `None` if it is unsigned.
+    /// The key that signed it; `None` if it is unsigned, or if the signature is uncheckable.
     pub signed_by: Option<PublicKey>,
+    /// The key of a signature that cannot be checked any more (`Signed::Uncheckable`).
+    pub uncheckable: Option<PublicKey>,
+    /// Whether the record says that parts of it were removed after the game.
+    pub redacted: bool,
 }
 
 /// A record being replayed.
@@ -61,13 +65,17 @@ pub(super) struct Replay<'a> {
     last_decision_ms: u64,
     pub(super) over: Option<v1::RoomState>,
     pub(super) ended: bool,
-    pub(super) signed_by: Option<PublicKey>,
+    /// The hash of the text of the file that it is from.
+    pub(super) text: Option<TextHash>,
+    pub(super) signed: Signed,
+    pub(super) redacted: bool,
 }
 
 impl<'a> Replay<'a> {
     pub(super) fn new(
         header: &'a v1::RecordHeader,
         lines: &'a [v1::RecordLine],
+        text: Option<TextHash>,
     ) -> Result<Self, Fault> {
         let setup = check(header)?;
         Ok(Self {
@@ -90,7 +98,9 @@ impl<'a> Replay<'a> {
             last_decision_ms: 0,
             over: None,
             ended: false,
-            signed_by: None,
+            text,
+            signed: Signed::Not,
+            redacted: false,
         })
     }
 
@@ -123,7 +133,12 @@ impl<'a> Replay<'a> {
             decisions: self.decisions,
             events: self.events,
             standings: standings.as_ref().map_or_else(Vec::new, final_table),
-            signed_by: self.signed_by,
+            signed_by: self.signed.by(),
+            uncheckable: match self.signed {
+                Signed::Uncheckable(key) => Some(key),
+                Signed::Not | Signed::By(_) => None,
+            },
+            redacted: self.redacted,
         })
     }
 

@@ -21,6 +21,9 @@ pub use game::Replayed;
 pub(crate) use seats::game_started;
 pub(crate) use seed::reveal;
 
+use crate::jsonl::Record;
+use crate::signature::TextHash;
+
 /// A line of a record and the game at that line.
 #[derive(Debug, Clone, Copy)]
 pub struct Moment<'a> {
@@ -53,6 +56,22 @@ pub fn replay(lines: &[v1::RecordLine]) -> Result<Replayed, ReplayError> {
 /// The first wrong line, which is not visited.
 pub fn walk(
     lines: &[v1::RecordLine],
+    visit: impl FnMut(Moment<'_>),
+) -> Result<Replayed, ReplayError> {
+    walk_text(lines, None, visit)
+}
+
+/// As [`walk`], for a record from a file, whose signature is that of its text.
+///
+/// # Errors
+/// The first wrong line, which is not visited.
+pub fn walk_file(record: &Record, visit: impl FnMut(Moment<'_>)) -> Result<Replayed, ReplayError> {
+    walk_text(&record.lines, Some(record.text), visit)
+}
+
+fn walk_text(
+    lines: &[v1::RecordLine],
+    text: Option<TextHash>,
     mut visit: impl FnMut(Moment<'_>),
 ) -> Result<Replayed, ReplayError> {
     let mut replay = None;
@@ -76,7 +95,7 @@ pub fn walk(
         };
         match (&mut replay, entry) {
             (None, Line::Header(header)) => {
-                let begun = Replay::new(header, lines).map_err(at)?;
+                let begun = Replay::new(header, lines, text).map_err(at)?;
                 show(None, begun.known());
                 replay = Some(begun);
             }

@@ -190,7 +190,7 @@ impl TestGame<'_> {
             state: v1::RoomState::Finished.into(),
             events: lines.events,
             decisions,
-            signature: None,
+            ..v1::RecordFooter::default()
         }));
         lines
             .lines
@@ -353,7 +353,7 @@ pub fn aborted(mut lines: Vec<v1::RecordLine>, after: usize) -> Vec<v1::RecordLi
         state: v1::RoomState::Aborted.into(),
         events,
         decisions,
-        signature: None,
+        ..v1::RecordFooter::default()
     };
     let end = [Line::Event(end), Line::Footer(footer)];
     lines.extend(end.map(|line| v1::RecordLine { line: Some(line) }));

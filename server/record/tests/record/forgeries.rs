@@ -2,9 +2,12 @@
 //! neither can. `docs/records.md` has the same list; a test compares the two.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::fixture;
+use chefshat_engine::{BySeat, Game, PlayedDecision, Seed};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_record::convert::{Played, reward_scheme_from_proto, rules_from_proto};
 use chefshat_record::jsonl;
 use chefshat_record::pseudonym::{Named, Pseudonym};
 use chefshat_record::replay::replay;
@@ -31,7 +34,7 @@ type Forgery = (&'static str, Outcome, fn(&mut Lines));
 /// The forgeries. Numbers of lines are those of
 /// the fixture `committed.jsonl`, from 1.
 #[rustfmt::skip] // One row each.
-const FORGERIES: [Forgery; 45] = [
+const FORGERIES: [Forgery; 47] = [
     // The deal.
     ("a card of a hand", Replay, |lines| if let Kind::ShiftStarted(shift) = kind(lines, 5) { shift.hands[1].cards[0] = 4 }),
     ("the hands of two seats exchanged", Replay, |lines| if let Kind::ShiftStarted(shift) = kind(lines, 5) { shift.hands.swap(0, 1) }),
@@ -82,6 +85,8 @@ const FORGERIES: [Forgery; 45] = [
     ("another room, tournament or series", Signature, |lines| { header(lines).room_name = "final".into(); header(lines).tournament_id = "0".repeat(32) }),
     // The result.
     ("another winner", Replay, |lines| if let Kind::GameEnded(ended) = kind(lines, 492) { ended.standings[0].seat = 1 }),
+    ("other decisions on the same deal", Signature, other_decisions),
+    ("cut short and called aborted", Signature, cut_short),
     ("a reward", Replay, |lines| if let Some(Line::Event(event)) = &mut lines[8].line { event.rewards[0].value = 1.0 }),
     ("the record signed again with another key", Believed, |lines| { let signature = SigningKey::from_seed(&[9; 32]).sign(lines); footer(lines).signature = Some(signature) }),
 ];
@@ -262,6 +267,79 @@ fn fixed_seed(lines: &mut Lines) {
     };
 }
 
+/// Another game from the same seed, with the times of its beginning throughout.
+fn other_decisions(lines: &mut Lines) {
+    let game_seed = reveal(lines).game_seed.clone();
+    let seed = Seed(game_seed.try_into().expect("32 bytes"));
+    let rules = header(lines).rules.clone().expect("rules");
+    let rules = rules_from_proto(&rules).expect("valid rules");
+    let policy = header(lines).policy.clone().expect("a policy");
+    let mut game = Game::new(rules, seed, |_| {});
+    let mut decisions = Vec::new();
+    while game.decision().is_some() {
+        let action = game.legal_actions().iter().next().expect("an action");
+        game.apply(action, |_| {}).expect("it is legal");
+        decisions.push(PlayedDecision {
+            action,
+            attempts: Vec::new(),
+            by_default: false,
+        });
+    }
+    let played = Played {
+        by: "",
+        rules: &rules,
+        agents: &BySeat::filled(rules.players(), None),
+        seed,
+        scheme: reward_scheme_from_proto(policy.reward_scheme()),
+        policy: &policy,
+        decisions: &decisions,
+    };
+    let mut other = played.record();
+    let is_start = |line: &v1::RecordLine| matches!(&line.line, Some(Line::Event(event)) if matches!(event.kind, Some(Kind::GameStarted(_))));
+    let start = |lines: &Lines| lines.iter().position(is_start).expect("it starts") + 1;
+    let mut footer_line = other.pop().expect("a footer");
+    if let Some(Line::Footer(it)) = &mut footer_line.line {
+        it.signature.clone_from(&footer(lines).signature);
+    }
+    let reveal = reveal(lines).clone();
+    let mut rest = other.split_off(start(&other));
+    let elapsed = match &lines[start(lines)].line {
+        Some(Line::Event(event)) => event.elapsed_ms,
+        other => panic!("{other:?}"),
+    };
+    for line in &mut rest {
+        match &mut line.line {
+            Some(Line::Decision(decision)) => decision.elapsed_ms = elapsed,
+            Some(Line::Event(event)) => {
+                event.elapsed_ms = elapsed;
+                if let Some(Kind::GameEnded(ended)) = &mut event.kind {
+                    ended.reveal = Some(reveal.clone());
+                }
+            }
+            _ => {}
+        }
+    }
+    lines.truncate(start(lines));
+    lines.extend(rest);
+    lines.push(footer_line);
+    for seat in &mut header(lines).seats {
+        seat.substituted = false;
+    }
+    number_events(lines);
+}
+
+/// The game closed by its owner before one of its decisions.
+fn cut_short(lines: &mut Lines) {
+    let is_decision = |line: &v1::RecordLine| matches!(line.line, Some(Line::Decision(_)));
+    let cut = 8 + lines[8..].iter().position(is_decision).expect("a decision");
+    let signature = footer(lines).signature.take();
+    *lines = chefshat_record::testing::aborted(lines.clone(), cut);
+    for seat in &mut header(lines).seats {
+        seat.substituted = false;
+    }
+    footer(lines).signature = signature;
+}
+
 fn committed() -> Lines {
     fixture("committed.jsonl")
 }
@@ -324,19 +402,41 @@ fn a_restart_before_the_game_leaves_its_timeouts_valid() {
 }
 
 #[test]
-fn a_record_without_a_participant_loses_its_signature() {
-    let mut lines = signed();
-    let delete = |name: &str| Pseudonym {
-        of: Named {
-            name: name.into(),
-            fingerprint: None,
-        },
-        pseudonym: "deleted participant".into(),
+fn a_record_without_a_participant_says_so_and_is_signed_by_who_had_signed_it() {
+    let delete = |name: &str, key: Option<SigningKey>, lines: &mut Lines| {
+        let pseudonym = Pseudonym {
+            of: Named {
+                name: name.into(),
+                fingerprint: None,
+            },
+            pseudonym: "deleted participant".into(),
+            key: key.map(Arc::new),
+        };
+        pseudonym.redact(lines);
+        replay(lines).expect("it fits")
     };
-    delete("nobody").redact(&mut lines);
-    assert_eq!(signer(&lines), Ok(Some(key().public())));
-    delete("Greta").redact(&mut lines);
-    assert_eq!(replay(&lines).expect("it fits").signed_by, None);
+    let unchanged = delete("nobody", Some(key()), &mut signed());
+    assert_eq!(unchanged.signed_by, Some(key().public()));
+    assert!(!unchanged.redacted);
+    let mut forged = signed();
+    rename(&mut forged);
+    for (mut lines, name, with, signed_by) in [
+        (signed(), "Greta", Some(key()), Some(key().public())),
+        (signed(), "Greta", None, None),
+        (
+            signed(),
+            "Greta",
+            Some(SigningKey::from_seed(&[9; 32])),
+            None,
+        ),
+        (committed(), "Greta", Some(key()), None),
+        // It vouches for nothing that it has not signed.
+        (forged, "Rosa", Some(key()), None),
+    ] {
+        let redacted = delete(name, with, &mut lines);
+        assert_eq!(redacted.signed_by, signed_by);
+        assert!(redacted.redacted && footer(&mut lines).participant_removed);
+    }
 }
 
 #[test]
@@ -396,6 +496,7 @@ fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
                 fingerprint: fingerprint.map(str::to_owned),
             },
             pseudonym: "deleted participant".into(),
+            key: None,
         };
         let mut redacted = lines.clone();
         let found = who.redact(&mut redacted);
@@ -442,9 +543,14 @@ fn a_signature_survives_the_file_and_public_keys_their_text() {
     jsonl::write(&path, &lines).expect("written");
     let read = jsonl::read(&path).expect("read");
     assert_eq!(signer(&read), Ok(Some(key().public())));
-    // The same signature, computed in Python.
+    // The same signature, computed in Python before signatures had a version of their text.
     let other = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/signed.jsonl");
-    assert_eq!(jsonl::read(&other).expect("read"), lines);
+    let mut earlier = lines.clone();
+    if let Some(signature) = &mut footer(&mut earlier).signature {
+        signature.text_version = 0;
+    }
+    assert_eq!(jsonl::read(&other).expect("read"), earlier);
+    assert_eq!(signer(&earlier), Ok(Some(key().public())));
     assert_eq!(signer(&committed()), Ok(None));
     let text = key().public().to_string();
     assert_eq!(text.parse(), Ok(key().public()));

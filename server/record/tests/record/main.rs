@@ -17,6 +17,7 @@ mod forgeries;
 mod fuzz;
 mod import;
 mod outcome;
+mod unordered;
 mod verify;
 
 /// The path of a recorded game of the fixtures.

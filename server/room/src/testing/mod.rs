@@ -15,7 +15,7 @@ use chefshat_engine::{
 use crate::ids::{Id, SecretHash};
 use crate::journal::{
     Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind, Report, ReportSource,
-    Reported, SeatedParticipant,
+    Reported, SeatLabels, SeatedParticipant, StudyGame,
 };
 use crate::log::RoomEvent;
 use crate::policy::Policy;
@@ -52,6 +52,7 @@ impl Table {
             rules: rules.validate().expect("a valid rule set"),
             rules_version: RULES_VERSION,
             server_version: String::new(),
+            participant_removed: false,
             policy,
             display_names: BTreeMap::new(),
             wizards: std::collections::BTreeSet::new(),
@@ -313,6 +314,25 @@ pub fn with_jokers_at(
         changed[seat] = Cards::from_counts(faces, counts, hands[seat].has_golden())?;
     }
     Some(changed)
+}
+
+/// The game of a study whose participant has seat 0.
+pub fn study_game(labels: SeatLabels) -> StudyGame {
+    StudyGame {
+        study: Id([9; 16]),
+        name: "study".into(),
+        condition: "condition".into(),
+        levels: [("factor".to_owned(), "level".to_owned())].into(),
+        number: 1,
+        participant: "Ana".into(),
+        session: 1,
+        step: 0,
+        practice: false,
+        seed_index: Some(0),
+        seat: Seat::new(0),
+        attempt: 1,
+        labels,
+    }
 }
 
 /// Rules for games of one Shift.

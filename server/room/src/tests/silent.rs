@@ -1,6 +1,9 @@
 //! Silent decisions: nothing that others can see depends on a special action that is declined or
 //! that runs out. `server/src/wire/silent_tests.rs` compares the messages of many such games.
 
+use std::sync::Arc;
+use std::time::Duration;
+
 use chefshat_agents::AgentKind;
 use chefshat_engine::{ActionId, DecisionKind, RuleSetSpec};
 
@@ -173,4 +176,84 @@ fn leaving_does_not_tell_who_is_offered_a_special_action() {
         assert_eq!(retired(&table), 1);
         table.assert_replays();
     }
+}
+
+#[test]
+fn the_first_gift_is_asked_for_at_the_same_time_whoever_is_offered_a_special_action() {
+    let paced = Policy {
+        pace: Some(ms(50)),
+        ..policy()
+    };
+    let giver = |table: &Table| {
+        let decision = table.core.awaited_in_public().expect("a participant gives");
+        (decision.seat, decision.decision)
+    };
+    // Nobody is offered one, its holder thinks before it declines, or lets it run out.
+    for (holders, thinks) in [([1, 2], 0), ([2, 2], 0), ([2, 2], 320), ([2, 2], 900)] {
+        let rules = RuleSetSpec::default();
+        let valid = rules.validate().expect("a valid rule set");
+        let hands = dealt(&valid, 3, holders.map(Seat::new)).expect("every seat has cards to swap");
+        let script = second_shift(hands);
+        let mut table = Table::scripted(paced.clone(), vec![OPEN; 4], rules, script);
+        table.fill();
+        let (seat, decision) = giver(&table);
+        table.pass_time(ms(thinks.min(499)));
+        if holders == [2, 2] && thinks < 500 {
+            let decline = table.core.header().rules.actions().decline();
+            let (holder, id) = table.open();
+            table.answer(holder, id, decline.index().into());
+        }
+        table.pass_time(ms(499) - table.now);
+        assert_eq!(
+            table
+                .core
+                .awaited()
+                .filter(|open| !open.is_silent())
+                .map(|_| ()),
+            None
+        );
+        let guessed = table.answer(seat, decision, 0);
+        assert_eq!(guessed.verdict, Verdict::Unknown, "{holders:?} {thinks}");
+        table.pass_time(ms(1));
+        let open = table.core.awaited().expect("the first gift");
+        assert_eq!((open.decision.seat, open.id), (seat, decision));
+        assert_eq!(table.core.time_left(table.now), (ms(1000), ms(500)));
+        table.assert_replays();
+    }
+}
+
+#[test]
+fn after_a_restart_the_first_gift_is_asked_for_at_the_same_time_too() {
+    for holders in [[1, 2], [2, 2]] {
+        let rules = RuleSetSpec::default();
+        let valid = rules.validate().expect("a valid rule set");
+        let hands = dealt(&valid, 3, holders.map(Seat::new)).expect("every seat has cards to swap");
+        let paced = Policy {
+            pace: Some(ms(50)),
+            ..policy()
+        };
+        let mut table = Table::scripted(paced, vec![OPEN; 4], rules, second_shift(hands));
+        table.fill();
+        table.pass_time(ms(300));
+        let header = Arc::clone(table.core.header());
+        let core = Core::revived(header, &table.journal, ms(2_000)).expect("a good journal");
+        assert_eq!(core.deadline(), Some(ms(2_500)), "{holders:?}");
+    }
+}
+
+#[test]
+fn a_short_pace_leaves_a_special_action_its_whole_decision_time() {
+    let paced = Policy {
+        pace: Some(ms(49)),
+        ..policy()
+    };
+    let rules = RuleSetSpec::default();
+    let valid = rules.validate().expect("a valid rule set");
+    let hands =
+        dealt(&valid, 3, [Seat::new(2), Seat::new(2)]).expect("every seat has cards to swap");
+    let mut table = Table::scripted(paced, vec![OPEN; 4], rules, second_shift(hands));
+    table.fill();
+    assert!(table.core.awaited().expect("the holder").is_silent());
+    assert_eq!(table.core.time_left(table.now), (ms(1000), Duration::ZERO));
+    table.assert_replays();
 }

@@ -19,7 +19,9 @@ use crate::store::cluster::{
     Beat, ClusterStore, Epoch, Kind, Location, NodeId, NodeInfo, NodeStatus, Unit,
 };
 use crate::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use crate::store::{Journal, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame};
+use crate::store::{
+    Journal, Listed, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame,
+};
 
 #[derive(Clone)]
 enum Row {
@@ -153,6 +155,8 @@ pub(super) struct FakeStore {
     pub(super) ends_read: watch::Sender<u32>,
     /// Whether reading the end of a game fails.
     pub(super) ends_unreadable: watch::Sender<bool>,
+    /// The next request of this kind to the database panics.
+    pub(super) panics_at: watch::Sender<&'static str>,
     /// The join codes of new rooms that are refused, until as many have been tried.
     pub(super) codes_taken: Mutex<(usize, Vec<String>)>,
     released: AsyncMutex<broadcast::Receiver<(NodeId, Id, Epoch)>>,
@@ -173,6 +177,7 @@ impl FakeStore {
             ends_unanswered: watch::Sender::new(false),
             ends_read: watch::Sender::new(0),
             ends_unreadable: watch::Sender::new(false),
+            panics_at: watch::Sender::new(""),
             codes_taken: Mutex::default(),
             released: AsyncMutex::new(database.released.subscribe()),
         })
@@ -180,6 +185,13 @@ impl FakeStore {
 
     pub(super) fn node(&self) -> NodeId {
         *self.node.lock().expect("no test panics here")
+    }
+
+    /// Panics once if that was planted for this kind of request.
+    fn may_panic(&self, what: &str) {
+        let planted =
+            (self.panics_at).send_if_modified(|at| *at == what && std::mem::take(at) == what);
+        assert!(!planted, "planted in {what}");
     }
 
     async fn reached(&self) {
@@ -335,6 +347,10 @@ impl Store for FakeStore {
         unreachable!("a node resumes units")
     }
 
+    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
+        self.database.finished.summary(game)
+    }
+
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         self.database.finished.finished(game)
     }
@@ -344,7 +360,7 @@ impl Store for FakeStore {
         filter: &'a v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>> {
+    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>> {
         self.database.finished.list(filter, part, count)
     }
 
@@ -418,7 +434,8 @@ impl Store for FakeStore {
         &self,
         _newest_over: usize,
     ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
-        unreachable!("a node resumes units")
+        // None is over, and a node resumes units.
+        async { Ok(Vec::new()) }.boxed()
     }
 
     fn failed(&self) -> BoxFuture<'static, StoreError> {
@@ -426,7 +443,7 @@ impl Store for FakeStore {
     }
 
     fn close(&self) -> BoxFuture<'_, ()> {
-        async {}.boxed()
+        self.reached().boxed()
     }
 }
 
@@ -449,6 +466,7 @@ impl ClusterStore for FakeStore {
 
     fn beat(&self) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
         async move {
+            self.may_panic("beat");
             self.reached().await;
             let mut lost = self.beats_lost.subscribe();
             (lost.wait_for(|lost| !lost).await).expect("the sender is here");
@@ -478,6 +496,7 @@ impl ClusterStore for FakeStore {
 
     fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(Id, Epoch)>, StoreError>> {
         async move {
+            self.may_panic("orphans");
             self.reached().await;
             let mut orphans = self.database.orphans();
             orphans.retain(|(id, _)| !self.database.is_ephemeral(*id));
@@ -503,6 +522,7 @@ impl ClusterStore for FakeStore {
 
     fn tidy(&self) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
+            self.may_panic("tidy");
             self.reached().await;
             let mut orphans = self.database.orphans();
             orphans.retain(|(id, _)| self.database.is_ephemeral(*id));
@@ -521,6 +541,7 @@ impl ClusterStore for FakeStore {
         orphans: Vec<(Id, Epoch)>,
     ) -> BoxFuture<'_, Result<Vec<Option<Epoch>>, StoreError>> {
         async move {
+            self.may_panic("claim");
             self.reached().await;
             let games = self.database.games.lock().expect("no test panics here");
             let restarted = |id| {
@@ -540,6 +561,7 @@ impl ClusterStore for FakeStore {
 
     fn load(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<Option<Unit>, StoreError>> {
         async move {
+            self.may_panic("load");
             self.reached().await;
             self.loads.send_modify(|loads| *loads += 1);
             let mut held = self.loads_held.subscribe();
@@ -591,6 +613,7 @@ impl ClusterStore for FakeStore {
 
     fn release(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
+            self.may_panic("release");
             self.reached().await;
             self.database.tables().release(unit, epoch);
             // Nobody may listen.
@@ -602,6 +625,7 @@ impl ClusterStore for FakeStore {
 
     fn leave(&self) -> BoxFuture<'_, Result<bool, StoreError>> {
         async move {
+            self.may_panic("leave");
             self.reached().await;
             self.database.tables().leave(self.node());
             Ok(!self.database.knows(self.node()))

@@ -3,6 +3,7 @@
 
 mod fake;
 
+use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,7 +11,10 @@ use chefshat_proto::v1;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{Durability, Policy};
-use futures::FutureExt as _;
+use futures::future::join as both;
+use futures::{FutureExt as _, stream};
+use tokio::io::DuplexStream;
+use tokio::sync::oneshot;
 use tokio::time::{Instant, sleep, timeout};
 use tokio_util::task::TaskTracker;
 
@@ -18,14 +22,16 @@ use super::located::LOOK_LIMIT;
 use super::node::LEFT_ALONE;
 use super::units::LOADS_AT_ONCE;
 use super::{ClusterNode, FoundBy, Hosted, Location, News, NodeLease, StoreDirectory};
-use crate::config::ServerConfig;
+use crate::config::{ServerConfig, longest_shutdown};
 use crate::convert;
 use crate::limits::Key;
 use crate::room::{Handle, JoinRequest, RoomGone};
 use crate::rooms::{NewRoom, Rooms};
+use crate::serve::Server;
 use crate::store::Store;
 use crate::store::cluster::{ClusterStore, Kind, NodeInfo};
 use crate::studies::Studies;
+use crate::tasks::{LongTask, polls, spinning};
 use crate::tournaments::{Entry, TournamentHandle, Tournaments};
 use fake::{Database, FakeStore};
 
@@ -412,6 +418,68 @@ async fn a_node_that_was_removed_joins_again() {
     assert_eq!(database.owner(created), Some(first.store.node()));
 }
 
+/// What a node waits for comes also if its work panics: no claim, release or beat stays open.
+#[tokio::test(start_paused = true)]
+async fn a_node_whose_work_panics_goes_on() {
+    let database = Database::new();
+    for what in ["orphans", "claim", "load", "tidy", "beat"] {
+        let first = TestNode::start(&database).await;
+        let room = first.create_room().await.id();
+        let second = TestNode::start(&database).await;
+        second.store.panics_at.send_replace(what);
+        drop(first);
+        let mut planted = second.store.panics_at.subscribe();
+        let seen = soon(planted.wait_for(|at| at.is_empty())).await;
+        drop(seen.expect("the sender is here"));
+        second.has(room).await;
+        let publishes = second.node.may_publish();
+        let beats = async {
+            // Longer than a lease holds without a beat.
+            sleep(SOON / 2).await;
+            *publishes.borrow()
+        };
+        assert!(soon(beats).await, "{what}");
+    }
+    for what in ["release", "leave"] {
+        let mut first = TestNode::start(&database).await;
+        let second = TestNode::start(&database).await;
+        let room = first.create_room().await.id();
+        first.store.panics_at.send_replace(what);
+        first.rooms.refuse_new();
+        soon(first.node.drain()).await;
+        assert_eq!(*first.store.panics_at.borrow(), "", "{what}");
+        second.has(room).await;
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_node_that_is_removed_while_it_hands_over_has_left() {
+    let database = Database::new();
+    let mut first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = first.create_room().await.id();
+    first.store.cut_off.send_replace(true);
+    second.has(room).await;
+    database.remove_expired();
+    let drained = async {
+        let drained = first.node.drain();
+        tokio::pin!(drained);
+        // It is away from the database.
+        let hour = Duration::from_secs(3_600);
+        assert!(timeout(hour, &mut drained).await.is_err());
+        first.store.cut_off.send_replace(false);
+        soon(drained).await;
+    };
+    drained.await;
+    assert_eq!(spinning(), [].into());
+    let (nodes, per_second) = (2, 10);
+    assert!(
+        polls()[&LongTask::Node] < 3_600 * nodes * per_second,
+        "{:?}",
+        polls()
+    );
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_drained_node_hands_over_and_leaves() {
     let database = Database::new();
@@ -442,6 +510,30 @@ async fn a_drained_node_hands_over_and_leaves() {
         "{:?}",
         began.elapsed()
     );
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_node_whose_database_is_away_ends_within_one_budget() {
+    let database = Database::new();
+    let store = FakeStore::new(&database);
+    let shared: Arc<dyn ClusterStore> = Arc::clone(&store) as Arc<dyn ClusterStore>;
+    let config = ServerConfig::default();
+    let longest = longest_shutdown(config.grace);
+    let info = NodeInfo::default();
+    let node = soon(Server::joined(config, shared, info)).await;
+    let node = node.expect("the database is there");
+    let (stop, stopped) = oneshot::channel::<()>();
+    let serving = node.serve_incoming(stream::pending::<io::Result<DuplexStream>>(), async {
+        stopped.await.expect("the test stops it");
+    });
+    let away = async {
+        sleep(SOON).await;
+        store.cut_off.send_replace(true);
+        stop.send(()).expect("it serves");
+    };
+    let served = timeout(SOON + longest, both(serving, away)).await;
+    let (served, ()) = served.expect("it ends in time");
+    served.expect("only the database is away");
 }
 
 #[tokio::test(start_paused = true)]

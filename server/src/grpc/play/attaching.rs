@@ -14,7 +14,7 @@ use tokio_util::task::AbortOnDropHandle;
 use tonic::{Code, Status};
 
 use super::parked::{Found, Parked, Parking, search};
-use super::reader::{BoundSeat, Contested, Reader};
+use super::reader::{BoundSeat, Contested, DETACHED_KEPT, Reader};
 use super::remote::NotPassedOn;
 use crate::access::Caller;
 use crate::config::MAX_SEATS_PER_STREAM;
@@ -209,8 +209,10 @@ impl Reader {
 
     /// Whether the stream can take one more seat.
     pub(super) fn has_space(&mut self) -> bool {
-        if self.count() >= MAX_SEATS_PER_STREAM {
+        // A long stream keeps no more rooms that are over than live ones, or a few.
+        if self.seats.len() >= self.prune_at || self.count() >= MAX_SEATS_PER_STREAM {
             self.seats.retain(|_, bound| !bound.is_detached());
+            self.prune_at = 2 * self.seats.len() + DETACHED_KEPT;
         }
         self.count() < MAX_SEATS_PER_STREAM
     }

@@ -222,6 +222,22 @@ async fn a_seat_whose_room_changes_hands_delays_no_other_seat() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_long_stream_keeps_few_seats_that_are_detached() {
+    let node = Node::start(&Says::only(Location::Nowhere));
+    let mut stream = node.stream();
+    let attach = node.seat().await;
+    for _ in 0..2_000 {
+        // Supersedes the last one.
+        stream.reader.attach(attach.clone()).await;
+        stream.received().expect("open");
+    }
+    let live = (stream.reader.seats.values()).filter(|seat| !seat.is_detached());
+    assert_eq!(live.count(), 1);
+    let kept = stream.reader.seats.len();
+    assert!(kept <= 2 + super::reader::DETACHED_KEPT, "{kept}");
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_client_with_nothing_else_tries_another_node_after_its_patience() {
     let node = Node::start(&Says::only(Location::Unknown));
     let mut stream = node.stream();

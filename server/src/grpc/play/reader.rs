@@ -31,6 +31,9 @@ use crate::wire::Updates;
 use chefshat_room::ids::Token;
 use chefshat_room::{Answer, ConnectionId};
 
+/// Detached seats that a stream may keep in any case, whose late answers are judged by their room.
+pub(super) const DETACHED_KEPT: usize = 64;
+
 /// A seat that is attached to a stream.
 pub(super) struct BoundSeat {
     pub(super) room: Handle,
@@ -103,6 +106,8 @@ pub(super) struct Reader {
     pub(super) outbox: Arc<Outbox>,
     /// The attached seats, by handle.
     pub(super) seats: BTreeMap<u32, BoundSeat>,
+    /// The number of seats at which detached ones are removed.
+    pub(super) prune_at: usize,
     /// The seats that other streams have, by handle.
     pub(super) contested: BTreeMap<u32, Contested>,
     /// The attachments to what this node does not have in memory. Boxed, because it is rare.
@@ -168,6 +173,7 @@ impl Reader {
             caller,
             outbox: Arc::clone(outbox),
             seats: BTreeMap::new(),
+            prune_at: DETACHED_KEPT,
             contested: BTreeMap::new(),
             parked: None,
             participants: BTreeMap::new(),
@@ -185,7 +191,9 @@ impl Reader {
 
     /// Lets the stream have seats at other nodes.
     pub(super) fn with_remote(mut self, gateway: Option<Gateway>) -> Self {
-        self.remote = gateway.map(|gateway| Box::new(RemoteSeats::new(gateway, &self.outbox)));
+        let clock = self.rooms.process_clock();
+        self.remote =
+            gateway.map(|gateway| Box::new(RemoteSeats::new(gateway, &self.outbox, clock)));
         self
     }
 

@@ -1,13 +1,14 @@
 //! The seats of a client's stream that other nodes have. For each of these nodes the reader opens
 //! one stream (`chefshat.peer.v1`), passes the commands for its seats on, and queues its updates as
 //! they are. This node is their gateway: here the client's transport takes decision requests and
-//! answers are read, so here the time in between is measured, and the network between nodes costs
-//! no seat its time.
+//! answers are read, so here the time in between is measured, and neither the network between nodes
+//! nor a pause of this process costs a seat its time.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 use std::task::{Context, Poll};
+use std::time::Duration;
 
 use chefshat_proto::v1::{self, seat_command::Command};
 use futures::StreamExt as _;
@@ -21,12 +22,15 @@ use tonic::{Request, Status};
 use tracing::debug;
 
 use super::parked::Parked;
+use crate::clock::ProcessClock;
 use crate::cluster::{Directory, Elsewhere, FoundBy, Peer};
 
+use crate::access::MAX_INPUTS_PER_MESSAGE;
 use crate::config::{MAX_PEER_MESSAGE_BYTES, MAX_SEATS_PER_STREAM};
 use crate::grpc::forward::Gateway;
 use crate::grpc::takeover::awaited;
 use crate::outbox::{OnHandover, OnSpace, Outbox, StreamEnd};
+use crate::tasks::{LongTask, named};
 use crate::wire::peer::peer_service_client::PeerServiceClient;
 use crate::wire::peer::{HandedOver, PlayInput, PlayRequest, play_input::Input};
 use crate::wire::{Received, Updates};
@@ -38,8 +42,6 @@ pub(super) const FIRST_CALLED: u32 = 1 << 31;
 pub(super) const CALLED: u32 = 1 << 24;
 /// Inputs that wait for one stream to another node. A client that sends more waits.
 const INPUTS_WAITING: usize = 1_024;
-/// Most inputs in one message.
-const INPUTS_PER_MESSAGE: usize = 64;
 /// Most nodes whose seats one stream has: each needs handles of its own, as this one does.
 const MAX_NODES: usize = ((u32::MAX - FIRST_CALLED) / CALLED) as usize;
 
@@ -47,9 +49,8 @@ const MAX_NODES: usize = ((u32::MAX - FIRST_CALLED) / CALLED) as usize;
 pub(super) struct RemoteSeats {
     gateway: Gateway,
     outbox: Arc<Outbox>,
+    clock: Arc<ProcessClock>,
     streams: Vec<PeerStream>,
-    /// The number of the stream of each seat that the client attached.
-    attached: BTreeMap<u32, usize>,
     /// Attachments that reached no node.
     give_back: mpsc::Sender<(u32, Box<Parked>)>,
     given_back: mpsc::Receiver<(u32, Box<Parked>)>,
@@ -68,8 +69,8 @@ struct PeerStream {
 #[derive(Default)]
 struct Shared {
     seats: Mutex<BTreeMap<u32, RemoteSeat>>,
-    /// What the client attached there.
-    ids: Mutex<BTreeSet<Id>>,
+    /// What the client attached there and lost because the node stops.
+    stopped: Mutex<BTreeSet<Id>>,
     /// Whether the stream has ended and its attachments were given back. Changes while `seats` are
     /// locked.
     is_over: AtomicBool,
@@ -80,8 +81,20 @@ impl Shared {
         (self.seats.lock()).expect("nothing panics under this lock")
     }
 
-    fn ids(&self) -> MutexGuard<'_, BTreeSet<Id>> {
-        (self.ids.lock()).expect("nothing panics under this lock")
+    fn stopped(&self) -> MutexGuard<'_, BTreeSet<Id>> {
+        (self.stopped.lock()).expect("nothing panics under this lock")
+    }
+
+    /// The rooms and tournaments that the client has there, those included that the node stops.
+    fn ids(&self) -> BTreeSet<Id> {
+        let mut ids = self.stopped().clone();
+        ids.extend(self.seats().values().filter_map(|seat| seat.id));
+        ids
+    }
+
+    /// Whether a seat is there, or on its way.
+    fn has(&self, handle: u32) -> bool {
+        self.seats().contains_key(&handle)
     }
 
     fn is_over(&self) -> bool {
@@ -114,6 +127,8 @@ impl Shared {
 #[derive(Default)]
 struct RemoteSeat {
     is_attached: bool,
+    /// Its room or tournament, if it was found by that.
+    id: Option<Id>,
     /// Its attachment, until it is attached. `None` if the other node attaches it by itself.
     parked: Option<Box<Parked>>,
     /// The last decision request.
@@ -124,13 +139,15 @@ struct RemoteSeat {
 struct Handover {
     handle: u32,
     decision_id: u64,
-    at: OnceLock<Instant>,
+    clock: Arc<ProcessClock>,
+    /// The time that this process had run.
+    at: OnceLock<Duration>,
     inputs: mpsc::WeakSender<PlayInput>,
 }
 
 impl OnHandover for Handover {
     fn handed_over(&self, now: Instant) {
-        let _ = self.at.set(now);
+        let _ = self.at.set(self.clock.at(now));
         // Without it, the owner learns of it with the answer.
         if let Some(inputs) = self.inputs.upgrade() {
             let handed_over = HandedOver {
@@ -147,13 +164,13 @@ impl OnHandover for Handover {
 
 impl RemoteSeats {
     /// No seats yet, for the client whose stream has this outbox.
-    pub(super) fn new(gateway: Gateway, outbox: &Arc<Outbox>) -> Self {
+    pub(super) fn new(gateway: Gateway, outbox: &Arc<Outbox>, clock: &Arc<ProcessClock>) -> Self {
         let (give_back, given_back) = mpsc::channel(MAX_SEATS_PER_STREAM);
         Self {
             gateway,
             outbox: Arc::clone(outbox),
+            clock: Arc::clone(clock),
             streams: Vec::new(),
-            attached: BTreeMap::new(),
             give_back,
             given_back,
         }
@@ -228,16 +245,17 @@ impl RemoteSeats {
             if stream.shared.is_over() {
                 return Err(NotPassedOn::NodeGone(parked));
             }
+            let id = match elsewhere.found_by {
+                FoundBy::Id(id) => Some(id),
+                FoundBy::Code(_) | FoundBy::Game(_) => None,
+            };
             let seat = RemoteSeat {
+                id,
                 parked: Some(parked),
                 ..RemoteSeat::default()
             };
             seats.insert(handle, seat);
         }
-        if let FoundBy::Id(id) = elsewhere.found_by {
-            stream.shared.ids().insert(id);
-        }
-        self.attached.insert(handle, number);
         // If the stream has ended, what becomes of the attachment depends on its other seats.
         let _ = stream.send(command, None).await;
         Ok(())
@@ -249,10 +267,7 @@ impl RemoteSeats {
         context: &mut Context<'_>,
     ) -> Poll<(u32, Box<Parked>)> {
         match self.given_back.poll_recv(context) {
-            Poll::Ready(Some((handle, parked))) => {
-                self.attached.remove(&handle);
-                Poll::Ready((handle, parked))
-            }
+            Poll::Ready(Some(given_back)) => Poll::Ready(given_back),
             // There is a sender here.
             Poll::Ready(None) | Poll::Pending => Poll::Pending,
         }
@@ -274,19 +289,21 @@ impl RemoteSeats {
             Some(Command::Answer(answer)) => stream.handed_over(command.handle, answer.decision_id),
             _ => None,
         };
-        let elapsed = elapsed.map(|at| arrived.saturating_duration_since(at).as_micros());
+        let elapsed = elapsed.map(|at| self.clock.at(arrived).saturating_sub(at).as_micros());
         let elapsed_us = elapsed.map(|micros| u64::try_from(micros).unwrap_or(u64::MAX));
         stream.send(command, elapsed_us).await.map(|()| None)
     }
 
     fn stream_of(&self, handle: u32) -> Option<&PeerStream> {
-        let number = match handle.checked_sub(FIRST_CALLED) {
-            None => self.attached.get(&handle).copied()?,
+        let stream = match handle.checked_sub(FIRST_CALLED) {
+            None => self.streams.iter().find(|stream| stream.shared.has(handle)),
             // The first handles are those of this node.
-            Some(offset) => usize::try_from(offset / CALLED).ok()?.checked_sub(1)?,
+            Some(offset) => {
+                let number = usize::try_from(offset / CALLED).ok()?.checked_sub(1)?;
+                self.streams.get(number)
+            }
         };
-        let stream = self.streams.get(number)?;
-        (!stream.shared.is_over()).then_some(stream)
+        stream.filter(|stream| !stream.shared.is_over())
     }
 
     /// Ends the streams to other nodes, and waits until their last updates are queued.
@@ -310,12 +327,13 @@ impl RemoteSeats {
         let number = u32::try_from(number).expect("at most MAX_NODES");
         let receiver = Receiver {
             shared: Arc::clone(&shared),
+            clock: Arc::clone(&self.clock),
             inputs: inputs.downgrade(),
             outbox: Arc::clone(&self.outbox),
             space: Arc::default(),
         };
         let mut first_assigned_handle = FIRST_CALLED + (number + 1) * CALLED;
-        let batches = ReceiverStream::new(waiting).ready_chunks(INPUTS_PER_MESSAGE);
+        let batches = ReceiverStream::new(waiting).ready_chunks(MAX_INPUTS_PER_MESSAGE);
         let requests = batches.map(move |inputs| {
             let first_assigned_handle = std::mem::take(&mut first_assigned_handle);
             PlayRequest {
@@ -333,27 +351,30 @@ impl RemoteSeats {
             endpoint: Arc::clone(&elsewhere.peer.endpoint),
             inputs: Some(inputs),
             shared,
-            receiving: AbortOnDropHandle::new(tokio::spawn(async move {
-                let ended = receiver.receive(channel.clone(), request).await;
-                if receiver.inputs.upgrade().is_some() {
-                    let ids = receiver.shared.ids().clone();
-                    if let Some(attachments) = receiver.shared.end_unattached() {
-                        debug!(
-                            ?ended,
-                            "a stream to another node has ended, which had no seats"
-                        );
-                        for id in &ids {
-                            directory.forget(&FoundBy::Id(*id));
+            receiving: AbortOnDropHandle::new(tokio::spawn(named(
+                LongTask::PeerStream,
+                async move {
+                    let ended = receiver.receive(channel.clone(), request).await;
+                    if receiver.inputs.upgrade().is_some() {
+                        let ids = receiver.shared.ids();
+                        if let Some(attachments) = receiver.shared.end_unattached() {
+                            debug!(
+                                ?ended,
+                                "a stream to another node has ended, which had no seats"
+                            );
+                            for id in &ids {
+                                directory.forget(&FoundBy::Id(*id));
+                            }
+                            for attachment in attachments {
+                                let _ = give_back.try_send(attachment);
+                            }
+                            return;
                         }
-                        for attachment in attachments {
-                            let _ = give_back.try_send(attachment);
-                        }
-                        return;
+                        awaited(&*directory, &peer, channel, ids).await;
                     }
-                    awaited(&*directory, &peer, channel, ids).await;
-                }
-                receiver.ended(ended, &*directory);
-            })),
+                    receiver.ended(ended, &*directory);
+                },
+            ))),
         }
     }
 }
@@ -383,8 +404,8 @@ impl PeerStream {
         inputs.send(input).await.map_err(|_| NodeGone)
     }
 
-    /// When the client's transport took the request for a decision.
-    fn handed_over(&self, handle: u32, decision_id: u64) -> Option<Instant> {
+    /// When the client's transport took the request for a decision, in time that the process has run.
+    fn handed_over(&self, handle: u32, decision_id: u64) -> Option<Duration> {
         let seats = self.shared.seats();
         let handover = seats.get(&handle)?.decision.as_ref()?;
         (handover.decision_id == decision_id)
@@ -396,6 +417,7 @@ impl PeerStream {
 /// Queues the updates of a peer stream for the client.
 struct Receiver {
     shared: Arc<Shared>,
+    clock: Arc<ProcessClock>,
     inputs: mpsc::WeakSender<PlayInput>,
     outbox: Arc<Outbox>,
     space: Arc<Space>,
@@ -471,7 +493,13 @@ impl Receiver {
                 let seat = seats.entry(handle).or_default();
                 (seat.is_attached, seat.parked) = (true, None);
             }
-            Received::Detached => drop(seats.remove(&handle)),
+            Received::Detached { stops } => {
+                let detached = seats.remove(&handle);
+                // Those of games that are over are of no interest any more.
+                if let Some(id) = detached.and_then(|seat| seat.id).filter(|_| stops) {
+                    self.shared.stopped().insert(id);
+                }
+            }
             // Of its attachment, or of another command.
             Received::Refused => {
                 if seats.get(&handle).is_some_and(|seat| !seat.is_attached) {
@@ -482,6 +510,7 @@ impl Receiver {
                 let handover = Arc::new(Handover {
                     handle,
                     decision_id,
+                    clock: Arc::clone(&self.clock),
                     at: OnceLock::new(),
                     inputs: self.inputs.clone(),
                 });
@@ -500,7 +529,7 @@ impl Receiver {
             return;
         }
         debug!(?ended, "a stream to another node has ended");
-        for id in self.shared.ids().iter() {
+        for id in &self.shared.ids() {
             directory.forget(&FoundBy::Id(*id));
         }
         self.outbox.end(StreamEnd::RoomGone);
@@ -511,16 +540,61 @@ impl Receiver {
 mod tests {
     use super::*;
 
-    #[test]
-    fn the_end_of_a_stream_whose_seats_a_node_that_stops_has_detached_is_told() {
+    fn receiver() -> Receiver {
         let (inputs, _waiting) = mpsc::channel(1);
         let (outbox, _updates) = Outbox::new();
-        let receiver = Receiver {
+        Receiver {
             shared: Arc::default(),
+            clock: Arc::default(),
             inputs: inputs.downgrade(),
             outbox,
             space: Arc::default(),
-        };
+        }
+    }
+
+    #[test]
+    fn what_ended_at_another_node_leaves_nothing_on_a_long_stream() {
+        let receiver = receiver();
+        let room = |number: u32| Id::parse(&format!("{number:032x}"));
+        for number in 0..10_000 {
+            let seat = RemoteSeat {
+                id: room(number),
+                ..RemoteSeat::default()
+            };
+            receiver.shared.seats().insert(number, seat);
+            let end = match number % 3 {
+                0 => Received::Refused,
+                _ => {
+                    receiver.follow(number, Received::Attached);
+                    receiver.follow(number, Received::Decision(1));
+                    Received::Detached { stops: false }
+                }
+            };
+            assert!(receiver.shared.has(number));
+            receiver.follow(number, end);
+            assert!(!receiver.shared.has(number), "its handle is invalid");
+        }
+        // Those that live, and those that continue at another node, are looked for there.
+        for (number, end) in [(1, None), (2, Some(Received::Detached { stops: true }))] {
+            let id = room(number);
+            let seat = RemoteSeat {
+                id,
+                ..RemoteSeat::default()
+            };
+            receiver.shared.seats().insert(number, seat);
+            receiver.follow(number, Received::Attached);
+            end.map(|end| receiver.follow(number, end));
+        }
+        assert_eq!(receiver.shared.seats().len(), 1);
+        assert_eq!(
+            receiver.shared.ids(),
+            [1, 2].into_iter().filter_map(room).collect()
+        );
+    }
+
+    #[test]
+    fn the_end_of_a_stream_whose_seats_a_node_that_stops_has_detached_is_told() {
+        let receiver = receiver();
         let parked = || RemoteSeat {
             parked: Some(Box::new(Parked::new(v1::Attach::default()))),
             ..RemoteSeat::default()
@@ -528,7 +602,7 @@ mod tests {
         receiver.shared.seats().insert(3, parked());
         receiver.follow(3, Received::Attached);
         assert!(receiver.shared.end_unattached().is_none());
-        receiver.follow(3, Received::Detached);
+        receiver.follow(3, Received::Detached { stops: true });
         assert!(receiver.shared.end_unattached().is_none());
 
         receiver.shared.seats().insert(4, parked());

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use chefshat_proto::v1::{self, participation_service_server::ParticipationService};
 use chefshat_record::convert::FieldProblem;
 use chefshat_study::{At, ParticipantLink, Refusal as StudyRefusal, SessionSecret};
+use prost::Message as _;
 use tokio::sync::mpsc;
 use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
@@ -21,6 +22,7 @@ use crate::limits::{Key, Refused};
 use crate::metrics::StreamKind;
 use crate::rooms::Rooms;
 use crate::studies::{Studies, StudyHandle, TraceRefusal};
+use crate::tasks::{LongTask, named};
 use chefshat_room::ids::Id;
 
 impl StudyCalls {
@@ -132,7 +134,8 @@ impl ParticipationService for StudyCalls {
             end(&sender, followed).await;
         };
         let closing = self.closing.clone();
-        tokio::spawn(closing.run_until_cancelled_owned(following));
+        let following = closing.run_until_cancelled_owned(following);
+        tokio::spawn(named(LongTask::Participation, following));
         Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
     }
 
@@ -193,6 +196,10 @@ impl ParticipationService for StudyCalls {
         let game =
             Id::parse(&request.game_id).ok_or_else(|| traces_refused(TraceRefusal::GameUnknown))?;
         let rooms = self.studies.rooms();
+        let bytes = (request.traces.iter())
+            .map(|trace| trace.encoded_len())
+            .sum();
+        rooms.may_store(key, bytes).map_err(Refusal::from)?;
         let recorded = handle.record_traces((number, session), game, request.traces, rooms);
         let recorded = recorded.await.map_err(|error| {
             tracing::error!(%error, "interface traces could not be stored");

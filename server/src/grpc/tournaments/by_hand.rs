@@ -57,7 +57,7 @@ impl TournamentCalls {
         let handle = self.find_owned(caller, id, owner).await?;
         let what = ByHand::Replace {
             participant: index(request.participant),
-            by: newcomer(&handle, &request)?,
+            by: newcomer(&handle, caller, &request)?,
         };
         let ticket = change(&handle, what).await?;
         Ok(v1::ReplaceParticipantResponse {
@@ -142,6 +142,7 @@ impl TournamentCalls {
 /// Who takes the place of a participant.
 fn newcomer(
     handle: &TournamentHandle,
+    caller: &Caller,
     request: &v1::ReplaceParticipantRequest,
 ) -> Result<Newcomer, Status> {
     let agent = convert::agent_from_proto("built_in_agent", &request.built_in_agent)
@@ -158,7 +159,7 @@ fn newcomer(
         return Ok(Newcomer::BuiltIn {
             agent,
             name,
-            request_id: request_id(&request.request_id)?,
+            request_id: request_id(&request.request_id, caller)?,
         });
     }
     let kind = convert::kind_from_proto("kind", request.kind)
@@ -175,7 +176,7 @@ fn newcomer(
         kind,
         max_games: index(request.max_games.max(1)),
         stateless: request.stateless,
-        request_id: request_id(&request.request_id)?,
+        request_id: request_id(&request.request_id, caller)?,
     })
 }
 

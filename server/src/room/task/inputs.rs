@@ -7,13 +7,14 @@ use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use chefshat_record::convert::seat_number;
 use chefshat_room::ids::Token;
-use chefshat_room::journal::{AbortReason, SeatedParticipant};
-use chefshat_room::{ConnectionId, JoinError, ReportOutcome};
+use chefshat_room::journal::SeatedParticipant;
+use chefshat_room::{ConnectionId, ExpressError, JoinError, ReportOutcome};
 use tokio::sync::oneshot;
 use tokio::time::Instant;
 
 use super::{Release, Room, answer, is_connection};
 use crate::convert::{self, Deck};
+use crate::limits::NotStored;
 use crate::room::message::{
     Acted, AttachRequest, AttachedSeat, JoinRequest, Joined, MarkOutcome, MarkRequest, Message,
     NotAttached, ReportRefusal, SeatAction,
@@ -57,9 +58,11 @@ impl Room {
                 answer(reply, seat.map(|seat| (seat, has_started)));
             }
             Message::HasStarted(reply) => answer(reply, self.core.game().is_some()),
-            Message::Close(secret, reply) => {
+            Message::Close(secret, client, reply) => {
                 if self.core.header().owner.matches(&secret) {
-                    self.core.abort(self.now, AbortReason::Closed);
+                    let owner = [client, self.context.owner];
+                    let seats = self.clients.seats_of(&self.core, owner);
+                    self.core.close(self.now, seats);
                     self.releases.push(Release::Closed(reply));
                 } else {
                     answer(reply, None);
@@ -229,8 +232,13 @@ impl Room {
 
     fn perform(&mut self, seat: Seat, action: SeatAction, arrived: Instant) -> Acted {
         match action {
-            SeatAction::Answer(answer) => {
+            SeatAction::Answer(mut answer) => {
                 self.observed.answer_read(arrived);
+                // The decision counts without them.
+                answer.annotations_refused |= answer
+                    .annotations
+                    .take_if(|bytes| self.may_store(bytes.len()).is_err())
+                    .is_some();
                 let (decision_id, action) = (answer.decision_id, answer.action);
                 let handed = self.connections[seat.index()]
                     .as_ref()
@@ -239,14 +247,25 @@ impl Room {
                 let answered = self.core.answer(self.now, seat, answer, arrived, handed);
                 Ok(Some(convert::answer_result(decision_id, action, answered)))
             }
-            SeatAction::Express(expression) => (self.core)
-                .express(self.now, seat, expression)
-                .map(|()| None),
+            SeatAction::Express(expression) => {
+                self.may_store(expression.encoded.len())
+                    .map_err(|refused| match refused {
+                        NotStored::DiskNearlyFull => ExpressError::DiskNearlyFull,
+                        NotStored::TooFast(_) => ExpressError::TooFast,
+                    })?;
+                let expressed = self.core.express(self.now, seat, expression);
+                expressed.map(|()| None)
+            }
             SeatAction::Resume => {
                 self.core.resume(self.now, seat);
                 Ok(None)
             }
         }
+    }
+
+    /// Charges the creator of the room for something of this size that the game does not need.
+    fn may_store(&self, bytes: usize) -> Result<(), NotStored> {
+        self.context.may_store(self.context.owner, bytes)
     }
 
     /// Whether a secret is that of the table's ticket.

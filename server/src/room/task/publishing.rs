@@ -174,7 +174,7 @@ impl Room {
         }
         let participant = self.core.standing(seat).participant;
         let kind = participant.map_or(ParticipantKind::Agent, |participant| participant.kind);
-        let stamp = HandStamp::new(self.clock);
+        let stamp = HandStamp::new(self.clock.clone());
         let connected = SeatConnection::new(
             (seat, connection),
             request.handle,

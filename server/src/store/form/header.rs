@@ -9,7 +9,7 @@ use chefshat_record::convert::{FieldProblem, rules_from_proto, rules_to_proto, s
 use prost::Message;
 
 use super::entry::{number_of, value_of};
-use super::{Unreadable, action, array};
+use super::{Unreadable, action, array, check_form};
 use crate::convert;
 use chefshat_room::ids::{Id, SecretHash};
 use chefshat_room::journal::{GameHeader, SeatLabels, StudyGame, TournamentGame};
@@ -58,6 +58,8 @@ struct HeaderForm {
     /// Empty: `FIRST_VERSION`.
     #[prost(string, tag = "20")]
     server_version: String,
+    #[prost(bool, tag = "21")]
+    participant_removed: bool,
 }
 
 /// The version of the server whose headers do not name it.
@@ -133,6 +135,7 @@ pub(in crate::store) fn header_to_bytes(header: &GameHeader) -> Vec<u8> {
         table: (header.table).map_or_else(Vec::new, |table| table.bytes().to_vec()),
         study: header.study.as_deref().map(study_to_form),
         server_version: header.server_version.clone(),
+        participant_removed: header.participant_removed,
     }
     .encode_to_vec()
 }
@@ -186,6 +189,30 @@ pub(in crate::store) fn stored_header(bytes: Option<&[u8]>) -> Result<GameHeader
     header_from_bytes(bytes.ok_or_else(|| Unreadable::new("its header is missing"))?)
 }
 
+/// The tournament or study that a stored game is part of, if any. An imported game has no header and
+/// is part of nothing here.
+///
+/// # Errors
+/// This version cannot read it.
+pub(in crate::store) fn stored_unit(
+    form: i64,
+    header: Option<&[u8]>,
+) -> Result<Option<Id>, Unreadable> {
+    check_form(form)?;
+    let Some(header) = header else {
+        return Ok(None);
+    };
+    let header = HeaderForm::decode(header)?;
+    let unit = match header.study {
+        Some(study) => study.study,
+        None => header.tournament,
+    };
+    match unit.is_empty() {
+        true => Ok(None),
+        false => array(&unit, "the id of what it is part of").map(|id| Some(Id(id))),
+    }
+}
+
 /// Decodes a header.
 ///
 /// # Errors
@@ -228,6 +255,7 @@ pub(in crate::store) fn header_from_bytes(bytes: &[u8]) -> Result<GameHeader, Un
             }
         },
         created_at_ms: form.created_at_ms,
+        participant_removed: form.participant_removed,
         join_code: form.join_code,
         owner: SecretHash::from_bytes(array(&form.owner, "the owner's hash")?),
         table: match form.table.as_slice() {

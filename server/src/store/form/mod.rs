@@ -18,7 +18,7 @@ use prost::Message as _;
 #[cfg(test)]
 pub(super) use entry::put_entry;
 pub(super) use entry::{entries_to_bytes, put_entries, read_entries};
-pub(super) use header::{header_from_bytes, header_to_bytes, stored_header};
+pub(super) use header::{header_from_bytes, header_to_bytes, stored_header, stored_unit};
 pub(super) use signature::{signature_from_bytes, signature_to_bytes};
 pub(super) use study::{
     stored_study, stored_traces, study_changes_to_bytes, study_to_bytes, traces_to_bytes,

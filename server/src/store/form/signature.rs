@@ -12,6 +12,8 @@ struct SignatureForm {
     public_key: Vec<u8>,
     #[prost(bytes = "vec", tag = "3")]
     signature: Vec<u8>,
+    #[prost(uint32, tag = "4")]
+    text_version: u32,
 }
 
 /// Encodes a signature.
@@ -19,6 +21,7 @@ pub(in crate::store) fn signature_to_bytes(signature: &v1::RecordSignature) -> V
     let form = SignatureForm {
         public_key: signature.public_key.clone(),
         signature: signature.signature.clone(),
+        text_version: signature.text_version,
     };
     form.encode_to_vec()
 }
@@ -34,5 +37,6 @@ pub(in crate::store) fn signature_from_bytes(
     Ok(v1::RecordSignature {
         public_key: form.public_key,
         signature: form.signature,
+        text_version: form.text_version,
     })
 }

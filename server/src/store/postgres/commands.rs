@@ -13,6 +13,7 @@ use sqlx::{Connection as _, Row as _};
 
 use super::ends::{End, Ended, WholeGame, finish, give_up, import, number, whole};
 use super::forget::rewrite;
+use super::retained::{divided, locked};
 use super::studies::StudyWrite;
 use super::values::{Owned, integer, text};
 use super::writer::{Answers, Work, confirming};
@@ -56,6 +57,8 @@ pub(super) enum Command {
     },
     /// Marks the record of a game as written to a file.
     RecordWritten { game_id: Id },
+    /// Deletes finished games that no tournament or study needs.
+    Prune { games: Vec<Id> },
     /// Deletes finished games.
     Delete { games: Vec<Id> },
     /// Removes a participant from games and tournaments that are over.
@@ -141,6 +144,7 @@ impl Command {
                     .await?;
                 return Ok(Ok(0));
             }
+            Self::Prune { games } => return prune(connection, games).await.map(Ok),
             Self::Delete { games } => return delete(connection, games).await.map(Ok),
             Self::Rewrite(changes) => {
                 rewrite(connection, changes).await?;
@@ -205,7 +209,8 @@ impl Command {
              ), place AS (
                  INSERT INTO owned (id, unit, kind, node, epoch, join_code, game_id, durable, form, rules_version)
                  SELECT $6, $7, 0, node, $8, $9, $1, $3 IS NOT NULL, $2, $10 FROM owner
-                 WHERE $3 IS NULL OR EXISTS (SELECT FROM game)
+                 WHERE EXISTS (SELECT FROM game)
+                    OR $3 IS NULL AND NOT EXISTS (SELECT FROM games WHERE game_id = $1)
                  ON CONFLICT DO NOTHING RETURNING id
              ), first AS (
                  INSERT INTO journal (game, position, epoch, entries)
@@ -320,6 +325,22 @@ impl Command {
             false => StoreError::Fenced(*id),
         }))
     }
+}
+
+/// Deletes those of these finished games that no tournament or study needs. The files of the others
+/// may be gone: they are written again.
+async fn prune(connection: &mut PgConnection, games: &[Id]) -> sqlx::Result<i64> {
+    let games = locked(connection, games).await?;
+    let (free, needed) = divided(connection, games).await?;
+    if !needed.is_empty() {
+        let numbers: Vec<i64> = needed.iter().map(|game| game.number).collect();
+        sqlx::query("UPDATE games SET filed = false WHERE number = ANY ($1)")
+            .bind(numbers)
+            .execute(&mut *connection)
+            .await?;
+    }
+    let free: Vec<Id> = free.iter().map(|game| game.game).collect();
+    delete(connection, &free).await
 }
 
 async fn delete(connection: &mut PgConnection, games: &[Id]) -> sqlx::Result<i64> {

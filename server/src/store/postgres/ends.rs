@@ -195,7 +195,8 @@ pub(super) async fn import(
     let query = sqlx::query(
         "WITH game AS (
              INSERT INTO games (game_id, form, added, state, summary, origin, room_name, created_at_ms, ended_at_ms)
-             VALUES ($11, $12, true, $1, $2, $3, $4, $5, $6)
+             SELECT $11, $12, true, $1, $2, $3, $4, $5, $6
+             WHERE NOT EXISTS (SELECT FROM owned WHERE game_id = $11 AND NOT over)
              ON CONFLICT DO NOTHING RETURNING number
          ), added AS (
              INSERT INTO added_records (game, record) SELECT number, $13 FROM game

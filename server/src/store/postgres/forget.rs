@@ -92,7 +92,7 @@ impl Reader {
     async fn game_rows(&self, number: i64) -> Result<Option<GameRows>, StoreError> {
         let game: Option<PgRow> = (self.read(|connection| {
             sqlx::query(
-                "SELECT game_id, state, filed, header, summary, record
+                "SELECT game_id, state, filed, header, summary, record, signature
                  FROM games LEFT JOIN added_records ON game = number WHERE number = $1",
             )
             .bind(number)
@@ -121,6 +121,7 @@ impl Reader {
             header: game.get(3),
             summary: game.get(4),
             record: game.get(5),
+            signature: game.get(6),
             journal: journal.await?,
         }))
     }
@@ -158,12 +159,13 @@ pub(super) async fn rewrite(connection: &mut PgConnection, rewrite: &Rewrite) ->
         }
         if let Some((summary, room_name)) = &game.summary {
             sqlx::query(
-                "UPDATE games SET summary = $2, room_name = $3, filed = false, signature = NULL
+                "UPDATE games SET summary = $2, room_name = $3, filed = false, signature = $4
                  WHERE number = $1",
             )
             .bind(game.number)
             .bind(summary.as_slice())
             .bind(text(room_name))
+            .bind(game.signature.as_deref())
             .execute(&mut *connection)
             .await?;
         }

@@ -11,6 +11,7 @@ use tokio_util::task::AbortOnDropHandle;
 use tracing::debug;
 
 use crate::store::cluster::Epoch;
+use crate::tasks::{self, LongTask};
 use chefshat_room::ids::Id;
 
 /// The channel of the database.
@@ -73,9 +74,12 @@ impl Handed {
         let listening = closing.run_until_cancelled_owned(listen(options, sender));
         Self {
             received,
-            _listening: AbortOnDropHandle::new(tokio::spawn(async move {
-                listening.await;
-            })),
+            _listening: AbortOnDropHandle::new(tokio::spawn(tasks::named(
+                LongTask::PostgresHandover,
+                async move {
+                    listening.await;
+                },
+            ))),
         }
     }
 

@@ -15,6 +15,7 @@ mod journals;
 mod open;
 mod owned;
 mod reader;
+mod retained;
 mod studies;
 #[cfg(test)]
 pub(super) mod tests;
@@ -48,7 +49,8 @@ use super::form;
 use super::studies::{StoredStudy, StoredTraces, StudyHeader};
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{
-    ForgetError, Forgotten, Journal, Keep, Part, ResumableGame, Store, StoreError, StoredGame,
+    ForgetError, Forgotten, Journal, Keep, Listed, Part, ResumableGame, Store, StoreError,
+    StoredGame,
 };
 use crate::metrics::StoreMetrics;
 use appends::Row;
@@ -312,6 +314,10 @@ impl Store for PostgresStore {
         self.own_games(ended_since_ms).boxed()
     }
 
+    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
+        self.reader.summary(game).boxed()
+    }
+
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         self.reader.finished(game).boxed()
     }
@@ -321,7 +327,7 @@ impl Store for PostgresStore {
         filter: &'a v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>> {
+    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>> {
         self.reader.list(filter, part, count).boxed()
     }
 
@@ -363,6 +369,14 @@ impl Store for PostgresStore {
         (self.reader)
             .prunable(keep, part, self.options.record_files)
             .boxed()
+    }
+
+    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+        async move {
+            let prune = Command::Prune { games };
+            self.commands.commit(Arc::new(prune)).await.map(drop)
+        }
+        .boxed()
     }
 
     fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
@@ -482,7 +496,7 @@ impl Store for PostgresStore {
         &self,
         study: Id,
         changes: Vec<StudyChange>,
-        forgotten: u32,
+        forgotten: Vec<u32>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
             let rewrite = StudyWrite::Rewrite {

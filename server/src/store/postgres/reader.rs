@@ -15,16 +15,19 @@ use tokio::time::timeout;
 use tracing::error;
 
 use super::errors::failure;
+use super::retained::{divided, old};
 use super::values::{integer, text};
 use crate::store::codec::Codec;
 use crate::store::form::{self, Unreadable, check_form, stored_header};
 use crate::store::tournaments::StoredTournament;
-use crate::store::{Keep, Part, StoreError, StoredGame};
+use crate::store::{Keep, Listed, Part, StoreError, StoredGame, listed};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
 /// How long one read may take.
 const READ_LIMIT: Duration = Duration::from_secs(15);
+/// Most games of which retention reads at a time whether they are needed.
+const MAX_PRUNABLE_READ: usize = 1_024;
 /// How long a connection that is given back may take to answer; then it is dropped.
 const RETURN_LIMIT: Duration = Duration::from_secs(1);
 
@@ -32,7 +35,7 @@ const RETURN_LIMIT: Duration = Duration::from_secs(1);
 macro_rules! list_query {
     ($part:literal, $order:literal) => {
         concat!(
-            "SELECT listed, summary FROM games
+            "SELECT listed, summary, game_id FROM games
              WHERE summary IS NOT NULL AND ",
             $part,
             " AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)
@@ -213,6 +216,23 @@ impl Reader {
         Ok(rooms)
     }
 
+    /// See `Store::summary`.
+    pub(super) async fn summary(&self, game: Id) -> Result<Option<v1::RecordSummary>, StoreError> {
+        let row: Option<PgRow> = (self.read(|connection| {
+            sqlx::query("SELECT summary FROM games WHERE game_id = $1 AND summary IS NOT NULL")
+                .bind(game.0.to_vec())
+                .fetch_optional(connection)
+                .boxed()
+        }))
+        .await?;
+        let decoded = row.map(|row| v1::RecordSummary::decode(row.get::<&[u8], _>(0)));
+        decoded.transpose().map_err(|error| {
+            StoreError::Unreadable(format!(
+                "the summary of game {game} cannot be read: {error}"
+            ))
+        })
+    }
+
     /// See `Store::finished`.
     pub(super) async fn finished(&self, game: Id) -> Result<Option<StoredGame>, StoreError> {
         let row = self.read(|connection| {
@@ -229,7 +249,7 @@ impl Reader {
             return Ok(None);
         };
         let unreadable = |problem: Unreadable| {
-            StoreError::Failed(format!("game {game} cannot be read: {problem}"))
+            StoreError::Unreadable(format!("game {game} cannot be read: {problem}"))
         };
         check_form(row.get(1)).map_err(unreadable)?;
         let record: Option<Vec<u8>> = row.get(3);
@@ -284,7 +304,7 @@ impl Reader {
         filter: &v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> Result<Vec<(u64, v1::RecordSummary)>, StoreError> {
+    ) -> Result<Vec<Listed>, StoreError> {
         let (query, number) = match part {
             Part::After(number) => (list_query!("listed > $1", "listed"), number),
             Part::Before(number) => (list_query!("listed < $1", "listed DESC"), number),
@@ -302,16 +322,10 @@ impl Reader {
             .bind(integer(count as u64));
         let rows = self.read(|connection| query.fetch_all(connection).boxed());
         let rows = rows.await?;
-        rows.iter()
-            .map(|row| {
-                let number: i64 = row.get(0);
-                let summary = v1::RecordSummary::decode(row.get::<&[u8], _>(1));
-                let summary = summary.map_err(|error| {
-                    StoreError::Failed(format!("game number {number}: {error}"))
-                })?;
-                Ok((u64::try_from(number).unwrap_or_default(), summary))
-            })
-            .collect()
+        Ok(rows
+            .iter()
+            .map(|row| listed(row.get(0), row.get(2), row.get(1)))
+            .collect())
     }
 
     /// See `Store::finished_games`.
@@ -325,36 +339,32 @@ impl Reader {
         Ok(u64::try_from(count).unwrap_or_default())
     }
 
-    /// See `Store::prunable`. Games without a record are none of the newest ones. A tournament may
-    /// need its games until it is over, at whatever node.
+    /// See `Store::prunable`. Games without a record are none of the newest ones.
     pub(super) async fn prunable(
         &self,
         keep: Keep,
         (after, count): (u64, usize),
         record_files: bool,
     ) -> Result<Vec<(u64, Id)>, StoreError> {
-        let query = sqlx::query_as(
-            "SELECT number, game_id FROM games
-             WHERE state <> 0 AND number > $1 AND coalesce(ended_at_ms, created_at_ms, 0) < $3
-               AND (summary IS NULL
-                    OR (filed OR NOT $5)
-                       AND listed <= (SELECT listed FROM games WHERE listed IS NOT NULL
-                                      ORDER BY listed DESC LIMIT 1 OFFSET $2))
-               AND NOT EXISTS (
-                   SELECT FROM tournaments JOIN owned ON unit = tournament_id
-                   WHERE NOT tournaments.over AND owned.game_id = games.game_id)
-             ORDER BY number LIMIT $4",
-        )
-        .bind(integer(after))
-        .bind(integer(keep.newest.unwrap_or_default().max(1)))
-        .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
-        .bind(integer(count as u64))
-        .bind(record_files);
-        let rows = self.read(|connection| query.fetch_all(connection).boxed());
-        let rows: Vec<(i64, Vec<u8>)> = rows.await?;
-        Ok((rows.into_iter())
-            .filter_map(|(number, id)| Some((u64::try_from(number).ok()?, Id(id.try_into().ok()?))))
-            .collect())
+        let (mut after, mut page) = (integer(after), count);
+        let mut found = Vec::new();
+        loop {
+            let games = self.read(|connection| old(connection, keep, (after, page), record_files));
+            let games = games.await?;
+            let Some(last) = games.last() else {
+                return Ok(found);
+            };
+            after = last.number;
+            let divided = self.read(|connection| divided(connection, games).boxed());
+            let (free, _) = divided.await?;
+            let left = count - found.len();
+            let free = free.iter().take(left);
+            found.extend(free.map(|game| (game.number.unsigned_abs(), game.game)));
+            if found.len() >= count {
+                return Ok(found);
+            }
+            page = MAX_PRUNABLE_READ.min(page * 2);
+        }
     }
 
     /// See `Store::without_record_file`.

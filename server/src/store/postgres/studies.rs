@@ -24,11 +24,11 @@ pub(super) enum StudyWrite {
         position: i64,
         changes: Vec<u8>,
     },
-    /// Replaces its journal by one row, and deletes the interface traces of a participant.
+    /// Replaces its journal by one row, and deletes the interface traces of participants.
     Rewrite {
         owned: Owned,
         changes: Vec<u8>,
-        forgotten: u32,
+        forgotten: Vec<u32>,
     },
     /// Adds interface traces.
     Traces {
@@ -63,7 +63,7 @@ impl StudyWrite {
                 owned,
                 changes,
                 forgotten,
-            } => rewrite(connection, *owned, changes, *forgotten).await?,
+            } => rewrite(connection, *owned, changes, forgotten).await?,
             Self::Traces {
                 owned,
                 id,
@@ -181,7 +181,7 @@ async fn rewrite(
     connection: &mut PgConnection,
     owned: Owned,
     changes: &[u8],
-    forgotten: u32,
+    forgotten: &[u32],
 ) -> sqlx::Result<bool> {
     let row = sqlx::query(
         "WITH owner AS (
@@ -192,7 +192,7 @@ async fn rewrite(
              DELETE FROM study_changes USING study WHERE study_changes.study = study.number AND position > 0
          ), traces AS (
              DELETE FROM study_traces USING study
-             WHERE study_traces.study = study.number AND participant = $3
+             WHERE study_traces.study = study.number AND participant = ANY ($3)
          )
          INSERT INTO study_changes (study, position, epoch, changes)
          SELECT number, 0, $2, $4 FROM study
@@ -201,7 +201,7 @@ async fn rewrite(
     )
     .bind(owned.id.0.as_slice())
     .bind(owned.epoch)
-    .bind(i64::from(forgotten))
+    .bind(forgotten.iter().map(|it| i64::from(*it)).collect::<Vec<_>>())
     .bind(changes)
     .fetch_optional(connection)
     .await?;
@@ -287,7 +287,7 @@ impl Reader {
         .await?;
         let stored = form::stored_study(row.get(1), row.get(2), &rows);
         let stored = stored.map_err(|problem| {
-            StoreError::Failed(format!("study {id} cannot be read: {problem}"))
+            StoreError::Unreadable(format!("study {id} cannot be read: {problem}"))
         })?;
         Ok(Some(stored))
     }
@@ -317,12 +317,14 @@ impl Reader {
             .boxed()
         }))
         .await?;
-        let traces = rows.iter().map(|(participant, game, traces)| {
+        let traces = rows.iter().filter_map(|(participant, game, traces)| {
             let participant = u32::try_from(*participant).unwrap_or_default();
-            form::stored_traces(participant, game, traces).map_err(|problem| {
-                StoreError::Failed(format!("traces of study {study} cannot be read: {problem}"))
-            })
+            form::stored_traces(participant, game, traces)
+                .inspect_err(|problem| {
+                    tracing::error!(%study, %problem, "traces of a game are left out");
+                })
+                .ok()
         });
-        traces.collect()
+        Ok(traces.collect())
     }
 }

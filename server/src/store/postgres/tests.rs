@@ -106,6 +106,7 @@ fn header(room: u8, tournament: Option<u8>, durability: Durability) -> Arc<GameH
         },
         rules_version: RULES_VERSION,
         server_version: "0.0.1".into(),
+        participant_removed: false,
         fills: vec![Fill::Open { reserved_for: None }; 4],
         display_names: Default::default(),
         wizards: std::collections::BTreeSet::new(),

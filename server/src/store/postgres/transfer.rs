@@ -42,8 +42,8 @@ pub struct Transferred {
 /// Why nothing was moved.
 #[derive(Debug, thiserror::Error)]
 pub enum TransferError {
-    /// The folder has no database.
-    #[error("{0} has no {DATABASE_FILE}; name the data directory of a server")]
+    /// The folder has no database, or an empty file.
+    #[error("{0} has no {DATABASE_FILE}, or an empty one; name the data directory of a server")]
     Missing(String),
     /// The folder cannot be used.
     #[error(transparent)]
@@ -78,7 +78,8 @@ pub async fn transfer(
     url: &str,
     mut progress: impl FnMut(u64, u64),
 ) -> Result<Transferred, TransferError> {
-    if !data_dir.join(DATABASE_FILE).exists() {
+    let database = data_dir.join(DATABASE_FILE).metadata();
+    if !database.is_ok_and(|about| about.len() > 0) {
         return Err(TransferError::Missing(data_dir.display().to_string()));
     }
     // Its statements may take long.

@@ -19,6 +19,7 @@ use super::errors::{failure, is_temporary};
 use super::open::connect;
 use crate::metrics::StoreMetrics;
 use crate::store::StoreError;
+use crate::tasks::{LongTask, named};
 
 /// Work that may wait for a writer.
 const QUEUE: usize = 1_024;
@@ -123,7 +124,10 @@ pub(super) fn start<W: Work>(
             shared: shared.clone(),
             connection: None,
         };
-        tasks.push(tokio::spawn(writer.run(Arc::clone(&waiting))));
+        tasks.push(tokio::spawn(named(
+            LongTask::PostgresWriter,
+            writer.run(Arc::clone(&waiting)),
+        )));
     }
     Queue(queue)
 }

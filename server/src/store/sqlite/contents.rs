@@ -9,7 +9,7 @@ use sqlx::Row as _;
 use sqlx::sqlite::SqliteRow;
 
 use super::errors::failure;
-use super::open::{self, OpenError, Opened};
+use super::open::{self, IfGone, OpenError, Opened};
 use super::rows::with_own_rows;
 use crate::store::StoreError;
 
@@ -85,7 +85,8 @@ type Rows<'a, T> = BoxStream<'a, Result<T, StoreError>>;
 impl Contents {
     /// Opens the database, and upgrades it to this version's.
     pub(in crate::store) async fn open(data_dir: &Path) -> Result<Self, OpenError> {
-        open::open(data_dir).await.map(Self)
+        let opened = open::open(data_dir, IfGone::CreateFirst).await;
+        opened.map(Self)
     }
 
     /// Number of games.

@@ -15,7 +15,7 @@ const LOCKED: i32 = 6;
 const READ_ONLY: i32 = 8;
 const IO_ERROR: i32 = 10;
 pub(super) const CORRUPT: i32 = 11;
-const FULL: i32 = 13;
+pub(super) const FULL: i32 = 13;
 const CANNOT_OPEN: i32 = 14;
 pub(super) const NOT_A_DATABASE: i32 = 26;
 

@@ -9,7 +9,7 @@ use sqlx::{Connection as _, Row as _};
 
 use super::SqliteStore;
 use super::errors::{explain, failure};
-use super::open::{self, OpenError};
+use super::open::{self, IfGone, OpenError};
 use super::reader::Reader;
 use super::rows::with_own_rows;
 use crate::store::forget::{GameRows, Rewrite};
@@ -23,7 +23,7 @@ impl SqliteStore {
     /// # Errors
     /// The directory cannot be used, a server uses it, or the database failed.
     pub async fn purge(data_dir: &Path) -> Result<(), OpenError> {
-        let mut opened = open::open(data_dir).await?;
+        let mut opened = open::open(data_dir, IfGone::CreateFirst).await?;
         opened.readers.close().await;
         let failed = |error| OpenError::Other(data_dir.to_path_buf(), explain(&error));
         for tidying in [
@@ -88,7 +88,7 @@ impl Reader {
     /// The rows of a game; `None` if it was deleted.
     async fn game_rows(&self, number: i64) -> Result<Option<GameRows>, StoreError> {
         let row = sqlx::query(
-            "SELECT game_id, state, filed, header, summary, record, last_row
+            "SELECT game_id, state, filed, header, summary, record, last_row, signature
              FROM games LEFT JOIN added_records ON game = number WHERE number = $1",
         )
         .bind(number)
@@ -108,6 +108,7 @@ impl Reader {
             header: row.get(3),
             summary: row.get(4),
             record: row.get(5),
+            signature: row.get(7),
             journal: journal_of(&self.pool, number, row.get(6)).await?,
         }))
     }

@@ -8,11 +8,13 @@ use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 use sqlx::sqlite::SqlitePool;
 use tokio::sync::{mpsc, oneshot};
+use tracing::error;
 
 use super::rows;
+use super::space::{RunningGame, Space};
 use super::writer::{Pending, Row, WriteCommand};
 use crate::store::codec::Codec;
-use crate::store::ephemeral::StoreWhole;
+use crate::store::ephemeral::{Reserved, StoreWhole};
 use crate::store::form;
 use crate::store::{Journal, StoreError};
 use chefshat_room::journal::{Entry, GameHeader};
@@ -23,6 +25,7 @@ pub(super) struct WriteQueue {
     pub(super) queue: mpsc::Sender<Pending>,
     /// The number of the next row of the journal.
     pub(super) next_row: Arc<AtomicI64>,
+    pub(super) space: Arc<Space>,
 }
 
 impl WriteQueue {
@@ -55,6 +58,8 @@ impl WriteQueue {
 pub(super) struct DurableJournal {
     pub(super) number: i64,
     pub(super) position: i64,
+    /// Until the game is over.
+    pub(super) running: Option<RunningGame>,
     /// Its last row so far.
     pub(super) last_row: Option<i64>,
     pub(super) queue: WriteQueue,
@@ -125,23 +130,29 @@ impl Journal for DurableJournal {
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.queue
-            .send(WriteCommand::Finish {
-                number: self.number,
-                // Only an aborted game can end before the deal.
-                state: v1::RoomState::Aborted.into(),
-                last_row: self.last_row,
-                summary,
-                signature: signature.as_ref().map(form::signature_to_bytes),
-            })
-            .boxed()
+        let finish = WriteCommand::Finish {
+            number: self.number,
+            // Only an aborted game can end before the deal.
+            state: v1::RoomState::Aborted.into(),
+            last_row: self.last_row,
+            summary,
+            signature: signature.as_ref().map(form::signature_to_bytes),
+        };
+        async move {
+            self.queue.send(finish).await?;
+            self.running = None;
+            Ok(())
+        }
+        .boxed()
     }
 }
 
 /// Where a game is stored when it ends.
 pub(super) struct Whole {
+    pub(super) _reserved: Reserved,
     pub(super) number: i64,
     pub(super) queue: WriteQueue,
+    pub(super) _running: RunningGame,
 }
 
 impl StoreWhole for Whole {
@@ -155,6 +166,12 @@ impl StoreWhole for Whole {
         let Some(summary) = summary else {
             return ready(Ok(())).boxed();
         };
+        let is_single = header.tournament.is_none() && header.study.is_none();
+        if is_single && self.queue.space.is_full() {
+            // Such a game may be lost, so its players need not wait for the disk.
+            error!(game = %header.game_id, "the disk is full: an ephemeral game is not stored");
+            return ready(Ok(())).boxed();
+        }
         let game = WriteCommand::Whole {
             number: self.number,
             game_id: header.game_id,

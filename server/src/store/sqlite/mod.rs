@@ -5,11 +5,14 @@ mod backup;
 mod contents;
 mod errors;
 mod forget;
+mod former;
 mod journals;
 mod open;
 mod reader;
+mod retained;
 mod rewriting;
 mod rows;
+mod space;
 #[cfg(test)]
 pub(super) mod tests;
 mod writer;
@@ -22,41 +25,40 @@ use chefshat_proto::v1;
 use chefshat_record::pseudonym::Pseudonym;
 use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
-use futures::future::{BoxFuture, ready};
+use futures::future::BoxFuture;
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
-use tracing::error;
+use tracing::{error, warn};
 
 pub use backup::{DatabaseCopy, check_copy, copy_database};
 pub(in crate::store) use contents::{
     Contents, GameRow, JournalRow, ParticipantRow, StudyRow, TournamentRow, TracesRow,
 };
 pub use errors::FILE as DATABASE_FILE;
-use open::FolderLock;
-pub use open::{LOCK_FILE, OpenError};
+pub use former::LOCK_FILE;
+pub use open::OpenError;
+use open::{FolderLock, IfGone};
 
 use super::codec::Codec;
-use super::ephemeral::EphemeralJournal;
+use super::ephemeral::{EphemeralJournal, Reservations};
 use super::form;
 use super::studies::{StoredStudy, StoredTraces, StudyHeader};
 use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use super::{
-    DiskUsage, ForgetError, Forgotten, Journal, Part, ResumableGame, Store, StoreError, StoredGame,
+    DiskUsage, ForgetError, Forgotten, Journal, Listed, Part, ResumableGame, Store, StoreError,
+    StoredGame,
 };
 use crate::metrics::StoreMetrics;
 use crate::store::Keep;
+use crate::tasks::{LongTask, named};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 use chefshat_room::policy::Durability;
 use errors::explain;
 use journals::{DurableJournal, Whole, WriteQueue};
 use reader::Reader;
+use space::Space;
 use writer::WriteCommand;
-
-/// Disk space reserved for running games: new ones are refused when only this is left. On a small
-/// disk the reserve is a share of its size.
-const MAX_RESERVE_BYTES: u64 = 64 * 1024 * 1024;
-const RESERVE_SHARE: u64 = 50;
 
 /// Stores games in the database of a data directory.
 pub struct SqliteStore {
@@ -66,19 +68,35 @@ pub struct SqliteStore {
     commands: WriteQueue,
     failed: watch::Receiver<Option<StoreError>>,
     numbers: Arc<AtomicI64>,
+    /// The ids of what is not in the database yet.
+    reserved: Reservations,
     writing: Mutex<Option<JoinHandle<()>>>,
     closed: Arc<AtomicBool>,
     metrics: StoreMetrics,
+    space: Arc<Space>,
     _lock: FolderLock,
 }
 
 impl SqliteStore {
-    /// Opens the database of a data directory, `games.sqlite3`; creates it if it is missing.
+    /// Opens the database of a data directory, `games.sqlite3`; creates it if it is missing, unless
+    /// the directory shows that there was one.
     ///
     /// # Errors
     /// The directory cannot be used; nothing was changed in it.
     pub async fn open(data_dir: &Path) -> Result<Self, OpenError> {
-        let opened = open::open(data_dir).await?;
+        Self::opened(data_dir, IfGone::CreateFirst).await
+    }
+
+    /// Opens the database of a data directory; creates it if it is missing, also if there was one.
+    ///
+    /// # Errors
+    /// The directory cannot be used; nothing was changed in it.
+    pub async fn open_or_new(data_dir: &Path) -> Result<Self, OpenError> {
+        Self::opened(data_dir, IfGone::Create).await
+    }
+
+    async fn opened(data_dir: &Path, if_gone: IfGone) -> Result<Self, OpenError> {
+        let opened = open::open(data_dir, if_gone).await?;
         let (last, last_row, last_listed): (i64, i64, i64) = sqlx::query_as(
             "SELECT (SELECT coalesce(max(number), 0) FROM games),
                     (SELECT coalesce(max(row), 0) FROM journal),
@@ -91,12 +109,24 @@ impl SqliteStore {
         let (has_failed, failed) = watch::channel(None);
         let codec = Codec::new();
         let metrics = StoreMetrics::default();
-        let writing = tokio::spawn(writer::run(
-            opened.writer,
-            last_listed,
-            queue,
-            has_failed,
-            metrics.clone(),
+        let space = Space::new(data_dir);
+        if space.has_some() {
+            space::keep_ballast(data_dir);
+        } else {
+            warn!(
+                "the disk is nearly full: durable rooms, tournaments and studies are refused until there is space"
+            );
+        }
+        let writing = tokio::spawn(named(
+            LongTask::SqliteWriter,
+            writer::run(
+                opened.writer,
+                last_listed,
+                queue,
+                has_failed,
+                metrics.clone(),
+                Arc::clone(&space),
+            ),
         ));
         Ok(Self {
             data_dir: data_dir.to_path_buf(),
@@ -108,12 +138,15 @@ impl SqliteStore {
             commands: WriteQueue {
                 queue: commands,
                 next_row: Arc::new(AtomicI64::new(last_row + 1)),
+                space: Arc::clone(&space),
             },
             failed,
             numbers: Arc::new(AtomicI64::new(last + 1)),
+            reserved: Reservations::default(),
             writing: Mutex::new(Some(writing)),
             closed: Arc::new(AtomicBool::new(false)),
             metrics,
+            space,
             _lock: opened.lock,
         })
     }
@@ -125,14 +158,11 @@ impl Store for SqliteStore {
     }
 
     fn has_space(&self) -> bool {
-        match rustix::fs::statvfs(&self.data_dir) {
-            Ok(disk) => {
-                let reserve = MAX_RESERVE_BYTES.min(disk.f_blocks * disk.f_frsize / RESERVE_SHARE);
-                disk.f_bavail * disk.f_frsize >= reserve
-            }
-            // If the free space is unknown, try.
-            Err(_) => true,
-        }
+        self.space.has_some()
+    }
+
+    fn stop_waiting(&self) {
+        self.space.stop();
     }
 
     fn metrics(&self) -> Option<&StoreMetrics> {
@@ -151,17 +181,30 @@ impl Store for SqliteStore {
         let number = self.numbers.fetch_add(1, Ordering::Relaxed);
         let (commands, readers) = (self.commands.clone(), self.reader.pool.clone());
         let codec = self.codec.clone();
-        if header.policy.durability == Durability::Ephemeral {
-            let queue = commands;
-            let first = form::entries_to_bytes(&mut entries);
-            let journal = EphemeralJournal::new(header, first, Whole { number, queue });
-            return ready(Ok(Box::new(journal) as Box<dyn Journal>)).boxed();
-        }
         async move {
+            let game = header.game_id;
+            let taken = StoreError::Taken(game);
+            let reserved = self.reserved.take(game).ok_or_else(|| taken.clone())?;
+            if header.policy.durability == Durability::Ephemeral {
+                if self.reader.has_game(game).await? {
+                    return Err(taken);
+                }
+                let running = commands.space.game();
+                let whole = Whole {
+                    number,
+                    queue: commands,
+                    _running: running,
+                    _reserved: reserved,
+                };
+                let first = form::entries_to_bytes(&mut entries);
+                let journal = EphemeralJournal::new(header, first, whole);
+                return Ok(Box::new(journal) as Box<dyn Journal>);
+            }
             let mut journal = DurableJournal {
                 number,
                 position: 0,
                 last_row: None,
+                running: Some(commands.space.game()),
                 queue: commands,
                 readers,
                 codec,
@@ -181,6 +224,10 @@ impl Store for SqliteStore {
             .boxed()
     }
 
+    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
+        self.reader.summary(game).boxed()
+    }
+
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         self.reader.finished(game).boxed()
     }
@@ -190,7 +237,7 @@ impl Store for SqliteStore {
         filter: &'a v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<(u64, v1::RecordSummary)>, StoreError>> {
+    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>> {
         self.reader.list(filter, part, count).boxed()
     }
 
@@ -202,6 +249,9 @@ impl Store for SqliteStore {
     ) -> BoxFuture<'_, Result<bool, StoreError>> {
         summary.added = true;
         async move {
+            let Some(_reserved) = self.reserved.take(game) else {
+                return Ok(false);
+            };
             let number = self.numbers.fetch_add(1, Ordering::Relaxed);
             let count = lines.len();
             let encoding = self.codec.run(count, move || form::lines_to_bytes(&lines));
@@ -242,6 +292,10 @@ impl Store for SqliteStore {
         count: usize,
     ) -> BoxFuture<'_, Result<Vec<(u64, Id)>, StoreError>> {
         self.reader.prunable(keep, after, count).boxed()
+    }
+
+    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.commands.send(WriteCommand::Prune { games }).boxed()
     }
 
     fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
@@ -327,7 +381,7 @@ impl Store for SqliteStore {
         &self,
         study: Id,
         changes: Vec<StudyChange>,
-        forgotten: u32,
+        forgotten: Vec<u32>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let row = study_row(study, 0, &changes);
         let rewritten = WriteCommand::StudyRewritten { row, forgotten };

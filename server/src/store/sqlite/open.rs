@@ -13,11 +13,11 @@ use sqlx::sqlite::{
 use sqlx::{Connection as _, SqlSafeStr as _};
 
 use super::errors::{BUSY_LIMIT, CORRUPT, FILE, NOT_A_DATABASE, explain, has_code};
+use super::former::{self, LOCK_FILE};
 use super::rows::with_own_rows;
+use super::space::give_up_ballast;
 use crate::store::StoreError;
 
-/// The file that a server locks while it uses the data directory.
-pub const LOCK_FILE: &str = "games.lock";
 /// Identifies our databases: `PRAGMA application_id` of the first migration.
 pub(super) const APPLICATION_ID: i64 = 0x4368_4874;
 /// Connections for reading.
@@ -70,6 +70,11 @@ pub enum OpenError {
         "{0} is damaged ({1}); nothing was changed: restore a backup, or move it away to start with an empty database (records are in records/)"
     )]
     Damaged(PathBuf, String),
+    /// The database is gone, and something else of an earlier server is there.
+    #[error(
+        "{0} is empty or missing, but a server used this folder before: {1}; nothing was changed: restore a backup or put the database back, or begin with an empty database: chefshat serve --new (records stay)"
+    )]
+    Gone(PathBuf, String),
     /// The database was written by a newer version.
     #[error(
         "{0} was written by a newer version of chefshat; nothing was changed: use that version, or choose another folder with --data-dir"
@@ -116,11 +121,48 @@ async fn make_shrinkable(writer: &mut SqliteConnection) -> sqlx::Result<()> {
     Ok(())
 }
 
-/// Opens the database of a data directory; creates it if it is missing.
-pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
-    let path = data_dir.join(FILE);
+/// What happens if the database is empty or missing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum IfGone {
+    /// It is created, unless the directory shows that there was one.
+    CreateFirst,
+    /// It is created.
+    Create,
+}
+
+/// Opens the database of a data directory; creates it if it is missing. Reading a database takes some
+/// space, too: on a full disk it takes what was kept for that.
+pub(super) async fn open(data_dir: &Path, if_gone: IfGone) -> Result<Opened, OpenError> {
+    let had_lock = data_dir.join(LOCK_FILE).exists();
     let lock = lock(data_dir)?;
+    let trace = match if_gone {
+        IfGone::CreateFirst => former::trace(data_dir, &lock.0, had_lock),
+        IfGone::Create => None,
+    };
+    let trace = trace.as_deref();
+    let (writer, readers) = match open_database(data_dir, trace).await {
+        Err(OpenError::Other(..)) if give_up_ballast(data_dir) => {
+            open_database(data_dir, trace).await
+        }
+        opened => opened,
+    }?;
+    former::mark(&lock.0);
+    Ok(Opened {
+        writer,
+        readers,
+        lock,
+    })
+}
+
+/// Opens the database of a data directory that this process has locked. `trace` shows that it had
+/// one: an empty one is not created then.
+async fn open_database(
+    data_dir: &Path,
+    trace: Option<&str>,
+) -> Result<(SqliteConnection, SqlitePool), OpenError> {
+    let path = data_dir.join(FILE);
     check_log(&path)?;
+    let mut is_empty = true;
     let options = SqliteConnectOptions::new()
         .filename(&path)
         .busy_timeout(BUSY_LIMIT)
@@ -155,6 +197,10 @@ pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
             return Err(OpenError::NotOurs(path));
         }
         looking.close().await.map_err(failed)?;
+        is_empty = id != APPLICATION_ID;
+    }
+    if is_empty && let Some(trace) = trace {
+        return Err(OpenError::Gone(path, trace.to_owned()));
     }
     make_private(&path)?;
     let options = options
@@ -198,11 +244,7 @@ pub(super) async fn open(data_dir: &Path) -> Result<Opened, OpenError> {
         .connect_with(options.read_only(true).create_if_missing(false))
         .await
         .map_err(failed)?;
-    Ok(Opened {
-        writer,
-        readers,
-        lock,
-    })
+    Ok((writer, readers))
 }
 
 /// Whether the database contains nothing but an incomplete first migration.
@@ -243,6 +285,7 @@ fn lock(data_dir: &Path) -> Result<FolderLock, OpenError> {
     let file = File::options()
         .create(true)
         .truncate(false)
+        .read(true)
         .write(true)
         .open(&path)
         .map_err(io)?;

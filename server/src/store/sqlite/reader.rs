@@ -12,24 +12,27 @@ use tracing::error;
 
 use super::errors::failure;
 use super::journals::{DurableJournal, WriteQueue};
+use super::retained::Units;
 use super::rows::{self, Read};
 use crate::store::Keep;
 use crate::store::codec::Codec;
 use crate::store::form::{self, Unreadable, check_form, stored_header};
 use crate::store::studies::{StoredStudy, StoredTraces};
 use crate::store::tournaments::StoredTournament;
-use crate::store::{Part, ResumableGame, StoreError, StoredGame};
+use crate::store::{Listed, Part, ResumableGame, StoreError, StoredGame, listed};
 use chefshat_room::ids::Id;
 
 /// Most ended games whose rooms are restored: the newest ones, because clients know the end of
 /// older ones.
 const MAX_ENDED: i64 = 256;
+/// Most games of which retention reads at a time whether they are needed.
+const MAX_PRUNABLE_READ: usize = 1_024;
 
 /// The query for a list of finished games, with the condition on their numbers and the order.
 macro_rules! list_query {
     ($part:literal, $order:literal) => {
         concat!(
-            "SELECT listed, summary FROM games
+            "SELECT listed, summary, game_id FROM games
              WHERE summary IS NOT NULL AND ",
             $part,
             " AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)
@@ -89,6 +92,7 @@ impl Reader {
                         number,
                         position: read.rows,
                         last_row: read.last_row,
+                        running: (!concluded).then(|| commands.space.game()),
                         queue: commands.clone(),
                         readers: self.pool.clone(),
                         codec: self.codec.clone(),
@@ -105,6 +109,23 @@ impl Reader {
         Ok(left)
     }
 
+    /// See `Store::summary`.
+    pub(super) async fn summary(&self, game: Id) -> Result<Option<v1::RecordSummary>, StoreError> {
+        let summary: Option<Vec<u8>> = sqlx::query_scalar(
+            "SELECT summary FROM games WHERE game_id = $1 AND summary IS NOT NULL",
+        )
+        .bind(game.0.as_slice())
+        .fetch_optional(&self.pool)
+        .await
+        .map_err(failure)?;
+        let decoded = summary.map(|bytes| v1::RecordSummary::decode(bytes.as_slice()));
+        decoded.transpose().map_err(|error| {
+            StoreError::Unreadable(format!(
+                "the summary of game {game} cannot be read: {error}"
+            ))
+        })
+    }
+
     /// See `Store::finished`.
     pub(super) async fn finished(&self, game: Id) -> Result<Option<StoredGame>, StoreError> {
         let row = sqlx::query(
@@ -118,7 +139,7 @@ impl Reader {
         .map_err(failure)?;
         let Some(row) = row else { return Ok(None) };
         let unreadable = |problem: Unreadable| {
-            StoreError::Failed(format!("game {game} cannot be read: {problem}"))
+            StoreError::Unreadable(format!("game {game} cannot be read: {problem}"))
         };
         check_form(row.get(1)).map_err(unreadable)?;
         let record: Option<Vec<u8>> = row.get(3);
@@ -139,6 +160,15 @@ impl Reader {
             journal.entries.into(),
             signature.map_err(unreadable)?.map(Arc::new),
         )))
+    }
+
+    /// Whether a game with this id is stored, over or not.
+    pub(super) async fn has_game(&self, game: Id) -> Result<bool, StoreError> {
+        sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM games WHERE game_id = $1)")
+            .bind(game.0.as_slice())
+            .fetch_one(&self.pool)
+            .await
+            .map_err(failure)
     }
 
     /// See `Store::tournaments`.
@@ -220,11 +250,12 @@ impl Reader {
         .fetch_all(&self.pool)
         .await
         .map_err(failure)?;
-        let read = rows
-            .iter()
-            .map(|row| form::stored_traces(row.get(0), row.get(1), row.get(2)));
-        read.collect::<Result<_, _>>()
-            .map_err(|problem| unreadable_study(study, &problem))
+        let read = rows.iter().filter_map(|row| {
+            form::stored_traces(row.get(0), row.get(1), row.get(2))
+                .inspect_err(|problem| error!(%study, %problem, "traces of a game are left out"))
+                .ok()
+        });
+        Ok(read.collect())
     }
 
     /// The journals of all running games, by game number; the inner result says why one cannot be
@@ -263,7 +294,7 @@ impl Reader {
         filter: &v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> Result<Vec<(u64, v1::RecordSummary)>, StoreError> {
+    ) -> Result<Vec<Listed>, StoreError> {
         let (query, number) = match part {
             Part::After(number) => (list_query!("listed > $1", "listed"), number),
             Part::Before(number) => (list_query!("listed < $1", "listed DESC"), number),
@@ -282,16 +313,10 @@ impl Reader {
             .fetch_all(&self.pool)
             .await
             .map_err(failure)?;
-        rows.iter()
-            .map(|row| {
-                let number: i64 = row.get(0);
-                let summary =
-                    v1::RecordSummary::decode(row.get::<&[u8], _>(1)).map_err(|error| {
-                        StoreError::Failed(format!("game number {number}: {error}"))
-                    })?;
-                Ok((u64::try_from(number).unwrap_or_default(), summary))
-            })
-            .collect()
+        Ok(rows
+            .iter()
+            .map(|row| listed(row.get(0), row.get(2), row.get(1)))
+            .collect())
     }
 
     /// See `Store::finished_games`.
@@ -307,28 +332,47 @@ impl Reader {
     pub(super) async fn prunable(
         &self,
         keep: Keep,
-        after: u64,
+        mut after: u64,
         count: usize,
     ) -> Result<Vec<(u64, Id)>, StoreError> {
         let integer = |number: u64| i64::try_from(number).unwrap_or(i64::MAX);
-        let rows: Vec<(i64, Vec<u8>)> = sqlx::query_as(
-            "SELECT number, game_id FROM games
-             WHERE state <> 0 AND number > $1 AND coalesce(ended_at_ms, created_at_ms, 0) < $3
-               AND (summary IS NULL
-                    OR filed = 1 AND listed <= (SELECT listed FROM games WHERE listed IS NOT NULL
-                                                ORDER BY listed DESC LIMIT 1 OFFSET $2))
-             ORDER BY number LIMIT $4",
-        )
-        .bind(integer(after))
-        .bind(integer(keep.newest.unwrap_or_default().max(1)))
-        .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
-        .bind(integer(count as u64))
-        .fetch_all(&self.pool)
-        .await
-        .map_err(failure)?;
-        Ok((rows.into_iter())
-            .filter_map(|(number, id)| Some((u64::try_from(number).ok()?, Id(id.try_into().ok()?))))
-            .collect())
+        let mut connection = self.pool.acquire().await.map_err(failure)?;
+        let (mut found, mut units) = (Vec::new(), Units::default());
+        let mut page = count;
+        loop {
+            /// Number, game, encoding version, header.
+            type Row = (i64, Vec<u8>, i64, Option<Vec<u8>>);
+            let rows: Vec<Row> = sqlx::query_as(
+                "SELECT number, game_id, form, header FROM games
+                 WHERE state <> 0 AND number > $1 AND coalesce(ended_at_ms, created_at_ms, 0) < $3
+                   AND (summary IS NULL
+                        OR filed = 1 AND listed <= (SELECT listed FROM games WHERE listed IS NOT NULL
+                                                    ORDER BY listed DESC LIMIT 1 OFFSET $2))
+                 ORDER BY number LIMIT $4",
+            )
+            .bind(integer(after))
+            .bind(integer(keep.newest.unwrap_or_default().max(1)))
+            .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
+            .bind(integer(page as u64))
+            .fetch_all(&mut *connection)
+            .await
+            .map_err(failure)?;
+            let Some((last, ..)) = rows.last() else {
+                return Ok(found);
+            };
+            after = last.unsigned_abs();
+            for (number, id, form, header) in rows {
+                let Ok(id) = id.try_into() else { continue };
+                let needed = units.need(&mut connection, form, header.as_deref());
+                if !needed.await.map_err(failure)? {
+                    found.push((number.unsigned_abs(), Id(id)));
+                }
+                if found.len() >= count {
+                    return Ok(found);
+                }
+            }
+            page = MAX_PRUNABLE_READ.min(page * 2);
+        }
     }
 
     /// See `Store::without_record_file`.
@@ -345,5 +389,5 @@ impl Reader {
 }
 
 fn unreadable_study(study: Id, problem: &Unreadable) -> StoreError {
-    StoreError::Failed(format!("study {study} cannot be read: {problem}"))
+    StoreError::Unreadable(format!("study {study} cannot be read: {problem}"))
 }

@@ -37,12 +37,13 @@ pub(super) async fn rewrite(
         }
         if let Some((summary, room_name)) = &game.summary {
             sqlx::query(
-                "UPDATE games SET summary = $2, room_name = $3, filed = 0, signature = NULL
+                "UPDATE games SET summary = $2, room_name = $3, filed = 0, signature = $4
                  WHERE number = $1",
             )
             .bind(game.number)
             .bind(summary.as_slice())
             .bind(room_name.as_str())
+            .bind(game.signature.as_deref())
             .execute(&mut *connection)
             .await?;
         }

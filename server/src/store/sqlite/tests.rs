@@ -19,7 +19,7 @@ use sqlx::{Connection as _, Executor as _};
 
 use super::{OpenError, SqliteStore};
 use crate::store::form;
-use crate::store::tournaments::StoredTournament;
+use crate::store::tournaments::{StoredTournament, TournamentEntry};
 use crate::store::{Keep, Part, Store, StoredGame};
 use crate::tournaments::restored;
 use chefshat_room::ids::{Id, SecretHash};
@@ -37,6 +37,7 @@ fn header(game: u8, durability: Durability) -> GameHeader {
         rules: RuleSetSpec::default().validate().expect("the standard"),
         rules_version: RULES_VERSION,
         server_version: "0.0.1".into(),
+        participant_removed: false,
         policy: Policy {
             durability,
             bank: Duration::from_millis(1_234),
@@ -374,7 +375,7 @@ async fn an_imported_game_is_stored_once() {
     );
     let listed = (store.list(&v1::RecordFilter::default(), Part::FROM_OLDEST, 9)).await;
     let listed = listed.expect("readable");
-    assert!(listed.len() == 1 && listed[0].1.added);
+    assert!(listed.len() == 1 && listed[0].1.as_ref().is_ok_and(|it| it.added));
     let hosted_here = v1::RecordFilter {
         hosted_here: true,
         ..v1::RecordFilter::default()
@@ -528,6 +529,52 @@ async fn an_import_of_an_earlier_version_is_kept_from_the_first_start_of_this_on
         };
         let found = store.prunable(keep, 0, 9).await.expect("readable");
         assert_eq!(found.len(), prunable);
+    }
+}
+
+#[tokio::test]
+async fn games_of_what_cannot_be_read_are_not_pruned() {
+    for (damage, needed) in [
+        ("SELECT 1", false),
+        ("UPDATE tournaments SET form = 99", true),
+        ("UPDATE tournament_entries SET entries = x'ff'", true),
+        ("UPDATE games SET header = x'ff'", true),
+        ("UPDATE games SET form = 99", true),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = opened(folder.path()).await;
+        let over = vec![TournamentEntry::Change(
+            chefshat_tournament::Change::Finished,
+        )];
+        let created = store
+            .create_tournament(Arc::new(tournaments::cup(9)), over)
+            .await;
+        created.expect("committed");
+        for game in 1..=2 {
+            let header = Arc::new(GameHeader {
+                tournament: Some(chefshat_room::journal::TournamentGame {
+                    tournament: Id([9; 16]),
+                    series: None,
+                }),
+                ..header(game, Durability::Durable)
+            });
+            let created = store.create(Arc::clone(&header), Vec::new()).await;
+            let mut journal = created.expect("committed");
+            let finished = journal.finish(Some(summary(&header)), None).await;
+            finished.expect("committed");
+            let written = store.mark_record_written(header.game_id).await;
+            written.expect("committed");
+        }
+        store.close().await;
+        drop(store);
+        edit(folder.path(), damage).await;
+        let store = opened(folder.path()).await;
+        let found = store.prunable(Keep::default(), 0, 9).await;
+        assert_eq!(found.expect("readable").is_empty(), needed, "{damage}");
+        store.prune(vec![Id([1; 16])]).await.expect("committed");
+        let left = store.finished_games().await;
+        assert_eq!(left, Ok(1 + u64::from(needed)), "{damage}");
+        store.close().await;
     }
 }
 

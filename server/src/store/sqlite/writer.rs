@@ -5,6 +5,7 @@
 //! database's own thread and back.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use chefshat_proto::v1;
 use prost::Message as _;
@@ -14,9 +15,11 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::Instant;
 use tracing::{error, warn};
 
-use super::errors::explain;
+use super::errors::{FULL, explain, has_code};
+use super::retained::Units;
 use super::rewriting::{empty_log, rewrite};
 use super::rows::with_own_rows;
+use super::space::Space;
 use crate::clock::since_epoch_ms;
 use crate::metrics::StoreMetrics;
 use crate::store::StoreError;
@@ -76,6 +79,8 @@ pub(super) enum WriteCommand {
     },
     /// Marks the record of a game as written to a file.
     RecordWritten { game_id: Id },
+    /// Deletes finished games that no tournament or study needs.
+    Prune { games: Vec<Id> },
     /// Deletes finished games.
     Delete { games: Vec<Id> },
     /// Creates a tournament.
@@ -89,8 +94,8 @@ pub(super) enum WriteCommand {
     Study { id: Id, header: Vec<u8> },
     /// Adds a row to a study.
     StudyChanges(StudyRow),
-    /// Replaces the rows of a study by one and deletes the interface traces of a participant.
-    StudyRewritten { row: StudyRow, forgotten: u32 },
+    /// Replaces the rows of a study by one and deletes the interface traces of participants.
+    StudyRewritten { row: StudyRow, forgotten: Vec<u32> },
     /// Deletes a study.
     StudyDeleted(Id),
     /// Adds interface traces.
@@ -150,8 +155,9 @@ pub(super) struct StudyRow {
 /// A command and the sender of its result.
 pub(super) type Pending = (WriteCommand, oneshot::Sender<Result<(), StoreError>>);
 
-/// Executes commands until all senders are gone. After the first failure it executes none: the
-/// outcome of the failed transaction is unknown.
+/// Executes commands until all senders are gone. While the disk is full, it waits: nothing of such a
+/// transaction was committed. After any other failure it executes none: the outcome of the failed
+/// transaction is unknown.
 ///
 /// `last_listed` is the highest number in the list of finished games.
 pub(super) async fn run(
@@ -160,6 +166,7 @@ pub(super) async fn run(
     mut commands: mpsc::Receiver<Pending>,
     failed: watch::Sender<Option<StoreError>>,
     metrics: StoreMetrics,
+    space: Arc<Space>,
 ) {
     let mut pending = Vec::new();
     let mut open = true;
@@ -176,7 +183,7 @@ pub(super) async fn run(
         let began = Instant::now();
         let committed = match failure {
             Some(failure) => Err(failure),
-            None => commit(&mut connection, &mut pending, &mut last_listed)
+            None => commit_with_space(&mut connection, &mut pending, &mut last_listed, &space)
                 .await
                 .map_err(|cause| {
                     let failure = StoreError::Failed(explain(&cause));
@@ -186,12 +193,18 @@ pub(super) async fn run(
                 }),
         };
         metrics.committed(pending.len(), began.elapsed());
-        let deletes = |(order, _): &Pending| matches!(order, WriteCommand::Delete { .. });
+        let deletes = |(order, _): &Pending| {
+            matches!(
+                order,
+                WriteCommand::Delete { .. } | WriteCommand::Prune { .. }
+            )
+        };
         let frees_pages = committed.is_ok() && pending.iter().any(deletes);
         let forgets = |(order, _): &Pending| {
             matches!(
                 order,
                 WriteCommand::Delete { .. }
+                    | WriteCommand::Prune { .. }
                     | WriteCommand::Rewrite(_)
                     | WriteCommand::StudyRewritten { .. }
                     | WriteCommand::StudyDeleted(_)
@@ -218,6 +231,32 @@ pub(super) async fn run(
     // The write-ahead log is as safe as the database: closing only tidies up.
     if let Err(cause) = connection.close().await {
         error!(%cause, "closing the database failed");
+    }
+}
+
+/// Commits commands, as soon as there is space for them on the disk.
+async fn commit_with_space(
+    connection: &mut SqliteConnection,
+    pending: &mut [Pending],
+    last_listed: &mut i64,
+    space: &Space,
+) -> sqlx::Result<BTreeMap<usize, Id>> {
+    let began = Instant::now();
+    let listed_before = *last_listed;
+    loop {
+        match commit(connection, pending, last_listed).await {
+            Ok(taken) => {
+                space.found();
+                return Ok(taken);
+            }
+            Err(cause) if has_code(&cause, FULL) => {
+                *last_listed = listed_before;
+                if !space.wait(began).await {
+                    return Err(cause);
+                }
+            }
+            Err(cause) => return Err(cause),
+        }
     }
 }
 
@@ -376,7 +415,7 @@ async fn write(
             }
             WriteCommand::StudyChanges(row) => change_study(connection, row).await?,
             WriteCommand::StudyRewritten { row, forgotten } => {
-                forget_in_study(connection, row.id, *forgotten).await?;
+                forget_in_study(connection, row.id, forgotten).await?;
                 change_study(connection, row).await?;
             }
             WriteCommand::StudyDeleted(study) => delete_study(connection, *study).await?,
@@ -397,6 +436,7 @@ async fn write(
                 .execute(&mut *connection)
                 .await?;
             }
+            WriteCommand::Prune { games } => prune(connection, games).await?,
             WriteCommand::Delete { games } => {
                 for game in games {
                     delete(connection, *game).await?;
@@ -435,6 +475,29 @@ async fn free_pages(connection: &mut SqliteConnection) {
         // It needs space in the write-ahead log. What was committed before is safe.
         warn!(%cause, "the disk space of deleted games could not be given back");
     }
+}
+
+/// Deletes those of these finished games that no tournament or study needs. The files of the others
+/// may be gone: they are written again.
+async fn prune(connection: &mut SqliteConnection, games: &[Id]) -> sqlx::Result<()> {
+    let mut units = Units::default();
+    for game in games {
+        let row: Option<(i64, Option<Vec<u8>>)> =
+            sqlx::query_as("SELECT form, header FROM games WHERE game_id = $1 AND state <> 0")
+                .bind(game.0.as_slice())
+                .fetch_optional(&mut *connection)
+                .await?;
+        let Some((form, header)) = row else { continue };
+        if units.need(connection, form, header.as_deref()).await? {
+            sqlx::query("UPDATE games SET filed = 0 WHERE game_id = $1")
+                .bind(game.0.as_slice())
+                .execute(&mut *connection)
+                .await?;
+        } else {
+            delete(connection, *game).await?;
+        }
+    }
+    Ok(())
 }
 
 /// Deletes a finished game.
@@ -548,12 +611,11 @@ async fn delete_study(connection: &mut SqliteConnection, study: Id) -> sqlx::Res
     Ok(())
 }
 
-/// Deletes the journal of a study, which is written again, and the interface traces of a
-/// participant.
+/// Deletes the journal of a study, which is written again, and the interface traces of participants.
 async fn forget_in_study(
     connection: &mut SqliteConnection,
     study: Id,
-    participant: u32,
+    participants: &[u32],
 ) -> sqlx::Result<()> {
     sqlx::query(
         "DELETE FROM study_changes WHERE study = (SELECT number FROM studies WHERE study_id = $1)",
@@ -561,15 +623,17 @@ async fn forget_in_study(
     .bind(study.0.as_slice())
     .execute(&mut *connection)
     .await?;
-    sqlx::query(
-        "DELETE FROM study_traces
-         WHERE study = (SELECT number FROM studies WHERE study_id = $1) AND participant = $2",
-    )
-    .bind(study.0.as_slice())
-    .bind(participant)
-    .execute(connection)
-    .await
-    .map(drop)
+    for participant in participants {
+        sqlx::query(
+            "DELETE FROM study_traces
+             WHERE study = (SELECT number FROM studies WHERE study_id = $1) AND participant = $2",
+        )
+        .bind(study.0.as_slice())
+        .bind(participant)
+        .execute(&mut *connection)
+        .await?;
+    }
+    Ok(())
 }
 
 /// Writes the end and the search fields of a game, and adds it to the list of finished games.

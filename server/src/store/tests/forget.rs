@@ -17,6 +17,7 @@ fn ana() -> Pseudonym {
             fingerprint: None,
         },
         pseudonym: "deleted 1".into(),
+        key: None,
     }
 }
 
@@ -235,6 +236,7 @@ async fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
                 fingerprint: Some(fingerprint.into()),
             },
             pseudonym: format!("deleted {fingerprint}"),
+            key: None,
         };
         let nobody = store.forget(&with_fingerprint("key of Bo")).await;
         assert_eq!(nobody.expect("nothing to do"), Forgotten::default());

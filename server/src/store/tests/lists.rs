@@ -174,6 +174,7 @@ async fn check(store: &dyn Store) {
         let numbers: Vec<u64> = listed.iter().map(|(number, _)| *number).collect();
         assert_eq!(numbers, expected, "{filter:?}");
         for (number, summary) in listed {
+            let summary = summary.expect("readable");
             assert!(crate::store::matches_filter(&filter, &summary), "{number}");
         }
         // In reverse order the same games come, whole or page by page.

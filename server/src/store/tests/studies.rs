@@ -162,7 +162,7 @@ async fn stored_studies_are_read_back_and_forget_participants() {
         let all = [1, 2, 1].map(traces).to_vec();
         assert_eq!(store.traces(id).await, Ok(all));
 
-        let rewritten = store.rewrite_study(id, vec![added(2)], 1);
+        let rewritten = store.rewrite_study(id, vec![added(2)], vec![1]);
         rewritten.await.expect("committed");
         let appended = store.append_study(id, 1, vec![Change::Closed]);
         appended.await.expect("committed");

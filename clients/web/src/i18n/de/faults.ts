@@ -51,6 +51,7 @@ export const faults: Texts["faults"] = {
     TOO_MANY_CALLS: "Der Server bekommt zu viele Anfragen aus deinem Netz oder mit deinem Link.",
     TOO_MANY_CALLS_AT_ONCE: "Der Server bekommt zu viele Anfragen aus deinem Netz oder mit deinem Link.",
     TOO_MANY_UNREAD_ANSWERS: "Der Server bekommt zu viele Anfragen aus deinem Netz oder mit deinem Link.",
+    TOO_MANY_LARGE_MESSAGES: "Der Server bekommt zu viele Anfragen aus deinem Netz oder mit deinem Link.",
     TOO_MANY_WAITING_CALLS:
       "Der Server bekommt zu viele Anfragen aus deinem Netz oder mit deinem Link. Lade die Seite neu.",
     TOO_MANY_STREAMS:
@@ -70,6 +71,8 @@ export const faults: Texts["faults"] = {
       "Der Server konnte das nicht ausführen. Versuche es noch einmal; wenn es wieder fehlschlägt, sag der Person Bescheid, die ihn betreibt.",
     SHUTTING_DOWN: "Der Server wird gerade abgeschaltet. Die Partien gehen weiter, wenn er wieder da ist.",
     GAME_UNKNOWN: "Der Server hat keine Aufzeichnung dieser Partie, oder sie ist privat.",
+    RECORD_UNREADABLE:
+      "Die Aufzeichnung dieser Partie ist beschädigt. Bitte informiere den Betreiber des Servers. Andere Partien sind nicht betroffen.",
     GAME_RUNNING: "Die Partie läuft noch. Ihre Aufzeichnung gibt es, wenn sie zu Ende ist.",
     SERIES_OPEN:
       "Andere Partien mit denselben Karten laufen noch. Die Aufzeichnung gibt es, wenn die Runde zu Ende ist.",

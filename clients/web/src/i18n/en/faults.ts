@@ -48,6 +48,7 @@ export const faults = {
     TOO_MANY_CALLS: "The server gets too many requests from your network, or with your link.",
     TOO_MANY_CALLS_AT_ONCE: "The server gets too many requests from your network, or with your link.",
     TOO_MANY_UNREAD_ANSWERS: "The server gets too many requests from your network, or with your link.",
+    TOO_MANY_LARGE_MESSAGES: "The server gets too many requests from your network, or with your link.",
     TOO_MANY_WAITING_CALLS:
       "The server gets too many requests from your network, or with your link. Load the page again.",
     TOO_MANY_STREAMS:
@@ -66,6 +67,8 @@ export const faults = {
     INTERNAL: "The server failed to do this. Try again; if it fails again, tell the server’s host.",
     SHUTTING_DOWN: "The server is shutting down. Games resume when it is back.",
     GAME_UNKNOWN: "The server has no record of this game, or it is private.",
+    RECORD_UNREADABLE:
+      "The record of this game is damaged. Please tell the operator of the server. Other games are not affected.",
     GAME_RUNNING: "The game is still running. Its record is available when it ends.",
     SERIES_OPEN: "Other games with the same deals are still running. The record is available when the round is over.",
     TOURNAMENT_UNKNOWN: "This tournament does not exist, or it is private.",

@@ -50,6 +50,7 @@ export const faults: Texts["faults"] = {
     TOO_MANY_CALLS: "El servidor recibe demasiadas peticiones de tu red, o con tu enlace.",
     TOO_MANY_CALLS_AT_ONCE: "El servidor recibe demasiadas peticiones de tu red, o con tu enlace.",
     TOO_MANY_UNREAD_ANSWERS: "El servidor recibe demasiadas peticiones de tu red, o con tu enlace.",
+    TOO_MANY_LARGE_MESSAGES: "El servidor recibe demasiadas peticiones de tu red, o con tu enlace.",
     TOO_MANY_WAITING_CALLS:
       "El servidor recibe demasiadas peticiones de tu red, o con tu enlace. Vuelve a cargar la página.",
     TOO_MANY_STREAMS: "Hay demasiadas páginas y agentes conectados desde tu red, o con tu enlace. Cierra algunos.",
@@ -68,6 +69,8 @@ export const faults: Texts["faults"] = {
       "El servidor no ha podido hacerlo. Inténtalo de nuevo; si vuelve a fallar, avisa a quien administra el servidor.",
     SHUTTING_DOWN: "El servidor se está apagando. Las partidas se reanudan cuando vuelva.",
     GAME_UNKNOWN: "El servidor no tiene ningún registro de esta partida, o es privada.",
+    RECORD_UNREADABLE:
+      "El registro de esta partida está dañado. Avisa al operador del servidor. Las demás partidas no están afectadas.",
     GAME_RUNNING: "La partida sigue en curso. Su registro estará disponible cuando termine.",
     SERIES_OPEN:
       "Otras partidas con las mismas cartas siguen en curso. El registro estará disponible cuando termine la ronda.",

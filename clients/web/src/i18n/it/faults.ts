@@ -49,6 +49,7 @@ export const faults: Texts["faults"] = {
     TOO_MANY_CALLS: "Il server riceve troppe richieste dalla tua rete o con il tuo link.",
     TOO_MANY_CALLS_AT_ONCE: "Il server riceve troppe richieste dalla tua rete o con il tuo link.",
     TOO_MANY_UNREAD_ANSWERS: "Il server riceve troppe richieste dalla tua rete o con il tuo link.",
+    TOO_MANY_LARGE_MESSAGES: "Il server riceve troppe richieste dalla tua rete o con il tuo link.",
     TOO_MANY_WAITING_CALLS: "Il server riceve troppe richieste dalla tua rete o con il tuo link. Ricarica la pagina.",
     TOO_MANY_STREAMS: "Troppe pagine e troppi agenti sono collegati dalla tua rete o con il tuo link. Chiudine alcuni.",
     TOO_MANY_FOLLOWERS: "Al momento troppe persone seguono dei tornei.",
@@ -64,6 +65,8 @@ export const faults: Texts["faults"] = {
     INTERNAL: "Il server non è riuscito a farlo. Riprova; se non basta, avvisa chi gestisce il server.",
     SHUTTING_DOWN: "Il server si sta spegnendo. Le partite riprendono al suo ritorno.",
     GAME_UNKNOWN: "Il server non ha la registrazione di questa partita, oppure è privata.",
+    RECORD_UNREADABLE:
+      "La registrazione di questa partita è danneggiata. Avvisa il gestore del server. Le altre partite non sono interessate.",
     GAME_RUNNING: "La partita è ancora in corso. La registrazione sarà disponibile alla fine.",
     SERIES_OPEN:
       "Altre partite con le stesse carte sono ancora in corso. La registrazione sarà disponibile alla fine del turno.",

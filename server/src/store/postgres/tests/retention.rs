@@ -50,3 +50,56 @@ async fn a_tournament_needs_its_games_at_every_node_until_it_is_over() {
     first.close().await;
     second.close().await;
 }
+
+#[tokio::test]
+async fn a_record_takes_no_id_of_a_game_that_another_node_plays() {
+    let database = chefshat_postgres::database();
+    let (first, second) = (node(&database).await, node(&database).await);
+    for (room, durability) in [(1, Durability::Ephemeral), (2, Durability::Durable)] {
+        let played = header(room, None, durability);
+        let import = || second.import(played.game_id, *summary(room), Arc::from([]));
+        let created = first.create(Arc::clone(&played), vec![entry(1)]).await;
+        let mut journal = created.expect("created");
+        assert_eq!(import().await, Ok(false));
+        let finished = journal.finish(Some(summary(room)), None).await;
+        finished.expect("committed");
+        assert_eq!(import().await, Ok(false));
+        let stored = second.finished(played.game_id).await.expect("readable");
+        assert!(matches!(stored, Some(StoredGame::Hosted(..))));
+    }
+    first.close().await;
+    second.close().await;
+}
+
+#[tokio::test]
+async fn games_of_what_cannot_be_read_are_kept() {
+    for (damage, kept) in [
+        ("SELECT 1", false),
+        ("UPDATE tournaments SET form = 99", true),
+        ("UPDATE tournament_entries SET entries = '\\xff'", true),
+        ("UPDATE games SET header = '\\xff'", true),
+        ("UPDATE games SET form = 99", true),
+    ] {
+        let database = chefshat_postgres::database();
+        let store = node(&database).await;
+        let created = store.create_tournament(cup(9), begun()).await;
+        created.expect("created");
+        for room in [1, 2] {
+            let header = header(room, Some(9), Durability::Durable);
+            let created = store.create(header, vec![entry(1)]).await;
+            let mut journal = created.expect("created");
+            let finished = journal.finish(Some(summary(room)), None).await;
+            finished.expect("committed");
+            let written = store.mark_record_written(Id([room; 16])).await;
+            written.expect("committed");
+        }
+        let end = vec![TournamentEntry::Change(TournamentChange::Closed)];
+        let ended = store.append_tournament(Id([9; 16]), 1, end).await;
+        ended.expect("committed");
+        run(&mut connected(&database).await, damage).await;
+        assert_eq!(prunable(&store).await.is_empty(), kept, "{damage}");
+        store.prune(vec![Id([1; 16])]).await.expect("committed");
+        assert_eq!(store.finished_games().await, Ok(1 + u64::from(kept)));
+        store.close().await;
+    }
+}

@@ -33,7 +33,7 @@ async fn shown(store: &dyn Store) -> String {
     let listed = listed.expect("readable");
     let mut games = Vec::new();
     for (_, summary) in &listed {
-        let id = Id::parse(&summary.game_id).expect("an id");
+        let id = Id::parse(&summary.as_ref().expect("readable").game_id).expect("an id");
         let stored = store.finished(id).await.expect("readable");
         games.push(stored.expect("it is listed"));
     }
@@ -74,7 +74,7 @@ async fn a_database_of_an_earlier_version_moves_with_everything_in_it() {
     let filter = v1::RecordFilter::default();
     let listed = store.list(&filter, Part::FROM_OLDEST, 99).await;
     for (_, summary) in listed.expect("readable") {
-        let id = Id::parse(&summary.game_id).expect("an id");
+        let id = Id::parse(&summary.as_ref().expect("readable").game_id).expect("an id");
         let stored = store.finished(id).await.expect("readable");
         let lines = convert::lines_of(&stored.expect("it is listed")).into_owned();
         let replayed = replay::replay(&lines);

@@ -89,6 +89,75 @@ async fn a_database_with_only_its_log_left_is_not_recreated() {
     assert_eq!(left, log);
 }
 
+/// What a folder has besides its database, and whether that shows a lost one.
+#[tokio::test]
+async fn a_lost_database_is_not_replaced_by_an_empty_one() {
+    let files: [(&[(&str, &str)], bool); 10] = [
+        (&[], false),
+        (&[("records/", "")], false),
+        (&[("signing-key", "a key"), ("tokens.json", "{}")], false),
+        (&[("games.lock", "")], false),
+        (&[("games.lock", ""), ("signing-key", "a key")], false),
+        (&[("records/a.jsonl", "{}")], false),
+        (&[("records/a.jsonl.part", "{}"), ("games.lock", "")], false),
+        (&[("records/a.jsonl", "{}"), ("games.lock", "")], true),
+        (&[("samples/a.0.samples", ""), ("games.lock", "")], true),
+        (&[("games.lock", "games.sqlite3 exists\n")], true),
+    ];
+    for empty in [None, Some(())] {
+        for (files, is_lost) in files {
+            let folder = tempfile::tempdir().expect("a folder");
+            for (name, text) in files {
+                let path = folder.path().join(name);
+                let parent = path.parent().expect("the folder");
+                std::fs::create_dir_all(parent).expect("created");
+                match name.ends_with('/') {
+                    true => std::fs::create_dir_all(path).expect("created"),
+                    false => std::fs::write(path, text).expect("written"),
+                }
+            }
+            let file = folder.path().join(super::super::errors::FILE);
+            if empty.is_some() {
+                std::fs::write(&file, "").expect("written");
+            }
+            let opened = SqliteStore::open(folder.path()).await;
+            match (opened, is_lost) {
+                (Ok(store), false) => store.close().await,
+                (Err(OpenError::Gone(..)), true) => {
+                    let length = file.metadata().map_or(0, |about| about.len());
+                    assert_eq!((file.exists(), length), (empty.is_some(), 0));
+                    let store = SqliteStore::open_or_new(folder.path()).await;
+                    store.expect("wanted").close().await;
+                    let store = SqliteStore::open(folder.path()).await;
+                    store.expect("there is one now").close().await;
+                }
+                (opened, _) => panic!("{files:?}: {:?}", opened.err()),
+            }
+        }
+    }
+}
+
+/// A server that ran once, even without a game, leaves a note.
+#[tokio::test]
+async fn a_database_that_is_lost_between_two_starts_is_missed() {
+    let tables_lost =
+        "PRAGMA application_id = 0; PRAGMA writable_schema = ON; DELETE FROM sqlite_schema";
+    for lose in ["remove", "empty", tables_lost] {
+        let folder = tempfile::tempdir().expect("a folder");
+        opened(folder.path()).await.close().await;
+        let file = folder.path().join(super::super::errors::FILE);
+        match lose {
+            "remove" => std::fs::remove_file(&file).expect("removed"),
+            "empty" => std::fs::write(&file, "").expect("emptied"),
+            statement => super::edit(folder.path(), statement).await,
+        }
+        let refused = SqliteStore::open(folder.path()).await;
+        let error = refused.err().expect("it is missed");
+        assert!(matches!(error, OpenError::Gone(..)), "{lose}: {error}");
+        assert!(error.to_string().contains("--new"), "{error}");
+    }
+}
+
 #[tokio::test]
 async fn games_abandoned_before_the_deal_leave_nothing_behind() {
     let folder = tempfile::tempdir().expect("a folder");

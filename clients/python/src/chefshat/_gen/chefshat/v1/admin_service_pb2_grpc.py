@@ -145,7 +145,9 @@ class AdminServiceServicer(object):
         has a participant of this name. Repeating the call completes what was interrupted, and changes
         nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint malformed);
         FAILED_PRECONDITION (PARTICIPANT_PLAYING while a game or tournament with the participant is not
-        over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
+        over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN, OWNER_UNREACHABLE: a
+        server that runs a study with the participant, or may still show the name, cannot be reached;
+        repeat the call when it can).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -66,7 +66,9 @@ class AdminServiceStub:
     has a participant of this name. Repeating the call completes what was interrupted, and changes
     nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint malformed);
     FAILED_PRECONDITION (PARTICIPANT_PLAYING while a game or tournament with the participant is not
-    over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
+    over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN, OWNER_UNREACHABLE: a
+    server that runs a study with the participant, or may still show the name, cannot be reached;
+    repeat the call when it can).
     """
 
 @_typing.type_check_only
@@ -107,7 +109,9 @@ class AdminServiceAsyncStub(AdminServiceStub):
     has a participant of this name. Repeating the call completes what was interrupted, and changes
     nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint malformed);
     FAILED_PRECONDITION (PARTICIPANT_PLAYING while a game or tournament with the participant is not
-    over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
+    over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN, OWNER_UNREACHABLE: a
+    server that runs a study with the participant, or may still show the name, cannot be reached;
+    repeat the call when it can).
     """
 
 class AdminServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -193,7 +197,9 @@ class AdminServiceServicer(metaclass=_abc_1.ABCMeta):
         has a participant of this name. Repeating the call completes what was interrupted, and changes
         nothing else. INVALID_ARGUMENT (NAME_REFUSED if the name is empty or the fingerprint malformed);
         FAILED_PRECONDITION (PARTICIPANT_PLAYING while a game or tournament with the participant is not
-        over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN).
+        over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN, OWNER_UNREACHABLE: a
+        server that runs a study with the participant, or may still show the name, cannot be reached;
+        repeat the call when it can).
         """
 
 def add_AdminServiceServicer_to_server(servicer: AdminServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

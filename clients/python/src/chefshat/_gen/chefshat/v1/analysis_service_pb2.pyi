@@ -111,7 +111,10 @@ class EvaluateRequest(_message.Message):
     4 deals at least, even if that costs more rollouts or time.
     """
     time_ms: _builtins.int
-    """Milliseconds, at most 10,000; 0: 1,000. Counting the possible deals is included."""
+    """Milliseconds of computing, at most 10,000; 0: 1,000. Counting the possible deals is included,
+    waiting for a thread is not. An analysis that could not end by the deadline of its call is
+    refused (TOO_MANY_ANALYSES).
+    """
     agent: _builtins.str
     """The built-in agent that plays all seats in rollouts: "random", "greedy" or "trained"; empty:
     "greedy".

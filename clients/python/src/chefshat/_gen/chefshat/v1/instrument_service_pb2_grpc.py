@@ -62,7 +62,7 @@ class InstrumentServiceServicer(object):
         """Puts a marker into the record of the room. Nobody but the owner learns of it. INVALID_ARGUMENT
         (MARKER_REFUSED) names the field; PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
         (ROOM_UNKNOWN); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_MARKERS: 10000 in
-        a game, or 50 a second and 200 at once; metadata `limit` says which).
+        a game, or 50 a second and 200 at once; metadata `limit` says which; DISK_NEARLY_FULL).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

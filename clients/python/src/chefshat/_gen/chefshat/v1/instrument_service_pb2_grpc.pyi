@@ -39,7 +39,7 @@ class InstrumentServiceStub:
     """Puts a marker into the record of the room. Nobody but the owner learns of it. INVALID_ARGUMENT
     (MARKER_REFUSED) names the field; PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
     (ROOM_UNKNOWN); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_MARKERS: 10000 in
-    a game, or 50 a second and 200 at once; metadata `limit` says which).
+    a game, or 50 a second and 200 at once; metadata `limit` says which; DISK_NEARLY_FULL).
     """
     FollowMarkers: _grpc.UnaryStreamMultiCallable[_instrument_service_pb2.FollowMarkersRequest, _instrument_service_pb2.FollowMarkersResponse]
     """Streams the markers of the room, those it has and then each that is added, until the game is
@@ -69,7 +69,7 @@ class InstrumentServiceAsyncStub(InstrumentServiceStub):
     """Puts a marker into the record of the room. Nobody but the owner learns of it. INVALID_ARGUMENT
     (MARKER_REFUSED) names the field; PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
     (ROOM_UNKNOWN); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_MARKERS: 10000 in
-    a game, or 50 a second and 200 at once; metadata `limit` says which).
+    a game, or 50 a second and 200 at once; metadata `limit` says which; DISK_NEARLY_FULL).
     """
     FollowMarkers: _aio.UnaryStreamMultiCallable[_instrument_service_pb2.FollowMarkersRequest, _instrument_service_pb2.FollowMarkersResponse]  # type: ignore[assignment]
     """Streams the markers of the room, those it has and then each that is added, until the game is
@@ -102,7 +102,7 @@ class InstrumentServiceServicer(metaclass=_abc_1.ABCMeta):
         """Puts a marker into the record of the room. Nobody but the owner learns of it. INVALID_ARGUMENT
         (MARKER_REFUSED) names the field; PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
         (ROOM_UNKNOWN); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_MARKERS: 10000 in
-        a game, or 50 a second and 200 at once; metadata `limit` says which).
+        a game, or 50 a second and 200 at once; metadata `limit` says which; DISK_NEARLY_FULL).
         """
 
     @_abc_1.abstractmethod

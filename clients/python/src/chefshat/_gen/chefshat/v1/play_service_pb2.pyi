@@ -470,7 +470,8 @@ class Refused(_message.Message):
     reason: _builtins.str
     """Reason in UPPER_SNAKE. For an Attach TICKET_UNKNOWN, ENTROPY_REFUSED or TOO_MANY_SEATS; for
     other commands HANDLE_UNKNOWN, COMMAND_MISSING, EXPRESSION_REFUSED, CHAT_OFF,
-    TOO_MANY_EXPRESSIONS, GAME_OVER or ROOM_GONE (reconnect: a durable game resumes).
+    TOO_MANY_EXPRESSIONS, DISK_NEARLY_FULL, GAME_OVER or ROOM_GONE (reconnect: a durable game
+    resumes).
     """
     message: _builtins.str
     """What is wrong and what to do, for people."""

@@ -83,7 +83,7 @@ class PlayServiceServicer(object):
         """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
         INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED, REQUEST_ID_REFUSED); FAILED_PRECONDITION
         (GAME_OVER, CHAT_OFF, HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS,
-        TOO_MANY_HINTS).
+        TOO_MANY_HINTS; DISK_NEARLY_FULL for an expression).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -52,7 +52,7 @@ class PlayServiceStub:
     """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
     INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED, REQUEST_ID_REFUSED); FAILED_PRECONDITION
     (GAME_OVER, CHAT_OFF, HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS,
-    TOO_MANY_HINTS).
+    TOO_MANY_HINTS; DISK_NEARLY_FULL for an expression).
     """
 
 @_typing.type_check_only
@@ -79,7 +79,7 @@ class PlayServiceAsyncStub(PlayServiceStub):
     """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
     INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED, REQUEST_ID_REFUSED); FAILED_PRECONDITION
     (GAME_OVER, CHAT_OFF, HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS,
-    TOO_MANY_HINTS).
+    TOO_MANY_HINTS; DISK_NEARLY_FULL for an expression).
     """
 
 class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -121,7 +121,7 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
         """One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
         INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED, REQUEST_ID_REFUSED); FAILED_PRECONDITION
         (GAME_OVER, CHAT_OFF, HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS,
-        TOO_MANY_HINTS).
+        TOO_MANY_HINTS; DISK_NEARLY_FULL for an expression).
         """
 
 def add_PlayServiceServicer_to_server(servicer: PlayServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

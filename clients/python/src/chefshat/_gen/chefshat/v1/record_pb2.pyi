@@ -506,16 +506,27 @@ class RecordFooter(_message.Message):
     EVENTS_FIELD_NUMBER: _builtins.int
     DECISIONS_FIELD_NUMBER: _builtins.int
     SIGNATURE_FIELD_NUMBER: _builtins.int
+    PARTICIPANT_REMOVED_FIELD_NUMBER: _builtins.int
+    PARTS_WITHHELD_FIELD_NUMBER: _builtins.int
     state: _room_pb2.RoomState.ValueType
     """How the game ended: FINISHED or ABORTED."""
     events: _builtins.int
     """Number of events."""
     decisions: _builtins.int
     """Number of decisions."""
+    participant_removed: _builtins.bool
+    """Whether a participant was deleted from the record: a pseudonym stands for its name, and its
+    expressions and annotations are missing. The server signs such a record again if it had signed
+    the whole one.
+    """
+    parts_withheld: _builtins.bool
+    """Whether parts are missing that the reader may not see: record-only expressions, markers,
+    annotations and media. The server signs what is left if it had signed the whole record.
+    """
     @_builtins.property
     def signature(self) -> Global___RecordSignature:
         """The signature of the server that hosted the game; unset if it has no key, or if the record was
-        changed later (a participant was deleted).
+        changed later by somebody without its key.
         """
 
     def __init__(
@@ -525,10 +536,12 @@ class RecordFooter(_message.Message):
         events: _builtins.int = ...,
         decisions: _builtins.int = ...,
         signature: Global___RecordSignature | None = ...,
+        participant_removed: _builtins.bool = ...,
+        parts_withheld: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["signature", b"signature"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["decisions", b"decisions", "events", b"events", "signature", b"signature", "state", b"state"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["decisions", b"decisions", "events", b"events", "participant_removed", b"participant_removed", "parts_withheld", b"parts_withheld", "signature", b"signature", "state", b"state"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -544,28 +557,35 @@ class RecordSignature(_message.Message):
     its line feed, and the footer has no `signature`. That text is the canonical JSON of RecordLine
     without spaces: fields in the order of their numbers, those with a default value absent, 64-bit
     numbers as strings, floats in the shortest form that gives the same 32-bit value, bytes in base64
-    with padding.
+    with padding, the entries of a map (`Annotations.extra`) in the order of the UTF-8 bytes of their
+    keys.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
 
     PUBLIC_KEY_FIELD_NUMBER: _builtins.int
     SIGNATURE_FIELD_NUMBER: _builtins.int
+    TEXT_VERSION_FIELD_NUMBER: _builtins.int
     public_key: _builtins.bytes
     """The server's public key, 32 bytes. `chefshat key show` and GetServerInfo have it as text:
     "ed25519:" and 64 hexadecimal digits.
     """
     signature: _builtins.bytes
     """The signature, 64 bytes."""
+    text_version: _builtins.int
+    """Version of the text that is signed: 1. 0 in signatures of versions before 0.3.0, which wrote the
+    entries of a map in any order: with two or more, the signature may fit no text that is left.
+    """
     def __init__(
         self,
         *,
         public_key: _builtins.bytes = ...,
         signature: _builtins.bytes = ...,
+        text_version: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["public_key", b"public_key", "signature", b"signature"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["public_key", b"public_key", "signature", b"signature", "text_version", b"text_version"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -28,33 +28,36 @@ from chefshat._gen.chefshat.v1 import room_pb2 as chefshat_dot_v1_dot_room__pb2
 from chefshat._gen.chefshat.v1 import rules_pb2 as chefshat_dot_v1_dot_rules__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n chefshat/v1/record_service.proto\x12\x0b\x63hefshat.v1\x1a\x17\x63hefshat/v1/event.proto\x1a\x18\x63hefshat/v1/record.proto\x1a\x16\x63hefshat/v1/room.proto\x1a\x17\x63hefshat/v1/rules.proto\"\xfb\x01\n\x0cRecordFilter\x12%\n\x05state\x18\x01 \x01(\x0e\x32\x16.chefshat.v1.RoomState\x12\x13\n\x0bparticipant\x18\x02 \x01(\t\x12*\n\x04kind\x18\x03 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x11\n\troom_name\x18\x04 \x01(\t\x12\'\n\x06origin\x18\x05 \x01(\x0e\x32\x17.chefshat.v1.GameOrigin\x12\x17\n\x0f\x63reated_from_ms\x18\x06 \x01(\x04\x12\x19\n\x11\x63reated_before_ms\x18\x07 \x01(\x04\x12\x13\n\x0bhosted_here\x18\x08 \x01(\x08\"\x95\x04\n\rRecordSummary\x12\x0f\n\x07game_id\x18\x01 \x01(\t\x12\x0f\n\x07room_id\x18\x02 \x01(\t\x12\x11\n\troom_name\x18\x03 \x01(\t\x12%\n\x05state\x18\x04 \x01(\x0e\x32\x16.chefshat.v1.RoomState\x12\'\n\x06origin\x18\x05 \x01(\x0e\x32\x17.chefshat.v1.GameOrigin\x12\x15\n\rcreated_at_ms\x18\x06 \x01(\x04\x12\x13\n\x0b\x65nded_at_ms\x18\x07 \x01(\x04\x12#\n\x05rules\x18\x08 \x01(\x0b\x32\x14.chefshat.v1.RuleSet\x12\'\n\x05seats\x18\t \x03(\x0b\x32\x18.chefshat.v1.Participant\x12(\n\tstandings\x18\n \x03(\x0b\x32\x15.chefshat.v1.Standing\x12\x0e\n\x06shifts\x18\x0b \x01(\r\x12\x11\n\tdecisions\x18\x0c \x01(\x04\x12\r\n\x05\x61\x64\x64\x65\x64\x18\r \x01(\x08\x12.\n\x0c\x61\x62ort_reason\x18\x0e \x01(\x0e\x32\x18.chefshat.v1.AbortReason\x12\x15\n\rtournament_id\x18\x0f \x01(\t\x12\x13\n\x0bsubstituted\x18\x10 \x01(\x08\x12+\n\nvisibility\x18\x11 \x01(\x0e\x32\x17.chefshat.v1.Visibility\x12\x0e\n\x06hinted\x18\x12 \x01(\x08\x12\x10\n\x08study_id\x18\x13 \x01(\t\"|\n\x12ListRecordsRequest\x12)\n\x06\x66ilter\x18\x01 \x01(\x0b\x32\x19.chefshat.v1.RecordFilter\x12\x11\n\tpage_size\x18\x02 \x01(\r\x12\x12\n\npage_token\x18\x03 \x01(\t\x12\x14\n\x0cnewest_first\x18\x04 \x01(\x08\"[\n\x13ListRecordsResponse\x12+\n\x07records\x18\x01 \x03(\x0b\x32\x1a.chefshat.v1.RecordSummary\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"#\n\x10GetRecordRequest\x12\x0f\n\x07game_id\x18\x01 \x01(\t\";\n\x11GetRecordResponse\x12&\n\x05lines\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.RecordLine\"A\n\x14StreamRecordsRequest\x12)\n\x06\x66ilter\x18\x01 \x01(\x0b\x32\x19.chefshat.v1.RecordFilter\"?\n\x15StreamRecordsResponse\x12&\n\x05lines\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.RecordLine\"=\n\x13ImportRecordRequest\x12&\n\x05lines\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.RecordLine\"B\n\x14ImportRecordResponse\x12*\n\x06record\x18\x01 \x01(\x0b\x32\x1a.chefshat.v1.RecordSummary2\xe0\x02\n\rRecordService\x12P\n\x0bListRecords\x12\x1f.chefshat.v1.ListRecordsRequest\x1a .chefshat.v1.ListRecordsResponse\x12L\n\tGetRecord\x12\x1d.chefshat.v1.GetRecordRequest\x1a\x1e.chefshat.v1.GetRecordResponse0\x01\x12X\n\rStreamRecords\x12!.chefshat.v1.StreamRecordsRequest\x1a\".chefshat.v1.StreamRecordsResponse0\x01\x12U\n\x0cImportRecord\x12 .chefshat.v1.ImportRecordRequest\x1a!.chefshat.v1.ImportRecordResponse(\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n chefshat/v1/record_service.proto\x12\x0b\x63hefshat.v1\x1a\x17\x63hefshat/v1/event.proto\x1a\x18\x63hefshat/v1/record.proto\x1a\x16\x63hefshat/v1/room.proto\x1a\x17\x63hefshat/v1/rules.proto\"\xfb\x01\n\x0cRecordFilter\x12%\n\x05state\x18\x01 \x01(\x0e\x32\x16.chefshat.v1.RoomState\x12\x13\n\x0bparticipant\x18\x02 \x01(\t\x12*\n\x04kind\x18\x03 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x11\n\troom_name\x18\x04 \x01(\t\x12\'\n\x06origin\x18\x05 \x01(\x0e\x32\x17.chefshat.v1.GameOrigin\x12\x17\n\x0f\x63reated_from_ms\x18\x06 \x01(\x04\x12\x19\n\x11\x63reated_before_ms\x18\x07 \x01(\x04\x12\x13\n\x0bhosted_here\x18\x08 \x01(\x08\"\x95\x04\n\rRecordSummary\x12\x0f\n\x07game_id\x18\x01 \x01(\t\x12\x0f\n\x07room_id\x18\x02 \x01(\t\x12\x11\n\troom_name\x18\x03 \x01(\t\x12%\n\x05state\x18\x04 \x01(\x0e\x32\x16.chefshat.v1.RoomState\x12\'\n\x06origin\x18\x05 \x01(\x0e\x32\x17.chefshat.v1.GameOrigin\x12\x15\n\rcreated_at_ms\x18\x06 \x01(\x04\x12\x13\n\x0b\x65nded_at_ms\x18\x07 \x01(\x04\x12#\n\x05rules\x18\x08 \x01(\x0b\x32\x14.chefshat.v1.RuleSet\x12\'\n\x05seats\x18\t \x03(\x0b\x32\x18.chefshat.v1.Participant\x12(\n\tstandings\x18\n \x03(\x0b\x32\x15.chefshat.v1.Standing\x12\x0e\n\x06shifts\x18\x0b \x01(\r\x12\x11\n\tdecisions\x18\x0c \x01(\x04\x12\r\n\x05\x61\x64\x64\x65\x64\x18\r \x01(\x08\x12.\n\x0c\x61\x62ort_reason\x18\x0e \x01(\x0e\x32\x18.chefshat.v1.AbortReason\x12\x15\n\rtournament_id\x18\x0f \x01(\t\x12\x13\n\x0bsubstituted\x18\x10 \x01(\x08\x12+\n\nvisibility\x18\x11 \x01(\x0e\x32\x17.chefshat.v1.Visibility\x12\x0e\n\x06hinted\x18\x12 \x01(\x08\x12\x10\n\x08study_id\x18\x13 \x01(\t\"|\n\x12ListRecordsRequest\x12)\n\x06\x66ilter\x18\x01 \x01(\x0b\x32\x19.chefshat.v1.RecordFilter\x12\x11\n\tpage_size\x18\x02 \x01(\r\x12\x12\n\npage_token\x18\x03 \x01(\t\x12\x14\n\x0cnewest_first\x18\x04 \x01(\x08\"\x8e\x01\n\x13ListRecordsResponse\x12+\n\x07records\x18\x01 \x03(\x0b\x32\x1a.chefshat.v1.RecordSummary\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\x12\x31\n\nunreadable\x18\x03 \x03(\x0b\x32\x1d.chefshat.v1.UnreadableRecord\"4\n\x10UnreadableRecord\x12\x0f\n\x07game_id\x18\x01 \x01(\t\x12\x0f\n\x07problem\x18\x02 \x01(\t\"#\n\x10GetRecordRequest\x12\x0f\n\x07game_id\x18\x01 \x01(\t\";\n\x11GetRecordResponse\x12&\n\x05lines\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.RecordLine\"P\n\x14StreamRecordsRequest\x12)\n\x06\x66ilter\x18\x01 \x01(\x0b\x32\x19.chefshat.v1.RecordFilter\x12\r\n\x05\x61\x66ter\x18\x02 \x01(\t\"r\n\x15StreamRecordsResponse\x12&\n\x05lines\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.RecordLine\x12\x31\n\nunreadable\x18\x02 \x01(\x0b\x32\x1d.chefshat.v1.UnreadableRecord\"=\n\x13ImportRecordRequest\x12&\n\x05lines\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.RecordLine\"B\n\x14ImportRecordResponse\x12*\n\x06record\x18\x01 \x01(\x0b\x32\x1a.chefshat.v1.RecordSummary2\xe0\x02\n\rRecordService\x12P\n\x0bListRecords\x12\x1f.chefshat.v1.ListRecordsRequest\x1a .chefshat.v1.ListRecordsResponse\x12L\n\tGetRecord\x12\x1d.chefshat.v1.GetRecordRequest\x1a\x1e.chefshat.v1.GetRecordResponse0\x01\x12X\n\rStreamRecords\x12!.chefshat.v1.StreamRecordsRequest\x1a\".chefshat.v1.StreamRecordsResponse0\x01\x12U\n\x0cImportRecord\x12 .chefshat.v1.ImportRecordRequest\x1a!.chefshat.v1.ImportRecordResponse(\x01\x42\x94\x01\n\x15io.github.chefshat.v1P\x01Z9github.com/chefshat/chefshat/proto/chefshat/v1;chefshatv1\xa2\x02\x03\x43HX\xaa\x02\x0b\x43hefsHat.V1\xba\x02\x0c\x43hefsHat_V1_\xca\x02\x0b\x43hefsHat\\V1\xea\x02\x0c\x43hefsHat::V1b\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'chefshat._gen.chefshat.v1.record_service_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
-  DESCRIPTOR._loaded_options = None
+  _globals['DESCRIPTOR']._loaded_options = None
+  _globals['DESCRIPTOR']._serialized_options = b'\n\025io.github.chefshat.v1P\001Z9github.com/chefshat/chefshat/proto/chefshat/v1;chefshatv1\242\002\003CHX\252\002\013ChefsHat.V1\272\002\014ChefsHat_V1_\312\002\013ChefsHat\\V1\352\002\014ChefsHat::V1'
   _globals['_RECORDFILTER']._serialized_start=150
   _globals['_RECORDFILTER']._serialized_end=401
   _globals['_RECORDSUMMARY']._serialized_start=404
   _globals['_RECORDSUMMARY']._serialized_end=937
   _globals['_LISTRECORDSREQUEST']._serialized_start=939
   _globals['_LISTRECORDSREQUEST']._serialized_end=1063
-  _globals['_LISTRECORDSRESPONSE']._serialized_start=1065
-  _globals['_LISTRECORDSRESPONSE']._serialized_end=1156
-  _globals['_GETRECORDREQUEST']._serialized_start=1158
-  _globals['_GETRECORDREQUEST']._serialized_end=1193
-  _globals['_GETRECORDRESPONSE']._serialized_start=1195
-  _globals['_GETRECORDRESPONSE']._serialized_end=1254
-  _globals['_STREAMRECORDSREQUEST']._serialized_start=1256
-  _globals['_STREAMRECORDSREQUEST']._serialized_end=1321
-  _globals['_STREAMRECORDSRESPONSE']._serialized_start=1323
-  _globals['_STREAMRECORDSRESPONSE']._serialized_end=1386
-  _globals['_IMPORTRECORDREQUEST']._serialized_start=1388
-  _globals['_IMPORTRECORDREQUEST']._serialized_end=1449
-  _globals['_IMPORTRECORDRESPONSE']._serialized_start=1451
-  _globals['_IMPORTRECORDRESPONSE']._serialized_end=1517
-  _globals['_RECORDSERVICE']._serialized_start=1520
-  _globals['_RECORDSERVICE']._serialized_end=1872
+  _globals['_LISTRECORDSRESPONSE']._serialized_start=1066
+  _globals['_LISTRECORDSRESPONSE']._serialized_end=1208
+  _globals['_UNREADABLERECORD']._serialized_start=1210
+  _globals['_UNREADABLERECORD']._serialized_end=1262
+  _globals['_GETRECORDREQUEST']._serialized_start=1264
+  _globals['_GETRECORDREQUEST']._serialized_end=1299
+  _globals['_GETRECORDRESPONSE']._serialized_start=1301
+  _globals['_GETRECORDRESPONSE']._serialized_end=1360
+  _globals['_STREAMRECORDSREQUEST']._serialized_start=1362
+  _globals['_STREAMRECORDSREQUEST']._serialized_end=1442
+  _globals['_STREAMRECORDSRESPONSE']._serialized_start=1444
+  _globals['_STREAMRECORDSRESPONSE']._serialized_end=1558
+  _globals['_IMPORTRECORDREQUEST']._serialized_start=1560
+  _globals['_IMPORTRECORDREQUEST']._serialized_end=1621
+  _globals['_IMPORTRECORDRESPONSE']._serialized_start=1623
+  _globals['_IMPORTRECORDRESPONSE']._serialized_end=1689
+  _globals['_RECORDSERVICE']._serialized_start=1692
+  _globals['_RECORDSERVICE']._serialized_end=2044
 # @@protoc_insertion_point(module_scope)

@@ -84,8 +84,10 @@ class RecordServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def StreamRecords(self, request, context):
-        """Streams the records that ListRecords lists, oldest first, one after the other. INVALID_ARGUMENT
-        (FILTER_REFUSED).
+        """Streams the records that ListRecords lists, oldest first, one after the other. A record that
+        cannot be read is named in its place (`StreamRecordsResponse.unreadable`), and the others
+        follow. INVALID_ARGUMENT (FILTER_REFUSED); NOT_FOUND (GAME_UNKNOWN) if `after` is not in the
+        list.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

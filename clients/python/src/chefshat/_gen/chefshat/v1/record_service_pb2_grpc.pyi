@@ -48,8 +48,10 @@ class RecordServiceStub:
     The record of a private game is complete only for its owner and the operator.
     """
     StreamRecords: _grpc.UnaryStreamMultiCallable[_record_service_pb2.StreamRecordsRequest, _record_service_pb2.StreamRecordsResponse]
-    """Streams the records that ListRecords lists, oldest first, one after the other. INVALID_ARGUMENT
-    (FILTER_REFUSED).
+    """Streams the records that ListRecords lists, oldest first, one after the other. A record that
+    cannot be read is named in its place (`StreamRecordsResponse.unreadable`), and the others
+    follow. INVALID_ARGUMENT (FILTER_REFUSED); NOT_FOUND (GAME_UNKNOWN) if `after` is not in the
+    list.
     """
     ImportRecord: _grpc.StreamUnaryMultiCallable[_record_service_pb2.ImportRecordRequest, _record_service_pb2.ImportRecordResponse]
     """Adds the record of a game played elsewhere: on another server, or at a physical table. Verifies
@@ -79,8 +81,10 @@ class RecordServiceAsyncStub(RecordServiceStub):
     The record of a private game is complete only for its owner and the operator.
     """
     StreamRecords: _aio.UnaryStreamMultiCallable[_record_service_pb2.StreamRecordsRequest, _record_service_pb2.StreamRecordsResponse]  # type: ignore[assignment]
-    """Streams the records that ListRecords lists, oldest first, one after the other. INVALID_ARGUMENT
-    (FILTER_REFUSED).
+    """Streams the records that ListRecords lists, oldest first, one after the other. A record that
+    cannot be read is named in its place (`StreamRecordsResponse.unreadable`), and the others
+    follow. INVALID_ARGUMENT (FILTER_REFUSED); NOT_FOUND (GAME_UNKNOWN) if `after` is not in the
+    list.
     """
     ImportRecord: _aio.StreamUnaryMultiCallable[_record_service_pb2.ImportRecordRequest, _record_service_pb2.ImportRecordResponse]  # type: ignore[assignment]
     """Adds the record of a game played elsewhere: on another server, or at a physical table. Verifies
@@ -125,8 +129,10 @@ class RecordServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _record_service_pb2.StreamRecordsRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_record_service_pb2.StreamRecordsResponse], _abc.AsyncIterator[_record_service_pb2.StreamRecordsResponse]]:
-        """Streams the records that ListRecords lists, oldest first, one after the other. INVALID_ARGUMENT
-        (FILTER_REFUSED).
+        """Streams the records that ListRecords lists, oldest first, one after the other. A record that
+        cannot be read is named in its place (`StreamRecordsResponse.unreadable`), and the others
+        follow. INVALID_ARGUMENT (FILTER_REFUSED); NOT_FOUND (GAME_UNKNOWN) if `after` is not in the
+        list.
         """
 
     @_abc_1.abstractmethod

@@ -483,7 +483,12 @@ class RoomPolicy(_message.Message):
     pace_ms: _builtins.int
     """Milliseconds that a built-in agent or substitute waits before it decides, so that people can
     follow, 0..=60000; by default 1000 in a game with people, else 0. It takes special actions at
-    once, so that the pace does not reveal one that is declined.
+    once, so that the pace does not reveal one that is declined. With a pace of 50 ms or more, and two
+    or more seats for participants, the time for a special action is ten paces, at most 10000 ms and
+    at most the longest decision time. Every Shift that may have one then waits that long before it
+    continues, unless one is declared, so that nobody learns from the time that one was declined.
+    With a shorter pace, or fewer than two seats for participants, the time at which a Shift begins
+    can show who declined one.
     """
     waiting_time_ms: _builtins.int
     """Milliseconds that the room waits for all seats to be attached, 1000..=86400000; by default
@@ -696,7 +701,10 @@ class Participant(_message.Message):
     connected: _builtins.bool
     """Whether the seat is attached to a stream now; always true for a built-in agent."""
     substituted: _builtins.bool
-    """Whether a substitute plays for the seat now."""
+    """Whether a substitute plays for the seat now. In lists of records: whether the participant did
+    not play to the end by itself, because a substitute took a decision for it, it was given a hint,
+    or it was gone when the game was broken off; ratings count it.
+    """
     at_table: _builtins.bool
     """Whether the player sits at the physical table with real cards."""
     shown_kind: Global___ParticipantKind.ValueType

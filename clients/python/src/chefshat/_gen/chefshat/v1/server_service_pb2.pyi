@@ -239,9 +239,10 @@ Global___GetClockResponse: _TypeAlias = GetClockResponse  # noqa: Y015
 @_typing.final
 class RoomClock(_message.Message):
     """The clock of a room. It measures all times of its events and record (`elapsed_ms`), starts at 0 when
-    the room is created and runs steadily, whatever happens to the time of day. Only when a server
-    resumes the room, after a restart or from another server, does it continue from the time of day, so
-    it may jump then: read it again after ServerRestarted.
+    the room is created and runs steadily, whatever happens to the time of day. It stands still while
+    the server's process is stopped for a second or longer. When a server resumes the room, after a
+    restart or from another server, it continues from the time of day, so it may jump then: read it
+    again after ServerRestarted.
     """
 
     DESCRIPTOR: _descriptor.Descriptor

@@ -27,13 +27,14 @@ from chefshat._gen.chefshat.v1 import play_service_pb2 as chefshat_dot_v1_dot_pl
 from chefshat._gen.chefshat.v1 import room_pb2 as chefshat_dot_v1_dot_room__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n#chefshat/v1/spectator_service.proto\x12\x0b\x63hefshat.v1\x1a\x17\x63hefshat/v1/event.proto\x1a\x1e\x63hefshat/v1/play_service.proto\x1a\x16\x63hefshat/v1/room.proto\"X\n\x1cSpectatorServiceWatchRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x15\n\rfrom_sequence\x18\x02 \x01(\x04\x12\x10\n\x08snapshot\x18\x03 \x01(\x08\"\xb8\x01\n\x1dSpectatorServiceWatchResponse\x12&\n\x06\x65vents\x18\x01 \x03(\x0b\x32\x16.chefshat.v1.GameEvent\x12\x1f\n\x04room\x18\x02 \x01(\x0b\x32\x11.chefshat.v1.Room\x12\'\n\x08snapshot\x18\x03 \x01(\x0b\x32\x15.chefshat.v1.Snapshot\x12%\n\x07\x61waited\x18\x04 \x03(\x0b\x32\x14.chefshat.v1.Awaited2t\n\x10SpectatorService\x12`\n\x05Watch\x12).chefshat.v1.SpectatorServiceWatchRequest\x1a*.chefshat.v1.SpectatorServiceWatchResponse0\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n#chefshat/v1/spectator_service.proto\x12\x0b\x63hefshat.v1\x1a\x17\x63hefshat/v1/event.proto\x1a\x1e\x63hefshat/v1/play_service.proto\x1a\x16\x63hefshat/v1/room.proto\"X\n\x1cSpectatorServiceWatchRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x15\n\rfrom_sequence\x18\x02 \x01(\x04\x12\x10\n\x08snapshot\x18\x03 \x01(\x08\"\xb8\x01\n\x1dSpectatorServiceWatchResponse\x12&\n\x06\x65vents\x18\x01 \x03(\x0b\x32\x16.chefshat.v1.GameEvent\x12\x1f\n\x04room\x18\x02 \x01(\x0b\x32\x11.chefshat.v1.Room\x12\'\n\x08snapshot\x18\x03 \x01(\x0b\x32\x15.chefshat.v1.Snapshot\x12%\n\x07\x61waited\x18\x04 \x03(\x0b\x32\x14.chefshat.v1.Awaited2t\n\x10SpectatorService\x12`\n\x05Watch\x12).chefshat.v1.SpectatorServiceWatchRequest\x1a*.chefshat.v1.SpectatorServiceWatchResponse0\x01\x42\x94\x01\n\x15io.github.chefshat.v1P\x01Z9github.com/chefshat/chefshat/proto/chefshat/v1;chefshatv1\xa2\x02\x03\x43HX\xaa\x02\x0b\x43hefsHat.V1\xba\x02\x0c\x43hefsHat_V1_\xca\x02\x0b\x43hefsHat\\V1\xea\x02\x0c\x43hefsHat::V1b\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'chefshat._gen.chefshat.v1.spectator_service_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
-  DESCRIPTOR._loaded_options = None
+  _globals['DESCRIPTOR']._loaded_options = None
+  _globals['DESCRIPTOR']._serialized_options = b'\n\025io.github.chefshat.v1P\001Z9github.com/chefshat/chefshat/proto/chefshat/v1;chefshatv1\242\002\003CHX\252\002\013ChefsHat.V1\272\002\014ChefsHat_V1_\312\002\013ChefsHat\\V1\352\002\014ChefsHat::V1'
   _globals['_SPECTATORSERVICEWATCHREQUEST']._serialized_start=133
   _globals['_SPECTATORSERVICEWATCHREQUEST']._serialized_end=221
   _globals['_SPECTATORSERVICEWATCHRESPONSE']._serialized_start=224

@@ -673,8 +673,8 @@ class ParticipationServiceServicer(object):
         """Records interface traces of a game of this participant. They are dropped if the study records
         none. INVALID_ARGUMENT (TRACES_REFUSED for more than 500 or invalid ones); NOT_FOUND
         (GAME_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_TRACES after 20000 in a game, counted since the
-        server was started); FAILED_PRECONDITION (PARTICIPATION_OVER); UNAUTHENTICATED
-        (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED); UNAVAILABLE (SHUTTING_DOWN).
+        server was started; DISK_NEARLY_FULL); FAILED_PRECONDITION (PARTICIPATION_OVER);
+        UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -319,8 +319,8 @@ class ParticipationServiceStub:
     """Records interface traces of a game of this participant. They are dropped if the study records
     none. INVALID_ARGUMENT (TRACES_REFUSED for more than 500 or invalid ones); NOT_FOUND
     (GAME_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_TRACES after 20000 in a game, counted since the
-    server was started); FAILED_PRECONDITION (PARTICIPATION_OVER); UNAUTHENTICATED
-    (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED); UNAVAILABLE (SHUTTING_DOWN).
+    server was started; DISK_NEARLY_FULL); FAILED_PRECONDITION (PARTICIPATION_OVER);
+    UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED); UNAVAILABLE (SHUTTING_DOWN).
     """
     WithdrawFromStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.WithdrawFromStudyRequest, _study_service_pb2.WithdrawFromStudyResponse]
     """Withdraws, at any time, also after the end and from any device: the link is enough. A running
@@ -365,8 +365,8 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
     """Records interface traces of a game of this participant. They are dropped if the study records
     none. INVALID_ARGUMENT (TRACES_REFUSED for more than 500 or invalid ones); NOT_FOUND
     (GAME_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_TRACES after 20000 in a game, counted since the
-    server was started); FAILED_PRECONDITION (PARTICIPATION_OVER); UNAUTHENTICATED
-    (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED); UNAVAILABLE (SHUTTING_DOWN).
+    server was started; DISK_NEARLY_FULL); FAILED_PRECONDITION (PARTICIPATION_OVER);
+    UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED); UNAVAILABLE (SHUTTING_DOWN).
     """
     WithdrawFromStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.WithdrawFromStudyRequest, _study_service_pb2.WithdrawFromStudyResponse]  # type: ignore[assignment]
     """Withdraws, at any time, also after the end and from any device: the link is enough. A running
@@ -444,8 +444,8 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
         """Records interface traces of a game of this participant. They are dropped if the study records
         none. INVALID_ARGUMENT (TRACES_REFUSED for more than 500 or invalid ones); NOT_FOUND
         (GAME_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_TRACES after 20000 in a game, counted since the
-        server was started); FAILED_PRECONDITION (PARTICIPATION_OVER); UNAUTHENTICATED
-        (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED); UNAVAILABLE (SHUTTING_DOWN).
+        server was started; DISK_NEARLY_FULL); FAILED_PRECONDITION (PARTICIPATION_OVER);
+        UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod

@@ -24,13 +24,14 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x17\x63hefshat/v1/table.proto\x12\x0b\x63hefshat.v1\"n\n\tViolation\x12\x11\n\x04seat\x18\x01 \x01(\rH\x00\x88\x01\x01\x12\'\n\x04rule\x18\x02 \x01(\x0e\x32\x19.chefshat.v1.ViolatedRule\x12\x0c\n\x04text\x18\x03 \x01(\t\x12\x0e\n\x06report\x18\x04 \x01(\x04\x42\x07\n\x05_seat*\xe5\x02\n\x0cViolatedRule\x12\x1d\n\x19VIOLATED_RULE_UNSPECIFIED\x10\x00\x12\x16\n\x12VIOLATED_RULE_TURN\x10\x01\x12\x16\n\x12VIOLATED_RULE_FACE\x10\x02\x12\x16\n\x12VIOLATED_RULE_SIZE\x10\x03\x12\x16\n\x12VIOLATED_RULE_FORM\x10\x04\x12\x19\n\x15VIOLATED_RULE_OPENING\x10\x05\x12\x16\n\x12VIOLATED_RULE_PASS\x10\x06\x12\x17\n\x13VIOLATED_RULE_CARDS\x10\x07\x12 \n\x1cVIOLATED_RULE_SPECIAL_ACTION\x10\x08\x12\x16\n\x12VIOLATED_RULE_GIFT\x10\t\x12\x16\n\x12VIOLATED_RULE_ROLE\x10\n\x12\x1a\n\x16VIOLATED_RULE_DECISION\x10\x0b\x12\x1c\n\x18VIOLATED_RULE_CORRECTION\x10\x0c\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x17\x63hefshat/v1/table.proto\x12\x0b\x63hefshat.v1\"n\n\tViolation\x12\x11\n\x04seat\x18\x01 \x01(\rH\x00\x88\x01\x01\x12\'\n\x04rule\x18\x02 \x01(\x0e\x32\x19.chefshat.v1.ViolatedRule\x12\x0c\n\x04text\x18\x03 \x01(\t\x12\x0e\n\x06report\x18\x04 \x01(\x04\x42\x07\n\x05_seat*\xe5\x02\n\x0cViolatedRule\x12\x1d\n\x19VIOLATED_RULE_UNSPECIFIED\x10\x00\x12\x16\n\x12VIOLATED_RULE_TURN\x10\x01\x12\x16\n\x12VIOLATED_RULE_FACE\x10\x02\x12\x16\n\x12VIOLATED_RULE_SIZE\x10\x03\x12\x16\n\x12VIOLATED_RULE_FORM\x10\x04\x12\x19\n\x15VIOLATED_RULE_OPENING\x10\x05\x12\x16\n\x12VIOLATED_RULE_PASS\x10\x06\x12\x17\n\x13VIOLATED_RULE_CARDS\x10\x07\x12 \n\x1cVIOLATED_RULE_SPECIAL_ACTION\x10\x08\x12\x16\n\x12VIOLATED_RULE_GIFT\x10\t\x12\x16\n\x12VIOLATED_RULE_ROLE\x10\n\x12\x1a\n\x16VIOLATED_RULE_DECISION\x10\x0b\x12\x1c\n\x18VIOLATED_RULE_CORRECTION\x10\x0c\x42\x94\x01\n\x15io.github.chefshat.v1P\x01Z9github.com/chefshat/chefshat/proto/chefshat/v1;chefshatv1\xa2\x02\x03\x43HX\xaa\x02\x0b\x43hefsHat.V1\xba\x02\x0c\x43hefsHat_V1_\xca\x02\x0b\x43hefsHat\\V1\xea\x02\x0c\x43hefsHat::V1b\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'chefshat._gen.chefshat.v1.table_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
-  DESCRIPTOR._loaded_options = None
+  _globals['DESCRIPTOR']._loaded_options = None
+  _globals['DESCRIPTOR']._serialized_options = b'\n\025io.github.chefshat.v1P\001Z9github.com/chefshat/chefshat/proto/chefshat/v1;chefshatv1\242\002\003CHX\252\002\013ChefsHat.V1\272\002\014ChefsHat_V1_\312\002\013ChefsHat\\V1\352\002\014ChefsHat::V1'
   _globals['_VIOLATEDRULE']._serialized_start=153
   _globals['_VIOLATEDRULE']._serialized_end=510
   _globals['_VIOLATION']._serialized_start=40
