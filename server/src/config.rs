@@ -217,6 +217,9 @@ pub struct ServerConfig {
     pub allowed_origins: Vec<String>,
     /// Where webhooks go; `None`: there are none.
     pub webhooks: Option<WebhookSettings>,
+    /// The program `chefshat-lab`, which draws the pictures that chats show of a link to a replay;
+    /// `None`: there are no pictures.
+    pub painter: Option<PathBuf>,
 }
 
 impl Default for ServerConfig {
@@ -242,6 +245,7 @@ impl Default for ServerConfig {
             client_endpoint: None,
             allowed_origins: Vec::new(),
             webhooks: None,
+            painter: None,
         }
     }
 }

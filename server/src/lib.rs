@@ -1,6 +1,6 @@
 //! The Chef's Hat game server as a library: tasks of rooms, tournaments and studies, stores, gRPC services
 //! and the page. The core of a room is `chefshat-room`, the rules are `chefshat-engine`; the
-//! command line is `chefshat`, in `server/cli`.
+//! command line is `chefshat`, in `server/cli` and `server/lab`.
 
 pub mod access;
 pub mod clock;

@@ -13,7 +13,6 @@ use http::Response;
 use hyper::server::conn::http1;
 use hyper_util::rt::TokioIo;
 use hyper_util::service::TowerToHyperService;
-use procfs::process::{LimitValue, Process};
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric};
 use prometheus_client::metrics::MetricType;
@@ -166,37 +165,72 @@ fn disk(usage: DiskUsage, to: &mut Encoder<'_, '_>) -> fmt::Result {
     to.gauge("database", help, Some(&Unit::Bytes), usage.bytes)
 }
 
-/// Reads the state of this process, where the system shows it.
+/// Reads the state of this process, where the system shows it: on Linux, in `/proc/self` (proc(5)).
 #[derive(Debug)]
 struct ProcessState;
 
 impl Collector for ProcessState {
     fn encode(&self, mut encoder: DescriptorEncoder<'_>) -> fmt::Result {
         let mut to = Encoder(&mut encoder);
-        let Ok(process) = Process::myself() else {
-            return Ok(());
-        };
-        if let Ok(stat) = process.stat() {
-            let bytes = stat.rss * procfs::page_size();
-            let help = "Memory in use";
-            to.gauge("process_resident_memory", help, Some(&Unit::Bytes), bytes)?;
-            let threads = u64::try_from(stat.num_threads).unwrap_or_default();
-            to.gauge("process_threads", "Threads", None, threads)?;
-            #[allow(clippy::cast_precision_loss, reason = "clock ticks are far below 2^53")]
-            let seconds = (stat.utime + stat.stime) as f64 / procfs::ticks_per_second() as f64;
-            let cpu = ConstCounter::new(seconds);
+        if let Some(stat) = ProcessStat::read() {
+            let (help, unit) = ("Memory in use", Some(&Unit::Bytes));
+            to.gauge("process_resident_memory", help, unit, stat.resident_bytes)?;
+            to.gauge("process_threads", "Threads", None, stat.threads)?;
+            let cpu = ConstCounter::new(stat.cpu_seconds);
             to.metric("process_cpu", "Processor time", Some(&Unit::Seconds), &cpu)?;
         }
-        if let Ok(open) = process.fd_count() {
-            let open = u64::try_from(open).unwrap_or(u64::MAX);
+        if let Ok(open) = std::fs::read_dir("/proc/self/fd") {
+            let open = u64::try_from(open.count()).unwrap_or(u64::MAX);
             to.gauge("process_open_fds", "Open file descriptors", None, open)?;
         }
-        if let Ok(limits) = process.limits()
-            && let LimitValue::Value(limit) = limits.max_open_files.soft_limit
-        {
+        #[cfg(unix)]
+        if let Some(limit) = rustix::process::getrlimit(rustix::process::Resource::Nofile).current {
             to.gauge("process_max_fds", "Most open file descriptors", None, limit)?;
         }
         Ok(())
+    }
+}
+
+/// What `/proc/self/stat` says.
+#[derive(Debug, PartialEq)]
+struct ProcessStat {
+    resident_bytes: u64,
+    threads: u64,
+    cpu_seconds: f64,
+}
+
+impl ProcessStat {
+    #[cfg(target_os = "linux")]
+    fn read() -> Option<Self> {
+        use rustix::param::{clock_ticks_per_second, page_size};
+
+        let text = std::fs::read_to_string("/proc/self/stat").ok()?;
+        let page = u64::try_from(page_size()).ok()?;
+        Self::parse(&text, clock_ticks_per_second(), page)
+    }
+
+    #[cfg(not(target_os = "linux"))]
+    fn read() -> Option<Self> {
+        None
+    }
+
+    #[cfg_attr(
+        not(target_os = "linux"),
+        allow(dead_code, reason = "its tests use it")
+    )]
+    fn parse(text: &str, ticks_per_second: u64, page_bytes: u64) -> Option<Self> {
+        // The name of the program, in parentheses, may have spaces and parentheses. The state after
+        // it is field 3.
+        let (_, after_name) = text.rsplit_once(')')?;
+        let fields: Vec<&str> = after_name.split_whitespace().collect();
+        let field = |number: usize| fields.get(number - 3)?.parse::<u64>().ok();
+        #[allow(clippy::cast_precision_loss, reason = "clock ticks are far below 2^53")]
+        let cpu_seconds = (field(14)? + field(15)?) as f64 / ticks_per_second as f64;
+        Some(Self {
+            resident_bytes: field(24)? * page_bytes,
+            threads: field(20)?,
+            cpu_seconds,
+        })
     }
 }
 

@@ -21,13 +21,13 @@ const Z95: f64 = 1.96;
 const PLACES: [&str; MAX_SEATS] = ["1st", "2nd", "3rd", "4th", "5th", "6th"];
 
 /// The mean of a rating and the half width of its 95 % interval.
-pub(super) fn rating_in_words(rating: &v1::Rating) -> [String; 2] {
+pub fn rating_in_words(rating: &v1::Rating) -> [String; 2] {
     let half = Z95 * rating.deviation;
     [format!("{:.2}", rating.mean), format!("± {half:.2}")]
 }
 
 /// Adds the table of a leaderboard.
-pub(super) fn add_table(text: &mut String, board: &v1::GetLeaderboardResponse) {
+pub fn add_table(text: &mut String, board: &v1::GetLeaderboardResponse) {
     if board.rated.is_empty() {
         line(text, "no participants");
         return;
@@ -54,7 +54,7 @@ pub(super) fn add_table(text: &mut String, board: &v1::GetLeaderboardResponse) {
 }
 
 /// The participants as a JSON array.
-pub(super) fn as_json(board: &v1::GetLeaderboardResponse) -> Vec<Value> {
+pub fn as_json(board: &v1::GetLeaderboardResponse) -> Vec<Value> {
     let lines = board.rated.iter().map(|line| {
         let rating = line.rating.unwrap_or_default();
         json!({
@@ -72,7 +72,7 @@ pub(super) fn as_json(board: &v1::GetLeaderboardResponse) -> Vec<Value> {
 }
 
 /// The participants as CSV with a header.
-pub(super) fn as_csv(board: &v1::GetLeaderboardResponse) -> Result<Vec<u8>, CommandError> {
+pub fn as_csv(board: &v1::GetLeaderboardResponse) -> Result<Vec<u8>, CommandError> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut header: Vec<String> = ["place", "name", "kind", "mean", "deviation", "games"]
         .map(str::to_owned)

@@ -16,6 +16,7 @@ use serde_json::{Value, json};
 use toml::de::{DeTable, DeValue};
 
 use crate::error::{CommandError, say};
+use crate::program::grouped;
 use crate::serve;
 
 /// The setting that names the file, which cannot be in the file.
@@ -41,22 +42,24 @@ pub(super) struct ConfigCommand {
     json: bool,
 }
 
-/// The command line of this process, with complete settings.
-pub(super) struct Parsed<C> {
-    pub(super) cli: C,
-    /// The matches of its command.
+/// How this process was started.
+#[derive(Debug)]
+pub struct Invocation {
+    /// The whole command line.
+    command: Command,
+    /// The matches of the command that runs.
     matches: ArgMatches,
     file: Option<SettingsFile>,
 }
 
-impl<C: Parser> Parsed<C> {
+impl Invocation {
     /// Parses the arguments of this process, and the configuration file they name. Ends the process
     /// if the arguments are wrong or ask for help.
     ///
     /// # Errors
     /// The file is unreadable, or has a wrong key or value.
-    pub(super) fn from_process() -> Result<Self, CommandError> {
-        let mut matches = C::command().get_matches();
+    pub(crate) fn of_process<C: Parser>() -> Result<(C, Self), CommandError> {
+        let mut matches = grouped(C::command()).get_matches();
         let path = match matches.subcommand() {
             Some((name, sub)) if COMMANDS.contains(&name) => sub.get_one::<PathBuf>(CONFIG),
             _ => None,
@@ -66,21 +69,37 @@ impl<C: Parser> Parsed<C> {
             None => None,
         };
         if let Some(file) = &file {
-            matches = file.as_defaults(C::command()).get_matches();
+            matches = grouped(file.as_defaults(C::command())).get_matches();
         }
         let cli = C::from_arg_matches(&matches)
             .unwrap_or_else(|error| error.format(&mut C::command()).exit());
         let (_, matches) = matches.remove_subcommand().expect("there is a command");
-        Ok(Self { cli, matches, file })
+        let command = C::command();
+        Ok((
+            cli,
+            Self {
+                command,
+                matches,
+                file,
+            },
+        ))
     }
 
-    /// Runs `chefshat config`.
-    pub(super) fn print(&self, command: &ConfigCommand) -> Result<ExitCode, CommandError> {
-        let effective: Vec<Effective> = settings(C::command())
+    /// The definition of the whole command line.
+    #[must_use]
+    pub fn command(&self) -> Command {
+        self.command.clone()
+    }
+}
+
+impl ConfigCommand {
+    /// Prints the settings of this process.
+    pub(super) fn run(&self, invocation: &Invocation) -> Result<ExitCode, CommandError> {
+        let effective: Vec<Effective> = settings(invocation.command())
             .into_iter()
-            .map(|argument| Effective::of(argument, &self.matches, self.file.as_ref()))
+            .map(|argument| Effective::of(argument, &invocation.matches, invocation.file.as_ref()))
             .collect();
-        if command.json {
+        if self.json {
             say(as_json(&effective))?;
         } else {
             say(as_toml(&effective).trim_end())?;
@@ -117,6 +136,7 @@ fn is_list(argument: &Arg) -> bool {
 type Entry = (Arg, Vec<String>);
 
 /// The values of a configuration file, checked.
+#[derive(Debug)]
 struct SettingsFile {
     path: PathBuf,
     values: Vec<Entry>,

@@ -12,13 +12,13 @@ use tokio::time::{Instant, sleep};
 use super::CommandError;
 
 /// Time to wait for a server or a file.
-pub(super) const PATIENCE: Duration = Duration::from_secs(30);
+pub const PATIENCE: Duration = Duration::from_secs(30);
 /// Time between two attempts.
 const PAUSE: Duration = Duration::from_millis(200);
 
 /// The server, and what it takes to be let in.
 #[derive(Clone, Args)]
-pub(super) struct ServerArg {
+pub struct ServerArg {
     /// Address of the server, https:// for TLS.
     #[arg(
         long,
@@ -45,12 +45,12 @@ impl fmt::Debug for ServerArg {
 
 impl ServerArg {
     /// The server with this address.
-    pub(super) fn new(server: String, token: Option<String>, ca: Option<PathBuf>) -> Self {
+    pub fn new(server: String, token: Option<String>, ca: Option<PathBuf>) -> Self {
         Self { server, token, ca }
     }
 
     /// The address as it was given.
-    pub(super) fn url(&self) -> &str {
+    pub fn url(&self) -> &str {
         &self.server
     }
 
@@ -66,7 +66,7 @@ impl ServerArg {
     ///
     /// # Errors
     /// The server does not answer or is not trusted, or an argument is invalid.
-    pub(super) async fn connect(&self) -> Result<Client, CommandError> {
+    pub async fn connect(&self) -> Result<Client, CommandError> {
         self.attempt().await.map_err(|error| match error.reason() {
             Some("CONNECT_FAILED") => {
                 let hint = "start one there with `chefshat serve`, or name another with --server";
@@ -80,7 +80,7 @@ impl ServerArg {
     ///
     /// # Errors
     /// As [`connect`](Self::connect); a file is unreadable.
-    pub(super) async fn connect_with(&self, secrets: &SecretArgs) -> Result<Client, CommandError> {
+    pub async fn connect_with(&self, secrets: &SecretArgs) -> Result<Client, CommandError> {
         let shown: Vec<_> = (secrets.tickets.iter().cloned())
             .chain(secrets.owner.given()?)
             .collect();
@@ -91,7 +91,7 @@ impl ServerArg {
     ///
     /// # Errors
     /// The last failure.
-    pub(super) async fn connect_patiently(&self) -> Result<Client, CommandError> {
+    pub async fn connect_patiently(&self) -> Result<Client, CommandError> {
         let give_up_at = Instant::now() + PATIENCE;
         let mut announced = false;
         loop {
@@ -123,7 +123,7 @@ impl ServerArg {
 
 /// The proof of who created a room or tournament.
 #[derive(Clone, Default, Args)]
-pub(super) struct OwnerArgs {
+pub struct OwnerArgs {
     /// The owner token, printed by `create`.
     #[arg(long, env = "CHEFSHAT_OWNER_TOKEN", hide_env_values = true)]
     owner_token: Option<String>,
@@ -147,7 +147,7 @@ impl OwnerArgs {
     ///
     /// # Errors
     /// There is none, or the file is unreadable.
-    pub(super) fn token(&self) -> Result<String, CommandError> {
+    pub fn token(&self) -> Result<String, CommandError> {
         let token = self.given()?;
         token.ok_or_else(|| "give --owner-token or --owner-file".into())
     }
@@ -163,7 +163,7 @@ impl fmt::Debug for OwnerArgs {
 /// Secrets that show unlisted and private rooms, tournaments and records.
 #[derive(Clone, Default, Args)]
 #[command(next_help_heading = "Unlisted and private")]
-pub(super) struct SecretArgs {
+pub struct SecretArgs {
     /// Ticket of a seat, a place in a tournament or a physical table. Repeatable.
     #[arg(
         long = "ticket",
@@ -186,7 +186,7 @@ impl fmt::Debug for SecretArgs {
 /// How to get a seat or place.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
-pub(super) struct JoinArgs {
+pub struct JoinArgs {
     /// Join code.
     #[arg(long)]
     code: Option<String>,
@@ -199,7 +199,7 @@ pub(super) struct JoinArgs {
 }
 
 /// How to get a seat or place.
-pub(super) enum Pass {
+pub enum Pass {
     /// A join code for a new one.
     Code(String),
     /// The ticket of an existing one.
@@ -208,7 +208,7 @@ pub(super) enum Pass {
 
 impl JoinArgs {
     /// Whether codes for several games can follow.
-    pub(super) fn has_code_file(&self) -> bool {
+    pub fn has_code_file(&self) -> bool {
         self.code_file.is_some()
     }
 
@@ -216,7 +216,7 @@ impl JoinArgs {
     ///
     /// # Errors
     /// There is no code in time, or the file is unreadable.
-    pub(super) async fn pass(&self, last: Option<&str>) -> Result<Pass, CommandError> {
+    pub async fn pass(&self, last: Option<&str>) -> Result<Pass, CommandError> {
         match (&self.ticket, &self.code, &self.code_file) {
             (Some(ticket), ..) => Ok(Pass::Ticket(ticket.clone())),
             (None, Some(code), _) => Ok(Pass::Code(code.clone())),
@@ -265,13 +265,13 @@ async fn code_in(file: &Path, last: Option<&str>) -> Result<String, CommandError
 }
 
 /// Number of free seats of a room.
-pub(super) fn free_seats(room: &v1::Room) -> usize {
+pub fn free_seats(room: &v1::Room) -> usize {
     let free = |seat: &&v1::Participant| seat.name.is_empty();
     room.seats.iter().filter(free).count()
 }
 
 /// The address of the attendant's view. Browsers send what follows the # to no server.
-pub(super) fn attendant_link(server: &str, room_id: &str, ticket: &str) -> String {
+pub fn attendant_link(server: &str, room_id: &str, ticket: &str) -> String {
     let server = server.trim_end_matches('/');
     format!("{server}/rooms/{room_id}/table#ticket={ticket}")
 }

@@ -9,7 +9,7 @@ use etcetera::BaseStrategy as _;
 use super::CommandError;
 
 /// The given or default data directory, created with its folder of records.
-pub(super) fn prepare(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
+pub fn prepare(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
     let folder = name(wanted)?;
     create(&folder, "records")?;
     Ok(folder)
@@ -17,7 +17,7 @@ pub(super) fn prepare(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> 
 
 /// The given or default data directory, created without a folder of records, which a node of a
 /// cluster does not have. A directory that exists may be read-only.
-pub(super) fn prepare_without_records(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
+pub fn prepare_without_records(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
     let folder = name(wanted)?;
     create(&folder, "")?;
     Ok(folder)
@@ -35,13 +35,13 @@ fn create(data_dir: &Path, folder: &str) -> Result<(), CommandError> {
 }
 
 /// The given or default data directory; it may not exist.
-pub(super) fn name(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
+pub fn name(wanted: Option<PathBuf>) -> Result<PathBuf, CommandError> {
     wanted.map_or_else(default, Ok)
 }
 
 /// Records to read.
 #[derive(Debug, Args)]
-pub(super) struct RecordsArg {
+pub struct RecordsArg {
     /// Records (GAME-ID.jsonl) or directories of them. Default: the records of the data directory.
     #[arg(value_name = "PATH")]
     paths: Vec<PathBuf>,
@@ -56,7 +56,7 @@ impl RecordsArg {
     ///
     /// # Errors
     /// There are none, or a directory is unreadable.
-    pub(super) fn files(&self) -> Result<Vec<RecordFile>, CommandError> {
+    pub fn files(&self) -> Result<Vec<RecordFile>, CommandError> {
         if !self.paths.is_empty() {
             return Ok(find_records(&self.paths)?);
         }

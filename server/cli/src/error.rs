@@ -4,9 +4,9 @@ use std::fmt::Display;
 use std::io::{self, Write as _};
 
 /// Why a command failed, as a message for the user.
-pub(crate) type CommandError = Box<dyn std::error::Error + Send + Sync>;
+pub type CommandError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Writes a line to standard output.
-pub(crate) fn say(line: impl Display) -> Result<(), CommandError> {
+pub fn say(line: impl Display) -> Result<(), CommandError> {
     Ok(writeln!(io::stdout().lock(), "{line}")?)
 }

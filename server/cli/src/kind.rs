@@ -1,11 +1,11 @@
 //! Kinds of participants as an argument of the command line.
 
 use chefshat_client::v1::ParticipantKind;
-pub(super) use chefshat_record::convert::kind_name;
+pub use chefshat_record::convert::kind_name;
 
 /// What a participant is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(super) enum KindArg {
+pub enum KindArg {
     /// A program.
     Agent,
     /// A person.
@@ -28,6 +28,6 @@ impl From<KindArg> for ParticipantKind {
 }
 
 /// The kind to filter by, of all kinds by default.
-pub(super) fn kind_filter(kind: Option<KindArg>) -> ParticipantKind {
+pub fn kind_filter(kind: Option<KindArg>) -> ParticipantKind {
     kind.map_or(ParticipantKind::Unspecified, ParticipantKind::from)
 }

@@ -10,7 +10,7 @@ use crate::CommandError;
 
 /// The flag for the key of a name.
 #[derive(Debug, Args)]
-pub(crate) struct NameKeyArg {
+pub struct NameKeyArg {
     /// File with the key that tells this name from the same name of others, in leaderboards and
     /// records. It is created if it does not exist; keep it secret, and use it again.
     #[arg(long, value_name = "FILE", conflicts_with = "ticket")]
@@ -22,7 +22,7 @@ impl NameKeyArg {
     ///
     /// # Errors
     /// The file contains no key, or cannot be read or created.
-    pub(crate) fn key(&self) -> Result<Vec<u8>, CommandError> {
+    pub fn key(&self) -> Result<Vec<u8>, CommandError> {
         let Some(file) = &self.name_key else {
             return Ok(Vec::new());
         };

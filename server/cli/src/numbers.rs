@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 /// A number with grouped thousands: `1,234,567`.
-pub(super) fn grouped(number: u64) -> String {
+pub fn grouped(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();
     for (index, digit) in digits.chars().enumerate() {
@@ -16,13 +16,13 @@ pub(super) fn grouped(number: u64) -> String {
 }
 
 /// `1 turn`, `2 turns`, `1,000 turns`.
-pub(super) fn counted(count: u64, what: &str) -> String {
+pub fn counted(count: u64, what: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{} {what}{plural}", grouped(count))
 }
 
 /// Parses a time such as 90d.
-pub(super) fn duration(text: &str) -> Result<Duration, String> {
+pub fn duration(text: &str) -> Result<Duration, String> {
     let units = [('s', 1), ('m', 60), ('h', 3_600), ('d', 86_400)];
     let parsed = units.iter().find_map(|(unit, seconds)| {
         let number: u32 = text.strip_suffix(*unit)?.parse().ok()?;
@@ -33,12 +33,12 @@ pub(super) fn duration(text: &str) -> Result<Duration, String> {
 }
 
 /// A seat as people count it, from 1. The protocol and JSON count from 0.
-pub(super) fn seat_number(seat: u32) -> u32 {
+pub fn seat_number(seat: u32) -> u32 {
     seat.saturating_add(1)
 }
 
 /// A place: `1st`, `2nd`, … `11th`, … `21st`.
-pub(super) fn ordinal(place: u32) -> String {
+pub fn ordinal(place: u32) -> String {
     let ending = match (place % 100, place % 10) {
         (11..=13, _) => "th",
         (_, 1) => "st",

@@ -13,19 +13,19 @@ use super::numbers::counted;
 const STYLE: TableStyle = TableStyle::new().header_separator(LineStyle::none().fill('─'));
 
 /// Adds a heading in bold; the stream strips the escape codes if needed.
-pub(super) fn heading(text: &mut String, words: &str) {
+pub fn heading(text: &mut String, words: &str) {
     let bold = Style::new().bold();
     writeln!(text, "{bold}{words}{bold:#}").expect("a String takes everything");
 }
 
 /// Adds an indented line.
-pub(super) fn line(text: &mut String, words: &str) {
+pub fn line(text: &mut String, words: &str) {
     writeln!(text, "  {words}").expect("a String takes everything");
 }
 
 /// Adds an indented table. The columns in `words` are aligned left; the others hold numbers and are
 /// aligned right.
-pub(super) fn table(
+pub fn table(
     text: &mut String,
     header: &[&str],
     words: &[usize],
@@ -48,12 +48,12 @@ pub(super) fn table(
 }
 
 /// Formats a share from 0 to 1: `28.0 %`.
-pub(super) fn percent(share: f64) -> String {
+pub fn percent(share: f64) -> String {
     format!("{:.1} %", 100.0 * share)
 }
 
 /// When a game ends: `to 15 points`, `4 Shifts`.
-pub(super) fn stop_in_words(stop: Stop) -> String {
+pub fn stop_in_words(stop: Stop) -> String {
     match stop {
         Stop::Points(points) => format!("to {points} points"),
         Stop::Shifts(shifts) => counted(u64::from(shifts), "Shift"),
@@ -61,7 +61,7 @@ pub(super) fn stop_in_words(stop: Stop) -> String {
 }
 
 /// A rule set: its size, end and points.
-pub(super) fn rules_in_short(rules: &RuleSet) -> String {
+pub fn rules_in_short(rules: &RuleSet) -> String {
     let spec = rules.spec();
     let stop = match spec.stop {
         stop @ Stop::Points(_) => stop_in_words(stop),
@@ -78,7 +78,7 @@ pub(super) fn rules_in_short(rules: &RuleSet) -> String {
 }
 
 /// How a rule set differs from the default beyond size, end and points.
-pub(super) fn variations(rules: &RuleSet) -> Vec<String> {
+pub fn variations(rules: &RuleSet) -> Vec<String> {
     let spec = rules.spec();
     let standard = RuleSetSpec::default();
     let mut variations = Vec::new();
@@ -109,6 +109,6 @@ pub(super) fn variations(rules: &RuleSet) -> Vec<String> {
 }
 
 /// Variations as lines: three per line fit in 100 columns.
-pub(super) fn variation_lines(variations: &[String]) -> impl Iterator<Item = String> {
+pub fn variation_lines(variations: &[String]) -> impl Iterator<Item = String> {
     variations.chunks(3).map(|some| some.join(", "))
 }

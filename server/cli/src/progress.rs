@@ -3,7 +3,7 @@
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// A bar that counts `total` items, for example games.
-pub(super) fn of_items(total: u64, items: &str) -> ProgressBar {
+pub fn of_items(total: u64, items: &str) -> ProgressBar {
     styled(
         ProgressBar::new(total),
         &format!("{{bar:40}} {{human_pos}} of {{human_len}} {items}, {{eta}} left"),
@@ -11,7 +11,7 @@ pub(super) fn of_items(total: u64, items: &str) -> ProgressBar {
 }
 
 /// A bar that counts the bytes of records.
-pub(super) fn of_record_bytes(total: u64) -> ProgressBar {
+pub fn of_record_bytes(total: u64) -> ProgressBar {
     styled(
         ProgressBar::new(total),
         "{bar:40} {bytes} of {total_bytes} of records, {eta} left",
@@ -19,7 +19,7 @@ pub(super) fn of_record_bytes(total: u64) -> ProgressBar {
 }
 
 /// Gives a bar a style.
-pub(super) fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
+pub fn styled(bar: ProgressBar, template: &str) -> ProgressBar {
     let style = ProgressStyle::with_template(template).expect("the template is valid");
     bar.with_style(style)
 }

@@ -12,7 +12,7 @@ use super::CommandError;
 /// A rule set on the command line.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Rules")]
-pub(super) struct RulesArgs {
+pub struct RulesArgs {
     /// Preset; every other flag overrides one field. paper: to 15 points, 5,3,1,0 by place, the
     /// Golden 11 opens. rulebook: the same with 3,2,1,0. original2020: as paper, but any 11 opens,
     /// the opener may pass and a pass binds for one turn.
@@ -96,7 +96,7 @@ enum PassScopeFlag {
 
 impl RulesArgs {
     /// Whether no flag changes the default.
-    pub(super) fn are_standard(&self) -> bool {
+    pub fn are_standard(&self) -> bool {
         let standard = v1::RuleSet {
             preset: RuleSetSpec::PRESETS[0].to_owned(),
             ..v1::RuleSet::default()
@@ -105,7 +105,7 @@ impl RulesArgs {
     }
 
     /// The rule set for the server; fields that are not given are left to the preset.
-    pub(super) fn message(&self) -> v1::RuleSet {
+    pub fn message(&self) -> v1::RuleSet {
         use v1::rule_set::Stop;
         let on = |switch: Switch| switch == Switch::On;
         v1::RuleSet {
@@ -141,7 +141,7 @@ impl RulesArgs {
     ///
     /// # Errors
     /// The first invalid flag.
-    pub(super) fn rules(&self) -> Result<RuleSet, CommandError> {
+    pub fn rules(&self) -> Result<RuleSet, CommandError> {
         rules_of(&self.message())
     }
 }
@@ -150,12 +150,12 @@ impl RulesArgs {
 ///
 /// # Errors
 /// The first invalid flag.
-pub(super) fn rules_of(message: &v1::RuleSet) -> Result<RuleSet, CommandError> {
+pub fn rules_of(message: &v1::RuleSet) -> Result<RuleSet, CommandError> {
     rules_from_proto(message).map_err(|problem| by_flag(problem.field, &problem.message).into())
 }
 
 /// The problem with a field, with the flag instead of the field.
-pub(super) fn by_flag(field: &str, message: &str) -> String {
+pub fn by_flag(field: &str, message: &str) -> String {
     let flag = match field {
         "reward_scheme" => "reward".to_owned(),
         "clocks" => "clock".to_owned(),

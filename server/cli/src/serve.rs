@@ -16,7 +16,7 @@ use tokio::sync::oneshot;
 use super::cluster::{NewNode, NodeSettings};
 use super::listen::{self, Address};
 use super::numbers::duration;
-use super::{CommandError, data_dir, lan, say};
+use super::{CommandError, data_dir, lab, lan, say};
 use chefshat_server::access::{Access, AccessSettings, Mode, Role};
 use chefshat_server::cluster::LeaseTimes;
 use chefshat_server::config::{KeepGames, ServerConfig};
@@ -346,6 +346,7 @@ impl Serve {
             grace: Duration::from_secs(settings.grace),
             allowed_origins: without_empty(settings.allowed_origins),
             webhooks,
+            painter: lab::program(),
             ..ServerConfig::default()
         };
         let server = match storage {

@@ -8,7 +8,7 @@ use super::CommandError;
 const MAX_THREADS: usize = 256;
 
 /// A pool of `asked` threads (0: one per core) for a number of tasks.
-pub(super) fn pool(asked: usize, pieces: u64) -> Result<ThreadPool, CommandError> {
+pub fn pool(asked: usize, pieces: u64) -> Result<ThreadPool, CommandError> {
     let threads = threads_for(asked, pieces);
     Ok(ThreadPoolBuilder::new().num_threads(threads).build()?)
 }

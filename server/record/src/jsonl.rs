@@ -165,10 +165,26 @@ fn write_to(
     lines: &[RecordLine],
 ) -> Result<(), RecordFileError> {
     for line in lines {
-        serde_json::to_writer(&mut file, line).map_err(|error| io_error(path, error.into()))?;
-        file.write_all(b"\n")?;
+        write_line(&mut file, line).map_err(|source| io_error(path, source))?;
     }
     Ok(file.finish()?)
+}
+
+fn write_line(mut to: impl io::Write, line: &RecordLine) -> io::Result<()> {
+    serde_json::to_writer(&mut to, line)?;
+    to.write_all(b"\n")
+}
+
+/// The text of a record.
+///
+/// # Errors
+/// A line has no JSON form: a number is not finite.
+pub fn text(lines: &[RecordLine]) -> io::Result<Vec<u8>> {
+    let mut text = Vec::new();
+    for line in lines {
+        write_line(&mut text, line)?;
+    }
+    Ok(text)
 }
 
 impl From<WriteError> for RecordFileError {
@@ -207,8 +223,16 @@ pub fn read(path: &Path) -> Result<Vec<RecordLine>, RecordFileError> {
 /// See [`read`].
 pub fn read_record(path: &Path) -> Result<Record, RecordFileError> {
     let file = File::open(path).map_err(|source| io_error(path, source))?;
+    read_text(path, BufReader::new(file))
+}
+
+/// Reads a record from anything that has its text. `path` names it in errors.
+///
+/// # Errors
+/// See [`read`].
+pub fn read_text(path: &Path, text: impl BufRead) -> Result<Record, RecordFileError> {
     let mut record = Record::default();
-    match read_lines(BufReader::new(file), MAX_RECORD_BYTES, &mut record) {
+    match read_lines(text, MAX_RECORD_BYTES, &mut record) {
         Ok(()) => Ok(record),
         Err(Stopped::Io(source)) => Err(io_error(path, source)),
         Err(Stopped::Line(problem)) => Err(RecordFileError::Line {

@@ -10,6 +10,7 @@ mod preview;
 #[cfg(test)]
 mod tests;
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 
@@ -43,12 +44,16 @@ pub struct PageLayer {
 
 impl PageLayer {
     /// Creates the page. `tls`: whether browsers reach this server with TLS. `shares`: how many
-    /// previews of games one caller may ask for at a time.
+    /// previews of games one caller may ask for at a time. `painter`: `chefshat-lab`, which draws them.
     ///
     /// # Errors
-    /// The operating system cannot start the thread that paints them.
-    pub fn new(tls: bool, shares: Shares) -> Result<Self, ThreadPoolBuildError> {
-        let previews = Arc::new(Previews::new(shares)?);
+    /// The operating system cannot start the thread that reads their records.
+    pub fn new(
+        tls: bool,
+        shares: Shares,
+        painter: Option<PathBuf>,
+    ) -> Result<Self, ThreadPoolBuildError> {
+        let previews = Arc::new(Previews::new(shares, painter)?);
         Ok(Self { tls, previews })
     }
 }
@@ -122,7 +127,8 @@ impl PageLayer {
                 let title = previews.title(game, services, extensions).await.ok();
                 let tagged = title.and_then(|title| {
                     let origin = preview::origin(request, self.tls)?;
-                    preview::document(&find(DOCUMENT)?.bytes, game, &title, &origin)
+                    let page = find(DOCUMENT)?;
+                    preview::document(&page.bytes, game, &title, &origin, previews.paints())
                 });
                 match tagged {
                     Some(tagged) => generated(tagged, request),

@@ -6,23 +6,28 @@
 //! Records are large and pictures take long, so few are read at a time, for callers in turns, and
 //! what was made of a game is kept for those that ask next.
 
-use std::sync::{Arc, LazyLock};
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::Bytes;
 use chefshat_proto::v1::{self, record_line::Line, record_service_client::RecordServiceClient};
+use chefshat_record::jsonl;
 use chefshat_record::outcome::outcome;
-use chefshat_render::{Painter, Perspective, last_scene};
 use chefshat_room::ids::Id;
 use http::uri::{Authority, Scheme};
 use http::{Extensions, Request, Response, Uri, header};
-use minijinja::{AutoEscape, Environment, Value, context};
 use prost::Message as _;
 use rayon::ThreadPoolBuildError;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::process::{Child, Command};
+use tokio::runtime::Handle;
 use tokio::time::timeout;
 use tonic::body::Body;
 use tonic::metadata::MetadataMap;
 use tower::{BoxError, Service};
+use tracing::warn;
 
 use super::answer::File;
 use super::cache::Cache;
@@ -48,13 +53,10 @@ const MAX_LINES: usize = 50_000;
 const MAX_BYTES: usize = 16 * 1024 * 1024;
 /// Width of a picture, in pixels.
 const WIDTH: u32 = 1200;
+/// Most bytes of a picture.
+const MAX_PICTURE_BYTES: u64 = 4 * 1024 * 1024;
 /// How a proxy that ends TLS says so.
 const FORWARDED_PROTO: &str = "x-forwarded-proto";
-/// The tags of a replay.
-const TAGS: &str = include_str!("preview.html");
-
-static PAINTER: LazyLock<Painter> = LazyLock::new(Painter::new);
-
 /// What a path shows of a game.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Link {
@@ -97,20 +99,26 @@ pub(super) struct Previews {
     places: Arc<Places>,
     waiting: Arc<Places>,
     threads: Threads,
+    /// The program that paints, `chefshat-lab`; without it there are no pictures.
+    painter: Option<PathBuf>,
     pictures: Cache<File>,
     titles: Cache<Title>,
 }
 
 impl Previews {
-    /// Starts the thread that paints.
+    /// Starts the thread that reads records.
     ///
     /// # Errors
     /// The operating system cannot start the thread.
-    pub(super) fn new(shares: Shares) -> Result<Self, ThreadPoolBuildError> {
+    pub(super) fn new(
+        shares: Shares,
+        painter: Option<PathBuf>,
+    ) -> Result<Self, ThreadPoolBuildError> {
         Ok(Self {
             places: Places::new(MAX_PREVIEWS, shares),
             waiting: Places::new(MAX_PREVIEWS_WAITING, shares),
             threads: Threads::new("previews", 1, Priority::Batches)?,
+            painter,
             pictures: Cache::new(PICTURES_KEPT),
             titles: Cache::new(TITLES_KEPT),
         })
@@ -130,11 +138,21 @@ impl Previews {
         S: Service<Request<Body>, Response = Response<Body>>,
         S::Error: Into<BoxError>,
     {
+        let painter = self.painter.clone().ok_or(Unshown::Unknown)?;
         let (kept, patience) = (&self.pictures, PICTURE_PATIENCE);
-        let shown = self.shown(kept, patience, game, services, extensions, |lines| {
-            Some(File::new("image/png", painted(lines)?))
-        });
-        shown.await
+        let runtime = Handle::current();
+        let start = move |lines: &[v1::RecordLine]| {
+            let _runtime = runtime.enter();
+            Some((started(&painter)?, jsonl::text(lines).ok()?))
+        };
+        let paint =
+            async |(child, record)| Some(File::new("image/png", painted(child, record).await?));
+        (self.shown(kept, patience, game, services, extensions, start, paint)).await
+    }
+
+    /// Whether there are pictures.
+    pub(super) fn paints(&self) -> bool {
+        self.painter.is_some()
     }
 
     /// What the tags of a game say.
@@ -152,20 +170,28 @@ impl Previews {
         S::Error: Into<BoxError>,
     {
         let (kept, patience) = (&self.titles, DOCUMENT_PATIENCE);
-        (self.shown(kept, patience, game, services, extensions, title)).await
+        let ready = async |title| Some(title);
+        (self.shown(kept, patience, game, services, extensions, title, ready)).await
     }
 
-    /// What is kept of a game, or what `make` makes of its record.
-    async fn shown<T, S>(
+    /// What is kept of a game, or what `finish` makes of what `make` makes of its record. A thread
+    /// that gives way to games runs `make`.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "the two callers differ in all of them"
+    )]
+    async fn shown<M, T, S>(
         &self,
         kept: &Cache<T>,
         patience: Duration,
         game: Id,
         services: S,
         extensions: &Extensions,
-        make: impl FnOnce(&[v1::RecordLine]) -> Option<T> + Send + 'static,
+        make: impl FnOnce(&[v1::RecordLine]) -> Option<M> + Send + 'static,
+        finish: impl AsyncFnOnce(M) -> Option<T>,
     ) -> Result<T, Unshown>
     where
+        M: Send + 'static,
         T: Clone + Send + 'static,
         S: Service<Request<Body>, Response = Response<Body>>,
         S::Error: Into<BoxError>,
@@ -183,8 +209,11 @@ impl Previews {
                 let lines = lines.ok_or(Unshown::Unknown)?;
                 // The work keeps its place when its request is cancelled.
                 let work = move || (make(&lines), place);
-                let made = self.threads.run(work).await;
-                made.and_then(|(made, _)| made).ok_or(Unshown::Unknown)
+                let made = self.threads.run(work).await.ok_or(Unshown::Unknown)?;
+                let (Some(made), _place) = made else {
+                    return Err(Unshown::Unknown);
+                };
+                finish(made).await.ok_or(Unshown::Unknown)
             };
             kept.get(game, making).await
         };
@@ -228,21 +257,49 @@ fn title(lines: &[v1::RecordLine]) -> Option<Title> {
     })
 }
 
-/// The document with the tags of a game. `origin`: where this server is reached.
-pub(super) fn document(document: &[u8], game: Id, title: &Title, origin: &str) -> Option<File> {
+/// The document with the tags of a game. `origin`: where this server is reached, which has no
+/// characters that HTML escapes. `has_picture`: whether there is a picture of it.
+pub(super) fn document(
+    document: &[u8],
+    game: Id,
+    title: &Title,
+    origin: &str,
+    has_picture: bool,
+) -> Option<File> {
     let document = std::str::from_utf8(document).ok()?;
     let (head, rest) = document.split_once("</head>")?;
-    let mut environment = Environment::new();
-    environment.set_auto_escape_callback(|_| AutoEscape::Html);
-    let tags = context! {
-        room => title.room.as_str(),
-        result => title.result.as_str(),
-        origin => Value::from_safe_string(origin.to_owned()),
-        game => game.to_string(),
+    let room = match title.room.as_str() {
+        "" => "A game of Chef’s Hat",
+        room => room,
     };
-    let tags = environment.render_str(TAGS, tags).ok()?;
+    let (room, result) = (escaped(room), escaped(&title.result));
+    let mut tags = format!(
+        r#"
+    <meta property="og:site_name" content="Chef’s Hat" />
+    <meta property="og:type" content="website" />
+    <meta property="og:title" content="{room}" />
+    <meta property="og:description" content="{result}" />
+    <meta property="og:url" content="{origin}/replay/{game}" />
+"#
+    );
+    if has_picture {
+        tags += &format!(
+            r#"    <meta property="og:image" content="{origin}/replay/{game}.png" />
+    <meta name="twitter:card" content="summary_large_image" />
+"#
+        );
+    }
     let tagged = format!("{head}{tags}</head>{rest}");
     Some(File::new("text/html", tagged.into()))
+}
+
+/// A text as the value of an attribute of HTML.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+        .replace('\'', "&#x27;")
 }
 
 /// The result of a game in words.
@@ -258,11 +315,37 @@ fn result(lines: &[v1::RecordLine]) -> String {
     places.join(" · ")
 }
 
-/// The picture of the end of a game, as PNG.
-fn painted(lines: &[v1::RecordLine]) -> Option<Bytes> {
-    let scene = last_scene(lines, Perspective::All).ok()?;
-    let pixels = PAINTER.pixels(&PAINTER.table(&scene), WIDTH).ok()?;
-    PAINTER.png(&pixels).ok().map(Bytes::from)
+/// Starts the program that paints. It gives way to games as the calling thread does, and ends with
+/// the value.
+fn started(painter: &Path) -> Option<Child> {
+    let mut command = Command::new(painter);
+    command
+        .args(["render", "-", "--out", "-", "--width"])
+        .arg(WIDTH.to_string());
+    command
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null());
+    let child = command.kill_on_drop(true).spawn();
+    child
+        .inspect_err(
+            |error| warn!(%error, painter = %painter.display(), "cannot draw previews of replays"),
+        )
+        .ok()
+}
+
+/// The picture of the end of a game, as PNG. Takes its record as JSON Lines.
+async fn painted(mut child: Child, record: Vec<u8>) -> Option<Bytes> {
+    let (mut to, from) = (child.stdin.take()?, child.stdout.take()?);
+    let write = async move {
+        // Fails if the program refuses the record; it writes no picture then.
+        let _ = to.write_all(&record).await;
+    };
+    let mut picture = Vec::new();
+    let mut from = from.take(MAX_PICTURE_BYTES);
+    let (_, read) = tokio::join!(write, from.read_to_end(&mut picture));
+    read.ok()?;
+    child.wait().await.ok()?.success().then(|| picture.into())
 }
 
 /// Where a client reaches this server; `None` if it does not say. Has no characters that HTML escapes.
@@ -295,7 +378,7 @@ mod tests {
     /// The page with the tags of a game.
     fn tagged(page: &[u8], lines: &[v1::RecordLine], origin: &str) -> String {
         let title = title(lines).expect("a header");
-        let made = document(page, game(), &title, origin).expect("a document");
+        let made = document(page, game(), &title, origin, true).expect("a document");
         String::from_utf8(made.bytes.into()).expect("text")
     }
 

@@ -84,7 +84,9 @@ fn send<'a>(page: &PageLayer, services: &Services, request: Request<Body>) -> An
 }
 
 fn page() -> PageLayer {
-    PageLayer::new(false, Shares::default()).expect("a thread")
+    // Says what it is given, instead of painting it.
+    let painter = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/web/painter.sh");
+    PageLayer::new(false, Shares::default(), Some(painter)).expect("a thread")
 }
 
 fn picture(game: usize) -> String {

@@ -56,11 +56,14 @@ class Images:
             part.rename(system)
         return self._image(name, {system: "/"} | files, [f"--env={setting}={_AUTHORITIES}" for setting in _SETTINGS])
 
-    def binary(self, file: Path) -> str:
-        """Makes an image that contains only /chefshat."""
-        stripped = self._storage / "chefshat"
-        run(["strip", "-o", str(stripped), str(file)])
-        return self._image("binary", {stripped: "/chefshat"}, [])
+    def binary(self, folder: Path) -> str:
+        """Makes an image that contains only the programs of a folder: /chefshat and /chefshat-lab."""
+        programs = {}
+        for name in ("chefshat", "chefshat-lab"):
+            stripped = self._storage / name
+            run(["strip", "-o", str(stripped), str(folder / name)])
+            programs[stripped] = f"/{name}"
+        return self._image("binary", programs, [])
 
     def load(self, file: Path) -> str:
         """Loads the image of a file, as docker does."""

@@ -1,6 +1,6 @@
 """Every command in the book is run as it is written, but for names, ports and printed values, or has a reason here why it is not.
 
-That all commands have options that exist is checked where they are parsed: `server/cli/src/documents.rs`,
+That all commands have options that exist is checked where they are parsed: `server/lab/src/documents.rs`,
 `clients/python/tests/test_book.py`, `clients/robot/tests/test_book.py`, `tests/xtask/src/main.rs`.
 """
 
@@ -23,7 +23,7 @@ PAGES = ["README.md", "proto/README.md", *(f"docs/{page.name}" for page in sorte
 #: Pages whose commands another test types, which names the page.
 TYPED_BY = {
     "docs/access.md": "tests/deployment/tests/test_friends.py",
-    "docs/pictures.md": "server/cli/tests/cli/render.rs",
+    "docs/pictures.md": "server/lab/tests/cli/render.rs",
     "docs/releases.md": "tests/deployment/tests/test_release.py",
 }
 
@@ -52,11 +52,11 @@ NOT_RUN = {
     r"(RAY_ADDRESS=auto )?python clients/python/samples/cluster/": "needs Ray, with older dependencies: see CONTRIBUTING.md",
     r"~/club/bin/|python -m chefshat\.players_club ": "needs ChefsHatGym 2; clients/python/tests has such players",
     r"for seed in |done$|chefshat compare (trained|exploiter|seed|deep_q)": "half an hour or more, or networks learned for hours",
-    r"chefshat participant delete P07 --data-dir": "the server would have to be stopped; server/cli/tests/cli/participant.rs",
-    r"target/debug/chefshat render .*\.mp4": "needs ffmpeg; server/cli/tests/cli/render.rs makes films",
+    r"chefshat participant delete P07 --data-dir": "the server would have to be stopped; server/lab/tests/cli/participant.rs",
+    r"target/debug/chefshat render .*\.mp4": "needs ffmpeg; server/lab/tests/cli/render.rs makes films",
     r"chefshat admin disconnect 17": "the number of a connection; tests/tests/system/operator.rs",
     r"chefshat import table-3\.csv|chefshat records import table-3": "the reader's table; server/record/tests has the page's",
-    r"chefshat verify game\.jsonl --key ": "a key of the reader; server/cli/tests/cli/verify.rs",
+    r"chefshat verify game\.jsonl --key ": "a key of the reader; server/lab/tests/cli/verify.rs",
     r"chefshat tournament table ": "needs a game at a physical table; tests/tests/system/tournament_tables.rs",
     r"chefshat-robot rehearse( --people 2 --(shifts 1 --mistakes|open)|$)": "minutes; docs/index.md has one that is run",
     r"chefshat-robot robot --room JOINCODE --name Pepe --referee ": "needs a game at a physical table; clients/robot/tests",

@@ -41,8 +41,11 @@ def test_a_server_and_an_agent_of_the_images_play(images: Images, base: str) -> 
     if not binary:
         pytest.skip("CHEFSHAT_BIN is not set: name the chefshat binary")
     bases = dict.fromkeys(("NODE_BASE", "RUST_BASE", "SERVER_BASE"), base)
-    image = images.build("server", bases | {"BINARY": images.binary(Path(binary))})
-    check(images, image, images.build("node-agent", bases))
+    bases["BINARY"] = images.binary(Path(binary).parent)
+    alone = images.container(images.build("server-alone", bases))
+    code, output = alone.run("simulate", "--help", environment={})
+    assert code == 1 and "chefshat-lab" in output, output
+    check(images, images.build("server", bases), images.build("node-agent", bases))
 
 
 @pytest.mark.slow
@@ -78,6 +81,8 @@ def check(images: Images, server_image: str, agent_image: str) -> None:
         code, output = stop(server)
     finally:
         end(server)
+    assert code == 0, output
+    code, output = container.run("simulate", "--games", "2", environment=environment)
     assert code == 0, output
     assert container.run("health", environment=environment)[0] == 1
 

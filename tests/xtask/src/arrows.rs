@@ -106,7 +106,23 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "chefshat-client",
         ],
     ),
-    ("chefshat", &["*"]),
+    // What only some users need, and takes long to build, belongs to chefshat-lab.
+    (
+        "chefshat",
+        &[
+            "chefshat-agents",
+            "chefshat-client",
+            "chefshat-engine",
+            "chefshat-proto",
+            "chefshat-record",
+            "chefshat-room",
+            "chefshat-search",
+            "chefshat-server",
+            "chefshat-simulation",
+            "chefshat-tournament",
+        ],
+    ),
+    ("chefshat-lab", &["*"]),
     ("chefshat-tests", &["*"]),
     (
         "chefshat-hostile",

@@ -15,6 +15,9 @@ use crate::setup::{self, at};
 use crate::steps::Steps;
 use crate::wheels::{self, tool};
 
+/// The programs: the server, and what only some need beside it.
+const PROGRAMS: [&str; 2] = ["chefshat", "chefshat-lab"];
+
 /// The version of everything.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Where the binary runs: on every Linux of this processor, without libraries.
@@ -109,23 +112,30 @@ impl Release<'_> {
     fn static_binary(&self) -> Command {
         let mut build = tool(self.places, "cargo-zigbuild", "");
         build.args(["zigbuild", "--locked", "--profile", "dist"]);
-        build.args([
-            "--target",
-            TARGET,
-            "--bin",
-            "chefshat",
-            "--features",
-            "chefshat/dist",
-        ]);
+        build.args(["--target", TARGET]);
+        for program in PROGRAMS {
+            build.args(["--package", program, "--bin", program]);
+            build.args(["--features", &format!("{program}/dist")]);
+        }
         build
     }
 
     fn binary(&self) -> PathBuf {
-        self.places.target.join(TARGET).join("dist/chefshat")
+        self.program(PROGRAMS[0])
+    }
+
+    fn program(&self, name: &str) -> PathBuf {
+        self.places.target.join(TARGET).join("dist").join(name)
     }
 
     fn check_static(&self) -> Result<(), Failure> {
-        let binary = self.binary();
+        PROGRAMS
+            .iter()
+            .try_for_each(|name| self.check_program(name))
+    }
+
+    fn check_program(&self, name: &str) -> Result<(), Failure> {
+        let binary = self.program(name);
         let headers = read(
             Command::new("readelf")
                 .arg("--program-headers")
@@ -144,7 +154,9 @@ impl Release<'_> {
     fn binary_archive(&self) -> Result<(), Failure> {
         let name = format!("chefshat-{VERSION}-{PLATFORM}");
         let folder = self.stage.join(&name);
-        copy(&self.binary(), &folder.join("chefshat"))?;
+        for program in PROGRAMS {
+            copy(&self.program(program), &folder.join(program))?;
+        }
         for document in ["docker/archive/README.md", "CHANGELOG.md", "LICENSE"] {
             let from = self.places.root.join(document);
             copy(&from, &folder.join(file_name(&from)))?;
@@ -173,7 +185,9 @@ impl Release<'_> {
         let root = self.stage.join("debian");
         let unpacked = self.stage.join(format!("chefshat-{VERSION}-{PLATFORM}"));
         let scripts = self.places.root.join("docker/debian");
-        copy(&unpacked.join("chefshat"), &root.join("usr/bin/chefshat"))?;
+        for program in PROGRAMS {
+            copy(&unpacked.join(program), &root.join("usr/bin").join(program))?;
+        }
         for (_, path) in COMPLETIONS {
             let from = unpacked.join("completions").join(file_name(path.as_ref()));
             copy(&from, &root.join(path))?;
@@ -289,7 +303,8 @@ impl Release<'_> {
     /// The bills of materials of the binary and of the page in it.
     fn contents(&self, mut cyclonedx: Command) -> Result<(), Failure> {
         let source = self.stage.join(format!("chefshat-{VERSION}-source"));
-        let manifest = source.join("server/cli/Cargo.toml");
+        // It contains what the other program contains.
+        let manifest = source.join("server/lab/Cargo.toml");
         cyclonedx
             .current_dir(&source)
             .arg("cyclonedx")
@@ -301,7 +316,7 @@ impl Release<'_> {
         cyclonedx.env("SOURCE_DATE_EPOCH", &self.date);
         run_command(&mut cyclonedx)?;
         let binary = self.dist.join(format!("chefshat-{VERSION}.cdx.json"));
-        copy(&source.join("server/cli/contents.json"), &binary)?;
+        copy(&source.join("server/lab/contents.json"), &binary)?;
         let mut npm = Command::new("npm");
         npm.current_dir(self.places.web());
         npm.args(["sbom", "--omit", "dev", "--sbom-format", "cyclonedx"]);
@@ -323,14 +338,17 @@ impl Release<'_> {
         }
         let authorities = "etc/ssl/certs/ca-certificates.crt";
         let system = system.display().to_string();
-        let binary = self.binary().display().to_string();
         self.base_image("base", &system, "/")?;
         self.base_image(
             "server-base",
             &format!("{system}/{authorities}"),
             &format!("/{authorities}"),
         )?;
-        self.base_image("binary", &binary, "/chefshat")?;
+        let programs = self.stage.join("programs");
+        for program in PROGRAMS {
+            copy(&self.program(program), &programs.join(program))?;
+        }
+        self.base_image("binary", &programs.display().to_string(), "/")?;
         let root = self.places.root.display();
         let name = format!("localhost/chefshat:{VERSION}");
         let mut build = self.buildah();

@@ -9,7 +9,7 @@ use crate::narration::view::GameView;
 /// How the seat of the reader is called.
 const YOU: &str = "you";
 /// What marks the Golden card.
-pub(crate) const GOLDEN: &str = "*";
+pub const GOLDEN: &str = "*";
 /// A joker.
 const JOKER: &str = "J";
 
@@ -23,7 +23,7 @@ fn stack(count: u32, card: &str) -> String {
 }
 
 /// The cards of a play: `2x7 J`.
-pub(crate) fn cards(face: u32, quantity: u32, jokers: u32, golden: bool) -> String {
+pub fn cards(face: u32, quantity: u32, jokers: u32, golden: bool) -> String {
     let golden = if golden { GOLDEN } else { "" };
     let stacks = [
         stack(quantity, &format!("{face}{golden}")),
@@ -34,7 +34,7 @@ pub(crate) fn cards(face: u32, quantity: u32, jokers: u32, golden: bool) -> Stri
 }
 
 /// A hand, rarest first.
-pub(crate) fn hand(hand: &Hand) -> String {
+pub fn hand(hand: &Hand) -> String {
     let stacks = hand.stacks().into_iter().map(|it| match it.joker {
         true => stack(it.count.into(), JOKER),
         false => cards(it.face, it.count.into(), 0, it.golden),
@@ -43,7 +43,7 @@ pub(crate) fn hand(hand: &Hand) -> String {
 }
 
 /// The name of a seat for a reader at seat `me`.
-pub(crate) fn name(view: &GameView, me: Option<u32>, seat: u32) -> String {
+pub fn name(view: &GameView, me: Option<u32>, seat: u32) -> String {
     match me == Some(seat) {
         true => YOU.to_owned(),
         false => view.name(seat),
@@ -51,7 +51,7 @@ pub(crate) fn name(view: &GameView, me: Option<u32>, seat: u32) -> String {
 }
 
 /// The name of a seat as the subject of a sentence in the third person.
-pub(crate) fn subject(view: &GameView, me: Option<u32>, seat: u32) -> String {
+pub fn subject(view: &GameView, me: Option<u32>, seat: u32) -> String {
     match me == Some(seat) {
         true => format!("{} ({YOU})", view.name(seat)),
         false => view.name(seat),
@@ -59,7 +59,7 @@ pub(crate) fn subject(view: &GameView, me: Option<u32>, seat: u32) -> String {
 }
 
 /// An action in words; `special` is what `declare` declares.
-pub(crate) fn action(space: ActionSpace, id: u32, special: v1::SpecialAction) -> String {
+pub fn action(space: ActionSpace, id: u32, special: v1::SpecialAction) -> String {
     let action = u16::try_from(id).ok().map(ActionId::new);
     let words = action.and_then(|id| space.decode(id)).map(|it| match it {
         Action::Play {
@@ -81,7 +81,7 @@ pub(crate) fn action(space: ActionSpace, id: u32, special: v1::SpecialAction) ->
 }
 
 /// The legal actions of a decision, each in a line: `13=2x6`, `199=pass`.
-pub(crate) fn options(space: ActionSpace, request: &v1::DecisionRequest) -> String {
+pub fn options(space: ActionSpace, request: &v1::DecisionRequest) -> String {
     let legal = Mask::from_bytes(&request.action_mask);
     let legal = legal.iter().flat_map(Mask::iter).map(|id| {
         let id = u32::from(id.index());

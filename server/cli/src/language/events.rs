@@ -17,15 +17,17 @@ const MAX_LABEL: usize = 40;
 
 /// An event in words.
 #[derive(Debug)]
-pub(crate) struct EventText {
-    pub(crate) sequence: u64,
-    pub(crate) words: String,
+pub struct EventText {
+    /// Number of the event.
+    pub sequence: u64,
+    /// What happened.
+    pub words: String,
     /// Whether a Shift begins with it.
-    pub(crate) begins_shift: bool,
+    pub begins_shift: bool,
 }
 
 /// Applies an event and returns it in words for a reader at seat `me`.
-pub(crate) fn advance(view: &mut GameView, me: Option<u32>, event: &v1::GameEvent) -> EventText {
+pub fn advance(view: &mut GameView, me: Option<u32>, event: &v1::GameEvent) -> EventText {
     let words = match &event.kind {
         None => String::new(),
         // The names come with the beginning of the game; other words need the state before the event.
@@ -138,7 +140,7 @@ fn standings(view: &GameView, me: Option<u32>, table: &[v1::Standing]) -> String
 }
 
 /// Events in one line for each Shift and each pizza.
-pub(crate) fn history<'a>(events: impl IntoIterator<Item = &'a EventText>) -> String {
+pub fn history<'a>(events: impl IntoIterator<Item = &'a EventText>) -> String {
     let mut text = String::new();
     for EventText { words, .. } in events.into_iter().filter(|it| !it.words.is_empty()) {
         if words.starts_with("Shift ") && !text.is_empty() {

@@ -11,15 +11,16 @@ use crate::narration::view::GameView;
 
 /// An open decision.
 #[derive(Debug)]
-pub(crate) struct Open {
-    pub(crate) request: v1::DecisionRequest,
+pub struct Open {
+    /// The request.
+    pub request: v1::DecisionRequest,
     /// When it arrived.
     since_ms: u64,
 }
 
 impl Open {
     /// Milliseconds left for the decision, and then in the time bank.
-    pub(crate) fn left_ms(&self, now_ms: u64) -> (u64, u64) {
+    pub fn left_ms(&self, now_ms: u64) -> (u64, u64) {
         let gone = now_ms.saturating_sub(self.since_ms);
         let (time, bank) = (self.request.time_left_ms, self.request.bank_left_ms);
         let (time, bank) = (u64::from(time), u64::from(bank));
@@ -30,21 +31,26 @@ impl Open {
 
 /// A seat as its participant knows it.
 #[derive(Debug)]
-pub(crate) struct Live {
-    pub(crate) view: GameView,
-    pub(crate) me: Option<u32>,
-    pub(crate) events: Vec<EventText>,
-    pub(crate) open: Option<Open>,
-    pub(crate) awaited: Option<AwaitedSeat>,
+pub struct Live {
+    /// What the seat sees.
+    pub view: GameView,
+    /// The seat, once it is known.
+    pub me: Option<u32>,
+    /// What happened, oldest first.
+    pub events: Vec<EventText>,
+    /// The decision that is open.
+    pub open: Option<Open>,
+    /// Whom the game waits for.
+    pub awaited: Option<AwaitedSeat>,
     /// Cards that all seats have played in this Shift.
-    pub(crate) played: Hand,
+    pub played: Hand,
     /// Why no more updates come although the game has not ended.
-    pub(crate) lost: Option<String>,
+    pub lost: Option<String>,
 }
 
 impl Live {
     /// A seat of a room, before its first update.
-    pub(crate) fn new(view: GameView, me: Option<u32>) -> Self {
+    pub fn new(view: GameView, me: Option<u32>) -> Self {
         Self {
             view,
             me,
@@ -57,12 +63,12 @@ impl Live {
     }
 
     /// Number of the last event; 0 before the first.
-    pub(crate) fn sequence(&self) -> u64 {
+    pub fn sequence(&self) -> u64 {
         self.events.last().map_or(0, |event| event.sequence)
     }
 
     /// The numbering of actions.
-    pub(crate) fn space(&self) -> ActionSpace {
+    pub fn space(&self) -> ActionSpace {
         let faces = u8::try_from(self.view.faces()).ok();
         faces
             .and_then(ActionSpace::new)
@@ -70,23 +76,23 @@ impl Live {
     }
 
     /// Whether the game has ended for this seat.
-    pub(crate) fn is_over(&self) -> bool {
+    pub fn is_over(&self) -> bool {
         self.view.end.is_some() || self.lost.is_some()
     }
 
     /// Whether a substitute plays for this seat, until it says that it is back.
-    pub(crate) fn is_substituted(&self) -> bool {
+    pub fn is_substituted(&self) -> bool {
         let me = self.me.and_then(|me| self.view.seat(me));
         !self.is_over() && me.is_some_and(|seat| seat.substituted)
     }
 
     /// Whether the participant has to act, or will never have to again.
-    pub(crate) fn concerns_me(&self) -> bool {
+    pub fn concerns_me(&self) -> bool {
         self.open.is_some() || self.is_over()
     }
 
     /// Takes an update that arrived at `now_ms`.
-    pub(crate) fn take(&mut self, update: Update, now_ms: u64) {
+    pub fn take(&mut self, update: Update, now_ms: u64) {
         match update {
             Update::Attached(attached) => {
                 self.me = Some(attached.seat);
@@ -111,12 +117,12 @@ impl Live {
     }
 
     /// Closes a decision that was answered, unless the next one is open already.
-    pub(crate) fn close(&mut self, decision_id: u64) {
+    pub fn close(&mut self, decision_id: u64) {
         (self.open).take_if(|open| open.request.decision_id == decision_id);
     }
 
     /// Closes the open decision if it is this one or an earlier one.
-    pub(crate) fn close_before(&mut self, decision_id: u64) {
+    pub fn close_before(&mut self, decision_id: u64) {
         (self.open).take_if(|open| open.request.decision_id <= decision_id);
     }
 

@@ -1,24 +1,24 @@
 //! A table in words, for language models: what `chefshat mcp` answers and `chefshat agent llm` asks.
 //! docs/mcp.md describes the text form line by line.
 
-pub(crate) mod cards;
-pub(crate) mod events;
-pub(crate) mod live;
+pub mod cards;
+pub mod events;
+pub mod live;
 #[cfg(test)]
 mod tests;
-pub(crate) mod text;
+pub mod text;
 
 use chefshat_engine::RuleSet;
 
 use crate::output::{rules_in_short, variations};
 
 /// Key of the annotation with the reason for a decision.
-pub(crate) const REASON: &str = "reason";
+pub const REASON: &str = "reason";
 /// Maximum bytes of a reason. Annotations of a decision have at most 4 KiB.
 const MAX_REASON_BYTES: usize = 3_500;
 
 /// The rules that a model needs at the table, in short. docs/rules.md has all of them.
-pub(crate) const RULES: &str = "\
+pub const RULES: &str = "\
 The rules in short: get rid of your cards first. A lower number is rarer and beats a higher one. A play is cards of one number; a joker (J) counts as one \
 more of them, and a joker alone is the weakest play. You must play a lower number than the board shows, and at least as many cards, or pass; a pass \
 counts until the pizza is done. When everybody else has passed, the board is cleared and whoever played last leads with anything. 11* is the Golden \
@@ -26,7 +26,7 @@ card, which opens the Shift. Places give points, with which the game ends. Betwe
 give back any.";
 
 /// The rules of one game beside [`RULES`], in a sentence.
-pub(crate) fn this_game(rules: Option<&RuleSet>) -> String {
+pub fn this_game(rules: Option<&RuleSet>) -> String {
     let Some(rules) = rules else {
         return String::new();
     };
@@ -39,7 +39,7 @@ pub(crate) fn this_game(rules: Option<&RuleSet>) -> String {
 }
 
 /// A reason as its annotation has it; `None` if it says nothing.
-pub(crate) fn reason(words: &str) -> Option<String> {
+pub fn reason(words: &str) -> Option<String> {
     let words = words.trim();
     let fits = &words[..words.floor_char_boundary(MAX_REASON_BYTES)];
     (!fits.is_empty()).then(|| fits.to_owned())

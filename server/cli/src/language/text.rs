@@ -17,7 +17,7 @@ use crate::narration::view::{End, GameView};
 use crate::numbers::ordinal;
 
 /// What happened after an event, then the open decision, or whom the game waits for.
-pub(crate) fn since(live: &Live, after: u64, now_ms: u64) -> String {
+pub fn since(live: &Live, after: u64, now_ms: u64) -> String {
     let mut text = format!("seq {}", live.sequence());
     let news = history(live.events.iter().filter(|it| it.sequence > after));
     if !news.is_empty() {
@@ -48,7 +48,7 @@ fn now(live: &Live, now_ms: u64) -> String {
 }
 
 /// Why no further decision comes; `None` while the game runs.
-pub(crate) fn over(live: &Live) -> Option<String> {
+pub fn over(live: &Live) -> Option<String> {
     let lost = live
         .lost
         .as_deref()
@@ -185,14 +185,14 @@ fn left(live: &Live) -> String {
 }
 
 /// What happened in this Shift, then the whole table, for a reader who remembers nothing.
-pub(crate) fn decision(live: &Live, now_ms: u64) -> String {
+pub fn decision(live: &Live, now_ms: u64) -> String {
     let shift = live.events.iter().rposition(|event| event.begins_shift);
     let news = history(live.events.iter().skip(shift.unwrap_or(0)));
     format!("{news}\n{}", state(live, now_ms))
 }
 
 /// The number of the last event, then the whole table.
-pub(crate) fn table(live: &Live, now_ms: u64) -> String {
+pub fn table(live: &Live, now_ms: u64) -> String {
     format!("seq {}\n{}", live.sequence(), state(live, now_ms))
 }
 

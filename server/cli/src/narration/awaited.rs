@@ -10,7 +10,7 @@ const PATIENCE_MS: u64 = 5_000;
 
 /// A seat whose decision is open.
 #[derive(Debug, Clone)]
-pub(crate) struct AwaitedSeat {
+pub struct AwaitedSeat {
     seat: u32,
     /// It is not connected.
     away: bool,
@@ -24,7 +24,7 @@ pub(crate) struct AwaitedSeat {
 
 impl AwaitedSeat {
     /// The seat of a message that arrived at `now_ms`; `None` if nobody is awaited.
-    pub(crate) fn new(awaited: &v1::Awaited, now_ms: u64) -> Option<Self> {
+    pub fn new(awaited: &v1::Awaited, now_ms: u64) -> Option<Self> {
         Some(Self {
             seat: awaited.seat?,
             away: awaited.away,
@@ -35,13 +35,13 @@ impl AwaitedSeat {
     }
 
     /// Whether it is not connected.
-    pub(crate) fn is_away(&self) -> bool {
+    pub fn is_away(&self) -> bool {
         self.away
     }
 
     /// The sentence at `now_ms`: the time left for a seat that is away, the time passed for one that
     /// is connected. `None` while that is not worth saying.
-    pub(crate) fn words(&self, table: &GameView, now_ms: u64) -> Option<String> {
+    pub fn words(&self, table: &GameView, now_ms: u64) -> Option<String> {
         let passed = now_ms.saturating_sub(self.since_ms);
         let name = table.name(self.seat);
         if self.away {

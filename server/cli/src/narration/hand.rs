@@ -2,27 +2,29 @@
 
 /// Cards of one hand.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(crate) struct Hand {
+pub struct Hand {
     /// Counts: index f-1 for face f, the last one for jokers.
-    pub(crate) counts: Vec<u8>,
+    pub counts: Vec<u8>,
     /// Contains the Golden card.
-    pub(crate) golden: bool,
+    pub golden: bool,
 }
 
 /// The cards of one face, or the jokers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Stack {
+pub struct Stack {
     /// The face; F+1 for jokers.
-    pub(crate) face: u32,
-    pub(crate) count: u8,
-    pub(crate) joker: bool,
+    pub face: u32,
+    /// How many cards.
+    pub count: u8,
+    /// Whether it is a joker.
+    pub joker: bool,
     /// Contains the Golden card.
-    pub(crate) golden: bool,
+    pub golden: bool,
 }
 
 impl Hand {
     /// Makes a hand of cards (F+1 for a joker); cards outside the deck are ignored.
-    pub(crate) fn of(faces: usize, cards: &[u32], golden: bool) -> Self {
+    pub fn of(faces: usize, cards: &[u32], golden: bool) -> Self {
         let mut hand = Self {
             counts: vec![0; faces + 1],
             golden,
@@ -31,7 +33,8 @@ impl Hand {
         hand
     }
 
-    pub(crate) fn put(&mut self, cards: &[u32]) {
+    /// Adds cards, by their faces.
+    pub fn put(&mut self, cards: &[u32]) {
         for card in cards {
             if let Some(count) = self.slot(*card) {
                 *count = count.saturating_add(1);
@@ -39,7 +42,8 @@ impl Hand {
         }
     }
 
-    pub(super) fn take(&mut self, face: u32, quantity: u32) {
+    /// Removes cards of a face.
+    pub fn take(&mut self, face: u32, quantity: u32) {
         let quantity = u8::try_from(quantity).unwrap_or(u8::MAX);
         if let Some(count) = self.slot(face) {
             *count = count.saturating_sub(quantity);
@@ -52,7 +56,7 @@ impl Hand {
     }
 
     /// Its stacks, rarest first, jokers last.
-    pub(crate) fn stacks(&self) -> Vec<Stack> {
+    pub fn stacks(&self) -> Vec<Stack> {
         let faces = self.counts.len().saturating_sub(1);
         (0..)
             .zip(&self.counts)
@@ -67,7 +71,7 @@ impl Hand {
     }
 
     /// Number of jokers.
-    pub(crate) fn jokers(&self) -> u8 {
+    pub fn jokers(&self) -> u8 {
         self.counts.last().copied().unwrap_or(0)
     }
 }

@@ -4,16 +4,16 @@
 //! Shift, a growing line for a pizza. The text always has colours; the caller prints it and may
 //! strip them.
 
-pub(crate) mod awaited;
+pub mod awaited;
 mod chain;
-pub(crate) mod hand;
+pub mod hand;
 mod results;
-pub(crate) mod story;
+pub mod story;
 #[cfg(test)]
 mod tests;
 mod text;
-pub(crate) mod view;
-pub(crate) mod words;
+pub mod view;
+pub mod words;
 
 use chefshat_client::v1::{self, game_event::Kind};
 use chefshat_engine::{Opening, RuleSet};
@@ -24,9 +24,9 @@ use crate::output::{stop_in_words, variations};
 use awaited::AwaitedSeat;
 use chain::Chain;
 use story::Line;
-pub(super) use story::{abort_reason, aborted, title};
+pub use story::{abort_reason, aborted, title};
 use text::{BOLD, DIM, GOLD, PLAIN, Piece, label, seat_style, wrapped};
-pub(super) use text::{MAX_NAME, clean, columns, heading, row};
+pub use text::{MAX_NAME, clean, columns, heading, row};
 use view::GameView;
 
 /// Indentation of the lines of a Shift.
@@ -34,7 +34,7 @@ const INDENT: &str = "   ";
 
 /// Writes a game as text.
 #[derive(Debug, Default)]
-pub(super) struct Narrator {
+pub struct Narrator {
     view: GameView,
     /// What plays each seat, in a word; from the start of the game unless set before.
     labels: Vec<String>,
@@ -46,7 +46,7 @@ pub(super) struct Narrator {
 
 impl Narrator {
     /// Narrates the game of a room.
-    pub(super) fn of_room(room: &v1::Room) -> Self {
+    pub fn of_room(room: &v1::Room) -> Self {
         Self {
             view: GameView::of_room(room),
             ..Self::default()
@@ -55,13 +55,13 @@ impl Narrator {
 
     /// Sets a label for what plays each seat, if the caller knows more than the server publishes.
     #[must_use]
-    pub(super) fn with_labels(mut self, labels: impl IntoIterator<Item = String>) -> Self {
+    pub fn with_labels(mut self, labels: impl IntoIterator<Item = String>) -> Self {
         self.labels = labels.into_iter().collect();
         self
     }
 
     /// Returns the text of an event. It ends in the middle of a line while a pizza is being made.
-    pub(super) fn narrate(&mut self, event: &v1::GameEvent) -> String {
+    pub fn narrate(&mut self, event: &v1::GameEvent) -> String {
         let Some(kind) = &event.kind else {
             return String::new();
         };
@@ -87,7 +87,7 @@ impl Narrator {
     }
 
     /// Returns the text about a seat that is away and awaited; empty for others.
-    pub(super) fn wait_for(&mut self, awaited: &v1::Awaited) -> String {
+    pub fn wait_for(&mut self, awaited: &v1::Awaited) -> String {
         let away = AwaitedSeat::new(awaited, 0).filter(AwaitedSeat::is_away);
         let words = away.and_then(|awaited| awaited.words(&self.view, 0));
         let line = words.map(|words| Line {
@@ -99,7 +99,7 @@ impl Narrator {
     }
 
     /// Ends an open line when no more events will come.
-    pub(super) fn break_off(&mut self) -> &'static str {
+    pub fn break_off(&mut self) -> &'static str {
         self.chain.break_off()
     }
 
@@ -240,7 +240,7 @@ impl Narrator {
 }
 
 /// Explains the lines of a pizza.
-pub(super) fn legend() -> String {
+pub fn legend() -> String {
     let items = [
         "3×9+J: three 9s and a joker",
         "(Rosa): a pass, omitted at the end of a pizza",

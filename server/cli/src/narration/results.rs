@@ -15,7 +15,7 @@ const MIN_NAME_COLUMN: usize = 12;
 
 impl Narrator {
     /// Places, points and totals of a Shift.
-    pub(super) fn shift_ended(&mut self, end: &v1::ShiftEnded) -> String {
+    pub fn shift_ended(&mut self, end: &v1::ShiftEnded) -> String {
         let mut out = self.chain.close(&self.view);
         let mut words = format!("{} pizzas, {} turns", end.pizzas, end.turns);
         if end.adjudicated {
@@ -47,7 +47,7 @@ impl Narrator {
     }
 
     /// The final standings.
-    pub(super) fn game_ended(&mut self, end: &v1::GameEnded) -> String {
+    pub fn game_ended(&mut self, end: &v1::GameEnded) -> String {
         let mut out = self.chain.close(&self.view);
         out.push_str(&heading("Standings"));
         let column = self.name_column();

@@ -14,17 +14,17 @@ const MAX_TEXT: usize = 200;
 
 /// A line of the story.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Line {
+pub struct Line {
     /// The seat whose name it begins with.
-    pub(crate) seat: Option<u32>,
+    pub seat: Option<u32>,
     /// The text without that name.
-    pub(crate) words: String,
+    pub words: String,
     /// It opens a section: a Shift, a pizza.
-    pub(crate) heading: bool,
+    pub heading: bool,
 }
 
 /// Applies an event and returns its lines.
-pub(crate) fn advance(view: &mut GameView, event: &v1::GameEvent) -> Vec<Line> {
+pub fn advance(view: &mut GameView, event: &v1::GameEvent) -> Vec<Line> {
     // The lines first: they need the state before the event.
     let lines = (event.kind.as_ref()).map_or_else(Vec::new, |kind| lines_of(view, kind));
     view.apply(event);
@@ -32,7 +32,7 @@ pub(crate) fn advance(view: &mut GameView, event: &v1::GameEvent) -> Vec<Line> {
 }
 
 /// The line of a decision for which the seat was given hints, before the line of the decision.
-pub(crate) fn after_hints(seat: u32, hints: u32) -> Line {
+pub fn after_hints(seat: u32, hints: u32) -> Line {
     let words = match hints {
         1 => "gets a hint".to_owned(),
         hints => format!("gets {hints} hints"),
@@ -185,7 +185,7 @@ fn exchanged(view: &GameView, cards: &v1::CardsExchanged) -> String {
 }
 
 /// The cards of a play: three 9s and a joker are `3×9+J`.
-pub(super) fn cards(play: &v1::Play) -> String {
+pub fn cards(play: &v1::Play) -> String {
     match (play.quantity, play.jokers) {
         (0, _) => "J".into(),
         (quantity, 0) => format!("{quantity}×{}", play.face),
@@ -195,7 +195,7 @@ pub(super) fn cards(play: &v1::Play) -> String {
 }
 
 /// Why the server decided for the seat, in a word; `None` if the seat decided.
-pub(crate) fn reason(source: v1::DecisionSource) -> Option<&'static str> {
+pub fn reason(source: v1::DecisionSource) -> Option<&'static str> {
     match source {
         v1::DecisionSource::Timeout => Some("too late"),
         v1::DecisionSource::Invalid => Some("invalid"),
@@ -209,13 +209,13 @@ pub(crate) fn reason(source: v1::DecisionSource) -> Option<&'static str> {
 }
 
 /// The sentence about an aborted game.
-pub(crate) fn aborted(reason: v1::AbortReason) -> String {
+pub fn aborted(reason: v1::AbortReason) -> String {
     let reason = abort_reason(reason);
     format!("The game was aborted and has no result: {reason}.")
 }
 
 /// Why a game has no result.
-pub(crate) fn abort_reason(reason: v1::AbortReason) -> &'static str {
+pub fn abort_reason(reason: v1::AbortReason) -> &'static str {
     match reason {
         v1::AbortReason::Unspecified => "the server gave no reason",
         v1::AbortReason::Closed => "its room was closed",
@@ -227,7 +227,7 @@ pub(crate) fn abort_reason(reason: v1::AbortReason) -> &'static str {
 }
 
 /// Name of a role.
-pub(crate) fn title(role: v1::Role) -> &'static str {
+pub fn title(role: v1::Role) -> &'static str {
     match role {
         v1::Role::Unspecified => "no role",
         v1::Role::Chef => "Chef",

@@ -6,7 +6,7 @@ use unicode_width::{UnicodeWidthChar as _, UnicodeWidthStr as _};
 /// Maximum columns of a line.
 pub(super) const WIDTH: usize = 98;
 /// Maximum columns of a name.
-pub(crate) const MAX_NAME: usize = 15;
+pub const MAX_NAME: usize = 15;
 
 /// Columns of the label of a line outside Shifts.
 const LABEL: usize = 17;
@@ -39,7 +39,7 @@ pub(super) fn seat_style(seat: u32) -> Style {
 }
 
 /// Columns of a text on a terminal.
-pub(crate) fn columns(text: &str) -> usize {
+pub fn columns(text: &str) -> usize {
     text.width()
 }
 
@@ -124,7 +124,7 @@ pub(super) fn wrapped(start: &Piece, items: &[Piece]) -> String {
 }
 
 /// A heading: text in a rule across the page.
-pub(crate) fn heading(words: &str) -> String {
+pub fn heading(words: &str) -> String {
     let words = clean(words, WIDTH - 10);
     let rest = WIDTH.saturating_sub(columns(&words) + 4);
     let line = Piece::new(BOLD, "━━ ")
@@ -140,13 +140,13 @@ pub(super) fn label(words: &str) -> Piece {
 }
 
 /// A line outside Shifts: a label and text. Not wrapped, so that addresses and paths can be copied.
-pub(crate) fn row(words: &str, text: &str) -> String {
+pub fn row(words: &str, text: &str) -> String {
     let line = label(words).and(PLAIN, text);
     format!("{}\n", line.as_str())
 }
 
 /// Text from outside, made safe to print: without control characters, at most `width` columns.
-pub(crate) fn clean(text: &str, width: usize) -> String {
+pub fn clean(text: &str, width: usize) -> String {
     let shown = |letter: &char| !steers(*letter);
     let safe: String = text.chars().filter(shown).collect();
     if columns(&safe) <= width {

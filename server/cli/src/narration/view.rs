@@ -14,84 +14,100 @@ const MAX_ROOM_NAME: usize = 64;
 
 /// A seat as the viewer knows it.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct SeatView {
+pub struct SeatView {
     /// Display name; empty while the seat is free.
-    pub(crate) name: String,
-    pub(crate) kind: v1::ParticipantKind,
+    pub name: String,
+    /// What the participant is.
+    pub kind: v1::ParticipantKind,
     /// The built-in agent that plays it or substitutes for its participant; empty otherwise.
-    pub(crate) built_in: String,
+    pub built_in: String,
     /// Its participant is connected.
-    pub(crate) connected: bool,
-    pub(crate) substituted: bool,
-    pub(crate) role: v1::Role,
+    pub connected: bool,
+    /// Whether a built-in agent plays for it.
+    pub substituted: bool,
+    /// The role in this Shift.
+    pub role: v1::Role,
     /// Cards in hand.
-    pub(crate) cards: u32,
-    pub(crate) points: u64,
+    pub cards: u32,
+    /// The points so far.
+    pub points: u64,
     /// Out of this pizza.
-    pub(crate) passed: bool,
+    pub passed: bool,
     /// Place in this Shift, from 1, once it has finished.
-    pub(crate) finished: Option<u32>,
+    pub finished: Option<u32>,
     /// The hand, if the viewer may see it.
-    pub(crate) hand: Option<Hand>,
+    pub hand: Option<Hand>,
 }
 
 /// The play on the board and its seat.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct OnBoard {
-    pub(crate) seat: u32,
+pub struct OnBoard {
+    /// The seat that played.
+    pub seat: u32,
     /// F+1 for a joker alone.
-    pub(crate) face: u32,
-    pub(crate) quantity: u32,
-    pub(crate) jokers: u32,
+    pub face: u32,
+    /// How many cards, jokers included.
+    pub quantity: u32,
+    /// How many of them are jokers.
+    pub jokers: u32,
     /// The Golden card is among them.
-    pub(crate) golden: bool,
+    pub golden: bool,
 }
 
 /// How a game ended.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum End {
+pub enum End {
+    /// It has a result.
     Finished(Vec<v1::Standing>),
+    /// It has none.
     Aborted(v1::AbortReason),
 }
 
 /// A game as the viewer knows it.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct GameView {
-    pub(crate) room_name: String,
-    pub(crate) game_id: String,
-    pub(crate) rules: Option<RuleSet>,
-    pub(crate) hand_size: u32,
+pub struct GameView {
+    /// The name of the room.
+    pub room_name: String,
+    /// The id of the game.
+    pub game_id: String,
+    /// The rules, once they are known.
+    pub rules: Option<RuleSet>,
+    /// How many cards each seat is dealt.
+    pub hand_size: u32,
     /// Index = seat.
-    pub(crate) seats: Vec<SeatView>,
-    pub(crate) started: bool,
+    pub seats: Vec<SeatView>,
+    /// Whether the first Shift has started.
+    pub started: bool,
     /// Shift, from 1; 0 before the first.
-    pub(crate) shift: u32,
+    pub shift: u32,
     /// Pizza of the Shift, from 1.
-    pub(crate) pizza: u32,
+    pub pizza: u32,
     /// Turns of this Shift so far.
-    pub(crate) turns: u32,
-    pub(crate) board: Option<OnBoard>,
+    pub turns: u32,
+    /// The play that must be beaten.
+    pub board: Option<OnBoard>,
     /// The seat to act, once the events determine it.
-    pub(crate) turn: Option<u32>,
+    pub turn: Option<u32>,
     /// Seats in the order in which they finished the last Shift.
-    pub(crate) last_order: Vec<u32>,
-    pub(crate) end: Option<End>,
+    pub last_order: Vec<u32>,
+    /// How the game ended.
+    pub end: Option<End>,
     /// At a physical table: the game is paused, and the clocks stand still.
-    pub(crate) paused: bool,
+    pub paused: bool,
     /// At a physical table: what a correction rebuilds the view from.
-    pub(crate) history: Option<Box<History>>,
+    pub history: Option<Box<History>>,
 }
 
 /// The events of a physical table that are not void, and the view before them.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct History {
+pub struct History {
     start: GameView,
     events: Vec<v1::GameEvent>,
 }
 
 impl GameView {
     /// A room before its first event.
-    pub(crate) fn of_room(room: &v1::Room) -> Self {
+    pub fn of_room(room: &v1::Room) -> Self {
         let mut view = Self {
             room_name: clean(&room.name, MAX_ROOM_NAME),
             game_id: room.game_id.clone(),
@@ -109,12 +125,12 @@ impl GameView {
     }
 
     /// Faces of the deck.
-    pub(crate) fn faces(&self) -> u32 {
+    pub fn faces(&self) -> u32 {
         self.rules.map_or(11, |rules| rules.faces().into())
     }
 
     /// A seat, if the game has it.
-    pub(crate) fn seat(&self, seat: u32) -> Option<&SeatView> {
+    pub fn seat(&self, seat: u32) -> Option<&SeatView> {
         self.seats.get(usize::try_from(seat).ok()?)
     }
 
@@ -123,7 +139,7 @@ impl GameView {
     }
 
     /// Display name of a seat.
-    pub(crate) fn name(&self, seat: u32) -> String {
+    pub fn name(&self, seat: u32) -> String {
         match self.seat(seat) {
             Some(place) if !place.name.is_empty() => place.name.clone(),
             _ => format!("seat {}", seat_number(seat)),
@@ -131,19 +147,19 @@ impl GameView {
     }
 
     /// Whether the cards are real and those of a seat are not yet known to the server.
-    pub(crate) fn awaits_hand(&self, seat: u32) -> bool {
+    pub fn awaits_hand(&self, seat: u32) -> bool {
         let unknown = |it: &SeatView| it.hand.is_none() && it.cards > 0;
         self.history.is_some() && self.seat(seat).is_some_and(unknown)
     }
 
     /// Number of free seats.
-    pub(crate) fn free_seats(&self) -> usize {
+    pub fn free_seats(&self) -> usize {
         let free = |place: &&SeatView| place.name.is_empty();
         self.seats.iter().filter(free).count()
     }
 
     /// Applies an event.
-    pub(crate) fn apply(&mut self, event: &v1::GameEvent) {
+    pub fn apply(&mut self, event: &v1::GameEvent) {
         let Some(mut history) = self.history.take() else {
             return self.step(event);
         };
@@ -361,7 +377,7 @@ impl GameView {
 
     /// Whether a play that comes next contains the Golden card: it opens a Shift if the rules say
     /// so; otherwise it is the last of its face to be played, which only a known hand shows.
-    pub(crate) fn plays_golden(&self, play: &v1::Play) -> bool {
+    pub fn plays_golden(&self, play: &v1::Play) -> bool {
         if play.face != self.faces() {
             return false;
         }

@@ -5,14 +5,14 @@ use chefshat_client::v1;
 use percent_encoding::{NON_ALPHANUMERIC, percent_decode_str, utf8_percent_encode};
 
 /// Label of an expression with words.
-pub(crate) const SAY: &str = "say";
+pub const SAY: &str = "say";
 /// What precedes the words.
 const PREFIX: &str = "data:,";
 /// Maximum bytes of `media` in the protocol.
 const MAX_MEDIA: usize = 256;
 
 /// Whether words can be said whole.
-pub(crate) fn fits(words: &str) -> bool {
+pub fn fits(words: &str) -> bool {
     encoded(words).len() <= MAX_MEDIA
 }
 
@@ -21,7 +21,7 @@ fn encoded(words: &str) -> String {
 }
 
 /// An expression that says these words.
-pub(crate) fn said(words: &str) -> v1::Expression {
+pub fn said(words: &str) -> v1::Expression {
     v1::Expression {
         label: SAY.to_owned(),
         media: to_data_url(words),
@@ -31,13 +31,13 @@ pub(crate) fn said(words: &str) -> v1::Expression {
 }
 
 /// The words in `media`; `None` if it refers to something else.
-pub(crate) fn from_data_url(media: &str) -> Option<String> {
+pub fn from_data_url(media: &str) -> Option<String> {
     let words = percent_decode_str(media.strip_prefix(PREFIX)?);
     Some(words.decode_utf8_lossy().into_owned())
 }
 
 /// `media` with these words. Words that do not fit are cut off, and end with an ellipsis.
-pub(crate) fn to_data_url(words: &str) -> String {
+pub fn to_data_url(words: &str) -> String {
     let mut media = encoded(words);
     let mut cut = words.to_owned();
     while media.len() > MAX_MEDIA {

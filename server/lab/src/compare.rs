@@ -15,10 +15,11 @@ use chefshat_simulation::{
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::numbers::counted;
-use super::output::{self, heading, line, table};
-use super::rules_args::RulesArgs;
-use super::{CommandError, progress, threads};
+use chefshat_cli::error::CommandError;
+use chefshat_cli::numbers::counted;
+use chefshat_cli::output::{self, heading, line, table};
+use chefshat_cli::rules_args::RulesArgs;
+use chefshat_cli::{progress, threads};
 
 /// Maximum length of an agent's name in the title.
 const MAX_NAME: usize = 25;

@@ -17,9 +17,10 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use rayon::prelude::*;
 
-use super::numbers::grouped;
-use super::rules_args::RulesArgs;
-use super::{CommandError, progress, threads};
+use chefshat_cli::error::CommandError;
+use chefshat_cli::numbers::grouped;
+use chefshat_cli::rules_args::RulesArgs;
+use chefshat_cli::{progress, threads};
 use chefshat_record::convert::MAX_RECORDED_ATTEMPTS;
 
 const EXAMPLES: &str = "\

@@ -6,11 +6,11 @@ use rmcp::ErrorData;
 use rmcp::model::{ReadResourceResult, Resource, ResourceContents, ResourceTemplate};
 
 use super::seats::Seats;
-use crate::CommandError;
-use crate::language::REASON;
-use crate::language::events;
-use crate::narration::clean;
-use crate::narration::view::GameView;
+use chefshat_cli::error::CommandError;
+use chefshat_cli::language::REASON;
+use chefshat_cli::language::events;
+use chefshat_cli::narration::clean;
+use chefshat_cli::narration::view::GameView;
 
 const RULES: &str = "chefshat://rules";
 const TABLES: &str = "chefshat://tables/";

@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 use clap::Parser as _;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-use crate::Cli;
+use chefshat_cli::program::CommandLine;
+
+use crate::Command;
 
 /// The Markdown files whose command lines are checked.
 fn documents() -> Vec<PathBuf> {
@@ -91,11 +93,18 @@ fn arguments(words: &[String]) -> Option<&[String]> {
         let begins = words.len() >= prefix.len() && words.iter().zip(prefix).all(|(a, b)| a == b);
         begins.then(|| &words[prefix.len()..])
     };
-    let direct = ["chefshat", "./chefshat", "target/release/chefshat"];
+    let direct = [
+        "chefshat",
+        "./chefshat",
+        "target/debug/chefshat",
+        "target/release/chefshat",
+    ];
     if let Some(rest) = direct.iter().find_map(|program| starts(&[program])) {
         return Some(rest);
     }
-    if let Some(rest) = starts(&["cargo", "run", "--release", "--"]) {
+    if let Some(rest) =
+        starts(&["cargo", "run", "--"]).or_else(|| starts(&["cargo", "run", "--release", "--"]))
+    {
         return Some(rest);
     }
     if let Some(rest) = starts(&["sudo", "-u", "chefshat"]).or_else(|| starts(&["do"])) {
@@ -121,7 +130,7 @@ fn value(word: &str) -> String {
 fn refusal(arguments: &[String], is_complete: bool) -> Option<String> {
     let arguments = arguments.iter().map(|word| value(word));
     let line = ["chefshat".to_owned()].into_iter().chain(arguments);
-    let error = Cli::try_parse_from(line).err()?;
+    let error = CommandLine::<Command>::try_parse_from(line).err()?;
     let is_help = matches!(
         error.kind(),
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion

@@ -10,9 +10,9 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout};
 
-use crate::language::live::Live;
-use crate::language::{self, cards, text};
-use crate::narration::view::GameView;
+use chefshat_cli::language::live::Live;
+use chefshat_cli::language::{self, cards, text};
+use chefshat_cli::narration::view::GameView;
 
 /// Longest wait of a call. Clients give up on calls after about a minute.
 pub(super) const LONGEST_WAIT: Duration = Duration::from_secs(25);

@@ -3,6 +3,7 @@
 
 mod reel;
 
+use std::io::{self, Write as _};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -15,7 +16,7 @@ use chefshat_render::{Film, Frame, Painter, Perspective, When, figure_at};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
-use super::{CommandError, say};
+use chefshat_cli::error::{CommandError, say};
 use reel::Reel;
 
 const HELP: &str = "\
@@ -44,9 +45,9 @@ const SHORTEST_SECONDS: f64 = 0.2;
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Render {
-    /// The record (JSON Lines).
+    /// The record (JSON Lines), or - for standard input.
     record: PathBuf,
-    /// The file to write: .png, .svg, .gif or .mp4.
+    /// The file to write: .png, .svg, .gif or .mp4, or - for a PNG on standard output.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// What to draw.
@@ -139,6 +140,11 @@ fn factor(text: &str) -> Result<f64, String> {
     positive(text, 1000.0).ok_or_else(|| "use a number above 0, at most 1000".to_owned())
 }
 
+/// Whether a path stands for standard input or output.
+fn is_standard(path: &Path) -> bool {
+    path == "-"
+}
+
 fn positive(text: &str, most: f64) -> Option<f64> {
     let number: f64 = text.parse().ok()?;
     (number > 0.0 && number <= most).then_some(number)
@@ -146,6 +152,9 @@ fn positive(text: &str, most: f64) -> Option<f64> {
 
 impl Kind {
     fn of(path: &Path) -> Result<Kind, CommandError> {
+        if is_standard(path) {
+            return Ok(Kind::Png);
+        }
         let extension = path.extension().and_then(|extension| extension.to_str());
         match extension.map(str::to_ascii_lowercase).as_deref() {
             Some("png") => Ok(Kind::Png),
@@ -186,7 +195,10 @@ impl Render {
     pub(super) fn run(self) -> Result<ExitCode, CommandError> {
         let kind = Kind::of(&self.out)?;
         self.check(kind)?;
-        let lines = jsonl::read(&self.record)?;
+        let lines = match is_standard(&self.record) {
+            true => jsonl::read_text(Path::new("standard input"), io::stdin().lock())?.lines,
+            false => jsonl::read(&self.record)?,
+        };
         let written = if kind.is_film() {
             self.film(&lines, kind)?
         } else {
@@ -257,9 +269,13 @@ impl Render {
             Kind::Svg => painter.outlined(&svg, width)?.into_bytes(),
             _ => painter.png(&pixels)?,
         };
-        let mut file = AtomicFile::create(&self.out)?;
-        file.write_all(&bytes)?;
-        file.finish()?;
+        if is_standard(&self.out) {
+            io::stdout().lock().write_all(&bytes)?;
+        } else {
+            let mut file = AtomicFile::create(&self.out)?;
+            file.write_all(&bytes)?;
+            file.finish()?;
+        }
         Ok(Written {
             width: pixels.width(),
             height: pixels.height(),
@@ -313,6 +329,10 @@ impl Render {
     }
 
     fn print(&self, kind: Kind, written: &Written) -> Result<(), CommandError> {
+        // The picture has the standard output.
+        if is_standard(&self.out) {
+            return Ok(());
+        }
         let bytes = std::fs::metadata(&self.out)?.len();
         let Written {
             width,

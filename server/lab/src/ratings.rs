@@ -18,11 +18,12 @@ use clap::Args;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-use super::data_dir::RecordsArg;
-use super::numbers::counted;
-use super::output::{heading, line};
-use super::{CommandError, board, progress};
-use crate::kind::{KindArg, kind_filter};
+use chefshat_cli::data_dir::RecordsArg;
+use chefshat_cli::error::CommandError;
+use chefshat_cli::kind::{KindArg, kind_filter};
+use chefshat_cli::numbers::counted;
+use chefshat_cli::output::{heading, line};
+use chefshat_cli::{board, progress};
 use chefshat_server::convert::leaderboard;
 use chefshat_server::tournaments::finish;
 

@@ -19,7 +19,7 @@ use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 
 use super::server::{Server, Settings};
-use crate::{CommandError, say};
+use chefshat_cli::error::{CommandError, say};
 
 /// Path of the endpoint.
 const PATH: &str = "/mcp";

@@ -5,7 +5,7 @@ use rmcp::model::{
     GetPromptRequestParams, GetPromptResult, Prompt, PromptArgument, PromptMessage, Role,
 };
 
-use crate::language::RULES;
+use chefshat_cli::language::RULES;
 
 const NAME: &str = "play";
 const ABOUT: &str = "Play a game of Chef's Hat to its end.";

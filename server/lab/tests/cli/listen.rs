@@ -90,7 +90,7 @@ fn a_server_takes_the_socket_that_systemd_opens_and_says_when_it_is_ready() {
     let path = folder.path().join("notify");
     let notified = UnixDatagram::bind(&path).unwrap();
     let mut command = Command::new("python3");
-    command.args(["-c", ACTIVATE, env!("CARGO_BIN_EXE_chefshat")]);
+    command.args(["-c", ACTIVATE, env!("CARGO_BIN_EXE_chefshat-lab")]);
     // The address is in use by nobody, but not used either.
     command.args(["serve", "--json", "--no-records", "--listen", "192.0.2.1:1"]);
     command.env("NOTIFY_SOCKET", &path).stdout(Stdio::piped());
@@ -107,7 +107,7 @@ fn a_server_takes_the_socket_that_systemd_opens_and_says_when_it_is_ready() {
 fn the_unit_for_systemd_is_valid() {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docker/systemd");
     let folder = TempDir::new().unwrap();
-    let binary = env!("CARGO_BIN_EXE_chefshat");
+    let binary = env!("CARGO_BIN_EXE_chefshat-lab");
     let units: Vec<PathBuf> = (["chefshat.service", "chefshat.socket"].into_iter())
         .map(|name| {
             let text = std::fs::read_to_string(source.join(name)).unwrap();
@@ -163,7 +163,7 @@ fn the_unit_for_systemd_allows_every_system_call_of_a_server() {
     command
         .args(["-f", "-qq", "-o"])
         .arg(&log)
-        .arg(env!("CARGO_BIN_EXE_chefshat"));
+        .arg(env!("CARGO_BIN_EXE_chefshat-lab"));
     command.args([
         "serve",
         "--json",

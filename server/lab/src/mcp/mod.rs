@@ -18,9 +18,9 @@ use rmcp::ServiceExt as _;
 use rmcp::service::ServerInitializeError;
 use tokio::signal::unix::{SignalKind, signal};
 
-use super::CommandError;
-use super::connect::ServerArg;
-use super::name_key::NameKeyArg;
+use chefshat_cli::connect::ServerArg;
+use chefshat_cli::error::CommandError;
+use chefshat_cli::name_key::NameKeyArg;
 use seats::{Handles, Seats};
 use server::{Server, Settings};
 

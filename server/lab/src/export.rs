@@ -9,9 +9,10 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::data_dir::RecordsArg;
-use super::numbers::counted;
-use super::{CommandError, progress};
+use chefshat_cli::data_dir::RecordsArg;
+use chefshat_cli::error::CommandError;
+use chefshat_cli::numbers::counted;
+use chefshat_cli::progress;
 
 const HELP: &str = "\
 The directory contains the tables `decisions`, `expressions`, `markers` and `samples` in every requested format, a dataset card (README.md) and SHA256SUMS. \

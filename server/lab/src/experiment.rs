@@ -12,9 +12,10 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 use serde_json::{Value, json};
 
-use super::numbers::{counted, grouped};
-use super::output::{heading, line, table};
-use super::{CommandError, progress, threads};
+use chefshat_cli::error::CommandError;
+use chefshat_cli::numbers::{counted, grouped};
+use chefshat_cli::output::{heading, line, table};
+use chefshat_cli::{progress, threads};
 
 const HELP: &str = "\
 What the paper calls a game is a Shift here; its rounds are laps. As in the paper, each Shift takes its roles from the result of the \

@@ -11,8 +11,8 @@ use chefshat_record::atomic_file::AtomicFile;
 use chefshat_render::{Frame, GifWriter, Painter, Palette, Pixels};
 use rayon::prelude::*;
 
-use crate::error::CommandError;
-use crate::progress;
+use chefshat_cli::error::CommandError;
+use chefshat_cli::progress;
 
 /// Frames painted per batch: enough for all cores within bounded memory.
 const AT_A_TIME: usize = 32;

@@ -99,7 +99,7 @@ fn a_game_is_narrated_to_its_end() {
 #[test]
 fn colours_can_be_forced() {
     let folder = TempDir::new().unwrap();
-    let output = std::process::Command::new(env!("CARGO_BIN_EXE_chefshat"))
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_chefshat-lab"))
         .args(["demo", "--target-shifts", "1", "--data-dir"])
         .arg(folder.path())
         .env("CLICOLOR_FORCE", "1")

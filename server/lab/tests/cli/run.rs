@@ -133,7 +133,7 @@ pub(super) fn fixture(path: &str) -> PathBuf {
 
 /// The program, without `CHEFSHAT_*` variables.
 pub(super) fn program() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_chefshat"));
+    let mut command = Command::new(env!("CARGO_BIN_EXE_chefshat-lab"));
     for (name, _) in std::env::vars_os() {
         if name.to_string_lossy().starts_with("CHEFSHAT_") {
             command.env_remove(name);

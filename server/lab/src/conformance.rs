@@ -11,7 +11,8 @@ use clap::Args;
 use indicatif::ProgressBar;
 use serde_json::{Value, json};
 
-use super::{CommandError, progress};
+use chefshat_cli::error::CommandError;
+use chefshat_cli::progress;
 
 const HELP: &str = "\
 A vector file has one JSON object per line, either a deal (rules, seed, shift, hands, leader) or a complete game (rules, seed, steps, \

@@ -5,8 +5,8 @@ use chefshat_engine::RewardScheme;
 use chefshat_simulation::{Batch, BatchTable, RulesForm};
 use serde_json::{Value, json};
 
-use super::super::numbers::{counted, grouped};
-use super::super::output::{self, heading, line, percent};
+use chefshat_cli::numbers::{counted, grouped};
+use chefshat_cli::output::{self, heading, line, percent};
 
 /// The column of agents; the others have numbers.
 const AGENT_COLUMN: usize = 1;

@@ -10,10 +10,10 @@ use tokio::time::timeout;
 use tokio_util::task::TaskTracker;
 
 use super::seat::{ATTACH_TIMEOUT, Seat};
-use crate::CommandError;
-use crate::connect::ServerArg;
-use crate::language::live::Live;
-use crate::narration::view::GameView;
+use chefshat_cli::connect::ServerArg;
+use chefshat_cli::error::CommandError;
+use chefshat_cli::language::live::Live;
+use chefshat_cli::narration::view::GameView;
 
 /// Maximum number of seats at a time, those of games that are over included.
 const MAX_SEATS: usize = 64;

@@ -12,7 +12,7 @@ use anstyle::{AnsiColor, Style};
 use clap::Args;
 use tokio::signal::unix::{SignalKind, signal};
 
-use super::{CommandError, say};
+use chefshat_cli::error::{CommandError, say};
 use chefshat_examiner::case::{CASES, Case, Patience};
 use chefshat_examiner::{AgentCommand, Examination, Outcome, Waiting};
 

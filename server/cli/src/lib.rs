@@ -1,0 +1,55 @@
+//! The command line of `chefshat`: one module per command, and what `chefshat-lab` shares with it.
+//! `program.rs` runs a command line; `main.rs` and the main of `chefshat-lab` say which commands it
+//! has.
+
+mod admin;
+mod agent;
+mod backup;
+pub mod board;
+mod cluster;
+mod commands;
+mod config;
+pub mod connect;
+pub mod data_dir;
+mod demo;
+pub mod error;
+mod generate;
+mod health;
+mod import;
+mod key;
+pub mod kind;
+pub mod lab;
+mod lan;
+pub mod language;
+mod leaderboard;
+mod listen;
+mod llm;
+mod migrate;
+pub mod name_key;
+pub mod narration;
+pub mod numbers;
+pub mod output;
+mod pages;
+mod participant;
+mod player;
+mod policy_args;
+pub mod program;
+pub mod progress;
+mod records;
+mod remote;
+mod room;
+pub mod rules_args;
+mod secret_file;
+mod serve;
+mod study;
+mod table;
+pub mod threads;
+mod token;
+mod tournament;
+#[cfg(feature = "otlp")]
+mod traces;
+mod tui;
+mod verify;
+
+pub use commands::ServerCommand;
+use error::{CommandError, say};

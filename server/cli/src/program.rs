@@ -1,0 +1,214 @@
+//! Runs a command line: parses it, starts logging, runs the command, and says why it failed.
+
+use std::io::{self, IsTerminal as _};
+use std::process::ExitCode;
+
+use clap::builder::FalseyValueParser;
+use clap::{Command, Parser, Subcommand};
+use tracing_subscriber::layer::SubscriberExt as _;
+use tracing_subscriber::util::SubscriberInitExt as _;
+use tracing_subscriber::{EnvFilter, Layer as _, fmt};
+
+pub use crate::config::Invocation;
+use crate::error::CommandError;
+
+/// The commands of a program.
+pub trait Commands: Subcommand {
+    /// Runs the command.
+    ///
+    /// # Errors
+    /// What its user must know, in words.
+    fn run(self, invocation: &Invocation) -> Result<ExitCode, CommandError>;
+
+    /// Whether the command draws on the whole terminal, which log lines would corrupt.
+    fn draws(&self) -> bool {
+        false
+    }
+
+    /// Where the command sends spans, if it does.
+    fn otlp_endpoint(&self) -> Option<&str> {
+        None
+    }
+}
+
+/// Chef's Hat: a game server for agents, robots and people.
+#[derive(Debug, Parser)]
+#[command(
+    name = "chefshat",
+    bin_name = "chefshat",
+    version,
+    propagate_version = true
+)]
+pub struct CommandLine<C: Subcommand> {
+    #[command(subcommand)]
+    command: C,
+    /// Log filter for standard error, for example `debug` or `chefshat_server=debug`.
+    #[arg(long, env = "CHEFSHAT_LOG", default_value = "warn", global = true)]
+    log: String,
+    /// Log lines as JSON.
+    #[arg(long, env = "CHEFSHAT_LOG_JSON", global = true, value_parser = FalseyValueParser::new())]
+    log_json: bool,
+}
+
+/// The commands, as the help lists them: what most people look for first.
+const GROUPS: [(&str, &[&str]); 6] = [
+    ("Start here", &["demo", "serve", "play", "agent"]),
+    (
+        "Play and watch",
+        &["room", "watch", "table", "leaderboard", "mcp"],
+    ),
+    ("Organise", &["tournament", "study"]),
+    (
+        "Records and research",
+        &[
+            "records",
+            "verify",
+            "import",
+            "export",
+            "render",
+            "simulate",
+            "compare",
+            "ratings",
+            "experiment",
+            "check-agent",
+            "conformance",
+        ],
+    ),
+    (
+        "Operate a server",
+        &[
+            "config",
+            "token",
+            "key",
+            "admin",
+            "health",
+            "participant",
+            "backup",
+            "restore",
+            "migrate",
+            "cluster",
+        ],
+    ),
+    ("Shell", &["completions", "man", "help"]),
+];
+
+/// A command line whose help lists its commands in groups.
+pub(crate) fn grouped(mut command: Command) -> Command {
+    use std::fmt::Write as _;
+
+    command.build();
+    let styles = command.get_styles();
+    let (header, literal) = (*styles.get_header(), *styles.get_literal());
+    let mut list = String::new();
+    for (heading, names) in GROUPS {
+        let _ = writeln!(list, "{header}{heading}:{header:#}");
+        for name in names {
+            let about = command.find_subcommand(name).and_then(Command::get_about);
+            let about = about.map(ToString::to_string).unwrap_or_default();
+            let _ = writeln!(list, "  {literal}{name:12}{literal:#} {about}");
+        }
+        list.push('\n');
+    }
+    let examples = "Examples:
+  chefshat demo                       a server, four agents and their game
+  chefshat serve                      a server at http://127.0.0.1:50051
+  chefshat play --local               a game against built-in agents, in this terminal
+  chefshat room create --help         the options of a command";
+    command.help_template(format!(
+        "{{about}}\n\n{{usage-heading}} {{usage}}\n\n{list}{header}Options:{header:#}\n{{options}}\n\n{examples}\n"
+    ))
+}
+
+/// Runs the command line of this process.
+pub fn run<C: Commands>() -> ExitCode {
+    let result = Invocation::of_process::<CommandLine<C>>().and_then(|(cli, invocation)| {
+        let _tracing = start_logging(&cli)?;
+        cli.command.run(&invocation)
+    });
+    match result {
+        Ok(code) => code,
+        // The reader of the output has closed the pipe, as `head` does.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => {
+            anstream::eprintln!("chefshat: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn is_broken_pipe(error: &CommandError) -> bool {
+    error
+        .downcast_ref::<io::Error>()
+        .is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+}
+
+/// Runs a command on tokio's threads.
+///
+/// # Errors
+/// The command failed, or the operating system cannot start the threads.
+pub fn in_runtime(
+    command: impl Future<Output = Result<ExitCode, CommandError>>,
+) -> Result<ExitCode, CommandError> {
+    tokio::runtime::Builder::new_multi_thread()
+        .enable_all()
+        .build()?
+        .block_on(command)
+}
+
+fn start_logging<C: Commands>(cli: &CommandLine<C>) -> Result<Tracing, CommandError> {
+    let filter = EnvFilter::try_new(&cli.log)
+        .map_err(|error| format!("--log {:?}: {error}; use for example info", cli.log))?;
+    let terminal = io::stderr().is_terminal();
+    let filter = if terminal && cli.command.draws() {
+        EnvFilter::new("off")
+    } else {
+        filter
+    };
+    let colours = terminal && std::env::var_os("NO_COLOR").is_none_or(|set| set.is_empty());
+    let lines = fmt::layer().with_ansi(colours).with_writer(io::stderr);
+    let lines = match cli.log_json {
+        true => lines.json().boxed(),
+        false => lines.boxed(),
+    };
+    let logs = tracing_subscriber::registry().with(lines.with_filter(filter));
+    #[cfg(feature = "otlp")]
+    if let Some(endpoint) = cli.command.otlp_endpoint() {
+        let traces = crate::traces::Traces::to(endpoint)?;
+        logs.with(traces.layer()).init();
+        return Ok(Tracing {
+            _traces: Some(traces),
+        });
+    }
+    logs.init();
+    Ok(Tracing::default())
+}
+
+/// What writes logs and spans until the end of the process.
+#[derive(Default)]
+struct Tracing {
+    #[cfg(feature = "otlp")]
+    _traces: Option<crate::traces::Traces>,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory as _;
+
+    use super::*;
+    use crate::lab::WithLab;
+
+    #[test]
+    fn each_command_is_in_one_group() {
+        let mut command = CommandLine::<WithLab>::command();
+        command.build();
+        let mut names: Vec<&str> = command.get_subcommands().map(Command::get_name).collect();
+        let mut listed: Vec<&str> = GROUPS
+            .iter()
+            .flat_map(|(_, names)| *names)
+            .copied()
+            .collect();
+        names.sort_unstable();
+        listed.sort_unstable();
+        assert_eq!(listed, names);
+    }
+}
