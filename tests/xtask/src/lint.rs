@@ -21,10 +21,35 @@ pub(crate) const OPTIONAL_FEATURES: &str = "chefshat/otlp";
 pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     let fmt = ["fmt", "--all", "--check"];
     steps.program("cargo fmt", in_root(places, cargo()).args(fmt))?;
-
     steps.run("arrows between crates", || arrows::check(places))?;
     steps.run("circles between files", || circles::check(places))?;
+    steps.beside(vec![
+        Box::new(|steps| rust(places, steps)),
+        Box::new(|steps| others(places, steps)),
+    ])
+}
 
+/// The linter of Rust, and the licences of what is built with.
+fn rust(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
+    let clippy = [
+        "clippy",
+        "--workspace",
+        "--all-targets",
+        "--features",
+        OPTIONAL_FEATURES,
+        "--",
+        "-D",
+        "warnings",
+    ];
+    steps.program("cargo clippy", in_root(places, cargo()).args(clippy))?;
+    steps.run("cargo deny", || {
+        let deny = ["--workspace", "check", "licenses", "bans", "sources"];
+        command::run(in_root(places, setup::cargo_deny(places)?).args(deny))
+    })
+}
+
+/// The checks of everything but Rust.
+fn others(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.run("set up checkers", || setup::tools(places))?;
     steps.program("buf lint", tool(places, "buf").args(["lint", "proto"]))?;
     let breaking = ["breaking", "proto", "--against", RELEASED_PROTOCOL];
@@ -67,26 +92,11 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     } else {
         steps.skip("tsc, biome", NO_WEB_PACKAGE);
     }
-
-    let clippy = [
-        "clippy",
-        "--workspace",
-        "--all-targets",
-        "--features",
-        OPTIONAL_FEATURES,
-        "--",
-        "-D",
-        "warnings",
-    ];
-    steps.program("cargo clippy", in_root(places, cargo()).args(clippy))?;
-    steps.run("cargo deny", || {
-        let deny = ["--workspace", "check", "licenses", "bans", "sources"];
-        command::run(in_root(places, setup::cargo_deny(places)?).args(deny))
-    })
+    Ok(())
 }
 
 /// The linter, formatter and type checker of the Python packages, which must be set up.
-pub(crate) fn python(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
+fn python(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     for package in places.python_packages() {
         let checks = [
             ("ruff check", "ruff", &["check", "."][..]),

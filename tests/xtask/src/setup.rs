@@ -31,6 +31,31 @@ const CPP_PACKAGES: [&str; 7] = [
     "protobuf-compiler-grpc",
 ];
 
+/// A program, and the Debian package that has it.
+pub(crate) type Program = (&'static str, &'static str);
+
+/// What the tests in Rust use, and the agent in C++ is built with.
+pub(crate) const FOR_RUST: [Program; 6] = [
+    ("psql", "postgresql"),
+    ("/usr/sbin/haproxy", "haproxy"),
+    ("strace", "strace"),
+    ("promtool", "prometheus"),
+    ("tmux", "tmux"),
+    ("grpc_cpp_plugin", "protobuf-compiler-grpc"),
+];
+
+/// What the tests of docker/ use.
+pub(crate) const FOR_DEPLOYMENT: [Program; 5] = [
+    ("openssl", "openssl"),
+    ("/usr/sbin/nginx", "nginx"),
+    ("/usr/sbin/haproxy", "haproxy"),
+    ("buildah", "buildah"),
+    ("/usr/sbin/debootstrap", "debootstrap"),
+];
+
+/// The browser.
+pub(crate) const CHROMIUM: Program = ("chromium", "chromium");
+
 /// A file in each created folder that lists its sources.
 const MADE_FROM: &str = ".made-from";
 
@@ -311,6 +336,30 @@ fn venv(folder: &Path, made_from: &str, install: &[&str]) -> Result<(), Failure>
         .args(["-m", "pip", "install", "--quiet"])
         .args(install))?;
     note_made_from(folder, made_from)
+}
+
+/// Installs the packages of missing programs at once, which takes a fraction of one at a time.
+pub(crate) fn debian_programs(wanted: &[Program]) -> Result<(), Failure> {
+    let is_missing = |program: &str| !is_on_path(program);
+    let mut packages: Vec<&str> = wanted
+        .iter()
+        .filter(|(program, _)| is_missing(program))
+        .map(|(_, package)| *package)
+        .collect();
+    packages.dedup();
+    if packages.contains(&"protobuf-compiler-grpc") {
+        packages.extend(CPP_PACKAGES);
+    }
+    match packages.is_empty() {
+        true => Ok(()),
+        false => debian_packages(&packages),
+    }
+}
+
+/// Whether there is a program, by its name or path.
+fn is_on_path(program: &str) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path).any(|folder| folder.join(program).exists())
 }
 
 /// Installs a Debian package if it is missing, or names it if it cannot.

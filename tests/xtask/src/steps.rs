@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 use std::process::Command;
-use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -22,10 +21,15 @@ struct Step {
     took: Duration,
 }
 
+/// Steps that run beside those of other lanes.
+pub(crate) type Lane<'a> = Box<dyn FnOnce(&mut Steps) -> Result<(), Failure> + Send + 'a>;
+
 /// The steps of a task so far.
 #[derive(Default)]
 pub(crate) struct Steps {
     done: Vec<Step>,
+    /// Whether other lanes print at the same time: what a program prints appears when it has ended.
+    in_lane: bool,
 }
 
 impl Steps {
@@ -53,52 +57,52 @@ impl Steps {
 
     /// Runs one program as a step.
     pub(crate) fn program(&mut self, name: &str, command: &mut Command) -> Result<(), Failure> {
-        self.run(name, || command::run(command))
-    }
-
-    /// Runs programs side by side, each as a step: for those that often wait. Of several, what each
-    /// prints appears when it has ended.
-    pub(crate) fn programs(&mut self, mut programs: Vec<(String, Command)>) -> Result<(), Failure> {
-        if let [(name, command)] = programs.as_mut_slice() {
-            return self.program(name, command);
-        }
-        let start = Instant::now();
-        let mut failed = Vec::new();
-        thread::scope(|scope| {
-            let (ended, results) = mpsc::channel();
-            for (name, mut command) in programs {
-                println!("\n==> {name}, beside others");
-                let ended = ended.clone();
-                scope.spawn(move || {
-                    let result = command::run_captured(&mut command);
-                    // The receiver lives until the last program has ended.
-                    let _ = ended.send((name, result, start.elapsed()));
-                });
-            }
-            drop(ended);
-            for (name, result, took) in results {
-                println!("\n==> {name}");
-                let outcome = match result {
-                    Ok(output) => {
-                        print!("{output}");
-                        Outcome::Passed
-                    }
+        match self.in_lane {
+            false => self.run(name, || command::run(command)),
+            true => self.run(name, || {
+                let result = command::run_captured(command);
+                let (output, result) = match result {
+                    Ok(output) => (output, Ok(())),
                     Err(failure) => {
-                        println!("{failure}");
-                        failed.push(name.clone());
-                        Outcome::Failed
+                        let failed = Err(Failure::new("see its output"));
+                        (failure.to_string(), failed)
                     }
                 };
-                self.done.push(Step {
-                    name,
-                    outcome,
-                    took,
-                });
-            }
+                println!("\n==> {name}, ended\n{}", output.trim_end());
+                result
+            }),
+        }
+    }
+
+    /// Runs lanes side by side, since many steps wait more than they compute. A failure ends its
+    /// lane and no other.
+    pub(crate) fn beside(&mut self, lanes: Vec<Lane<'_>>) -> Result<(), Failure> {
+        let ended = thread::scope(|scope| {
+            let started: Vec<_> = lanes
+                .into_iter()
+                .map(|lane| {
+                    scope.spawn(move || {
+                        let mut steps = Steps {
+                            in_lane: true,
+                            ..Steps::default()
+                        };
+                        let result = lane(&mut steps);
+                        (steps, result)
+                    })
+                })
+                .collect();
+            let join =
+                |lane: thread::ScopedJoinHandle<'_, _>| lane.join().expect("lanes do not panic");
+            started.into_iter().map(join).collect::<Vec<_>>()
         });
-        match failed.as_slice() {
+        let mut failures = Vec::new();
+        for (steps, result) in ended {
+            self.done.extend(steps.done);
+            failures.extend(result.err().map(|failure| failure.to_string()));
+        }
+        match failures.as_slice() {
             [] => Ok(()),
-            names => Err(Failure::new(format!("{} failed", names.join(", ")))),
+            failures => Err(Failure::new(failures.join("; "))),
         }
     }
 
@@ -164,20 +168,23 @@ mod tests {
     }
 
     #[test]
-    fn of_programs_side_by_side_all_are_in_the_summary_and_each_failure_is_named() {
-        let program = |name: &str, script: &str| {
-            let mut shell = Command::new("sh");
-            shell.args(["-c", script]);
-            (name.to_owned(), shell)
+    fn lanes_end_alone_and_all_steps_and_failures_are_named() {
+        let program = |steps: &mut Steps, name: &str, script: &str| {
+            steps.program(name, Command::new("sh").args(["-c", script]))
         };
         let mut steps = Steps::default();
-        let failing = program("first", "echo words; exit 1");
-        let failure = steps
-            .programs(vec![failing, program("second", "exit 0")])
-            .unwrap_err();
-        assert_eq!(failure.to_string(), "first failed");
+        let lanes: Vec<Lane<'_>> = vec![
+            Box::new(move |steps| {
+                program(steps, "first", "echo words; exit 1")?;
+                program(steps, "never", "exit 0")
+            }),
+            Box::new(move |steps| program(steps, "second", "exit 0")),
+        ];
+        let failure = steps.beside(lanes).unwrap_err();
+        assert_eq!(failure.to_string(), "first failed: see its output");
         let summary = steps.summary();
         assert!(summary.contains("FAILED   first "), "{summary}");
         assert!(summary.contains("ok       second "), "{summary}");
+        assert!(!summary.contains("never"), "{summary}");
     }
 }

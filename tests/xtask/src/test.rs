@@ -7,12 +7,12 @@ use clap::ValueEnum;
 
 use crate::command::{cargo, python_command, with_environment};
 use crate::failure::Failure;
-use crate::lint::{self, OPTIONAL_FEATURES};
+use crate::lint::OPTIONAL_FEATURES;
 use crate::places::{
     CLIENTS, DEPLOYMENT, NO_NODE_PACKAGE, NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places,
 };
 use crate::setup;
-use crate::steps::Steps;
+use crate::steps::{Lane, Steps};
 use crate::web;
 use crate::wheels;
 
@@ -43,41 +43,68 @@ pub(crate) fn run(
     let wants = |part| only.is_none_or(|only| only == part);
     let has_python = !places.python_packages().is_empty();
     let (has_node, has_web) = (places.has_node_package(), places.has_web_package());
-
     let deployment = wants(Part::Deployment);
     let needs_python = has_python && (wants(Part::Rust) || wants(Part::Python) || deployment);
-    if needs_python {
-        steps.run("set up Python", || setup::python_packages(places))?;
-    }
-    if has_node && (wants(Part::Rust) || wants(Part::Node) || deployment) {
-        steps.run("set up Node", || setup::node_package(places))?;
-    }
-    if has_web && (wants(Part::Rust) || wants(Part::Web) || deployment) {
-        web::run(places, steps)?;
-    }
-    // Libraries, programs and tests together: otherwise hundreds of crates would be built twice,
-    // with the features of the server and with those of its tests.
-    let build = [
-        "build",
-        "--workspace",
-        "--features",
-        OPTIONAL_FEATURES,
-        "--lib",
-        "--bins",
-        "--tests",
-        "--examples",
-    ];
-    steps.program("build", cargo_command(places).args(build))?;
+    let needs_node = has_node && (wants(Part::Rust) || wants(Part::Node) || deployment);
+    let needs_page = has_web && (wants(Part::Rust) || wants(Part::Web) || deployment);
 
-    if needs_python {
-        steps.run("install the native module", || setup::native_module(places))?;
-    }
+    // Downloads wait while Cargo computes.
+    steps.beside(vec![
+        // Libraries, programs and tests together: otherwise hundreds of crates would be built twice,
+        // with the features of the server and with those of its tests.
+        Box::new(|steps| {
+            let what = ["--lib", "--bins", "--tests", "--examples"];
+            let mut build = cargo_command(places);
+            build.args(["build", "--workspace", "--features", OPTIONAL_FEATURES]);
+            steps.program("build", build.args(what))
+        }),
+        Box::new(|steps| {
+            if needs_python {
+                steps.run("set up Python", || setup::python_packages(places))?;
+            }
+            if wants(Part::Python) && has_python {
+                for which in VERSIONS {
+                    let set_up = || setup::versions(places, which);
+                    steps.run(&format!("set up the {which} versions"), set_up)?;
+                }
+            }
+            Ok(())
+        }),
+        Box::new(|steps| {
+            if needs_node {
+                steps.run("set up Node", || setup::node_package(places))?;
+            }
+            if needs_page {
+                web::run(places, steps)?;
+            }
+            Ok(())
+        }),
+        Box::new(|steps| {
+            let mut wanted = Vec::new();
+            if wants(Part::Rust) {
+                wanted.extend(setup::FOR_RUST);
+            }
+            if deployment {
+                wanted.extend(setup::FOR_DEPLOYMENT);
+            }
+            if wants(Part::Web) || deployment {
+                wanted.push(setup::CHROMIUM);
+            }
+            // What is still missing afterwards is reported where it is needed.
+            if let Err(failure) = setup::debian_programs(&wanted) {
+                println!("{failure}");
+            }
+            if wants(Part::Rust) {
+                steps.run("build the agent in C++", || setup::cpp_agent(places))?;
+            }
+            Ok(())
+        }),
+    ])?;
 
-    let mut tests = Vec::new();
+    let mut lanes: Vec<Lane<'_>> = Vec::new();
     if wants(Part::Rust) {
         steps.run("PostgreSQL", setup::postgresql)?;
         steps.run("HAProxy", setup::haproxy)?;
-        steps.run("build the agent in C++", || setup::cpp_agent(places))?;
         // Tests that need something missing on this machine report that they are skipped.
         if let Err(failure) = setup::strace() {
             steps.skip("a disk that does not sync", &failure.to_string());
@@ -88,65 +115,71 @@ pub(crate) fn run(
         if let Err(failure) = setup::tmux() {
             steps.skip("commands at a terminal", &failure.to_string());
         }
-        let test = [
-            "test",
-            "--workspace",
-            "--features",
-            OPTIONAL_FEATURES,
-            "--no-fail-fast",
-        ];
-        let mut cargo_test = cargo_command(places);
-        cargo_test.args(test);
-        tests.push(("cargo test".to_owned(), cargo_test));
+        lanes.push(Box::new(|steps| {
+            let mut tests = cargo_command(places);
+            tests.args(["test", "--workspace", "--features", OPTIONAL_FEATURES]);
+            tests.arg("--no-fail-fast");
+            // Most tests wait for servers and clocks.
+            tests.env("RUST_TEST_THREADS", "4");
+            steps.program("cargo test", &mut tests)
+        }));
     }
-    if wants(Part::Python) {
-        if has_python {
+    if wants(Part::Python) && !has_python {
+        steps.skip("pytest", NO_PYTHON_PACKAGE);
+    } else if needs_python {
+        steps.run("install the native module", || setup::native_module(places))?;
+    }
+    if wants(Part::Python) && has_python {
+        lanes.push(Box::new(|steps| {
+            let mut outcomes = Vec::new();
             for package in places.python_packages() {
-                if package == CLIENTS {
-                    // The longest suite: it has both cores once the others have ended.
-                    let options = ["--numprocesses=2", "--dist=loadfile"];
-                    tests.push(pytest(places, package, &options));
-                } else if package != DEPLOYMENT {
-                    tests.push(pytest(places, package, &[]));
-                }
+                // The longest suite has the most processes.
+                let options: &[&str] = match package {
+                    CLIENTS => &["--numprocesses=2", "--dist=loadfile"],
+                    DEPLOYMENT => continue,
+                    _ => &[],
+                };
+                let (name, mut pytest) = pytest(places, package, options);
+                outcomes.push(steps.program(&name, &mut pytest));
             }
             for which in VERSIONS {
-                let set_up = || setup::versions(places, which);
-                steps.run(&format!("set up the {which} versions"), set_up)?;
-                tests.push(pytest_with(places, which));
+                let (name, mut pytest) = pytest_with(places, which);
+                outcomes.push(steps.program(&name, &mut pytest));
             }
-        } else {
-            steps.skip("pytest, ruff, mypy", NO_PYTHON_PACKAGE);
-        }
+            if slow {
+                outcomes.push(wheels::run(places, steps, "release", true));
+            }
+            all_of(outcomes)
+        }));
     }
+    let mut others = Vec::<Lane<'_>>::new();
     if wants(Part::Node) {
-        if has_node {
-            let mut node = with_environment(places, Command::new("node"));
-            node.arg("--test").current_dir(places.node());
-            tests.push(("node --test".to_owned(), node));
-        } else {
-            steps.skip("node --test", NO_NODE_PACKAGE);
-        }
-    }
-    // A failure stops only what depends on it, so that one run shows all of them.
-    let mut outcomes = vec![steps.programs(tests)];
-    if wants(Part::Python) && has_python {
-        outcomes.push(lint::python(places, steps));
-        if slow {
-            outcomes.push(wheels::run(places, steps, "release", true));
+        match has_node {
+            true => others.push(Box::new(|steps| {
+                let mut node = with_environment(places, Command::new("node"));
+                steps.program("node --test", node.arg("--test").current_dir(places.node()))
+            })),
+            false => steps.skip("node --test", NO_NODE_PACKAGE),
         }
     }
     if wants(Part::Web) {
-        if has_web {
-            outcomes.push(web::test(places, steps));
-            outcomes.push(web::check(places, steps));
-        } else {
-            steps.skip("vitest, browser tests, tsc, biome", NO_WEB_PACKAGE);
+        match has_web {
+            true => others.push(Box::new(|steps| web::test(places, steps))),
+            false => steps.skip("vitest, browser tests", NO_WEB_PACKAGE),
         }
     }
     if deployment {
-        outcomes.push(test_deployment(places, steps, slow));
+        others.push(Box::new(|steps| test_deployment(places, steps, slow)));
     }
+    lanes.push(Box::new(|steps| {
+        all_of(others.into_iter().map(|tests| tests(steps)).collect())
+    }));
+    // A failure stops only what depends on it, so that one run shows all of them.
+    steps.beside(lanes)
+}
+
+/// The failures of steps that ran whatever became of the others.
+fn all_of(outcomes: Vec<Result<(), Failure>>) -> Result<(), Failure> {
     let failures: Vec<String> = outcomes
         .into_iter()
         .filter_map(|outcome| outcome.err().map(|failure| failure.to_string()))
