@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use toml::de::{DeTable, DeValue};
 
 use crate::error::{CommandError, say};
-use crate::program::grouped;
+use crate::help::grouped;
 use crate::serve;
 
 /// The setting that names the file, which cannot be in the file.

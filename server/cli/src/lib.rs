@@ -15,6 +15,7 @@ mod demo;
 pub mod error;
 mod generate;
 mod health;
+mod help;
 mod import;
 mod key;
 pub mod kind;
@@ -50,6 +51,8 @@ mod tournament;
 mod traces;
 mod tui;
 mod verify;
+mod with_lab;
 
 pub use commands::ServerCommand;
 use error::{CommandError, say};
+pub use with_lab::WithLab;

@@ -3,8 +3,7 @@
 
 use std::process::ExitCode;
 
-use chefshat_cli::lab::WithLab;
-use chefshat_cli::program;
+use chefshat_cli::{WithLab, program};
 
 /// The allocators of C libraries keep the memory that a flood of clients took; this one gives it
 /// back within seconds.

@@ -4,7 +4,7 @@ use std::io::{self, IsTerminal as _};
 use std::process::ExitCode;
 
 use clap::builder::FalseyValueParser;
-use clap::{Command, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 use tracing_subscriber::layer::SubscriberExt as _;
 use tracing_subscriber::util::SubscriberInitExt as _;
 use tracing_subscriber::{EnvFilter, Layer as _, fmt};
@@ -48,75 +48,6 @@ pub struct CommandLine<C: Subcommand> {
     /// Log lines as JSON.
     #[arg(long, env = "CHEFSHAT_LOG_JSON", global = true, value_parser = FalseyValueParser::new())]
     log_json: bool,
-}
-
-/// The commands, as the help lists them: what most people look for first.
-const GROUPS: [(&str, &[&str]); 6] = [
-    ("Start here", &["demo", "serve", "play", "agent"]),
-    (
-        "Play and watch",
-        &["room", "watch", "table", "leaderboard", "mcp"],
-    ),
-    ("Organise", &["tournament", "study"]),
-    (
-        "Records and research",
-        &[
-            "records",
-            "verify",
-            "import",
-            "export",
-            "render",
-            "simulate",
-            "compare",
-            "ratings",
-            "experiment",
-            "check-agent",
-            "conformance",
-        ],
-    ),
-    (
-        "Operate a server",
-        &[
-            "config",
-            "token",
-            "key",
-            "admin",
-            "health",
-            "participant",
-            "backup",
-            "restore",
-            "migrate",
-            "cluster",
-        ],
-    ),
-    ("Shell", &["completions", "man", "help"]),
-];
-
-/// A command line whose help lists its commands in groups.
-pub(crate) fn grouped(mut command: Command) -> Command {
-    use std::fmt::Write as _;
-
-    command.build();
-    let styles = command.get_styles();
-    let (header, literal) = (*styles.get_header(), *styles.get_literal());
-    let mut list = String::new();
-    for (heading, names) in GROUPS {
-        let _ = writeln!(list, "{header}{heading}:{header:#}");
-        for name in names {
-            let about = command.find_subcommand(name).and_then(Command::get_about);
-            let about = about.map(ToString::to_string).unwrap_or_default();
-            let _ = writeln!(list, "  {literal}{name:12}{literal:#} {about}");
-        }
-        list.push('\n');
-    }
-    let examples = "Examples:
-  chefshat demo                       a server, four agents and their game
-  chefshat serve                      a server at http://127.0.0.1:50051
-  chefshat play --local               a game against built-in agents, in this terminal
-  chefshat room create --help         the options of a command";
-    command.help_template(format!(
-        "{{about}}\n\n{{usage-heading}} {{usage}}\n\n{list}{header}Options:{header:#}\n{{options}}\n\n{examples}\n"
-    ))
 }
 
 /// Runs the command line of this process.
@@ -188,27 +119,4 @@ fn start_logging<C: Commands>(cli: &CommandLine<C>) -> Result<Tracing, CommandEr
 struct Tracing {
     #[cfg(feature = "otlp")]
     _traces: Option<crate::traces::Traces>,
-}
-
-#[cfg(test)]
-mod tests {
-    use clap::CommandFactory as _;
-
-    use super::*;
-    use crate::lab::WithLab;
-
-    #[test]
-    fn each_command_is_in_one_group() {
-        let mut command = CommandLine::<WithLab>::command();
-        command.build();
-        let mut names: Vec<&str> = command.get_subcommands().map(Command::get_name).collect();
-        let mut listed: Vec<&str> = GROUPS
-            .iter()
-            .flat_map(|(_, names)| *names)
-            .copied()
-            .collect();
-        names.sort_unstable();
-        listed.sort_unstable();
-        assert_eq!(listed, names);
-    }
 }
