@@ -88,9 +88,8 @@ impl Core {
         }
     }
 
-    /// Ends the game without a result. Does nothing if it has ended.
-    /// Closes the room for its owner, who also has these seats. The owner leaves the game with them,
-    /// so that the record says who broke it off.
+    /// Closes the room for its owner, who also has these seats. The owner leaves the game with
+    /// them, so that the record says who broke it off.
     pub fn close(&mut self, now: Duration, seats: impl IntoIterator<Item = Seat>) {
         if self.state == State::Playing {
             for seat in seats {

@@ -140,8 +140,8 @@ pub struct GameHeader {
     pub policy: Policy,
     /// What fills each seat.
     pub fills: Vec<Fill>,
-    /// Open seats that a person plays as the kind that they are reserved for (Wizard of Oz). Nothing
-    /// depends on it but the record.
+    /// Open seats that a person plays as the kind that they are reserved for (Wizard of Oz).
+    /// Nothing depends on it but the record.
     pub wizards: BTreeSet<usize>,
     /// Display names of built-in agents, by seat, if set.
     pub display_names: BTreeMap<usize, String>,

@@ -136,8 +136,8 @@ struct SeatState {
     recalled: bool,
     connection_events: u32,
     expressions: u32,
-    /// The built-in agent of the seat or its substitute. Of one that searches: what it plays without
-    /// a search.
+    /// The built-in agent of the seat or its substitute. Of one that searches: what it plays
+    /// without a search.
     agent: Option<Box<BuiltInAgent>>,
     substituted: bool,
     ever_substituted: bool,
@@ -505,8 +505,8 @@ impl Core {
         self.game().and_then(Game::default_action)
     }
 
-    /// The seat with this ticket, unless its participant has left for good. Compares in constant time
-    /// for each seat.
+    /// The seat with this ticket, unless its participant has left for good. Compares in constant
+    /// time for each seat.
     pub fn seat_of_ticket(&self, secret: &[u8]) -> Option<Seat> {
         let hash = SecretHash::of(secret);
         self.all_seats().find(|seat| {
