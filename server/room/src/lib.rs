@@ -540,6 +540,12 @@ impl Core {
         state.substituted || state.fill.is_built_in()
     }
 
+    /// Whether a built-in agent or a substitute decides for the seat, for all that anybody may
+    /// know: one may play in every hidden seat.
+    fn seems_automatic(&self, seat: Seat) -> bool {
+        self.is_automatic(seat) || self.header.is_hidden(seat)
+    }
+
     /// Changes that are folded but not committed. The store removes them. They must not be
     /// published before they are committed.
     pub fn pending(&mut self) -> &mut Vec<Entry> {
