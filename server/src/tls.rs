@@ -1,6 +1,6 @@
-//! TLS on the server's connections. Each handshake is a task of its own beside the accept loop, so a
-//! peer that stalls delays nobody; `handshakes` limits them. The certificate is read again when its files change; existing
-//! connections keep theirs.
+//! TLS on the server's connections. Each handshake is a task of its own beside the accept loop, so
+//! a peer that stalls delays nobody; `handshakes` limits them. The certificate is read again when
+//! its files change; existing connections keep theirs.
 
 use std::io;
 use std::path::{Path, PathBuf};

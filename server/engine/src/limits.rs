@@ -4,6 +4,8 @@
 /// Invalid attempts at one decision after which the default is taken even if attempts are
 /// unlimited, so that records stay bounded.
 pub const MAX_ATTEMPTS: u32 = 10_000;
+/// Shortest pace of built-in agents, in milliseconds, with which special actions have a fixed time.
+pub const MIN_PACE_OF_PHASE_MS: u32 = 50;
 /// Most hints for one decision.
 pub const MAX_HINTS: u32 = 3;
 /// Most annotations recorded per decision, bytes.

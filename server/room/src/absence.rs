@@ -71,15 +71,15 @@ impl Core {
         Some(shown(number, first.seat, silent_since, None))
     }
 
-    /// The first decision of a participant in a silence, if no special action is declared. Who
-    /// gives is known from the roles.
+    /// The first decision of a participant who is not hidden in a silence, if no special action is
+    /// declared. Who gives is known from the roles.
     fn first_in_silence(&self) -> Option<Decision> {
         let Some(RoomGame::Dealt(game)) = &self.game else {
             return None;
         };
         let decision = game.decision()?;
         let is_shown = |decision: Decision| {
-            decision.kind != DecisionKind::SpecialAction && !self.is_automatic(decision.seat)
+            decision.kind != DecisionKind::SpecialAction && !self.seems_automatic(decision.seat)
         };
         if is_shown(decision) {
             return Some(decision);
@@ -115,7 +115,8 @@ impl Core {
 
     /// When the phase of special actions that has begun ends, unless somebody declares one before.
     /// `None` if the phase has no fixed time: the pace is too short, or there is at most one
-    /// participant, from whom only built-in agents could hide something.
+    /// participant, from whom only built-in agents could hide something. Where seats are hidden,
+    /// nobody may know that.
     ///
     /// What the phase brings is asked for when it ends, so that nobody learns from the time whether
     /// somebody was offered a special action, and declined it or let it run out.
@@ -124,8 +125,9 @@ impl Core {
         let open = self
             .all_seats()
             .filter(|seat| matches!(self.seats[seat.index()].fill, Fill::Open { .. }));
+        let hides = self.header.only_shown_seat().is_some();
         let pace = self.pace();
-        if pace < MIN_PACE_OF_PHASE || open.count() < 2 {
+        if pace < MIN_PACE_OF_PHASE || !(hides || open.count() >= 2) {
             return None;
         }
         let time = (SPECIAL_ACTION_PACES * pace).min(MAX_SPECIAL_ACTION_TIME);
@@ -180,10 +182,11 @@ impl Core {
     }
 
     /// Whether somebody waits for a seat that is away: the other games of its tournament, or
-    /// another participant who is here.
+    /// another participant who is here. Hidden ones may be, for all that anybody knows.
     fn holds_others_up(&self, seat: Seat) -> bool {
         let mut others = self.all_seats().filter(|other| *other != seat);
         self.header.tournament.is_some()
+            || self.header.only_shown_seat() == Some(seat)
             || others.any(|other| {
                 let state = &self.seats[other.index()];
                 match state.fill {

@@ -88,9 +88,8 @@ impl Core {
         }
     }
 
-    /// Ends the game without a result. Does nothing if it has ended.
-    /// Closes the room for its owner, who also has these seats. The owner leaves the game with them,
-    /// so that the record says who broke it off.
+    /// Closes the room for its owner, who also has these seats. The owner leaves the game with
+    /// them, so that the record says who broke it off.
     pub fn close(&mut self, now: Duration, seats: impl IntoIterator<Item = Seat>) {
         if self.state == State::Playing {
             for seat in seats {
@@ -192,10 +191,12 @@ impl Core {
         }
     }
 
-    /// The longest decision time of a seat that participants can take.
+    /// The longest decision time of a seat that participants can take and that is not hidden: its
+    /// time would tell whether and which participants have the hidden ones.
     pub(super) fn longest_decision_time(&self) -> Option<Duration> {
         (self.all_seats())
             .filter(|seat| matches!(self.seats[seat.index()].fill, Fill::Open { .. }))
+            .filter(|seat| !self.header.is_hidden(*seat))
             .map(|seat| self.usual_decision_time(seat))
             .max()
     }
@@ -403,16 +404,14 @@ impl Core {
         self.commit(now, Change::Decided(decided));
     }
 
-    /// Substitutes a seat that is away or has been late too often, or aborts the game.
+    /// Substitutes a seat that is away or has been late too often, or aborts the game. Whether all
+    /// are lost does not depend on who has hidden seats.
     fn lose(&mut self, now: Duration, seat: Seat) {
-        let others_lost = self
-            .seats
-            .iter()
-            .enumerate()
-            .filter(|(index, state)| {
-                *index != seat.index() && matches!(state.fill, Fill::Open { .. })
-            })
-            .all(|(_, state)| state.substituted);
+        let others_lost = (self.all_seats())
+            .filter(|other| *other != seat && !self.header.is_hidden(*other))
+            .map(|other| &self.seats[other.index()])
+            .filter(|state| matches!(state.fill, Fill::Open { .. }))
+            .all(|state| state.substituted);
         let abort = match self.header.policy.abort {
             AbortPolicy::AnyLost => true,
             AbortPolicy::AllLost => others_lost,

@@ -182,7 +182,7 @@ impl Core {
         let offered = self.open.as_ref().is_some_and(OpenDecision::is_silent);
         let declined = offered && Some(decided.action) == self.default_action();
         // Neither does a gift of a built-in agent show before all gifts are given.
-        let shows = !declined && !self.is_automatic(decided.seat);
+        let shows = !declined && !self.seems_automatic(decided.seat);
         let mut events = std::mem::take(&mut self.events);
         let game = self.game.as_mut();
         let ruling = match game.expect("a decision is taken in a game that has started") {

@@ -115,8 +115,8 @@ impl Token {
         }
     }
 
-    /// The owner token of a tournament's room, the same whenever it is computed. Only the server and
-    /// the tournament's owner know `key`, the hash of the tournament's owner token.
+    /// The owner token of a tournament's room, the same whenever it is computed. Only the server
+    /// and the tournament's owner know `key`, the hash of the tournament's owner token.
     pub fn of_tournament_room(room: Id, key: &SecretHash) -> Self {
         Self {
             room,

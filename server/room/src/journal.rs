@@ -140,8 +140,8 @@ pub struct GameHeader {
     pub policy: Policy,
     /// What fills each seat.
     pub fills: Vec<Fill>,
-    /// Open seats that a person plays as the kind that they are reserved for (Wizard of Oz). Nothing
-    /// depends on it but the record.
+    /// Open seats that a person plays as the kind that they are reserved for (Wizard of Oz).
+    /// Nothing depends on it but the record.
     pub wizards: BTreeSet<usize>,
     /// Display names of built-in agents, by seat, if set.
     pub display_names: BTreeMap<usize, String>,
@@ -174,10 +174,17 @@ impl GameHeader {
     }
 
     /// Whether a seat's participant is hidden: in a study that shows labels, every seat but that of
-    /// the study's participant. What is shown of such a seat does not depend on what fills it.
+    /// the study's participant. What is shown of such a seat, and when, does not depend on what
+    /// fills it.
     pub fn is_hidden(&self, seat: Seat) -> bool {
-        (self.study.as_ref())
-            .is_some_and(|game| game.labels != SeatLabels::AsTheyAre && game.seat != seat)
+        self.only_shown_seat().is_some_and(|shown| shown != seat)
+    }
+
+    /// The seat of the study's participant, if all others are hidden.
+    pub fn only_shown_seat(&self) -> Option<Seat> {
+        let study = self.study.as_ref();
+        let hiding = study.filter(|game| game.labels != SeatLabels::AsTheyAre);
+        hiding.map(|game| game.seat)
     }
 
     /// The series of games with the same deals.

@@ -136,8 +136,8 @@ struct SeatState {
     recalled: bool,
     connection_events: u32,
     expressions: u32,
-    /// The built-in agent of the seat or its substitute. Of one that searches: what it plays without
-    /// a search.
+    /// The built-in agent of the seat or its substitute. Of one that searches: what it plays
+    /// without a search.
     agent: Option<Box<BuiltInAgent>>,
     substituted: bool,
     ever_substituted: bool,
@@ -505,8 +505,8 @@ impl Core {
         self.game().and_then(Game::default_action)
     }
 
-    /// The seat with this ticket, unless its participant has left for good. Compares in constant time
-    /// for each seat.
+    /// The seat with this ticket, unless its participant has left for good. Compares in constant
+    /// time for each seat.
     pub fn seat_of_ticket(&self, secret: &[u8]) -> Option<Seat> {
         let hash = SecretHash::of(secret);
         self.all_seats().find(|seat| {
@@ -538,6 +538,12 @@ impl Core {
     fn is_automatic(&self, seat: Seat) -> bool {
         let state = &self.seats[seat.index()];
         state.substituted || state.fill.is_built_in()
+    }
+
+    /// Whether a built-in agent or a substitute decides for the seat, for all that anybody may
+    /// know: one may play in every hidden seat.
+    fn seems_automatic(&self, seat: Seat) -> bool {
+        self.is_automatic(seat) || self.header.is_hidden(seat)
     }
 
     /// Changes that are folded but not committed. The store removes them. They must not be

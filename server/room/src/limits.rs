@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use chefshat_engine::limits::MIN_PACE_OF_PHASE_MS;
 pub use chefshat_engine::limits::{
     MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS, MAX_CONNECTION_EVENTS,
     MAX_HINTS,
@@ -29,7 +30,7 @@ pub const RECALL_TIME: Duration = Duration::from_secs(60);
 /// in every Shift that has one, whether or not somebody is offered one.
 pub(crate) const SPECIAL_ACTION_PACES: u32 = 10;
 /// Shortest pace for which it does: ten shorter ones would end before a distant agent has answered.
-pub(crate) const MIN_PACE_OF_PHASE: Duration = Duration::from_millis(50);
+pub(crate) const MIN_PACE_OF_PHASE: Duration = Duration::from_millis(MIN_PACE_OF_PHASE_MS as u64);
 /// Longest such phase.
 pub(crate) const MAX_SPECIAL_ACTION_TIME: Duration = Duration::from_secs(10);
 /// A seat that has waited this long for the store gets the time back. Shorter waits are part of

@@ -1,5 +1,5 @@
-//! Markers: moments that the owner of a room, or an instrument with the owner's token, puts into the
-//! recording. They change nothing in the game, and no event shows them.
+//! Markers: moments that the owner of a room, or an instrument with the owner's token, puts into
+//! the recording. They change nothing in the game, and no event shows them.
 
 use std::time::Duration;
 

@@ -98,8 +98,8 @@ impl Core {
         }
     }
 
-    /// Moves what follows from the report or decision `number` to the log. `by`: source and time of a seat's
-    /// decision.
+    /// Moves what follows from the report or decision `number` to the log. `by`: source and time of
+    /// a seat's decision.
     pub(super) fn fold_ruling(
         &mut self,
         at: Duration,

@@ -118,8 +118,8 @@ pub struct Policy {
     pub hints: bool,
     /// Whether people may write.
     pub chat: bool,
-    /// How long the game waits, at each decision, for a seat that is not connected. `None`, in games
-    /// of earlier servers: an absence changes nothing.
+    /// How long the game waits, at each decision, for a seat that is not connected. `None`, in
+    /// games of earlier servers: an absence changes nothing.
     pub absence_time: Option<Duration>,
 }
 

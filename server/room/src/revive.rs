@@ -11,8 +11,8 @@ use chefshat_engine::{Seat, Viewer};
 use super::{Core, MAX_MARKERS};
 use crate::journal::{Change, Entry, Fill, GameHeader, Report, Source};
 
-/// How long a journal need not say again that the server was restarted: what takes a room over writes
-/// it before the room is restored.
+/// How long a journal need not say again that the server was restarted: what takes a room over
+/// writes it before the room is restored.
 const SAID_FOR: Duration = Duration::from_secs(1);
 
 /// Why a game cannot be resumed.

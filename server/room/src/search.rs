@@ -1,6 +1,6 @@
-//! Decisions of agents that search, and hints for other seats. A search takes long, so the core only says what to search and
-//! takes what was found as an input. The journal has the decision alone: after a restart of the server,
-//! the open one is searched again.
+//! Decisions of agents that search, and hints for other seats. A search takes long, so the core
+//! only says what to search and takes what was found as an input. The journal has the decision
+//! alone: after a restart of the server, the open one is searched again.
 
 use std::time::Duration;
 
@@ -143,8 +143,8 @@ impl Core {
             .is_some_and(|(open, _)| !matches!(open.search, Search::Ended(_)))
     }
 
-    /// The open decision, if an agent that searches takes it. It takes a silent one at once: otherwise
-    /// the time of the next event would reveal it.
+    /// The open decision, if an agent that searches takes it. It takes a silent one at once:
+    /// otherwise the time of the next event would reveal it.
     fn to_be_searched(&self) -> Option<(&OpenDecision, MonteCarlo)> {
         let runs = self.state == State::Playing && !self.header.is_physical();
         let open = self

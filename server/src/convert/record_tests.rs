@@ -40,7 +40,8 @@ fn policy(chance: &mut Chance) -> Policy {
         decision_time: ms(1_000),
         bank: ms(chance.below(3) * 700),
         max_timeouts: 3,
-        pace: Some(ms(0)),
+        // With a pace, the time for special actions is that of the phase.
+        pace: Some(ms(chance.below(2) * 50)),
         abort: AbortPolicy::Never,
         clocks: vec![KindClock {
             kind: ParticipantKind::Human,

@@ -6,15 +6,18 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_agents::AgentKind;
-use chefshat_engine::{ActionId, BySeat, Cards, RuleSetSpec, Seat, SeedPlan, Stop, Viewer};
+use chefshat_engine::{
+    ActionId, BySeat, Cards, DecisionKind, RuleSetSpec, Seat, SeedPlan, Stop, Viewer,
+};
 use chefshat_proto::v1;
 use chefshat_record::convert::{decision_kind, observation_to_proto};
+use chefshat_record::replay::replay;
 use chefshat_referee::counts::JOKER;
 use chefshat_referee::{Report, SeenCards};
 use chefshat_room::journal::{Change, Fill, GameHeader, ParticipantKind, SeatLabels};
-use chefshat_room::policy::Policy;
+use chefshat_room::policy::{AbortPolicy, KindClock, Policy};
 use chefshat_room::testing::real_table::{PERSON, policy, shifts};
-use chefshat_room::testing::{OPEN, Table, ms, study_game};
+use chefshat_room::testing::{OPEN, Table, dealt, ms, second_shift, study_game};
 use chefshat_room::{Core, OpenDecision, ReportVerdict, Verdict};
 use prost::Message as _;
 
@@ -48,7 +51,7 @@ fn sent_to(table: &Table, viewer: Seat, see: Viewer) -> Vec<Vec<u8>> {
         .collect();
     if let Some(open) = table
         .core
-        .open()
+        .awaited()
         .filter(|open| open.decision.seat == viewer)
     {
         let mut written = Vec::new();
@@ -179,24 +182,59 @@ fn a_person_who_plays_as_an_agent_does_not_change_what_is_sent() {
     }
 }
 
-/// A room of a study whose participant has seat 0, with these other seats.
-fn studied(labels: SeatLabels, others: Fill) -> Table {
-    let policy = Policy {
-        pace: Some(ms(300)),
-        ..Policy::default()
-    };
-    let fills = vec![OPEN, others, others, others];
-    // Special actions are declined in silence: `silent_tests` compares those.
-    let rules = RuleSetSpec {
-        stop: Stop::Shifts(2),
-        special_actions: false,
-        ..RuleSetSpec::default()
-    };
-    let mut table = Table::with_rules(policy, fills, rules);
-    let mut header = GameHeader::clone(table.core.header());
-    header.study = Some(Arc::new(study_game(labels)));
-    table.core = Core::new(Arc::new(header));
-    table
+/// The game of a study whose other seats are hidden.
+#[derive(Debug, Clone)]
+struct Hidden {
+    labels: SeatLabels,
+    /// Who holds the jokers. `None`: the first of two Shifts is dealt from the seed.
+    jokers: Option<[usize; 2]>,
+    policy: Policy,
+    /// Whether the participant loses its connection at some of its decisions.
+    leaves: bool,
+}
+
+impl Hidden {
+    fn new(labels: SeatLabels) -> Self {
+        Self {
+            labels,
+            jokers: None,
+            policy: Policy {
+                pace: Some(ms(300)),
+                // A program has more time than a person.
+                decision_time: ms(3_000),
+                bank: ms(500),
+                abort: AbortPolicy::Never,
+                absence_time: Some(ms(3_000)),
+                clocks: vec![KindClock {
+                    kind: ParticipantKind::Human,
+                    decision_time: Some(ms(2_000)),
+                    bank: None,
+                    absence_time: Some(ms(600)),
+                }],
+                ..Policy::default()
+            },
+            leaves: false,
+        }
+    }
+
+    /// Its room, with these in the seats that are not the participant's.
+    fn room(&self, others: Fill) -> Table {
+        let fills = vec![OPEN, others, others, others];
+        let rules = RuleSetSpec {
+            stop: Stop::Shifts(2),
+            ..RuleSetSpec::default()
+        };
+        let valid = rules.validate().expect("a valid rule set");
+        let mut table = Table::with_rules(self.policy.clone(), fills, rules);
+        let mut header = GameHeader::clone(table.core.header());
+        header.study = Some(Arc::new(study_game(self.labels)));
+        header.start.script = self.jokers.map(|jokers| {
+            let hands = dealt(&valid, 3, jokers.map(Seat::new));
+            second_shift(hands.expect("every seat has cards to swap"))
+        });
+        table.core = Core::new(Arc::new(header));
+        table
+    }
 }
 
 /// What is shown: its class, and its bytes.
@@ -235,15 +273,12 @@ fn shown_of(table: &Table) -> Shown {
 
 /// Plays a game with built-in agents in the other seats, and the same game with programs that decide
 /// the same at the same times. Returns the games, and what was shown at every moment of them.
-fn with_both_fills(labels: SeatLabels) -> [(Table, Shown); 2] {
-    let built_in = studied(labels, Fill::BuiltIn(AgentKind::Greedy.into()));
+fn with_both_fills(hidden: &Hidden) -> [(Table, Shown); 2] {
+    let built_in = hidden.room(Fill::BuiltIn(AgentKind::Greedy.into()));
     let agents = Fill::Open {
         reserved_for: Some(ParticipantKind::Agent),
     };
-    let mut both = [
-        (built_in, Vec::new()),
-        (studied(labels, agents), Vec::new()),
-    ];
+    let mut both = [(built_in, Vec::new()), (hidden.room(agents), Vec::new())];
     let note = |both: &mut [(Table, Vec<_>); 2]| {
         for (table, shown) in both {
             shown.extend(shown_of(table));
@@ -256,56 +291,89 @@ fn with_both_fills(labels: SeatLabels) -> [(Table, Shown); 2] {
         both[1].0.attach(Seat::new(seat));
         note(&mut both);
     }
-    for (table, _) in &mut both {
-        table.now += ms(40);
-        assert_eq!(table.join(ParticipantKind::Human), Ok(Seat::new(0)));
-        table.attach(Seat::new(0));
-    }
-    let mut read = both[0].0.journal.len();
+    let own = Seat::new(0);
+    let mut connections = both.each_mut().map(|(table, _)| {
+        table.now += ms(50);
+        assert_eq!(table.join(ParticipantKind::Human), Ok(own));
+        table.attach(own)
+    });
+    let mut read = 0;
+    // Until when the participant is away.
+    let mut returns_at = None;
     for turn in 0.. {
-        note(&mut both);
-        if both[0].0.core.state().is_over() {
-            break;
-        }
-        if both[0].0.open().0 == Seat::new(0) {
-            for (table, _) in &mut both {
-                table.pass_time(ms(50));
-                let ((seat, id), action) = (table.open(), table.legal(turn));
-                assert_eq!(table.answer(seat, id, action).verdict, Verdict::Accepted);
-            }
-        } else {
-            both.iter_mut()
-                .for_each(|(table, _)| table.pass_time(ms(10)));
-        }
         let [(built_in, _), (programs, _)] = &mut both;
         for entry in &built_in.journal[read..] {
             if let Change::Decided(decided) = &entry.change
-                && decided.seat != Seat::new(0)
+                && decided.seat != own
+                && !programs.core.state().is_over()
             {
                 let (seat, id) = programs.open();
-                assert_eq!(seat, decided.seat);
-                let answered = programs.answer(seat, id, decided.action.index().into());
-                assert_eq!(answered.verdict, Verdict::Accepted);
+                // A program that is not asked at the same time cannot answer.
+                if seat == decided.seat {
+                    programs.answer(seat, id, decided.action.index().into());
+                }
             }
         }
         read = built_in.journal.len();
+        note(&mut both);
+        let core = &both[0].0.core;
+        if core.state().is_over() {
+            break;
+        }
+        let asked = core.awaited().filter(|open| open.decision.seat == own);
+        let asked = asked.map(|open| open.id);
+        if returns_at.is_some_and(|at| both[0].0.now >= at) {
+            connections = both.each_mut().map(|(table, _)| table.attach(own));
+            returns_at = None;
+        } else if returns_at.is_some() {
+            both.iter_mut()
+                .for_each(|(table, _)| table.pass_time(ms(50)));
+        } else if let Some(id) = asked {
+            let leaves = hidden.leaves && id % 3 == 1;
+            for ((table, shown), connection) in both.iter_mut().zip(connections) {
+                table.pass_time(ms(50));
+                if leaves {
+                    table.lost(own, connection);
+                } else {
+                    let action = table.legal(turn);
+                    let verdict = table.answer(own, id, action).verdict;
+                    shown.push(("a verdict", format!("{verdict:?}").into_bytes()));
+                }
+            }
+            if first_difference(&both).is_err() {
+                break;
+            }
+            // Some absences are shorter than the absence time, some longer than all the time.
+            let away = [300, 900, 4_000][usize::try_from(id).unwrap_or_default() / 3 % 3];
+            returns_at = leaves.then(|| both[0].0.now + ms(away));
+        } else {
+            both.iter_mut()
+                .for_each(|(table, _)| table.pass_time(ms(50)));
+        }
     }
-    assert!(both[1].0.core.state().is_over(), "the same game");
     both
+}
+
+/// The first class in which what was shown differs, and how many messages were compared.
+fn first_difference([(_, one), (_, other)]: &[(Table, Shown); 2]) -> Result<usize, &'static str> {
+    let differing = (one.iter().zip(other)).find(|((_, one), (_, other))| one != other);
+    match differing {
+        Some(((what, _), _)) => Err(what),
+        None if one.len() != other.len() => Err("the end"),
+        None => Ok(one.len()),
+    }
 }
 
 #[test]
 fn what_fills_a_hidden_seat_of_a_study_does_not_change_what_is_shown() {
     for labels in [SeatLabels::Kinds, SeatLabels::Players] {
-        let [(built_in, shown), (programs, other)] = with_both_fills(labels);
-        assert!(shown.len() > 2_000, "only {} messages", shown.len());
-        assert_eq!(shown.len(), other.len());
-        for ((what, one), (_, other)) in shown.iter().zip(&other) {
-            assert!(
-                one == other,
-                "{what} differs with {labels:?}:\n{one:?}\n{other:?}"
-            );
-        }
+        let both = with_both_fills(&Hidden::new(labels));
+        let compared = first_difference(&both).unwrap_or_else(|what| {
+            panic!("{what} differs with {labels:?}");
+        });
+        assert!(compared > 2_000, "only {compared} messages");
+        assert!(both[1].0.core.state().is_over(), "the same game");
+        let [(built_in, _), (programs, _)] = both;
         // The record has what is true, for the owner of the study.
         let times = |table: &Table| {
             let lines = convert::record_lines(table.core.header(), &table.journal);
@@ -324,7 +392,7 @@ fn what_fills_a_hidden_seat_of_a_study_does_not_change_what_is_shown() {
         assert_eq!(times(&built_in).len(), times(&programs).len());
     }
     // The comparison finds what is shown where nothing is hidden.
-    let [(_, shown), (_, other)] = with_both_fills(SeatLabels::AsTheyAre);
+    let [(_, shown), (_, other)] = with_both_fills(&Hidden::new(SeatLabels::AsTheyAre));
     for what in [
         "the room",
         "the start",
@@ -342,12 +410,99 @@ fn what_fills_a_hidden_seat_of_a_study_does_not_change_what_is_shown() {
     }
 }
 
+/// Whoever holds the jokers, each Shift waits as long, and the game waits as long for a participant
+/// who is away.
+#[test]
+fn what_fills_a_hidden_seat_of_a_study_does_not_change_when_it_is_shown() {
+    let mut decided = [0; 2];
+    for jokers in [None, Some([1, 2]), Some([2, 2]), Some([0, 0])] {
+        for (leaves, pace) in [(false, 300), (false, 0), (true, 300), (true, 0)] {
+            for abort in [AbortPolicy::Never, AbortPolicy::AllLost] {
+                let mut hidden = Hidden::new(SeatLabels::Players);
+                (hidden.jokers, hidden.leaves) = (jokers, leaves);
+                (hidden.policy.pace, hidden.policy.abort) = (Some(ms(pace)), abort);
+                let both = with_both_fills(&hidden);
+                let compared = first_difference(&both).unwrap_or_else(|what| {
+                    panic!("{what} differs: {hidden:?}");
+                });
+                assert!(compared > 200, "only {compared} messages: {hidden:?}");
+                let silent = both[1].0.core.header().rules.actions();
+                let silent = [silent.decline(), silent.declare()];
+                for entry in &both[1].0.journal {
+                    if let Change::Decided(it) = &entry.change
+                        && silent.contains(&it.action)
+                    {
+                        decided[usize::from(it.seat == Seat::new(0))] += 1;
+                    }
+                }
+                for (table, _) in &both {
+                    table.assert_replays();
+                    let lines = convert::record_lines(table.core.header(), &table.journal);
+                    replay(&lines).unwrap_or_else(|error| panic!("{error}: {hidden:?}"));
+                }
+            }
+        }
+    }
+    assert!(decided.iter().all(|count| *count >= 8), "{decided:?}");
+}
+
+#[test]
+fn in_a_hidden_study_the_first_gift_is_asked_for_at_the_same_time_whatever_fills_the_seats() {
+    let agents = Fill::Open {
+        reserved_for: Some(ParticipantKind::Agent),
+    };
+    let built_in = Fill::BuiltIn(AgentKind::Greedy.into());
+    // The participant's own time limits the phase, not that of a program.
+    for (pace, ends) in [(150, 1_500), (300, 2_000)] {
+        // Nobody is offered a special action, or a program thinks before it declines, or lets it run
+        // out.
+        let cases = [(built_in, None), (agents, None)].into_iter();
+        let thinking = [0, 700, 9_000].map(|thinks| (agents, Some(thinks)));
+        for (others, thinks) in cases.chain(thinking) {
+            let mut hidden = Hidden::new(SeatLabels::Players);
+            hidden.jokers = Some(thinks.map_or([1, 2], |_| [2, 2]));
+            hidden.policy.pace = Some(ms(pace));
+            let mut table = hidden.room(others);
+            if others == agents {
+                for _ in 1..4 {
+                    let seat = table.join(ParticipantKind::Agent).expect("a free seat");
+                    table.attach(seat);
+                }
+            }
+            table.join(ParticipantKind::Human).expect("a free seat");
+            table.attach(Seat::new(0));
+            if let Some(thinks) = thinks {
+                table.pass_time(ms(thinks.min(ends - 1)));
+                let decline = table.core.header().rules.actions().decline();
+                let (seat, id) = table.open();
+                assert_eq!(seat, Seat::new(2));
+                if thinks < ends {
+                    table.answer(seat, id, decline.index().into());
+                }
+            }
+            // The first gift is that of the participant, who was first in the Shift before.
+            let gives = |table: &Table| {
+                let awaited = table
+                    .core
+                    .awaited()
+                    .filter(|open| open.decision.kind == DecisionKind::Exchange);
+                awaited.map(|open| open.decision.seat)
+            };
+            table.pass_time(ms(ends - 1) - table.now);
+            assert_eq!(gives(&table), None, "{others:?} {thinks:?} {pace}");
+            table.pass_time(ms(1));
+            let own = Some(Seat::new(0));
+            assert_eq!(gives(&table), own, "{others:?} {thinks:?} {pace}");
+        }
+    }
+}
+
 #[test]
 fn of_a_hidden_seat_only_a_substitution_is_shown() {
     let agents = Fill::Open {
         reserved_for: Some(ParticipantKind::Agent),
     };
-    let mut table = studied(SeatLabels::Players, agents);
+    let mut table = Hidden::new(SeatLabels::Players).room(agents);
     for _ in 1..4 {
         table.join(ParticipantKind::Agent).expect("a free seat");
     }

@@ -117,6 +117,8 @@ pub(super) struct OpenDecision<'a> {
     pub(super) since_last_ms: u64,
     /// The longest time per decision of any seat, milliseconds.
     pub(super) longest_decision_ms: u32,
+    /// The shortest time that a special action may have, milliseconds.
+    pub(super) shortest_special_ms: u32,
 }
 
 impl OpenDecision<'_> {
@@ -360,9 +362,12 @@ impl OpenDecision<'_> {
             let away = clock.away_ms_at(record.elapsed_ms);
             away.is_none_or(|away| away >= absence.into())
         };
-        // The longest time of any seat limits a special action, without the bank.
+        // The longest time of any seat limits a special action, without the bank. It may have less.
         let (least, most) = match (special, absence) {
-            (true, _) => (own, u64::from(self.longest_decision_ms).max(own + bank)),
+            (true, _) => (
+                u64::from(self.shortest_special_ms),
+                u64::from(self.longest_decision_ms).max(own + bank),
+            ),
             (false, Some(absence)) if was_away(absence) => (absence.into(), own + bank),
             (false, _) => (own + bank, own + bank + unbanked),
         };

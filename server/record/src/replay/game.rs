@@ -200,6 +200,13 @@ impl<'a> Replay<'a> {
             .map(|part| part.decisions)
             .sum();
         let longest_decision_ms = self.seats.longest_decision_ms();
+        // A study that hides the other seats gives each the time of its participant.
+        let shortest_special_ms = match (&self.header.study, self.setup.special_actions_have_phase)
+        {
+            (_, true) => 0,
+            (Some(_), false) => self.seats.shortest_decision_ms(),
+            (None, false) => self.seats.clock(open.seat).decision_time_ms,
+        };
         let clock = self.seats.clock(open.seat);
         let open_decision = OpenDecision {
             setup: &self.setup,
@@ -211,6 +218,7 @@ impl<'a> Replay<'a> {
             hand_known: known[open.seat],
             since_last_ms: record.elapsed_ms.saturating_sub(self.last_decision_ms),
             longest_decision_ms,
+            shortest_special_ms,
         };
         let action = open_decision.check(record)?;
         clock.count(open.kind, record);

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
+use chefshat_engine::limits::MIN_PACE_OF_PHASE_MS;
 use chefshat_engine::{RULES_VERSION, RewardScheme, RuleSet, Script};
 use chefshat_proto::v1;
 use chefshat_referee::StartState;
@@ -30,6 +31,8 @@ pub(super) struct Setup {
     pub(super) origin: v1::GameOrigin,
     /// Invalid attempts per decision before the default decision; 0: unlimited.
     pub(super) max_invalid_attempts: u32,
+    /// Whether special actions have a fixed time, which may be shorter than a decision time.
+    pub(super) special_actions_have_phase: bool,
     /// Whether seats may ask for hints.
     pub(super) hints: bool,
     /// The first Shift, if its hands were given.
@@ -96,6 +99,7 @@ pub(super) fn check(header: &v1::RecordHeader) -> Result<Setup, String> {
         scheme: reward_scheme_from_proto(policy.reward_scheme()),
         origin,
         max_invalid_attempts: policy.max_invalid_attempts(),
+        special_actions_have_phase: policy.pace_ms() >= MIN_PACE_OF_PHASE_MS,
         hints: policy.hints,
         script,
         physical,

@@ -90,6 +90,12 @@ impl Seats {
         times.map(|clock| clock.decision_time_ms).max().unwrap_or(0)
     }
 
+    /// The shortest time per decision of any such seat, milliseconds.
+    pub(super) fn shortest_decision_ms(&self) -> u32 {
+        let times = self.clocks.iter().filter(|clock| !clock.built_in);
+        times.map(|clock| clock.decision_time_ms).min().unwrap_or(0)
+    }
+
     /// A decision was taken: what seats were away before it does not matter to the next one.
     pub(super) fn decided(&mut self, elapsed_ms: u64) {
         for clock in &mut self.clocks {
