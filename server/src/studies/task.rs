@@ -347,6 +347,9 @@ impl Task {
         }
         let count = ids.len();
         self.rooms.delete_games(ids).await?;
+        for number in &due {
+            handle.data.forget_answers(*number);
+        }
         handle.lock_deleting().retain(|it| !due.contains(it));
         if is_changed {
             info!(study = %handle.id(), participants = due.len(), games = count, "the data of participants were deleted");
