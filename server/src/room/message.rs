@@ -58,6 +58,8 @@ pub struct AttachRequest {
     pub request_id: u32,
     /// The stream.
     pub outbox: Arc<Outbox>,
+    /// Who is charged for what it stores.
+    pub charged: Key,
     /// Number of the seat on the stream.
     pub handle: u32,
     /// How events and decisions are delivered to it.
@@ -200,8 +202,9 @@ pub(super) enum Message {
     ),
     Lost(Seat, ConnectionId, Option<v1::DetachReason>),
     Do(Seat, ConnectionId, SeatAction, Instant),
+    /// With the secret of the seat's ticket, and who is charged for what is stored.
     Act(
-        [u8; 32],
+        ([u8; 32], Key),
         SeatAction,
         Instant,
         oneshot::Sender<Option<Acted>>,

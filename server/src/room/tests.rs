@@ -77,6 +77,19 @@ async fn room_of_node(
     metrics: Arc<Metrics>,
     change: impl FnOnce(Box<dyn Journal>) -> Box<dyn Journal>,
 ) -> Handle {
+    let store = MemoryStore::default();
+    room_in(store, lease, fills, policy, shifts, metrics, change).await
+}
+
+async fn room_in(
+    store: MemoryStore,
+    lease: Option<Arc<NodeLease>>,
+    fills: Vec<Fill>,
+    policy: Policy,
+    shifts: u32,
+    metrics: Arc<Metrics>,
+    change: impl FnOnce(Box<dyn Journal>) -> Box<dyn Journal>,
+) -> Handle {
     let header = Arc::new(GameHeader {
         room_id: Id([1; 16]),
         game_id: Id([2; 16]),
@@ -104,7 +117,7 @@ async fn room_of_node(
         table: None,
         study: None,
     });
-    let store = Arc::new(MemoryStore::default());
+    let store = Arc::new(store);
     let journal = store
         .create(Arc::clone(&header), Vec::new())
         .await
@@ -152,6 +165,11 @@ struct AttachedSeat {
 }
 
 async fn take_seat(room: &Handle) -> AttachedSeat {
+    take_seat_from(room, Key::Local).await
+}
+
+/// Takes a seat from an address.
+async fn take_seat_from(room: &Handle, charged: Key) -> AttachedSeat {
     let joined = room
         .join(JoinRequest {
             request_id: None,
@@ -164,7 +182,7 @@ async fn take_seat(room: &Handle) -> AttachedSeat {
         .await
         .expect("the room exists")
         .expect("a free seat");
-    attach(room, joined.ticket).await
+    attach_from(room, joined.ticket, charged).await
 }
 
 fn attachment(ticket: &Token, outbox: Arc<Outbox>) -> AttachRequest {
@@ -172,6 +190,7 @@ fn attachment(ticket: &Token, outbox: Arc<Outbox>) -> AttachRequest {
         secret: ticket.secret,
         request_id: 0,
         outbox,
+        charged: Key::Local,
         handle: 0,
         options: DeliveryOptions {
             at_once: true,
@@ -189,9 +208,17 @@ fn attachment(ticket: &Token, outbox: Arc<Outbox>) -> AttachRequest {
 }
 
 async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
+    attach_from(room, ticket, Key::Local).await
+}
+
+async fn attach_from(room: &Handle, ticket: Token, charged: Key) -> AttachedSeat {
     let (outbox, updates) = Outbox::new();
+    let attachment = AttachRequest {
+        charged,
+        ..attachment(&ticket, outbox)
+    };
     let attached = room
-        .attach(attachment(&ticket, outbox))
+        .attach(attachment)
         .await
         .expect("the room exists")
         .expect("a valid ticket");
@@ -737,6 +764,59 @@ async fn answers_are_handled_in_place_while_the_task_waits_and_the_mailbox_is_em
     );
     let record = room.describe().await.expect("the room is shown");
     assert_eq!(record.state(), v1::RoomState::Finished);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_flood_of_annotations_drops_those_of_its_sender_alone() {
+    let policy = Policy::default();
+    let (store, metrics) = (MemoryStore::outliving_server(), Arc::default());
+    let room = room_in(store, None, vec![FREE; 4], policy, 1, metrics, |it| it).await;
+    let address = |last| Key::Address([192, 0, 2, last].into());
+    let mut seats = Vec::new();
+    for last in 1..=4 {
+        seats.push(take_seat_from(&room, address(last)).await);
+    }
+    // Nobody's decision: its annotations are read all the same.
+    let flood = || Answer {
+        annotations: Some(vec![0; 65 << 20].into()),
+        ..Answer::new(u64::MAX, 0)
+    };
+    let sender = &seats[0];
+    let sent = SeatAction::Answer(flood());
+    let sent = room.perform(sender.seat, sender.connection, sent, Instant::now());
+    sent.await.expect("the room exists");
+    let mut dropped = Vec::new();
+    while dropped.len() < 4 {
+        for seat in &mut seats {
+            let (seat, connection, updates) = (seat.seat, seat.connection, &mut seat.updates);
+            tokio::task::yield_now().await;
+            let Some(Some(updates)) = updates.next().now_or_never() else {
+                continue;
+            };
+            let written = updates.expect("no error").encode_to_vec();
+            let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
+            for update in response.updates.into_iter().filter_map(|it| it.update) {
+                match update {
+                    Update::Decision(decision) => {
+                        let answer = Answer {
+                            annotations: Some([0].into()),
+                            ..Answer::new(decision.decision_id, first_legal(&decision))
+                        };
+                        let action = SeatAction::Answer(answer);
+                        let sent = room.perform(seat, connection, action, Instant::now());
+                        sent.await.expect("the room exists");
+                    }
+                    Update::Result(result) if result.status() == v1::AnswerStatus::Accepted => {
+                        dropped.push((seat.index(), result.annotations_dropped));
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+    for (seat, is_dropped) in dropped {
+        assert_eq!(is_dropped, seat == seats[0].seat.index(), "seat {seat}");
+    }
 }
 
 #[tokio::test]

@@ -36,9 +36,19 @@ pub struct MemoryStore {
     reserved: Reservations,
     /// Tournaments that are not over.
     tournaments: Mutex<BTreeSet<Id>>,
+    outlives_server: bool,
 }
 
 impl MemoryStore {
+    /// A store that is treated like one that outlives the server.
+    #[cfg(test)]
+    pub fn outliving_server() -> Self {
+        Self {
+            outlives_server: true,
+            ..Self::default()
+        }
+    }
+
     /// Whether a tournament that is not over, or a study, needs the record of a game.
     fn is_needed(&self, game: &StoredGame) -> bool {
         match game {
@@ -119,7 +129,7 @@ impl Finished {
 
 impl Store for MemoryStore {
     fn outlives_server(&self) -> bool {
-        false
+        self.outlives_server
     }
 
     fn create(
