@@ -233,17 +233,16 @@ impl Store for MemoryStore {
         ready(Ok(found)).boxed()
     }
 
-    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn prune(&self, mut games: Vec<Id>) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
         let mut finished = lock(&self.finished);
-        for game in games {
-            if finished
-                .get(game)
-                .is_some_and(|it| !self.is_needed(&it.stored))
-            {
-                finished.remove(game);
-            }
+        games.retain(|game| {
+            let is_free = |it: &FinishedGame| !self.is_needed(&it.stored);
+            finished.get(*game).is_none_or(is_free)
+        });
+        for game in &games {
+            finished.remove(*game);
         }
-        ready(Ok(())).boxed()
+        ready(Ok(games)).boxed()
     }
 
     fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {

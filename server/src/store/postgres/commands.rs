@@ -327,18 +327,10 @@ impl Command {
     }
 }
 
-/// Deletes those of these finished games that no tournament or study needs. The files of the others
-/// may be gone: they are written again.
+/// Deletes those of these finished games that no tournament or study needs.
 async fn prune(connection: &mut PgConnection, games: &[Id]) -> sqlx::Result<i64> {
     let games = locked(connection, games).await?;
-    let (free, needed) = divided(connection, games).await?;
-    if !needed.is_empty() {
-        let numbers: Vec<i64> = needed.iter().map(|game| game.number).collect();
-        sqlx::query("UPDATE games SET filed = false WHERE number = ANY ($1)")
-            .bind(numbers)
-            .execute(&mut *connection)
-            .await?;
-    }
+    let (free, _) = divided(connection, games).await?;
     let free: Vec<Id> = free.iter().map(|game| game.game).collect();
     delete(connection, &free).await
 }

@@ -531,8 +531,7 @@ async fn free_pages(connection: &mut SqliteConnection) {
     }
 }
 
-/// Deletes those of these finished games that no tournament or study needs. The files of the others
-/// may be gone: they are written again.
+/// Deletes those of these finished games that no tournament or study needs.
 async fn prune(connection: &mut SqliteConnection, games: &[Id]) -> sqlx::Result<()> {
     let mut units = Units::default();
     for game in games {
@@ -542,12 +541,7 @@ async fn prune(connection: &mut SqliteConnection, games: &[Id]) -> sqlx::Result<
                 .fetch_optional(&mut *connection)
                 .await?;
         let Some((form, header)) = row else { continue };
-        if units.need(connection, form, header.as_deref()).await? {
-            sqlx::query("UPDATE games SET filed = 0 WHERE game_id = $1")
-                .bind(game.0.as_slice())
-                .execute(&mut *connection)
-                .await?;
-        } else {
+        if !units.need(connection, form, header.as_deref()).await? {
             delete(connection, *game).await?;
         }
     }
