@@ -17,7 +17,7 @@ use super::message::{
 use super::resting::Resting;
 use super::task::{self, Room, TaskContext};
 use crate::clock::RoomClock;
-use crate::limits::Key;
+use crate::limits::{Key, Payer};
 use crate::store::Journal;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::AbortReason;
@@ -331,7 +331,11 @@ impl Handle {
     ///
     /// # Errors
     /// The room is gone.
-    pub async fn close(&self, secret: [u8; 32], client: Key) -> Result<Option<v1::Room>, RoomGone> {
+    pub async fn close(
+        &self,
+        secret: [u8; 32],
+        client: Payer,
+    ) -> Result<Option<v1::Room>, RoomGone> {
         self.ask(|reply| Message::Close(secret, client, reply))
             .await
     }

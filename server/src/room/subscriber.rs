@@ -18,7 +18,7 @@ use chefshat_room::log::RoomEvent;
 use chefshat_room::{Awaited, ConnectionId, Core};
 
 use crate::convert;
-use crate::limits::{Held, Key};
+use crate::limits::{Held, Payer};
 use crate::metrics::Counted;
 use crate::outbox::{HandStamp, OnSpace, Outbox, StreamEnd};
 use crate::wire::{Events, Updates, encode_decision, put_event};
@@ -79,7 +79,7 @@ pub struct SeatConnection {
     /// Number of the connection.
     pub id: ConnectionId,
     /// Who is charged for what it stores.
-    pub charged: Key,
+    pub charged: Payer,
     /// Number of the seat on the stream.
     pub handle: u32,
     /// How events and decisions are delivered to it.
@@ -102,7 +102,7 @@ pub struct SeatConnection {
 impl SeatConnection {
     /// Creates a connection that has received nothing yet.
     pub fn new(
-        (seat, id, charged): (Seat, ConnectionId, Key),
+        (seat, id, charged): (Seat, ConnectionId, Payer),
         handle: u32,
         options: DeliveryOptions,
         stamp: Arc<HandStamp>,

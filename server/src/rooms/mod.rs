@@ -123,6 +123,7 @@ impl Rooms {
                 lease,
                 webhooks,
                 owner: Key::Resumed,
+                creator: None,
                 stored: Arc::default(),
                 shares: config.shares,
                 process_clock: Arc::default(),

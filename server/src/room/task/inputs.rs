@@ -61,8 +61,11 @@ impl Room {
             Message::HasStarted(reply) => answer(reply, self.core.game().is_some()),
             Message::Close(secret, client, reply) => {
                 if self.core.header().owner.matches(&secret) {
-                    let owner = [client, self.context.owner];
-                    let seats = self.clients.seats_of(&self.core, owner);
+                    let owner = Vec::from_iter([client].into_iter().chain(self.context.creator));
+                    let connected = (self.connections.iter().flatten())
+                        .filter_map(|subscriber| subscriber.connection())
+                        .map(|connection| (connection.seat, connection.charged));
+                    let seats = self.clients.seats_of(&self.core, connected, &owner);
                     self.core.close(self.now, seats);
                     self.releases.push(Release::Closed(reply));
                 } else {
@@ -113,7 +116,8 @@ impl Room {
         if let Some(seat) = self.core.seat_of_ticket(&ticket.secret) {
             return self.join_again(seat, ticket, &request);
         }
-        self.clients.check(&self.core, request.client)?;
+        let client = request.client.map(|client| client.key);
+        self.clients.check(&self.core, client)?;
         let seat = self.core.join(
             self.now,
             request.seat,
@@ -226,7 +230,7 @@ impl Room {
         else {
             return;
         };
-        let by = (seat, current.charged);
+        let by = (seat, current.charged.key);
         let release = match self.perform(by, action, arrived) {
             Ok(Some(result)) => Release::Result(seat, connection, result),
             Ok(None) => return,
