@@ -96,6 +96,7 @@ impl Work for Command {
             let mut transaction = connection.begin().await?;
             let mut answers = Vec::with_capacity(work.len());
             let mut listed = Vec::new();
+            lock_ids(&mut transaction, work).await?;
             for command in work {
                 answers.push(command.run(&mut transaction, again, &mut listed).await?);
             }
@@ -325,6 +326,33 @@ impl Command {
             false => StoreError::Fenced(*id),
         }))
     }
+}
+
+/// Waits for other transactions that take ids of games outside of one another's sight, until the end
+/// of this one: an import looks for no running game, and an ephemeral game for no stored one, but
+/// neither sees what is not committed. In order, so that nobody waits for each other.
+async fn lock_ids(connection: &mut PgConnection, work: &[Arc<Command>]) -> sqlx::Result<()> {
+    let mut keys: Vec<i64> = (work.iter())
+        .filter_map(|command| match &**command {
+            Command::Import { game_id, .. } => Some(game_id),
+            Command::Create {
+                game_id,
+                durable: None,
+                ..
+            } => Some(game_id),
+            _ => None,
+        })
+        .map(|id| i64::from_be_bytes(std::array::from_fn(|index| id.0[index])))
+        .collect();
+    keys.sort_unstable();
+    keys.dedup();
+    for key in keys {
+        sqlx::query("SELECT pg_advisory_xact_lock($1)")
+            .bind(key)
+            .execute(&mut *connection)
+            .await?;
+    }
+    Ok(())
 }
 
 /// Deletes those of these finished games that no tournament or study needs.
