@@ -412,7 +412,7 @@ impl Server {
             .layer(ForwardedLayer::new(config.trusted_proxies.clone()))
             .layer(OriginLayer::new(origins))
             .layer(cors(&config.allowed_origins)?)
-            .layer(PageLayer::new(encrypted, config.shares)?)
+            .layer(PageLayer::new(encrypted, Arc::clone(&rooms))?)
             .layer(tonic_web::GrpcWebLayer::new())
             .layer(grpc::count_refusals(rooms.metrics()))
             .layer(option_layer(forwarding))

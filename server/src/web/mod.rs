@@ -27,7 +27,7 @@ use preview::{Link, Previews, Unshown};
 #[cfg(test)]
 pub(crate) use preview::{MAX_PREVIEWS, MAX_PREVIEWS_WAITING, PICTURE_PATIENCE};
 
-use crate::limits::Shares;
+use crate::rooms::Rooms;
 
 /// Whether the page was built.
 pub fn is_built() -> bool {
@@ -42,13 +42,13 @@ pub struct PageLayer {
 }
 
 impl PageLayer {
-    /// Creates the page. `tls`: whether browsers reach this server with TLS. `shares`: how many
-    /// previews of games one caller may ask for at a time.
+    /// Creates the page. `tls`: whether browsers reach this server with TLS. `rooms`: whose games it
+    /// previews.
     ///
     /// # Errors
     /// The operating system cannot start the thread that paints them.
-    pub fn new(tls: bool, shares: Shares) -> Result<Self, ThreadPoolBuildError> {
-        let previews = Arc::new(Previews::new(shares)?);
+    pub fn new(tls: bool, rooms: Arc<Rooms>) -> Result<Self, ThreadPoolBuildError> {
+        let previews = Arc::new(Previews::new(rooms)?);
         Ok(Self { tls, previews })
     }
 }
