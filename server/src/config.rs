@@ -95,6 +95,8 @@ pub const MAX_STUDIES: usize = 256;
 /// Most bytes of memory that the settings of all studies take. Decoding them is costed, which is
 /// about as much as a study keeps.
 pub const MAX_STUDY_MEMORY: usize = 48 * 1024 * 1024;
+/// Most bytes of memory that the participants of all studies and their answers take.
+pub const MAX_STUDY_DATA: usize = 64 * 1024 * 1024;
 /// Messages that may wait for one study.
 pub const STUDY_MAILBOX: usize = 256;
 /// Most participants that one request adds to a study.

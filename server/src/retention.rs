@@ -1,6 +1,7 @@
 //! How long finished games are kept: deletes the oldest with the files of their records, at an
-//! operator's request or on a schedule, and gives their disk space back. A crash in between leaves
-//! nothing behind that the next run does not delete.
+//! operator's request or on a schedule, and gives their disk space back. The store decides which, and
+//! only then are files deleted. A crash in between leaves nothing behind that the next run does not
+//! delete.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -8,7 +9,7 @@ use std::time::Duration;
 
 use chefshat_record::{atomic_file, jsonl};
 use chefshat_room::ids::Id;
-use tracing::{error, info};
+use tracing::{error, info, warn};
 
 use crate::clock::since_epoch_ms;
 use crate::config::KeepGames;
@@ -21,6 +22,10 @@ const GAMES_PER_COMMIT: usize = 16;
 const PAUSE: Duration = Duration::from_millis(20);
 /// Time between two runs of the schedule.
 const INTERVAL: Duration = Duration::from_secs(600);
+
+/// A file of the data directory with the ids of games whose deletion has begun, one a line. It is
+/// deleted after their files.
+const PRUNING: &str = "pruning";
 
 /// Which games a setting keeps now.
 fn kept_now(setting: KeepGames) -> Keep {
@@ -97,6 +102,7 @@ impl Retention {
     pub async fn prune(&self, keep: Keep) -> Result<Pruned, StoreError> {
         let before = self.usage().await?;
         let mut pruned = Pruned::default();
+        self.delete(self.left_over()).await?;
         let mut after = 0;
         loop {
             let store = self.rooms.store();
@@ -104,18 +110,7 @@ impl Retention {
             let Some((last, _)) = found.last() else { break };
             after = *last;
             let games: Vec<Id> = found.into_iter().map(|(_, game)| game).collect();
-            // Files before the games: after a crash in between, the next run deletes them.
-            if let Some(data_dir) = self.rooms.record_writer().data_dir() {
-                let paths: Vec<_> = (games.iter())
-                    .map(|game| jsonl::path_of(data_dir, &game.to_string()))
-                    .collect();
-                let deleting = move || paths.iter().try_for_each(|path| atomic_file::remove(path));
-                (tokio::task::spawn_blocking(deleting).await)
-                    .map_err(|error| StoreError::Failed(error.to_string()))?
-                    .map_err(|error| StoreError::Failed(format!("deleting a record: {error}")))?;
-            }
-            pruned.games += games.len() as u64;
-            self.rooms.prune_games(games).await?;
+            pruned.games += self.delete(games).await?;
             tokio::time::sleep(PAUSE).await;
         }
         let after = self.usage().await?;
@@ -131,6 +126,42 @@ impl Retention {
             );
         }
         Ok(pruned)
+    }
+
+    /// Deletes those of these games that nothing needs, and their files. Returns how many it did.
+    pub(crate) async fn delete(&self, games: Vec<Id>) -> Result<u64, StoreError> {
+        if games.is_empty() {
+            return Ok(0);
+        }
+        let data_dir = self.rooms.record_writer().data_dir();
+        if let Some(data_dir) = data_dir {
+            let ids: Vec<String> = games.iter().map(Id::to_string).collect();
+            // A disk that is full must not prevent what frees space.
+            if let Err(error) = std::fs::write(data_dir.join(PRUNING), ids.join("\n")) {
+                warn!(%error, "a crash from here on may leave files of deleted games behind");
+            }
+        }
+        let deleted = self.rooms.prune_games(games).await?;
+        if let Some(data_dir) = data_dir {
+            let records = deleted.iter().map(ToString::to_string);
+            let mut paths: Vec<_> = (records)
+                .map(|game| jsonl::path_of(data_dir, &game))
+                .collect();
+            paths.push(data_dir.join(PRUNING));
+            let deleting = move || paths.iter().try_for_each(|path| atomic_file::remove(path));
+            (tokio::task::spawn_blocking(deleting).await)
+                .map_err(|error| StoreError::Failed(error.to_string()))?
+                .map_err(|error| StoreError::Failed(format!("deleting a record: {error}")))?;
+        }
+        Ok(deleted.len() as u64)
+    }
+
+    /// The games whose deletion an earlier run began and may not have completed.
+    fn left_over(&self) -> Vec<Id> {
+        let data_dir = self.rooms.record_writer().data_dir();
+        let read = data_dir.and_then(|it| std::fs::read_to_string(it.join(PRUNING)).ok());
+        let ids = read.unwrap_or_default();
+        ids.lines().filter_map(Id::parse).collect()
     }
 
     /// Deletes games on a schedule, until the future is dropped.

@@ -414,7 +414,7 @@ impl Server {
             .layer(cors(&config.allowed_origins)?)
             .layer(PageLayer::new(
                 encrypted,
-                config.shares,
+                Arc::clone(&rooms),
                 config.painter.clone(),
             )?)
             .layer(tonic_web::GrpcWebLayer::new())

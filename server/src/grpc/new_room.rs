@@ -18,7 +18,7 @@ use super::status::{field, request_id, status};
 use crate::access::Caller;
 use crate::config::MAX_HOSTED_SHIFTS;
 use crate::convert;
-use crate::limits::Key;
+use crate::limits::{Key, Payer};
 use crate::rooms::NewRoom;
 use chefshat_room::ids::{Id, RequestKey};
 use chefshat_room::journal::{Branch, Fill, GameStart};
@@ -107,6 +107,7 @@ pub(super) async fn new_room(
         seating: None,
         request: request_key,
         charged,
+        creator: Some(Payer::of_caller(caller)),
     })
 }
 

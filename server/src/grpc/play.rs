@@ -31,7 +31,7 @@ use super::status::{Refusal, field, request_id, room_unknown, stream_ended, tick
 use crate::access::Caller;
 use crate::config::{HEARTBEAT, MAX_SEATS_PER_WATCH};
 use crate::convert;
-use crate::limits::{Executing, Hint};
+use crate::limits::{Executing, Hint, Key};
 use crate::metrics::StreamKind;
 use crate::outbox::{Outbox, OutboxStream, StreamEnd};
 use crate::room::SeatAction;
@@ -248,7 +248,7 @@ impl PlayService for Play {
             }
         };
         let result = room
-            .act(token.secret, action, arrived)
+            .act((token.secret, Key::of_caller(&caller)), action, arrived)
             .await
             .map_err(Refusal::from)?
             .ok_or_else(ticket_unknown)?

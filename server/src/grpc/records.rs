@@ -4,6 +4,7 @@ use std::iter::Peekable;
 use std::pin::Pin;
 use std::sync::Arc;
 
+use chefshat_proto::cost::{Cost, shapes};
 use chefshat_proto::v1::{
     self, game_event::Kind, record_line::Line, record_service_server::RecordService,
 };
@@ -404,18 +405,36 @@ async fn received(
     memory: &Arc<Places>,
     key: Key,
 ) -> Result<(Vec<v1::RecordLine>, Vec<Held>), Status> {
-    let (mut parts, mut count, mut bytes, mut taken) = (Vec::new(), 0, 0, Vec::new());
+    let mut received = Received::default();
     loop {
         let next = timeout(IMPORT_IDLE_TIMEOUT, requests.message());
-        let Some(request) = next.await.map_err(|_| import_too_slow())?? else {
-            // At once: a list that grows takes up to three times the memory.
-            let mut lines = Vec::with_capacity(count);
-            lines.extend(parts.into_iter().flatten());
-            return Ok((lines, taken));
-        };
-        let encoded = request.encoded_len();
-        bytes += encoded;
-        if bytes > MAX_IMPORT_BYTES {
+        match next.await.map_err(|_| import_too_slow())?? {
+            Some(request) => received.add(request, memory, key)?,
+            None => return Ok(received.put_together()),
+        }
+    }
+}
+
+/// The parts of a record that have arrived.
+#[derive(Default)]
+struct Received {
+    parts: Vec<Vec<v1::RecordLine>>,
+    lines: usize,
+    bytes: usize,
+    /// The memory of each part.
+    memory: Vec<Held>,
+}
+
+impl Received {
+    /// Checks the next part and adds it.
+    fn add(
+        &mut self,
+        request: v1::ImportRecordRequest,
+        memory: &Arc<Places>,
+        key: Key,
+    ) -> Result<(), Status> {
+        self.bytes += request.encoded_len();
+        if self.bytes > MAX_IMPORT_BYTES {
             return Err(status(
                 Code::ResourceExhausted,
                 "RECORD_TOO_LARGE",
@@ -424,14 +443,14 @@ async fn received(
             ));
         }
         // A decoded line can take far more memory than its bytes.
-        for (number, line) in (count + 1..).zip(&request.lines) {
+        for (number, line) in (self.lines + 1..).zip(&request.lines) {
             check_line(line).map_err(|problem| refused(number, &problem))?;
             if number == 1 && !matches!(line.line, Some(Line::Header(_))) {
                 return Err(refused(number, "the first line must be the header"));
             }
         }
-        count += request.lines.len();
-        if count > MAX_IMPORT_LINES {
+        self.lines += request.lines.len();
+        if self.lines > MAX_IMPORT_LINES {
             return Err(status(
                 Code::ResourceExhausted,
                 "RECORD_TOO_LARGE",
@@ -439,17 +458,27 @@ async fn received(
                 [("max_lines", &MAX_IMPORT_LINES.to_string())],
             ));
         }
-        let memory_of_part = memory_of(request.lines.len(), encoded);
-        let held = memory.try_take_many(key, memory_of_part.div_ceil(1024));
-        taken.push(held.ok_or_else(too_much_imported)?);
-        parts.push(request.lines);
+        let places = memory_of(&request).div_ceil(1024);
+        let held = memory.try_take_many(key, places);
+        self.memory.push(held.ok_or_else(too_much_imported)?);
+        self.parts.push(request.lines);
+        Ok(())
+    }
+
+    fn put_together(self) -> (Vec<v1::RecordLine>, Vec<Held>) {
+        // At once: a list that grows takes up to three times the memory.
+        let mut lines = Vec::with_capacity(self.lines);
+        lines.extend(self.parts.into_iter().flatten());
+        (lines, self.memory)
     }
 }
 
-/// Memory of lines that have this many bytes together: themselves, once more while they are put
-/// together, and what they point to.
-fn memory_of(lines: usize, encoded: usize) -> usize {
-    2 * lines * size_of::<v1::RecordLine>() + 4 * encoded
+/// Memory of a part of a record: what it was decoded to, at most, and its lines once more while they
+/// are put together.
+fn memory_of(part: &v1::ImportRecordRequest) -> usize {
+    let cost = shapes::IMPORT_RECORD_REQUEST.cost(&part.encode_to_vec(), Cost::MAX);
+    let decoded = cost.map_or(usize::MAX, |cost| cost.memory);
+    decoded.saturating_add(part.lines.len() * size_of::<v1::RecordLine>())
 }
 
 fn too_much_imported() -> Status {
@@ -560,4 +589,139 @@ fn next_part(lines: &mut Peekable<impl Iterator<Item = v1::RecordLine>>) -> Vec<
         part.push(line);
     }
     part
+}
+
+#[cfg(test)]
+mod tests {
+    use futures::FutureExt as _;
+    use tokio_util::task::TaskTracker;
+
+    use super::super::reach::Reach;
+    use super::*;
+    use crate::access::Role;
+    use crate::rooms::Rooms;
+    use crate::store::{MemoryStore, Store as _};
+
+    fn header(game: u8) -> v1::RecordLine {
+        v1::RecordLine {
+            line: Some(Line::Header(v1::RecordHeader {
+                game_id: Id([game; 16]).to_string(),
+                ..v1::RecordHeader::default()
+            })),
+        }
+    }
+
+    fn summary_of(game: u8) -> v1::RecordSummary {
+        v1::RecordSummary {
+            game_id: Id([game; 16]).to_string(),
+            state: v1::RoomState::Finished.into(),
+            ..v1::RecordSummary::default()
+        }
+    }
+
+    /// Small when encoded and large when decoded.
+    fn large_decision() -> v1::RecordLine {
+        let extra = (0..64).map(|number| (number.to_string(), String::new()));
+        v1::RecordLine {
+            line: Some(Line::Decision(v1::DecisionRecord {
+                annotations: Some(v1::Annotations {
+                    extra: extra.collect(),
+                    ..v1::Annotations::default()
+                }),
+                ..v1::DecisionRecord::default()
+            })),
+        }
+    }
+
+    #[test]
+    fn a_part_of_an_import_counts_as_much_as_it_decodes_to() {
+        for lines in [vec![header(1)], vec![large_decision(); 1_000]] {
+            let part = v1::ImportRecordRequest { lines };
+            let bytes = part.encode_to_vec();
+            let cost = shapes::IMPORT_RECORD_REQUEST.cost(&bytes, Cost::MAX);
+            let decoded = cost.expect("a message").memory;
+            assert!(
+                memory_of(&part) >= decoded,
+                "{} < {decoded}",
+                memory_of(&part)
+            );
+        }
+    }
+
+    #[test]
+    fn imports_take_a_bounded_memory_together() {
+        let memory = Places::new(MAX_IMPORT_MEMORY / 1024, Shares::ALL);
+        let part = || v1::ImportRecordRequest {
+            lines: vec![large_decision(); 100],
+        };
+        let mut imports = Vec::new();
+        let refused = loop {
+            let mut received = Received::default();
+            let first = v1::ImportRecordRequest {
+                lines: vec![header(1)],
+            };
+            let key = Key::Address([192, 0, 2, imports.len() as u8].into());
+            received.add(first, &memory, key).expect("it is small");
+            let added: Result<(), Status> =
+                (0..10).try_for_each(|_| received.add(part(), &memory, key));
+            imports.push(received);
+            if let Err(refused) = added {
+                break refused;
+            }
+            assert!(imports.len() < 200, "it is bounded");
+        };
+        let reason = has_reason(&refused, "RECORD_TOO_LARGE");
+        assert!(reason && refused.message().contains("192 MiB"), "{refused}");
+        let taken = memory.taken() * 1024;
+        let most = MAX_IMPORT_MEMORY;
+        assert!((most * 9 / 10..=most).contains(&taken), "{taken}");
+        imports.truncate(1);
+        let (lines, held) = imports.remove(0).put_together();
+        assert_eq!(lines.len(), 1 + 10 * 100);
+        drop(held);
+        assert_eq!(memory.taken(), 0);
+    }
+
+    #[tokio::test]
+    async fn a_record_that_is_deleted_before_its_turn_ends_no_stream() {
+        let store = Arc::new(MemoryStore::default());
+        for game in 1..=3 {
+            let lines = Arc::from([header(game)]);
+            let imported = store.import(Id([game; 16]), summary_of(game), lines);
+            assert_eq!(imported.await, Ok(true));
+        }
+        let config = ServerConfig::default();
+        let rooms = Rooms::new(&config, store.clone(), TaskTracker::new()).expect("threads");
+        let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
+        let reach = Reach::new(rooms, Arc::clone(&tournaments));
+        let recorded = Recorded::new(reach, Role::Spectator);
+        let records = Records::new(recorded, tournaments, &config);
+        let caller = Caller {
+            role: Role::Admin,
+            ..Caller::default()
+        };
+        let (request, filter) = (
+            v1::StreamRecordsRequest::default(),
+            v1::RecordFilter::default(),
+        );
+        let (sender, mut receiver) = mpsc::channel(9);
+        // The page has been read, and the first record waits for its turn.
+        let all = records
+            .sending
+            .take_many_anyway(Key::Local, MAX_RECORDS_SENT);
+        {
+            let sending = records.send_all(&caller, &request, &filter, (Key::Local, None), &sender);
+            tokio::pin!(sending);
+            assert!(sending.as_mut().now_or_never().is_none());
+            store.delete(vec![Id([1; 16])]).await.expect("deleted");
+            drop(all);
+            sending.await.expect("the others follow");
+        }
+        drop(sender);
+        let mut sent = Vec::new();
+        while let Some(response) = receiver.recv().await {
+            sent.extend(response.expect("a part").lines);
+        }
+        assert_eq!(sent, [header(2), header(3)]);
+    }
 }

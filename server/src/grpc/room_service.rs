@@ -21,7 +21,7 @@ use super::recorded::Recorded;
 use super::status::{self, Refusal, field, name_fingerprint, request_id, ticket_unknown};
 use crate::access::Caller;
 use crate::convert;
-use crate::limits::{COST_OF_BUILT_IN_GAME, COST_OF_ROOM, CallLimits, Key};
+use crate::limits::{COST_OF_BUILT_IN_GAME, COST_OF_ROOM, CallLimits, Key, Payer};
 use crate::room::{Handle, JoinRequest};
 use crate::rooms::{CreateError, Rooms};
 use crate::store::StoreError;
@@ -307,7 +307,7 @@ impl RoomService for RoomCalls {
                 kind,
                 seat: request.seat,
                 request_id,
-                client: Some(key),
+                client: Some(Payer::of_caller(&caller)),
             })
             .await
             .map_err(Refusal::from)?
@@ -340,7 +340,7 @@ impl RoomService for RoomCalls {
         request: Request<v1::CloseRoomRequest>,
     ) -> Result<Response<v1::CloseRoomResponse>, Status> {
         let caller = Caller::of(request.extensions());
-        let key = charged(request.extensions());
+        let client = Payer::of_caller(&caller);
         let request = request.into_inner();
         let caller = caller.showing(&request.owner_token);
         let handle = self.reach().room(&caller, &request.room_id).await?;
@@ -348,7 +348,7 @@ impl RoomService for RoomCalls {
             .filter(|token| token.room == handle.id())
             .ok_or_else(status::owner_token_wrong)?;
         let room = handle
-            .close(token.secret, key)
+            .close(token.secret, client)
             .await
             .map_err(Refusal::from)?
             .ok_or_else(status::owner_token_wrong)?;

@@ -38,7 +38,9 @@ use crate::config::{
 use crate::convert;
 use crate::limits::{COST_OF_TOURNAMENT, CallLimits, Key, Places, Refused};
 use crate::metrics::StreamKind;
-use crate::studies::{CreateProblem, ExportError, ExportedFile, Stopped, Studies, StudyHandle};
+use crate::studies::{
+    CreateProblem, ExportError, ExportedFile, NotAdded, Stopped, Studies, StudyHandle,
+};
 use crate::tasks::{LongTask, named};
 use chefshat_room::ids::{Id, RequestKey};
 
@@ -196,6 +198,7 @@ impl StudyService for StudyCalls {
         request: Request<v1::AddStudyParticipantsRequest>,
     ) -> Result<Response<v1::AddStudyParticipantsResponse>, Status> {
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let request = request.into_inner();
         let handle = self
             .owned(&caller, &request.study_id, &request.owner_token)
@@ -213,8 +216,8 @@ impl StudyService for StudyCalls {
             return Err(field("COUNT_REFUSED", &FieldProblem::new("count", words)));
         }
         pseudonyms.resize(count, String::new());
-        let added = handle.add(pseudonyms).await.map_err(stopped)?;
-        let first = added.map_err(refused)?;
+        let added = handle.add(key, pseudonyms).await.map_err(stopped)?;
+        let first = added.map_err(not_added)?;
         Ok(Response::new(v1::AddStudyParticipantsResponse {
             links: self.links(&handle, first, count),
         }))
@@ -278,12 +281,13 @@ impl StudyService for StudyCalls {
         request: Request<v1::RemoveStudyParticipantRequest>,
     ) -> Result<Response<v1::RemoveStudyParticipantResponse>, Status> {
         let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
         let request = request.into_inner();
         let handle = self
             .owned(&caller, &request.study_id, &request.owner_token)
             .await?;
-        let removed = handle.remove(request.number, request.replace).await;
-        let added = removed.map_err(stopped)?.map_err(refused)?;
+        let removed = handle.remove(key, request.number, request.replace).await;
+        let added = removed.map_err(stopped)?.map_err(not_added)?;
         Ok(Response::new(v1::RemoveStudyParticipantResponse {
             participant: handle.participant(request.number, self.studies.rooms()),
             replacement: (added > 0).then(|| handle.link(added)),
@@ -494,6 +498,14 @@ fn settings_refused(problem: &SettingsProblem) -> Status {
         problem.to_string(),
         [("field", &problem.field)],
     )
+}
+
+/// The status for a command that would have added to a study.
+fn not_added(problem: NotAdded) -> Status {
+    match problem {
+        NotAdded::Study(refusal) => refused(refusal),
+        NotAdded::Memory(refusal) => Refusal::from(refusal).into(),
+    }
 }
 
 /// The status for a refused command.

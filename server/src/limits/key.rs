@@ -78,6 +78,13 @@ pub struct Payer {
     pub key: Key,
 }
 
+impl From<Key> for Payer {
+    /// A caller without an address besides its key.
+    fn from(key: Key) -> Self {
+        Self { address: key, key }
+    }
+}
+
 impl Payer {
     /// Who is charged for what this caller computes.
     pub fn of_caller(caller: &Caller) -> Self {

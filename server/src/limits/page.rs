@@ -9,9 +9,10 @@ use crate::access::{COST_OF_STREAM, Call, MessageLimits};
 use crate::config::{
     FIRST_MESSAGE_TIMEOUT, IMPORT_IDLE_TIMEOUT, MAX_ANALYSES, MAX_ANALYSIS_TIME,
     MAX_CONCURRENT_RECORDS, MAX_FOLLOWERS, MAX_IMPORT_MEMORY, MAX_IMPORTS, MAX_RECORDS_SENT,
-    MAX_SEARCH_BUDGET, MAX_SEARCH_ROLLOUTS, MAX_STUDIES, MAX_STUDY_MEMORY, MAX_STUDY_STREAMS,
-    MAX_TOURNAMENTS, MAX_VECTOR_NETWORK_MULTIPLICATIONS, MAX_VECTOR_SEATS_IN_ALL,
-    MAX_VECTOR_STREAMS, RECORD_SEND_TIMEOUT, ServerConfig, VECTOR_SETUP_TIMEOUT,
+    MAX_SEARCH_BUDGET, MAX_SEARCH_ROLLOUTS, MAX_STUDIES, MAX_STUDY_DATA, MAX_STUDY_MEMORY,
+    MAX_STUDY_STREAMS, MAX_TOURNAMENTS, MAX_VECTOR_NETWORK_MULTIPLICATIONS,
+    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, RECORD_SEND_TIMEOUT, ServerConfig,
+    VECTOR_SETUP_TIMEOUT,
 };
 use crate::connections::STALLED_LIMIT;
 use crate::handshakes::{
@@ -80,6 +81,11 @@ fn of_all() -> String {
         (
             "memory of the settings of studies",
             format!("{} MiB; further ones are refused", MAX_STUDY_MEMORY >> 20),
+            "",
+        ),
+        (
+            "memory of the participants of studies and of their answers",
+            format!("{} MiB; further ones are refused", MAX_STUDY_DATA >> 20),
             "",
         ),
         (

@@ -1,5 +1,5 @@
 //! What one caller may have written to the disk besides what games need: annotations, expressions,
-//! markers, samples, interface traces and imported records. Its rate is bounded, and when the disk is
+//! markers, samples, interface traces, answers to questionnaires and imported records. Its rate is bounded, and when the disk is
 //! nearly full there is none of it, so that decisions are still committed.
 
 use std::time::Duration;

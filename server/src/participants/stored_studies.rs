@@ -104,7 +104,7 @@ impl ParticipantData {
                 else {
                     continue;
                 };
-                for answer in answers {
+                for answer in answers.iter() {
                     let item = questionnaire.items.get(answer.item);
                     let value = match &answer.value {
                         Answer::Number(number) => json!(number),

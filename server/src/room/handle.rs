@@ -17,7 +17,7 @@ use super::message::{
 use super::resting::Resting;
 use super::task::{self, Room, TaskContext};
 use crate::clock::RoomClock;
-use crate::limits::Key;
+use crate::limits::{Key, Payer};
 use crate::store::Journal;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::AbortReason;
@@ -217,17 +217,18 @@ impl Handle {
             .map_err(|_| RoomGone)
     }
 
-    /// Executes a command of a seat without a stream; `None` if the room has no such ticket.
+    /// Executes a command of a seat without a stream, by the secret of its ticket and by who is charged
+    /// for what is stored; `None` if the room has no such ticket.
     ///
     /// # Errors
     /// The room is gone.
     pub async fn act(
         &self,
-        secret: [u8; 32],
+        by: ([u8; 32], Key),
         action: SeatAction,
         arrived: Instant,
     ) -> Result<Option<Acted>, RoomGone> {
-        self.ask(|reply| Message::Act(secret, action, arrived, reply))
+        self.ask(|reply| Message::Act(by, action, arrived, reply))
             .await
     }
 
@@ -330,7 +331,11 @@ impl Handle {
     ///
     /// # Errors
     /// The room is gone.
-    pub async fn close(&self, secret: [u8; 32], client: Key) -> Result<Option<v1::Room>, RoomGone> {
+    pub async fn close(
+        &self,
+        secret: [u8; 32],
+        client: Payer,
+    ) -> Result<Option<v1::Room>, RoomGone> {
         self.ask(|reply| Message::Close(secret, client, reply))
             .await
     }

@@ -11,7 +11,7 @@ use tokio::time::Instant;
 use super::markers::MarkerFollower;
 use super::subscriber::DeliveryOptions;
 use super::table_view::SentState;
-use crate::limits::{Hint, Key};
+use crate::limits::{Hint, Key, Payer};
 use crate::outbox::{HandStamp, OnSpace, Outbox};
 use chefshat_record::convert::FieldProblem;
 use chefshat_room::ids::Token;
@@ -35,7 +35,7 @@ pub struct JoinRequest {
     /// Identifies repetitions of the request.
     pub request_id: Option<[u8; 32]>,
     /// Who asks, where the server can tell clients apart.
-    pub client: Option<Key>,
+    pub client: Option<Payer>,
 }
 
 /// A seat that was taken.
@@ -58,6 +58,8 @@ pub struct AttachRequest {
     pub request_id: u32,
     /// The stream.
     pub outbox: Arc<Outbox>,
+    /// Who is charged for what it stores.
+    pub charged: Payer,
     /// Number of the seat on the stream.
     pub handle: u32,
     /// How events and decisions are delivered to it.
@@ -200,8 +202,9 @@ pub(super) enum Message {
     ),
     Lost(Seat, ConnectionId, Option<v1::DetachReason>),
     Do(Seat, ConnectionId, SeatAction, Instant),
+    /// With the secret of the seat's ticket, and who is charged for what is stored.
     Act(
-        [u8; 32],
+        ([u8; 32], Key),
         SeatAction,
         Instant,
         oneshot::Sender<Option<Acted>>,
@@ -224,7 +227,7 @@ pub(super) enum Message {
     SeatOf([u8; 32], oneshot::Sender<Option<(Seat, bool)>>),
     /// Whether the game has started.
     HasStarted(oneshot::Sender<bool>),
-    Close([u8; 32], Key, oneshot::Sender<Option<v1::Room>>),
+    Close([u8; 32], Payer, oneshot::Sender<Option<v1::Room>>),
     Leave(
         [u8; 32],
         oneshot::Sender<Option<Result<v1::Room, LeaveError>>>,

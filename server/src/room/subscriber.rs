@@ -18,7 +18,7 @@ use chefshat_room::log::RoomEvent;
 use chefshat_room::{Awaited, ConnectionId, Core};
 
 use crate::convert;
-use crate::limits::Held;
+use crate::limits::{Held, Payer};
 use crate::metrics::Counted;
 use crate::outbox::{HandStamp, OnSpace, Outbox, StreamEnd};
 use crate::wire::{Events, Updates, encode_decision, put_event};
@@ -78,6 +78,8 @@ pub struct SeatConnection {
     pub seat: Seat,
     /// Number of the connection.
     pub id: ConnectionId,
+    /// Who is charged for what it stores.
+    pub charged: Payer,
     /// Number of the seat on the stream.
     pub handle: u32,
     /// How events and decisions are delivered to it.
@@ -100,7 +102,7 @@ pub struct SeatConnection {
 impl SeatConnection {
     /// Creates a connection that has received nothing yet.
     pub fn new(
-        (seat, id): (Seat, ConnectionId),
+        (seat, id, charged): (Seat, ConnectionId, Payer),
         handle: u32,
         options: DeliveryOptions,
         stamp: Arc<HandStamp>,
@@ -111,6 +113,7 @@ impl SeatConnection {
         Self {
             seat,
             id,
+            charged,
             handle,
             options,
             stamp,

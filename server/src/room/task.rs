@@ -43,7 +43,7 @@ use crate::clock::{ProcessClock, RoomClock};
 use crate::cluster::{News, NodeLease};
 use crate::config::{HINT_TIME, ROOM_MAILBOX};
 use crate::limits::{
-    Background, Held, Hint, Key, NotStored, Places, Searches, Shares, StoredBytes, Turn,
+    Background, Held, Hint, Key, NotStored, Payer, Places, Searches, Shares, StoredBytes, Turn,
 };
 use crate::metrics::Metrics;
 use crate::outbox::{OnSpace, StreamEnd};
@@ -85,6 +85,9 @@ pub struct TaskContext {
     pub webhooks: Webhooks,
     /// Who created the room.
     pub owner: Key,
+    /// The caller that created it; `None` if that was a tournament or study, or is unknown because the
+    /// room was resumed.
+    pub creator: Option<Payer>,
     /// What callers have written to the disk.
     pub stored: Arc<StoredBytes>,
     /// How much of each limit one caller may use.

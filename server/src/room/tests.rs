@@ -21,18 +21,19 @@ use super::{
     AttachRequest, Handle, JoinRequest, MAX_SPECTATORS, NotAttached, RoomWatcher, SeatAction,
     SpectateError, SpectateRequest, Supersedes, TaskContext, spawn_room,
 };
+use crate::access::TokenId;
 use crate::clock::RoomClock;
 use crate::cluster::NodeLease;
-use crate::limits::{Background, Key, Searches, Shares};
+use crate::limits::{Background, Key, Payer, Searches, Shares};
 use crate::metrics::{Metrics, SearchOutcome};
 use crate::outbox::StreamEnd;
 use crate::outbox::{Outbox, OutboxStream};
 use crate::record_writer::RecordWriter;
 use crate::signing::Signer;
-use crate::store::{Journal, MemoryStore, Store as _, StoreError};
+use crate::store::{Journal, MemoryStore, Store as _, StoreError, StoredGame};
 use crate::webhooks::Webhooks;
 use chefshat_room::ids::{Id, SecretHash, Token};
-use chefshat_room::journal::{Entry, Fill, GameHeader, GameStart, ParticipantKind};
+use chefshat_room::journal::{Change, Entry, Fill, GameHeader, GameStart, ParticipantKind};
 use chefshat_room::policy::{AbortPolicy, Policy};
 use chefshat_room::{Answer, ConnectionId, Core, JoinError};
 
@@ -43,6 +44,8 @@ impl RoomWatcher for NullWatcher {
     fn gone(&self, _room: Id) {}
 }
 
+/// The owner's secret.
+const OWNER: [u8; 32] = [9; 32];
 /// A seat that anybody may take.
 const FREE: Fill = Fill::Open { reserved_for: None };
 
@@ -77,6 +80,19 @@ async fn room_of_node(
     metrics: Arc<Metrics>,
     change: impl FnOnce(Box<dyn Journal>) -> Box<dyn Journal>,
 ) -> Handle {
+    let store = Arc::default();
+    room_in(store, lease, fills, policy, shifts, metrics, change).await
+}
+
+async fn room_in(
+    store: Arc<MemoryStore>,
+    lease: Option<Arc<NodeLease>>,
+    fills: Vec<Fill>,
+    policy: Policy,
+    shifts: u32,
+    metrics: Arc<Metrics>,
+    change: impl FnOnce(Box<dyn Journal>) -> Box<dyn Journal>,
+) -> Handle {
     let header = Arc::new(GameHeader {
         room_id: Id([1; 16]),
         game_id: Id([2; 16]),
@@ -99,12 +115,11 @@ async fn room_of_node(
         seed: SeedPlan::Fixed { game_seed: [3; 32] },
         created_at_ms: 0,
         join_code: "CODE".into(),
-        owner: SecretHash::of(b"owner"),
+        owner: SecretHash::of(&OWNER),
         tournament: None,
         table: None,
         study: None,
     });
-    let store = Arc::new(MemoryStore::default());
     let journal = store
         .create(Arc::clone(&header), Vec::new())
         .await
@@ -138,6 +153,7 @@ async fn room_of_node(
             webhooks: Webhooks::default(),
             stored: Arc::default(),
             owner: Key::Local,
+            creator: None,
             shares: Shares::default(),
             process_clock,
         },
@@ -152,6 +168,11 @@ struct AttachedSeat {
 }
 
 async fn take_seat(room: &Handle) -> AttachedSeat {
+    take_seat_from(room, Key::Local).await
+}
+
+/// Takes a seat from an address.
+async fn take_seat_from(room: &Handle, charged: Key) -> AttachedSeat {
     let joined = room
         .join(JoinRequest {
             request_id: None,
@@ -164,7 +185,7 @@ async fn take_seat(room: &Handle) -> AttachedSeat {
         .await
         .expect("the room exists")
         .expect("a free seat");
-    attach(room, joined.ticket).await
+    attach_from(room, joined.ticket, charged).await
 }
 
 fn attachment(ticket: &Token, outbox: Arc<Outbox>) -> AttachRequest {
@@ -172,6 +193,7 @@ fn attachment(ticket: &Token, outbox: Arc<Outbox>) -> AttachRequest {
         secret: ticket.secret,
         request_id: 0,
         outbox,
+        charged: Key::Local.into(),
         handle: 0,
         options: DeliveryOptions {
             at_once: true,
@@ -189,9 +211,17 @@ fn attachment(ticket: &Token, outbox: Arc<Outbox>) -> AttachRequest {
 }
 
 async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
+    attach_from(room, ticket, Key::Local).await
+}
+
+async fn attach_from(room: &Handle, ticket: Token, charged: Key) -> AttachedSeat {
     let (outbox, updates) = Outbox::new();
+    let attachment = AttachRequest {
+        charged: charged.into(),
+        ..attachment(&ticket, outbox)
+    };
     let attached = room
-        .attach(attachment(&ticket, outbox))
+        .attach(attachment)
         .await
         .expect("the room exists")
         .expect("a valid ticket");
@@ -739,6 +769,159 @@ async fn answers_are_handled_in_place_while_the_task_waits_and_the_mailbox_is_em
     assert_eq!(record.state(), v1::RoomState::Finished);
 }
 
+#[tokio::test(start_paused = true)]
+async fn a_flood_of_annotations_drops_those_of_its_sender_alone() {
+    let policy = Policy::default();
+    let store = Arc::new(MemoryStore::outliving_server());
+    let metrics = Arc::default();
+    let room = room_in(store, None, vec![FREE; 4], policy, 1, metrics, |it| it).await;
+    let address = |last| Key::Address([192, 0, 2, last].into());
+    let mut seats = Vec::new();
+    for last in 1..=4 {
+        seats.push(take_seat_from(&room, address(last)).await);
+    }
+    // Nobody's decision: its annotations are read all the same.
+    let flood = || Answer {
+        annotations: Some(vec![0; 65 << 20].into()),
+        ..Answer::new(u64::MAX, 0)
+    };
+    let sender = &seats[0];
+    let sent = SeatAction::Answer(flood());
+    let sent = room.perform(sender.seat, sender.connection, sent, Instant::now());
+    sent.await.expect("the room exists");
+    let mut dropped = Vec::new();
+    while dropped.len() < 4 {
+        for seat in &mut seats {
+            let (seat, connection, updates) = (seat.seat, seat.connection, &mut seat.updates);
+            tokio::task::yield_now().await;
+            let Some(Some(updates)) = updates.next().now_or_never() else {
+                continue;
+            };
+            let written = updates.expect("no error").encode_to_vec();
+            let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
+            for update in response.updates.into_iter().filter_map(|it| it.update) {
+                match update {
+                    Update::Decision(decision) => {
+                        let answer = Answer {
+                            annotations: Some([0].into()),
+                            ..Answer::new(decision.decision_id, first_legal(&decision))
+                        };
+                        let action = SeatAction::Answer(answer);
+                        let sent = room.perform(seat, connection, action, Instant::now());
+                        sent.await.expect("the room exists");
+                    }
+                    Update::Result(result) if result.status() == v1::AnswerStatus::Accepted => {
+                        dropped.push((seat.index(), result.annotations_dropped));
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+    for (seat, is_dropped) in dropped {
+        assert_eq!(is_dropped, seat == seats[0].seat.index(), "seat {seat}");
+    }
+}
+
+/// Who may close a room is its owner, whatever it showed when it took its seat.
+#[tokio::test]
+async fn an_owner_who_closes_its_room_leaves_the_seats_that_are_its_own() {
+    let address = |last: u8| Key::Address([192, 0, 2, last].into());
+    let with_token = |last| Payer {
+        address: address(last),
+        key: Key::Token(TokenId([last; 4])),
+    };
+    let of = |address: Key| Payer::from(address);
+    // Who took the four seats, if that is known; who is connected to them; who closes; whose is lost.
+    for (seated, connected, closes, lost) in [
+        // Its token was not shown when it took the seat, or is not when it closes the room.
+        (
+            [1, 2, 3, 4].map(|it| Some(of(address(it)))),
+            None,
+            with_token(1),
+            [0].as_slice(),
+        ),
+        (
+            [1, 2, 3, 4].map(|it| Some(with_token(it))),
+            None,
+            of(address(2)),
+            &[1],
+        ),
+        // Tokens of one address are different parties.
+        (
+            [
+                with_token(1),
+                Payer {
+                    address: address(1),
+                    ..with_token(2)
+                },
+                of(address(3)),
+                of(address(4)),
+            ]
+            .map(Some),
+            None,
+            with_token(1),
+            &[0],
+        ),
+        // After a restart, only the connections are known.
+        (
+            [None; 4],
+            Some([1, 2, 3, 4].map(|it| of(address(it)))),
+            with_token(3),
+            &[2],
+        ),
+        // An organiser has no seat.
+        (
+            [1, 2, 3, 4].map(|it| Some(of(address(it)))),
+            None,
+            with_token(9),
+            &[],
+        ),
+    ] {
+        let store: Arc<MemoryStore> = Arc::default();
+        let (policy, metrics) = (Policy::default(), Arc::default());
+        let fills = vec![FREE; 4];
+        let room = room_in(Arc::clone(&store), None, fills, policy, 1, metrics, |it| it).await;
+        let mut seats = Vec::new();
+        for index in 0..4_u32 {
+            let joined = room.join(JoinRequest {
+                request_id: None,
+                name: format!("player {index}"),
+                name_fingerprint: String::new(),
+                kind: ParticipantKind::Agent,
+                seat: Some(index),
+                client: seated[index as usize],
+            });
+            let joined = joined.await.expect("the room exists").expect("a free seat");
+            let (outbox, updates) = Outbox::new();
+            let attachment = AttachRequest {
+                charged: connected.map_or(of(address(100)), |them| them[index as usize]),
+                ..attachment(&joined.ticket, outbox)
+            };
+            let attached = room.attach(attachment).await.expect("the room exists");
+            seats.push((attached.expect("a valid ticket"), updates));
+        }
+        while room.describe().await.expect("shown").state() != v1::RoomState::Playing {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+        let closed = room.close(OWNER, closes).await;
+        assert!(closed.expect("the room exists").is_some());
+        let entries = loop {
+            match store.finished(Id([2; 16])).await.expect("readable") {
+                Some(StoredGame::Hosted(_, entries, _)) => break entries,
+                _ => tokio::time::sleep(Duration::from_millis(5)).await,
+            }
+        };
+        let left: Vec<usize> = (entries.iter())
+            .filter_map(|entry| match &entry.change {
+                Change::Disconnected(seat) => Some(seat.index()),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(left, lost, "{closes:?}");
+    }
+}
+
 #[tokio::test]
 async fn a_client_takes_one_seat_if_the_policy_says_so() {
     let request = |client: u8| JoinRequest {
@@ -747,7 +930,7 @@ async fn a_client_takes_one_seat_if_the_policy_says_so() {
         name_fingerprint: String::new(),
         kind: ParticipantKind::Agent,
         seat: None,
-        client: Some(Key::Address([10, 0, 0, client].into())),
+        client: Some(Key::Address([10, 0, 0, client].into()).into()),
     };
     let join = async |room: &Handle, client: u8| {
         let joined = room.join(request(client)).await.expect("the room exists");

@@ -13,7 +13,7 @@ use super::{CODES_TRIED, Rooms};
 use crate::clock::{RoomClock, since_epoch_ms};
 use crate::cluster::News;
 use crate::config::SERVER_VERSION;
-use crate::limits::{Held, Key, Refused};
+use crate::limits::{Held, Key, Payer, Refused};
 use crate::room::{Handle, TaskContext, spawn_room};
 use crate::store::StoreError;
 use chefshat_room::Core;
@@ -55,6 +55,8 @@ pub struct NewRoom {
     pub request: Option<RequestKey>,
     /// Who is charged for it.
     pub charged: Key,
+    /// The caller that creates it; `None` for a tournament or study.
+    pub creator: Option<Payer>,
 }
 
 #[cfg(test)]
@@ -77,6 +79,7 @@ impl NewRoom {
             seating: None,
             request: None,
             charged: Key::Local,
+            creator: None,
         }
     }
 }
@@ -317,6 +320,7 @@ impl Reservation {
             table.make_space(rooms.max_rooms);
             let context = TaskContext {
                 owner: new.charged,
+                creator: new.creator,
                 ..rooms.context.clone()
             };
             let handle = spawn_room(core, clock, None, journal, context);

@@ -123,6 +123,7 @@ impl Rooms {
                 lease,
                 webhooks,
                 owner: Key::Resumed,
+                creator: None,
                 stored: Arc::default(),
                 shares: config.shares,
                 process_clock: Arc::default(),
@@ -152,14 +153,15 @@ impl Rooms {
         self.context.store.delete(games).await
     }
 
-    /// Deletes those of these finished games that no tournament or study needs, with the samples of
-    /// their seats.
+    /// Deletes those of these finished games that no tournament or study needs, and then the samples
+    /// of their seats. Returns them.
     ///
     /// # Errors
     /// The store or the file system failed; doing it again completes it.
-    pub async fn prune_games(&self, games: Vec<Id>) -> Result<(), StoreError> {
-        self.delete_samples(&games).await?;
-        self.context.store.prune(games).await
+    pub async fn prune_games(&self, games: Vec<Id>) -> Result<Vec<Id>, StoreError> {
+        let deleted = self.context.store.prune(games).await?;
+        self.delete_samples(&deleted).await?;
+        Ok(deleted)
     }
 
     async fn delete_samples(&self, games: &[Id]) -> Result<(), StoreError> {

@@ -150,7 +150,7 @@ impl Store for FailingStore {
         self.inner.prunable(keep, after, count)
     }
 
-    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
         self.inner.prune(games)
     }
 

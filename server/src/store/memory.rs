@@ -36,9 +36,19 @@ pub struct MemoryStore {
     reserved: Reservations,
     /// Tournaments that are not over.
     tournaments: Mutex<BTreeSet<Id>>,
+    outlives_server: bool,
 }
 
 impl MemoryStore {
+    /// A store that is treated like one that outlives the server.
+    #[cfg(test)]
+    pub fn outliving_server() -> Self {
+        Self {
+            outlives_server: true,
+            ..Self::default()
+        }
+    }
+
     /// Whether a tournament that is not over, or a study, needs the record of a game.
     fn is_needed(&self, game: &StoredGame) -> bool {
         match game {
@@ -119,7 +129,7 @@ impl Finished {
 
 impl Store for MemoryStore {
     fn outlives_server(&self) -> bool {
-        false
+        self.outlives_server
     }
 
     fn create(
@@ -223,17 +233,16 @@ impl Store for MemoryStore {
         ready(Ok(found)).boxed()
     }
 
-    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn prune(&self, mut games: Vec<Id>) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
         let mut finished = lock(&self.finished);
-        for game in games {
-            if finished
-                .get(game)
-                .is_some_and(|it| !self.is_needed(&it.stored))
-            {
-                finished.remove(game);
-            }
+        games.retain(|game| {
+            let is_free = |it: &FinishedGame| !self.is_needed(&it.stored);
+            finished.get(*game).is_none_or(is_free)
+        });
+        for game in &games {
+            finished.remove(*game);
         }
-        ready(Ok(())).boxed()
+        ready(Ok(games)).boxed()
     }
 
     fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {

@@ -264,9 +264,10 @@ pub trait Store: Send + Sync + 'static {
         ready(Ok(Vec::new())).boxed()
     }
     /// Deletes those of these games that a tournament or study does not need, as `prunable` says,
-    /// and gives their space back. The record files of the others count as not written.
-    fn prune(&self, _games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
-        ready(Ok(())).boxed()
+    /// and gives their space back. Returns those that it no longer has: only their files may be
+    /// deleted.
+    fn prune(&self, _games: Vec<Id>) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        ready(Ok(Vec::new())).boxed()
     }
     /// Deletes finished games, whatever needs them, and gives their space back.
     fn delete(&self, _games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {

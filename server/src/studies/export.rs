@@ -404,7 +404,7 @@ async fn answers(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<(
                 .or_else(|| (sequence.len() == 1).then(|| sequence[0]));
             let condition = condition.map(|index| &study.settings().conditions[index].id);
             let order = study.item_order(*number, *step).unwrap_or_default();
-            for answer in answers {
+            for answer in answers.iter() {
                 let Some(item) = questionnaire.items.get(answer.item) else {
                     continue;
                 };

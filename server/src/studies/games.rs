@@ -192,6 +192,7 @@ impl Task {
             physical: false,
             request: None,
             charged: self.handle.charged,
+            creator: None,
             seating: Some(Seating {
                 part_of: PartOf::Study(Arc::new(StudyGame {
                     study: self.handle.id(),

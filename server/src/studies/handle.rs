@@ -11,9 +11,10 @@ use chefshat_study::{
 use tokio::sync::{Mutex as AsyncMutex, mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 
+use super::data::StudyData;
 use super::message::{Command, Message, Stopped};
 use crate::convert::{self, StudyPlan};
-use crate::limits::{Held, Key};
+use crate::limits::{Held, Key, Refused};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::studies::{StoredTraces, StudyHeader};
@@ -43,6 +44,17 @@ pub enum TraceRefusal {
     Session(#[from] Refusal),
 }
 
+/// Why a study does not grow.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotAdded {
+    /// The study does not admit it.
+    #[error(transparent)]
+    Study(#[from] Refusal),
+    /// The server has no memory for it.
+    #[error(transparent)]
+    Memory(#[from] Refused),
+}
+
 /// A study of this server.
 #[derive(Debug)]
 pub struct StudyHandle {
@@ -52,6 +64,8 @@ pub struct StudyHandle {
     pub(super) charged: Key,
     /// Its place among its creator's studies, and the memory of its settings.
     pub(super) _places: [Held; 2],
+    /// The memory of its participants and answers.
+    pub(super) data: Arc<StudyData>,
     /// The state with only committed changes.
     pub(super) committed: Mutex<Study>,
     pub(super) mailbox: mpsc::Sender<Message>,
@@ -200,18 +214,30 @@ impl StudyHandle {
         Token::of_tournament_room(room, &self.header.owner)
     }
 
-    /// Adds participants with these pseudonyms, empty ones by number. Returns the number of the
-    /// first.
+    /// Adds participants with these pseudonyms, empty ones by number, and charges a caller for their
+    /// memory. Returns the number of the first.
     ///
     /// # Errors
     /// The server ends, or (inner result) the request is refused.
-    pub async fn add(&self, pseudonyms: Vec<String>) -> Result<Result<u32, Refusal>, Stopped> {
-        self.command(move |study, _| {
+    pub async fn add(
+        &self,
+        key: Key,
+        pseudonyms: Vec<String>,
+    ) -> Result<Result<u32, NotAdded>, Stopped> {
+        let memory = match self.data.for_participants(key, &pseudonyms) {
+            Ok(memory) => memory,
+            Err(refused) => return Ok(Err(refused.into())),
+        };
+        let data = Arc::clone(&self.data);
+        let added = self.command(move |study, _| {
             let first = study.participants().len() + 1;
             let first = u32::try_from(first).unwrap_or(u32::MAX);
-            Ok((study.add(&pseudonyms)?, first))
-        })
-        .await
+            let changes = study.add(&pseudonyms)?;
+            // Here, because the caller may go before it gets its answer.
+            data.keep_participants(memory);
+            Ok((changes, first))
+        });
+        Ok(added.await?.map_err(NotAdded::from))
     }
 
     /// Opens a session of a participant. Returns its number; 0 if there is only the end to show.
@@ -238,17 +264,28 @@ impl StudyHandle {
             .await
     }
 
-    /// Records the answers of a participant.
+    /// Records the answers of a participant, and charges a caller for their memory.
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
     pub async fn answer(
         &self,
+        key: Key,
         at: At,
         answers: Vec<ItemAnswer>,
-    ) -> Result<Result<u32, Refusal>, Stopped> {
-        self.command(move |study, now_ms| Ok((vec![study.answer(at, answers, now_ms)?], 0)))
-            .await
+    ) -> Result<Result<u32, NotAdded>, Stopped> {
+        let memory = match self.data.for_answers(key, &answers) {
+            Ok(memory) => memory,
+            Err(refused) => return Ok(Err(refused.into())),
+        };
+        let data = Arc::clone(&self.data);
+        let answered = self.command(move |study, now_ms| {
+            let change = study.answer(at, answers, now_ms)?;
+            // Here, because the caller may go before it gets its answer.
+            data.keep_answers(at.number, memory);
+            Ok((vec![change], 0))
+        });
+        Ok(answered.await?.map_err(NotAdded::from))
     }
 
     /// Continues with the next step of a participant.
@@ -286,26 +323,33 @@ impl StudyHandle {
         Ok(Ok(()))
     }
 
-    /// Removes a participant, and adds another one if wanted. Returns the number of the other; 0 if
-    /// there is none.
+    /// Removes a participant, and adds another one if wanted, for whose memory a caller is charged.
+    /// Returns the number of the other; 0 if there is none.
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
     pub async fn remove(
         &self,
+        key: Key,
         number: u32,
         replace: bool,
-    ) -> Result<Result<u32, Refusal>, Stopped> {
-        self.command(move |study, now_ms| {
+    ) -> Result<Result<u32, NotAdded>, Stopped> {
+        let memory = match replace.then(|| self.data.for_participants(key, &[String::new()])) {
+            Some(Err(refused)) => return Ok(Err(refused.into())),
+            memory => memory.and_then(Result::ok),
+        };
+        let data = Arc::clone(&self.data);
+        let removed = self.command(move |study, now_ms| {
             let mut changes = Vec::from_iter(study.remove(number, now_ms)?);
-            if !replace {
+            let Some(memory) = memory else {
                 return Ok((changes, 0));
-            }
+            };
             let next = u32::try_from(study.participants().len() + 1).unwrap_or(u32::MAX);
             changes.extend(study.add(&[String::new()])?);
+            data.keep_participants(memory);
             Ok((changes, next))
-        })
-        .await
+        });
+        Ok(removed.await?.map_err(NotAdded::from))
     }
 
     /// Closes the study.

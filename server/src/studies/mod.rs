@@ -1,6 +1,7 @@
 //! The studies of a server: creates, finds and resumes them. `chefshat_study` decides what each
 //! participant does next; `task` runs one study; `export` gathers its data.
 
+mod data;
 mod export;
 mod games;
 mod handle;
@@ -23,12 +24,12 @@ use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
 pub use export::{ExportError, ExportedFile};
-pub use handle::{MAX_TRACES, MAX_TRACES_OF_GAME, Presence, StudyHandle, TraceRefusal};
+pub use handle::{MAX_TRACES, MAX_TRACES_OF_GAME, NotAdded, Presence, StudyHandle, TraceRefusal};
 pub use message::Stopped;
 
 use crate::clock::{TimeOfDay, since_epoch_ms};
 use crate::cluster::News;
-use crate::config::{MAX_STUDIES, MAX_STUDY_MEMORY, STUDY_MAILBOX};
+use crate::config::{MAX_STUDIES, MAX_STUDY_DATA, MAX_STUDY_MEMORY, STUDY_MAILBOX};
 use crate::convert::{self, StudyPlan};
 use crate::limits::{Held, Key, Places, Refused};
 use crate::rooms::Rooms;
@@ -36,9 +37,10 @@ use crate::store::StoreError;
 use crate::store::studies::{StoredStudy, StudyHeader};
 use crate::tasks::{LongTask, named};
 use chefshat_room::ids::{Id, RequestKey, Token, random_bytes};
+use data::StudyData;
 use task::{Stop, Task};
 
-/// When it is worth trying again to create a study.
+/// When it is worth trying again to create a study, or to add to one.
 const RETRY_STUDIES: Duration = Duration::from_secs(3_600);
 
 /// Why a study was not created.
@@ -83,6 +85,8 @@ pub struct Studies {
     places: Arc<Places>,
     /// The memory of their settings, in KiB.
     memory: Arc<Places>,
+    /// The memory of their participants and answers, in bytes.
+    data: Arc<Places>,
 }
 
 #[derive(Debug, Default)]
@@ -110,8 +114,10 @@ impl Studies {
     fn at(now: TimeOfDay, rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
         let places = Places::new(MAX_STUDIES, rooms.shares());
         let memory = Places::new(MAX_STUDY_MEMORY / 1024, rooms.shares());
+        let data = Places::new(MAX_STUDY_DATA, rooms.shares());
         Arc::new(Self {
             memory,
+            data,
             rooms,
             now,
             tracker,
@@ -376,12 +382,14 @@ impl Studies {
             end: self.stop.end.child_token(),
             ..self.stop.clone()
         };
+        let id = header.id;
         let handle = Arc::new(StudyHandle {
             end: stop.end.clone(),
             header,
             plan,
             charged,
             _places: places,
+            data: Arc::new(StudyData::of(&study, id, &self.data)),
             committed: Mutex::new(study),
             mailbox,
             changes: watch::Sender::new(0),

@@ -107,6 +107,13 @@ impl Task {
             tokio::pin!(changed);
             // From here on no end of a game is missed.
             changed.as_mut().enable();
+            // What is deleted need not be committed before: on a full disk, the deletion that frees
+            // space would wait for space.
+            match self.delete_study(&mut inbox).await {
+                Ok(false) => {}
+                Ok(true) => return,
+                Err(error) => return self.fail(&error),
+            }
             if let Err(error) = self.settle(stop.no_more_games.is_cancelled()).await {
                 return self.fail(&error);
             }
@@ -347,6 +354,9 @@ impl Task {
         }
         let count = ids.len();
         self.rooms.delete_games(ids).await?;
+        for number in &due {
+            handle.data.forget_answers(*number);
+        }
         handle.lock_deleting().retain(|it| !due.contains(it));
         if is_changed {
             info!(study = %handle.id(), participants = due.len(), games = count, "the data of participants were deleted");
@@ -381,6 +391,7 @@ impl Task {
                 self.deletion.push(reply);
             }
         }
+        self.replies.drain(..).for_each(|reply| reply());
         for reply in self.deletion.drain(..) {
             // The caller may have gone.
             let _ = reply.send(Ok(count));

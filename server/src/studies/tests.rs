@@ -74,7 +74,7 @@ impl Lab {
         let studies = server(&store);
         let created = studies.create(settings(), None, Key::Local).await;
         let (study, _) = created.expect("valid settings");
-        let added = study.add(vec![String::new(); 2]).await;
+        let added = study.add(Key::Local, vec![String::new(); 2]).await;
         assert_eq!(added.expect("it runs"), Ok(1));
         Self {
             store,
@@ -248,7 +248,7 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
         assert_eq!(withdrawn.expect("it runs"), Ok(()));
     }
     assert_eq!(rows().await, 1, "rewritten");
-    let added = lab.study.add(vec!["Ada".into()]).await;
+    let added = lab.study.add(Key::Local, vec!["Ada".into()]).await;
     assert_eq!(added.expect("it runs"), Ok(3));
     assert_eq!(rows().await, 2);
     lab.studies.end();
@@ -261,7 +261,7 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
     assert_eq!(rows().await, 2, "nothing is left to delete");
 
     // A server that ended right after the withdrawals.
-    let added = study.add(vec!["Bo".into()]).await;
+    let added = study.add(Key::Local, vec!["Bo".into()]).await;
     assert_eq!(added.expect("it runs"), Ok(4));
     studies.end();
     let withdrew = |number| chefshat_study::Change::Withdrew {
@@ -340,4 +340,123 @@ async fn the_settings_of_all_studies_of_a_caller_take_its_share_of_memory() {
     tokio::task::yield_now().await;
     create().await.expect("its memory is free again");
     assert!(matches!(create().await, Err(CreateProblem::Refused(_))));
+}
+
+/// One participant, who answers questionnaires with long texts and nothing else.
+fn long_answers(questionnaires: usize) -> v1::StudySettings {
+    use v1::study_item::Kind;
+    use v1::study_stage::Stage;
+    let item = |number| v1::StudyItem {
+        id: format!("q{number}"),
+        text: "Why?".into(),
+        kind: Some(Kind::FreeText(v1::StudyFreeText {
+            max_characters: 10_000,
+        })),
+        ..v1::StudyItem::default()
+    };
+    let questionnaire = |number| v1::StudyStage {
+        stage: Some(Stage::Questionnaire(v1::StudyQuestionnaire {
+            id: format!("s{number}"),
+            items: (0..100).map(item).collect(),
+            ..v1::StudyQuestionnaire::default()
+        })),
+    };
+    let mut settings = settings();
+    settings
+        .stages
+        .splice(0..1, (0..questionnaires).map(questionnaire));
+    settings
+}
+
+#[tokio::test(start_paused = true)]
+async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
+    let lab = Lab::new().await;
+    let (studies, store) = (&lab.studies, &lab.store);
+    let created = studies.create(long_answers(49), None, Key::Local).await;
+    let (study, _) = created.expect("valid settings");
+    let added = study.add(Key::Local, vec![String::new(); 2]).await;
+    assert_eq!(added.expect("it runs"), Ok(1));
+    assert_eq!(study.open(1).await.expect("it runs"), Ok(1));
+    let address = |last| Key::Address([192, 0, 2, last].into());
+    let before = studies.data.taken();
+    let answer = |item| chefshat_study::ItemAnswer {
+        item,
+        value: chefshat_study::Answer::Text("x".repeat(10_000)),
+        answered_after_ms: None,
+    };
+    let answers: Vec<_> = (0..100).map(answer).collect();
+    let mut step = 0;
+    let mut answer = async |key, study: &StudyHandle| {
+        let at = At {
+            number: 1,
+            session: 1,
+            step,
+        };
+        let answered = study.answer(key, at, answers.clone()).await;
+        let answered = answered.expect("it runs");
+        step += usize::from(answered.is_ok());
+        answered
+    };
+    // An answer at another step is charged for nothing.
+    let wrong = At {
+        number: 1,
+        session: 1,
+        step: 7,
+    };
+    let refused = study.answer(address(1), wrong, answers.clone()).await;
+    assert!(
+        matches!(refused, Ok(Err(NotAdded::Study(_)))),
+        "{refused:?}"
+    );
+    assert_eq!(studies.data.taken(), before);
+
+    // A caller stores its share; others store theirs.
+    let share = MAX_STUDY_DATA / 10;
+    while answer(address(1), &study).await.is_ok() {}
+    let taken = studies.data.taken() - before;
+    assert!((share - 2_000_000..=share).contains(&taken), "{taken}");
+    let refused = answer(address(1), &study).await;
+    assert!(
+        matches!(&refused, Err(NotAdded::Memory(it)) if it.reason == "TOO_MANY_ANSWERS"),
+        "{refused:?}"
+    );
+    assert_eq!(answer(address(2), &study).await, Ok(0));
+    let stored = studies.data.taken();
+
+    // A restart counts them, and loads them even if there are too many.
+    studies.end();
+    let resumed = server(store);
+    let full = resumed.data.take_many_anyway(Key::Local, MAX_STUDY_DATA);
+    resumed.restore().await.expect("readable");
+    let counted = resumed.data.taken() - MAX_STUDY_DATA;
+    // With the names that participants got.
+    assert!((stored..stored + 100).contains(&counted), "{counted}");
+    drop(full);
+    let study = resumed.get(study.id()).expect("it is resumed");
+    let mut callers = 3;
+    while answer(address(callers), &study).await.is_ok() || callers < 20 {
+        callers += 1;
+    }
+    assert!(resumed.data.taken() <= MAX_STUDY_DATA);
+    let free = MAX_STUDY_DATA - resumed.data.taken();
+    let others = resumed.data.take_many_anyway(Key::Local, free);
+    let one_more = study.add(address(200), vec![String::new()]).await;
+    assert!(
+        matches!(&one_more, Ok(Err(NotAdded::Memory(it))) if it.reason == "TOO_MANY_PARTICIPANTS"),
+        "{one_more:?}"
+    );
+
+    drop(others);
+    let added = study.add(address(200), vec![String::new()]).await;
+    assert_eq!(added.expect("it runs"), Ok(3));
+
+    // What is deleted is free again.
+    let withdrawn = study.withdraw(1, true).await;
+    assert_eq!(withdrawn.expect("it runs"), Ok(()));
+    assert!(resumed.data.taken() < share, "{}", resumed.data.taken());
+    let deleted = resumed.delete(study, true).await;
+    deleted.expect("it runs").expect("nobody is in it");
+    let left = resumed.data.taken();
+    let participants = 2 * 2 * size_of::<chefshat_study::Participant>() + 4 * "P01".len();
+    assert_eq!(left, participants, "those of the other study");
 }

@@ -268,6 +268,7 @@ impl Task {
             physical,
             request: None,
             charged: self.handle.charged,
+            creator: None,
             seating: Some(Seating {
                 part_of: PartOf::Tournament(TournamentGame {
                     tournament: self.handle.id(),

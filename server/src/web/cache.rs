@@ -1,5 +1,6 @@
 //! What was generated for a game, kept for a short time: it is generated once for all that ask at
-//! the same time or soon after. Kept no longer, because a record may be deleted or lose a name.
+//! the same time or soon after. Kept no longer, because a record may be deleted or lose a name; what
+//! was made before a deletion on this server is not shown at all.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -12,11 +13,14 @@ use tokio::time::Instant;
 /// How long a value is kept.
 pub(super) const KEPT_FOR: Duration = Duration::from_secs(60);
 
+/// A game, and the number of deletions on this server before its value is made.
+pub(super) type Key = (Id, u64);
+
 /// Values by game.
 #[derive(Debug)]
 pub(super) struct Cache<T> {
     most: usize,
-    entries: Mutex<BTreeMap<Id, Entry<T>>>,
+    entries: Mutex<BTreeMap<Key, Entry<T>>>,
 }
 
 #[derive(Debug)]
@@ -42,7 +46,7 @@ impl<T: Clone> Cache<T> {
     }
 
     /// The value of a game, if it is kept.
-    pub(super) fn find(&self, game: Id) -> Option<T> {
+    pub(super) fn find(&self, game: Key) -> Option<T> {
         let entries = self.lock();
         let made = entries.get(&game)?.value.get()?;
         (made.at.elapsed() < KEPT_FOR).then(|| made.value.clone())
@@ -52,7 +56,7 @@ impl<T: Clone> Cache<T> {
     /// kept, and the next one that waits tries again.
     pub(super) async fn get<E>(
         &self,
-        game: Id,
+        game: Key,
         make: impl Future<Output = Result<T, E>>,
     ) -> Result<T, E> {
         let making = async {
@@ -65,7 +69,7 @@ impl<T: Clone> Cache<T> {
         Ok(made.value.clone())
     }
 
-    fn join(&self, game: Id) -> Flight<'_, T> {
+    fn join(&self, game: Key) -> Flight<'_, T> {
         let mut entries = self.lock();
         entries.retain(|_, entry| {
             let is_old = |made: &Made<T>| made.at.elapsed() >= KEPT_FOR;
@@ -82,7 +86,7 @@ impl<T: Clone> Cache<T> {
     }
 
     /// One of those that wait for a value has it, or has given up.
-    fn leave(&self, game: Id) {
+    fn leave(&self, game: Key) {
         let mut entries = self.lock();
         let Some(entry) = entries.get_mut(&game) else {
             return;
@@ -101,7 +105,7 @@ impl<T: Clone> Cache<T> {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, BTreeMap<Id, Entry<T>>> {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<Key, Entry<T>>> {
         (self.entries.lock()).expect("no code that holds this lock can panic")
     }
 }
@@ -109,7 +113,7 @@ impl<T: Clone> Cache<T> {
 /// One that waits for a value.
 struct Flight<'a, T: Clone> {
     cache: &'a Cache<T>,
-    game: Id,
+    game: Key,
     value: Arc<OnceCell<Made<T>>>,
 }
 
@@ -128,8 +132,24 @@ mod tests {
 
     use super::*;
 
-    fn game(number: usize) -> Id {
-        Id::parse(&format!("{number:032x}")).expect("an id")
+    fn game(number: usize) -> Key {
+        let id = Id::parse(&format!("{number:032x}"));
+        (id.expect("an id"), 0)
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn nothing_is_shown_that_was_made_before_a_deletion() {
+        let cache = Cache::new(2);
+        let (id, _) = game(1);
+        let before = cache.get((id, 0), pending::<Result<&str, ()>>());
+        tokio::pin!(before);
+        assert!(before.as_mut().now_or_never().is_none());
+        // Nor that was being made, from a record with the name.
+        let after = cache.get((id, 1), async { Ok::<_, ()>("P1") });
+        assert_eq!(after.await, Ok("P1"));
+        assert_eq!(cache.find((id, 0)), None);
+        assert_eq!(cache.find((id, 1)), Some("P1"));
+        assert_eq!(cache.find((id, 2)), None);
     }
 
     #[tokio::test(start_paused = true)]

@@ -28,7 +28,7 @@ use preview::{Link, Previews, Unshown};
 #[cfg(test)]
 pub(crate) use preview::{MAX_PREVIEWS, MAX_PREVIEWS_WAITING, PICTURE_PATIENCE};
 
-use crate::limits::Shares;
+use crate::rooms::Rooms;
 
 /// Whether the page was built.
 pub fn is_built() -> bool {
@@ -43,17 +43,17 @@ pub struct PageLayer {
 }
 
 impl PageLayer {
-    /// Creates the page. `tls`: whether browsers reach this server with TLS. `shares`: how many
-    /// previews of games one caller may ask for at a time. `painter`: `chefshat-lab`, which draws them.
+    /// Creates the page. `tls`: whether browsers reach this server with TLS. `rooms`: whose games it
+    /// previews. `painter`: `chefshat-lab`, which draws the previews.
     ///
     /// # Errors
     /// The operating system cannot start the thread that reads their records.
     pub fn new(
         tls: bool,
-        shares: Shares,
+        rooms: Arc<Rooms>,
         painter: Option<PathBuf>,
     ) -> Result<Self, ThreadPoolBuildError> {
-        let previews = Arc::new(Previews::new(shares, painter)?);
+        let previews = Arc::new(Previews::new(rooms, painter)?);
         Ok(Self { tls, previews })
     }
 }

@@ -32,7 +32,8 @@ use tracing::warn;
 use super::answer::File;
 use super::cache::Cache;
 use crate::connections::peer_address;
-use crate::limits::{Key, Places, Shares};
+use crate::limits::{Key, Places};
+use crate::rooms::Rooms;
 use crate::threads::{Priority, Threads};
 
 /// Most records that are in memory at a time, those being painted included.
@@ -96,6 +97,7 @@ pub(super) struct Title {
 /// Shows games.
 #[derive(Debug)]
 pub(super) struct Previews {
+    rooms: Arc<Rooms>,
     places: Arc<Places>,
     waiting: Arc<Places>,
     threads: Threads,
@@ -111,10 +113,12 @@ impl Previews {
     /// # Errors
     /// The operating system cannot start the thread.
     pub(super) fn new(
-        shares: Shares,
+        rooms: Arc<Rooms>,
         painter: Option<PathBuf>,
     ) -> Result<Self, ThreadPoolBuildError> {
+        let shares = rooms.shares();
         Ok(Self {
+            rooms,
             places: Places::new(MAX_PREVIEWS, shares),
             waiting: Places::new(MAX_PREVIEWS_WAITING, shares),
             threads: Threads::new("previews", 1, Priority::Batches)?,
@@ -196,7 +200,9 @@ impl Previews {
         S: Service<Request<Body>, Response = Response<Body>>,
         S::Error: Into<BoxError>,
     {
-        if let Some(value) = kept.find(game) {
+        // A value that was made before names were deleted may show them.
+        let now = (game, self.rooms.forgotten());
+        if let Some(value) = kept.find(now) {
             return Ok(value);
         }
         let key = Key::of_address(peer_address(extensions));
@@ -215,7 +221,7 @@ impl Previews {
                 };
                 finish(made).await.ok_or(Unshown::Unknown)
             };
-            kept.get(game, making).await
+            kept.get(now, making).await
         };
         timeout(patience, showing)
             .await

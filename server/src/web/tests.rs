@@ -12,10 +12,13 @@ use http_body_util::{BodyExt as _, Full};
 use prost::Message as _;
 use tokio::sync::Semaphore;
 use tokio::time::Instant;
+use tokio_util::task::TaskTracker;
 use tower::service_fn;
 
 use super::*;
+use crate::config::ServerConfig;
 use crate::connections::ForwardedClient;
+use crate::store::MemoryStore;
 
 /// Services that have one record for all games, and count how often it was asked for.
 #[derive(Clone)]
@@ -84,9 +87,18 @@ fn send<'a>(page: &PageLayer, services: &Services, request: Request<Body>) -> An
 }
 
 fn page() -> PageLayer {
-    // Says what it is given, instead of painting it.
+    page_of(&rooms())
+}
+
+fn page_of(rooms: &Arc<Rooms>) -> PageLayer {
+    // Its picture is the record.
     let painter = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/web/painter.sh");
-    PageLayer::new(false, Shares::default(), Some(painter)).expect("a thread")
+    PageLayer::new(false, Arc::clone(rooms), Some(painter)).expect("a thread")
+}
+
+fn rooms() -> Arc<Rooms> {
+    let store = Arc::new(MemoryStore::default());
+    Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads")
 }
 
 fn picture(game: usize) -> String {
@@ -114,6 +126,20 @@ async fn a_picture_is_painted_once_for_all_that_ask() {
     assert_eq!(answer.status(), StatusCode::NOT_MODIFIED);
     let body = answer.into_body().collect().await.expect("a body");
     assert!(body.to_bytes().is_empty());
+}
+
+#[tokio::test]
+async fn what_was_painted_before_a_name_was_deleted_is_painted_again() {
+    let (rooms, services) = (rooms(), Services::new(9));
+    let page = page_of(&rooms);
+    for (asked, forgets) in [(1, false), (1, true), (2, false)] {
+        let answer = get(&page, &services, &picture(1), 1).await;
+        assert_eq!(answer.status(), StatusCode::OK);
+        assert_eq!(services.asked(), asked);
+        if forgets {
+            rooms.count_forgotten();
+        }
+    }
 }
 
 #[tokio::test]

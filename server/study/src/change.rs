@@ -1,6 +1,8 @@
 //! The changes of a study and the values in them. `state` applies them; `commands` and `games`
 //! decide when they follow.
 
+use std::sync::Arc;
+
 use crate::questionnaire::ItemAnswer;
 
 /// A step of a study. Folding the same changes again restores the study.
@@ -34,7 +36,7 @@ pub enum Change {
         /// The participant.
         number: u32,
         /// The answers.
-        answers: Vec<ItemAnswer>,
+        answers: Arc<[ItemAnswer]>,
         /// When, in milliseconds since the Unix epoch.
         at_ms: u64,
     },

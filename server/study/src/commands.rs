@@ -163,7 +163,7 @@ impl Study {
         questionnaire.check_answers(&answers)?;
         Ok(Change::Answered {
             number: at.number,
-            answers,
+            answers: answers.into(),
             at_ms: now_ms,
         })
     }

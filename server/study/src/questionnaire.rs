@@ -115,6 +115,18 @@ pub struct ItemAnswer {
     pub answered_after_ms: Option<u32>,
 }
 
+impl ItemAnswer {
+    /// Bytes that it takes in memory.
+    pub fn memory(&self) -> usize {
+        let content = match &self.value {
+            Answer::Number(_) => 0,
+            Answer::Options(chosen) => chosen.capacity() * size_of::<usize>(),
+            Answer::Text(text) => text.capacity(),
+        };
+        size_of::<Self>() + content
+    }
+}
+
 /// The value of an answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Answer {

@@ -3,6 +3,7 @@
 //! changes always lead to the same state.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::change::{Change, ConsentGiven, Outcome, PlacedGame};
 use crate::questionnaire::ItemAnswer;
@@ -42,8 +43,8 @@ pub struct Participant {
     pub ended_at_ms: Option<u64>,
     /// Its consent.
     pub consent: Option<ConsentGiven>,
-    /// Its answers, by step.
-    pub answers: BTreeMap<usize, Vec<ItemAnswer>>,
+    /// Its answers, by step. They may be long, so copies share them.
+    pub answers: BTreeMap<usize, Arc<[ItemAnswer]>>,
     /// Its games, in order.
     pub games: Vec<PlayedGame>,
     /// Whether it withdrew and had its data deleted.
@@ -151,7 +152,7 @@ impl StudyState {
             } => {
                 if let Some(participant) = self.active(*number) {
                     let step = participant.step();
-                    participant.answers.insert(step, answers.clone());
+                    participant.answers.insert(step, Arc::clone(answers));
                     participant.advance(steps, *at_ms);
                 }
             }

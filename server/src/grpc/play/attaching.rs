@@ -21,6 +21,7 @@ use crate::config::MAX_SEATS_PER_STREAM;
 use crate::grpc::reach::Reach;
 use crate::grpc::status::{is_elsewhere, owner_unreachable, status, ticket_unknown};
 use crate::grpc::takeover::{is_changing, waits};
+use crate::limits::Payer;
 use crate::outbox::StreamEnd;
 use crate::room::subscriber::DeliveryOptions;
 use crate::room::{AttachRequest, NotAttached, RoomGone, Supersedes};
@@ -275,6 +276,7 @@ impl Reader {
             secret: token.secret,
             request_id: attach.request_id,
             outbox: Arc::clone(&self.outbox),
+            charged: Payer::of_caller(&self.caller),
             handle,
             options: DeliveryOptions {
                 at_once: attach.delivery() == v1::EventDelivery::AtOnce,

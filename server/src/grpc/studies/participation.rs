@@ -12,7 +12,7 @@ use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status};
 
-use super::{Responses, StudyCalls, refused, stopped};
+use super::{Responses, StudyCalls, not_added, refused, stopped};
 use crate::config::{FOLLOW_SEND_TIMEOUT, HEARTBEAT};
 use crate::convert;
 use crate::grpc::follow::end;
@@ -159,6 +159,9 @@ impl ParticipationService for StudyCalls {
         let key = charged(request.extensions());
         let request = request.into_inner();
         let (handle, number, session) = self.of_session(&request.session, key).await?;
+        let bytes = (request.answers.iter())
+            .map(|answer| answer.encoded_len())
+            .sum();
         let answers = convert::answers_from_proto(request.answers).map_err(|item| {
             status(
                 Code::InvalidArgument,
@@ -167,8 +170,10 @@ impl ParticipationService for StudyCalls {
                 [("item", &item.to_string())],
             )
         })?;
-        let answered = handle.answer(at(number, session, request.step), answers);
-        answered.await.map_err(stopped)?.map_err(refused)?;
+        let rooms = self.studies.rooms();
+        rooms.may_store(key, bytes).map_err(Refusal::from)?;
+        let answered = handle.answer(key, at(number, session, request.step), answers);
+        answered.await.map_err(stopped)?.map_err(not_added)?;
         let view = Some(view_of(&handle, number, self.studies.rooms())?);
         Ok(Response::new(v1::AnswerQuestionnaireResponse { view }))
     }

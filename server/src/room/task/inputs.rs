@@ -14,11 +14,12 @@ use tokio::time::Instant;
 
 use super::{Release, Room, answer, is_connection};
 use crate::convert::{self, Deck};
-use crate::limits::NotStored;
+use crate::limits::{Key, NotStored};
 use crate::room::message::{
     Acted, AttachRequest, AttachedSeat, JoinRequest, Joined, MarkOutcome, MarkRequest, Message,
     NotAttached, ReportRefusal, SeatAction,
 };
+use crate::room::subscriber::Subscriber;
 
 impl Room {
     pub(super) fn receive(&mut self, message: Message) {
@@ -32,10 +33,10 @@ impl Room {
             Message::Do(seat, connection, action, arrived) => {
                 self.execute(seat, connection, action, arrived);
             }
-            Message::Act(secret, action, arrived, reply) => {
+            Message::Act((secret, charged), action, arrived, reply) => {
                 match self.core.seat_of_ticket(&secret) {
                     Some(seat) => {
-                        let acted = self.perform(seat, action, arrived);
+                        let acted = self.perform((seat, charged), action, arrived);
                         self.releases.push(Release::Acted(reply, acted));
                     }
                     None => answer(reply, None),
@@ -60,8 +61,11 @@ impl Room {
             Message::HasStarted(reply) => answer(reply, self.core.game().is_some()),
             Message::Close(secret, client, reply) => {
                 if self.core.header().owner.matches(&secret) {
-                    let owner = [client, self.context.owner];
-                    let seats = self.clients.seats_of(&self.core, owner);
+                    let owner = Vec::from_iter([client].into_iter().chain(self.context.creator));
+                    let connected = (self.connections.iter().flatten())
+                        .filter_map(|subscriber| subscriber.connection())
+                        .map(|connection| (connection.seat, connection.charged));
+                    let seats = self.clients.seats_of(&self.core, connected, &owner);
                     self.core.close(self.now, seats);
                     self.releases.push(Release::Closed(reply));
                 } else {
@@ -112,7 +116,8 @@ impl Room {
         if let Some(seat) = self.core.seat_of_ticket(&ticket.secret) {
             return self.join_again(seat, ticket, &request);
         }
-        self.clients.check(&self.core, request.client)?;
+        let client = request.client.map(|client| client.key);
+        self.clients.check(&self.core, client)?;
         let seat = self.core.join(
             self.now,
             request.seat,
@@ -219,10 +224,14 @@ impl Room {
         action: SeatAction,
         arrived: Instant,
     ) {
-        if !self.is_current(seat, connection) {
+        let subscriber = self.connections[seat.index()].as_ref();
+        let Some(current) = (subscriber.and_then(Subscriber::connection))
+            .filter(|current| current.id == connection)
+        else {
             return;
-        }
-        let release = match self.perform(seat, action, arrived) {
+        };
+        let by = (seat, current.charged.key);
+        let release = match self.perform(by, action, arrived) {
             Ok(Some(result)) => Release::Result(seat, connection, result),
             Ok(None) => return,
             Err(error) => Release::Refuse(seat, connection, convert::express_refused(error)),
@@ -230,14 +239,23 @@ impl Room {
         self.releases.push(release);
     }
 
-    fn perform(&mut self, seat: Seat, action: SeatAction, arrived: Instant) -> Acted {
+    /// Executes a command of a seat. Whoever sends it is charged for what is stored that the game
+    /// does not need: a player uses up nobody else's share.
+    fn perform(
+        &mut self,
+        (seat, charged): (Seat, Key),
+        action: SeatAction,
+        arrived: Instant,
+    ) -> Acted {
+        let context = &self.context;
+        let may_store = |bytes: usize| context.may_store(charged, bytes);
         match action {
             SeatAction::Answer(mut answer) => {
                 self.observed.answer_read(arrived);
                 // The decision counts without them.
                 answer.annotations_refused |= answer
                     .annotations
-                    .take_if(|bytes| self.may_store(bytes.len()).is_err())
+                    .take_if(|bytes| may_store(bytes.len()).is_err())
                     .is_some();
                 let (decision_id, action) = (answer.decision_id, answer.action);
                 let handed = self.connections[seat.index()]
@@ -248,11 +266,10 @@ impl Room {
                 Ok(Some(convert::answer_result(decision_id, action, answered)))
             }
             SeatAction::Express(expression) => {
-                self.may_store(expression.encoded.len())
-                    .map_err(|refused| match refused {
-                        NotStored::DiskNearlyFull => ExpressError::DiskNearlyFull,
-                        NotStored::TooFast(_) => ExpressError::TooFast,
-                    })?;
+                may_store(expression.encoded.len()).map_err(|refused| match refused {
+                    NotStored::DiskNearlyFull => ExpressError::DiskNearlyFull,
+                    NotStored::TooFast(_) => ExpressError::TooFast,
+                })?;
                 let expressed = self.core.express(self.now, seat, expression);
                 expressed.map(|()| None)
             }
@@ -261,11 +278,6 @@ impl Room {
                 Ok(None)
             }
         }
-    }
-
-    /// Charges the creator of the room for something of this size that the game does not need.
-    fn may_store(&self, bytes: usize) -> Result<(), NotStored> {
-        self.context.may_store(self.context.owner, bytes)
     }
 
     /// Whether a secret is that of the table's ticket.

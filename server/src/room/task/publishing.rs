@@ -176,7 +176,7 @@ impl Room {
         let kind = participant.map_or(ParticipantKind::Agent, |participant| participant.kind);
         let stamp = HandStamp::new(self.clock.clone());
         let connected = SeatConnection::new(
-            (seat, connection),
+            (seat, connection, request.charged),
             request.handle,
             request.options,
             Arc::clone(&stamp),

@@ -96,6 +96,7 @@ impl Work for Command {
             let mut transaction = connection.begin().await?;
             let mut answers = Vec::with_capacity(work.len());
             let mut listed = Vec::new();
+            lock_ids(&mut transaction, work).await?;
             for command in work {
                 answers.push(command.run(&mut transaction, again, &mut listed).await?);
             }
@@ -327,18 +328,37 @@ impl Command {
     }
 }
 
-/// Deletes those of these finished games that no tournament or study needs. The files of the others
-/// may be gone: they are written again.
-async fn prune(connection: &mut PgConnection, games: &[Id]) -> sqlx::Result<i64> {
-    let games = locked(connection, games).await?;
-    let (free, needed) = divided(connection, games).await?;
-    if !needed.is_empty() {
-        let numbers: Vec<i64> = needed.iter().map(|game| game.number).collect();
-        sqlx::query("UPDATE games SET filed = false WHERE number = ANY ($1)")
-            .bind(numbers)
+/// Waits for other transactions that take ids of games outside of one another's sight, until the end
+/// of this one: an import looks for no running game, and an ephemeral game for no stored one, but
+/// neither sees what is not committed. In order, so that nobody waits for each other.
+async fn lock_ids(connection: &mut PgConnection, work: &[Arc<Command>]) -> sqlx::Result<()> {
+    let mut keys: Vec<i64> = (work.iter())
+        .filter_map(|command| match &**command {
+            Command::Import { game_id, .. } => Some(game_id),
+            Command::Create {
+                game_id,
+                durable: None,
+                ..
+            } => Some(game_id),
+            _ => None,
+        })
+        .map(|id| i64::from_be_bytes(std::array::from_fn(|index| id.0[index])))
+        .collect();
+    keys.sort_unstable();
+    keys.dedup();
+    for key in keys {
+        sqlx::query("SELECT pg_advisory_xact_lock($1)")
+            .bind(key)
             .execute(&mut *connection)
             .await?;
     }
+    Ok(())
+}
+
+/// Deletes those of these finished games that no tournament or study needs.
+async fn prune(connection: &mut PgConnection, games: &[Id]) -> sqlx::Result<i64> {
+    let games = locked(connection, games).await?;
+    let (free, _) = divided(connection, games).await?;
     let free: Vec<Id> = free.iter().map(|game| game.game).collect();
     delete(connection, &free).await
 }

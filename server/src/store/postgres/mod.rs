@@ -371,10 +371,13 @@ impl Store for PostgresStore {
             .boxed()
     }
 
-    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
         async move {
-            let prune = Command::Prune { games };
-            self.commands.commit(Arc::new(prune)).await.map(drop)
+            let prune = Command::Prune {
+                games: games.clone(),
+            };
+            self.commands.commit(Arc::new(prune)).await?;
+            self.reader.missing(games).await
         }
         .boxed()
     }

@@ -367,6 +367,20 @@ impl Reader {
         }
     }
 
+    /// Those of these games that are not stored.
+    pub(super) async fn missing(&self, mut games: Vec<Id>) -> Result<Vec<Id>, StoreError> {
+        let ids: Vec<Vec<u8>> = games.iter().map(|id| id.0.to_vec()).collect();
+        let stored: Vec<Vec<u8>> = (self.read(move |connection| {
+            sqlx::query_scalar("SELECT game_id FROM games WHERE game_id = ANY ($1)")
+                .bind(ids)
+                .fetch_all(connection)
+                .boxed()
+        }))
+        .await?;
+        games.retain(|game| !stored.iter().any(|id| id.as_slice() == game.0));
+        Ok(games)
+    }
+
     /// See `Store::without_record_file`.
     pub(super) async fn without_record_file(&self) -> Result<Vec<Id>, StoreError> {
         let ids: Vec<Vec<u8>> = (self.read(|connection| {

@@ -294,8 +294,21 @@ impl Store for SqliteStore {
         self.reader.prunable(keep, after, count).boxed()
     }
 
-    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.commands.send(WriteCommand::Prune { games }).boxed()
+    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        async move {
+            let prune = WriteCommand::Prune {
+                games: games.clone(),
+            };
+            self.commands.send(prune).await?;
+            let mut gone = Vec::new();
+            for game in games {
+                if !self.reader.has_game(game).await? {
+                    gone.push(game);
+                }
+            }
+            Ok(gone)
+        }
+        .boxed()
     }
 
     fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {

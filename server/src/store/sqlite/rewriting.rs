@@ -74,10 +74,19 @@ pub(super) async fn rewrite(
 /// Empties the write-ahead log, which still has what was overwritten, unless a reader needs it:
 /// then the log is emptied later.
 pub(super) async fn empty_log(connection: &mut SqliteConnection) {
+    checkpoint(connection, "TRUNCATE").await;
+}
+
+/// Empties the write-ahead log, as [`empty_log`] does, but keeps its space on the disk.
+pub(super) async fn empty_log_in_place(connection: &mut SqliteConnection) {
+    checkpoint(connection, "RESTART").await;
+}
+
+async fn checkpoint(connection: &mut SqliteConnection, how: &str) {
     let limit = format!("PRAGMA busy_timeout = {}", BUSY_LIMIT.as_millis());
     for text in [
         "PRAGMA busy_timeout = 0".to_owned(),
-        "PRAGMA wal_checkpoint(TRUNCATE)".to_owned(),
+        format!("PRAGMA wal_checkpoint({how})"),
         limit,
     ] {
         if let Err(cause) = connection.execute(AssertSqlSafe(text)).await {

@@ -1,6 +1,6 @@
 //! The space on the disk of a data directory: what running games may still need of it, and what
 //! happens when there is none left. A full disk fails no commit: the commit waits, and with it all
-//! that would follow from it, until there is space or the server stops.
+//! that would follow from it, until there is space or the server stops. Deletions go first.
 
 use std::fs::File;
 use std::io::Write as _;
@@ -13,6 +13,8 @@ use tokio::time::{Instant, sleep};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info, warn};
 
+use super::errors::is_full;
+
 /// Disk space reserved for running games: new ones are refused when only this is left. On a small
 /// disk this part of the reserve is a share of its size.
 const MAX_RESERVE_BYTES: u64 = 64 * 1024 * 1024;
@@ -21,6 +23,8 @@ const RESERVE_SHARE: u64 = 50;
 /// their times, take about half of it in a long game of the standard rules. Annotations,
 /// expressions, markers and samples are not in it: they are refused before the reserve is used.
 pub(super) const BYTES_PER_GAME: u64 = 256 * 1024;
+/// A disk with less space than this has none: an error of the disk then means that it is full.
+const NO_SPACE_BYTES: u64 = 1024 * 1024;
 /// How often a commit that found the disk full is tried again.
 const RETRY: Duration = Duration::from_secs(1);
 /// How often the operator is reminded of it.
@@ -83,6 +87,20 @@ impl Space {
         }
     }
 
+    /// Whether an error of a commit means that the disk is full.
+    pub(super) fn explains(&self, error: &sqlx::Error) -> bool {
+        is_full(error, || {
+            rustix::fs::statvfs(&self.data_dir)
+                .is_ok_and(|disk| disk.f_bavail * disk.f_frsize < NO_SPACE_BYTES)
+        })
+    }
+
+    /// Gives up the space that was kept for a start, until there is some again; `false` if there is
+    /// none.
+    pub(super) fn give_up_ballast(&self) -> bool {
+        give_up_ballast(&self.data_dir)
+    }
+
     /// Whether commits wait for space.
     pub(super) fn is_full(&self) -> bool {
         self.is_full.load(Ordering::Relaxed)
@@ -115,6 +133,9 @@ impl Space {
     /// A commit has succeeded.
     pub(super) fn found(&self) {
         if self.is_full.swap(false, Ordering::Relaxed) {
+            if self.has_some() {
+                keep_ballast(&self.data_dir);
+            }
             info!("there is space on the disk again; games continue");
         }
     }

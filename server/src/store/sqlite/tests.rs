@@ -1,6 +1,7 @@
 //! The database returns what was stored. `opening` tests folders and files that cannot be used.
 
 mod damage;
+mod full;
 mod opening;
 pub(in crate::store) mod tournaments;
 

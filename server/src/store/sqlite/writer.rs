@@ -15,9 +15,9 @@ use tokio::sync::{mpsc, oneshot, watch};
 use tokio::time::Instant;
 use tracing::{error, warn};
 
-use super::errors::{FULL, explain, has_code};
+use super::errors::explain;
 use super::retained::Units;
-use super::rewriting::{empty_log, rewrite};
+use super::rewriting::{empty_log, empty_log_in_place, rewrite};
 use super::rows::with_own_rows;
 use super::space::Space;
 use crate::clock::since_epoch_ms;
@@ -32,6 +32,8 @@ use chefshat_room::ids::Id;
 pub(super) const QUEUE: usize = 1_024;
 /// Most commands in one transaction.
 const MAX_COMMANDS_PER_TRANSACTION: usize = 1_024;
+/// Most commands that wait for space on a full disk, where deletions among them go first.
+const MAX_WAITING: usize = 4 * QUEUE;
 /// Unused pages that are given back to the disk with each deletion of games.
 const FREED_PAGES: u32 = 2_048;
 /// Numbers of rows that one statement inserts. There are only these, so that few statements need to
@@ -111,6 +113,21 @@ pub(super) enum WriteCommand {
     Close,
 }
 
+impl WriteCommand {
+    /// Whether it only deletes.
+    fn is_deletion(&self) -> bool {
+        matches!(
+            self,
+            Self::Delete { .. } | Self::Prune { .. } | Self::StudyDeleted(_)
+        )
+    }
+
+    /// Whether what it overwrites must not stay in the log.
+    fn forgets(&self) -> bool {
+        self.is_deletion() || matches!(self, Self::Rewrite(_) | Self::StudyRewritten { .. })
+    }
+}
+
 /// A row of the journal.
 pub(super) struct Row {
     /// Its number, nearly in the order of all games' rows.
@@ -155,8 +172,11 @@ pub(super) struct StudyRow {
 /// A command and the sender of its result.
 pub(super) type Pending = (WriteCommand, oneshot::Sender<Result<(), StoreError>>);
 
-/// Executes commands until all senders are gone. While the disk is full, it waits: nothing of such a
-/// transaction was committed. After any other failure it executes none: the outcome of the failed
+/// Ids of commands that were refused because it is taken, by the index of the command.
+type Taken = BTreeMap<usize, Id>;
+
+/// Executes commands until all senders are gone. While the disk is full, all but deletions wait:
+/// nothing of such a transaction was committed. After any other failure it executes none: the outcome of the failed
 /// transaction is unknown.
 ///
 /// `last_listed` is the highest number in the list of finished games.
@@ -176,55 +196,33 @@ pub(super) async fn run(
             .await
             > 0
     {
-        open = !pending
-            .iter()
-            .any(|(order, _)| matches!(order, WriteCommand::Close));
         let failure = failed.borrow().clone();
         let began = Instant::now();
         let committed = match failure {
             Some(failure) => Err(failure),
-            None => commit_with_space(&mut connection, &mut pending, &mut last_listed, &space)
-                .await
-                .map_err(|cause| {
-                    let failure = StoreError::Failed(explain(&cause));
-                    error!(%failure, "a commit failed; the store stops");
-                    failed.send_replace(Some(failure.clone()));
-                    failure
-                }),
+            None => {
+                let log = &mut last_listed;
+                commit_with_space(&mut connection, &mut pending, &mut commands, log, &space)
+                    .await
+                    .map_err(|cause| {
+                        let failure = StoreError::Failed(explain(&cause));
+                        error!(%failure, "a commit failed; the store stops");
+                        failed.send_replace(Some(failure.clone()));
+                        failure
+                    })
+            }
         };
         metrics.committed(pending.len(), began.elapsed());
-        let deletes = |(order, _): &Pending| {
-            matches!(
-                order,
-                WriteCommand::Delete { .. } | WriteCommand::Prune { .. }
-            )
-        };
-        let frees_pages = committed.is_ok() && pending.iter().any(deletes);
-        let forgets = |(order, _): &Pending| {
-            matches!(
-                order,
-                WriteCommand::Delete { .. }
-                    | WriteCommand::Prune { .. }
-                    | WriteCommand::Rewrite(_)
-                    | WriteCommand::StudyRewritten { .. }
-                    | WriteCommand::StudyDeleted(_)
-            )
-        };
-        let forgotten = committed.is_ok() && pending.iter().any(forgets);
-        for (index, (_, reply)) in pending.drain(..).enumerate() {
-            let answer = match &committed {
-                Ok(taken) => taken
-                    .get(&index)
-                    .map_or(Ok(()), |id| Err(StoreError::Taken(*id))),
-                Err(failure) => Err(failure.clone()),
-            };
-            // The room may have gone.
-            let _ = reply.send(answer);
-        }
-        if frees_pages {
+        open = !pending
+            .iter()
+            .any(|(order, _)| matches!(order, WriteCommand::Close));
+        let forgets = committed.is_ok() && pending.iter().any(|(order, _)| order.forgets());
+        let deletes = forgets && pending.iter().any(|(order, _)| order.is_deletion());
+        send_replies(&mut pending, &committed);
+        if deletes {
             free_pages(&mut connection).await;
         }
-        if forgotten {
+        if forgets {
             empty_log(&mut connection).await;
         }
     }
@@ -234,13 +232,27 @@ pub(super) async fn run(
     }
 }
 
-/// Commits commands, as soon as there is space for them on the disk.
+fn send_replies(pending: &mut Vec<Pending>, committed: &Result<Taken, StoreError>) {
+    for (index, (_, reply)) in pending.drain(..).enumerate() {
+        let answer = match committed {
+            Ok(taken) => taken
+                .get(&index)
+                .map_or(Ok(()), |id| Err(StoreError::Taken(*id))),
+            Err(failure) => Err(failure.clone()),
+        };
+        // The room may have gone.
+        let _ = reply.send(answer);
+    }
+}
+
+/// Commits commands, as soon as there is space for them on the disk. Meanwhile more of them arrive.
 async fn commit_with_space(
     connection: &mut SqliteConnection,
-    pending: &mut [Pending],
+    pending: &mut Vec<Pending>,
+    commands: &mut mpsc::Receiver<Pending>,
     last_listed: &mut i64,
     space: &Space,
-) -> sqlx::Result<BTreeMap<usize, Id>> {
+) -> sqlx::Result<Taken> {
     let began = Instant::now();
     let listed_before = *last_listed;
     loop {
@@ -249,9 +261,14 @@ async fn commit_with_space(
                 space.found();
                 return Ok(taken);
             }
-            Err(cause) if has_code(&cause, FULL) => {
+            Err(cause) if space.explains(&cause) => {
                 *last_listed = listed_before;
-                if !space.wait(began).await {
+                while pending.len() < MAX_WAITING
+                    && let Ok(next) = commands.try_recv()
+                {
+                    pending.push(next);
+                }
+                if !delete_first(connection, pending, space).await? && !space.wait(began).await {
                     return Err(cause);
                 }
             }
@@ -260,12 +277,49 @@ async fn commit_with_space(
     }
 }
 
-/// Commits commands; returns those that were refused because their id is taken, by their index.
+/// Commits the deletions among commands that wait for space: they may be what frees it. Returns
+/// whether there were any, and the space sufficed for them.
+async fn delete_first(
+    connection: &mut SqliteConnection,
+    pending: &mut Vec<Pending>,
+    space: &Space,
+) -> sqlx::Result<bool> {
+    let mut deletions: Vec<Pending> = pending
+        .extract_if(.., |(order, _)| order.is_deletion())
+        .collect();
+    if deletions.is_empty() {
+        return Ok(false);
+    }
+    // A deletion writes to the log, which has the space of what it contained once that is in the
+    // database, and if that does not suffice, the space that was kept for a start.
+    empty_log_in_place(connection).await;
+    let mut committed = commit(connection, &mut deletions, &mut 0).await;
+    if matches!(&committed, Err(cause) if space.explains(cause)) && space.give_up_ballast() {
+        committed = commit(connection, &mut deletions, &mut 0).await;
+    }
+    match committed {
+        Ok(taken) => {
+            send_replies(&mut deletions, &Ok(taken));
+            free_pages(connection).await;
+            empty_log(connection).await;
+            Ok(true)
+        }
+        Err(cause) => {
+            pending.append(&mut deletions);
+            match space.explains(&cause) {
+                true => Ok(false),
+                false => Err(cause),
+            }
+        }
+    }
+}
+
+/// Commits commands.
 async fn commit(
     connection: &mut SqliteConnection,
     pending: &mut [Pending],
     last_listed: &mut i64,
-) -> sqlx::Result<BTreeMap<usize, Id>> {
+) -> sqlx::Result<Taken> {
     let written = write(connection, pending, last_listed).await;
     if written.is_err() {
         // The transaction is rolled back in any case, at the latest when the file is opened again.
@@ -279,7 +333,7 @@ async fn write(
     connection: &mut SqliteConnection,
     pending: &mut [Pending],
     last_listed: &mut i64,
-) -> sqlx::Result<BTreeMap<usize, Id>> {
+) -> sqlx::Result<Taken> {
     let mut taken = BTreeMap::new();
     let mut rows = Vec::with_capacity(pending.len());
     let rows_alone = (pending.iter()).all(|(order, _)| matches!(order, WriteCommand::Append(_)));
@@ -477,8 +531,7 @@ async fn free_pages(connection: &mut SqliteConnection) {
     }
 }
 
-/// Deletes those of these finished games that no tournament or study needs. The files of the others
-/// may be gone: they are written again.
+/// Deletes those of these finished games that no tournament or study needs.
 async fn prune(connection: &mut SqliteConnection, games: &[Id]) -> sqlx::Result<()> {
     let mut units = Units::default();
     for game in games {
@@ -488,12 +541,7 @@ async fn prune(connection: &mut SqliteConnection, games: &[Id]) -> sqlx::Result<
                 .fetch_optional(&mut *connection)
                 .await?;
         let Some((form, header)) = row else { continue };
-        if units.need(connection, form, header.as_deref()).await? {
-            sqlx::query("UPDATE games SET filed = 0 WHERE game_id = $1")
-                .bind(game.0.as_slice())
-                .execute(&mut *connection)
-                .await?;
-        } else {
+        if !units.need(connection, form, header.as_deref()).await? {
             delete(connection, *game).await?;
         }
     }

@@ -1,9 +1,15 @@
 //! What retention leaves alone, in each store.
 
+use chefshat_record::{jsonl, samples};
 use chefshat_room::journal::{GameHeader, StudyGame, TournamentGame};
 use chefshat_tournament::Change as TournamentChange;
+use tokio_util::task::TaskTracker;
 
 use super::*;
+use crate::config::ServerConfig;
+use crate::retention::Retention;
+use crate::rooms::Rooms;
+use crate::store::MemoryStore;
 use crate::store::sqlite::tests::tournaments::cup;
 use crate::store::studies::StudyHeader;
 use crate::store::tournaments::TournamentEntry;
@@ -97,14 +103,12 @@ async fn games_of_what_is_not_over_are_neither_offered_nor_deleted() {
         assert_eq!(found.iter().map(|(_, id)| id.0[0]).collect::<Vec<_>>(), [3]);
 
         let all: Vec<Id> = (1..=4).map(|game| Id([game; 16])).collect();
-        store.prune(all.clone()).await.expect("committed");
+        let deleted = store.prune(all.clone()).await.expect("committed");
+        assert_eq!(deleted, [Id([3; 16]), Id([4; 16])]);
         assert_eq!(stored(store).await, [1, 2, 5]);
         if store.outlives_server() {
             let unwritten = store.without_record_file().await.expect("readable");
-            assert_eq!(unwritten, [Id([1; 16]), Id([2; 16])], "written again");
-        }
-        for game in [1, 2] {
-            written(store, game).await;
+            assert_eq!(unwritten, [], "their files are there");
         }
 
         let end = vec![TournamentEntry::Change(TournamentChange::Finished)];
@@ -130,4 +134,45 @@ async fn a_deletion_on_purpose_asks_nobody() {
         assert_eq!(stored(store).await, [0; 0]);
     })
     .await;
+}
+
+/// What the store keeps, keeps its files, also if it was to be deleted; and what a server that ended
+/// in between has left is deleted by the next run.
+#[tokio::test]
+async fn only_the_files_of_deleted_games_are_deleted() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store: Arc<dyn Store> = Arc::new(MemoryStore::default());
+    let created = store.create_tournament(Arc::new(cup(7)), Vec::new()).await;
+    created.expect("committed");
+    play(&*store, 1, Of::Tournament, Durability::Durable).await;
+    play(&*store, 2, Of::Nothing, Durability::Durable).await;
+    play(&*store, 3, Of::Nothing, Durability::Durable).await;
+    let config = ServerConfig {
+        data_dir: Some(folder.path().to_path_buf()),
+        ..ServerConfig::default()
+    };
+    let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new()).expect("threads");
+    let id = |game: u8| Id([game; 16]).to_string();
+    let files = |game: u8| {
+        [
+            jsonl::path_of(folder.path(), &id(game)),
+            samples::path_of(folder.path(), &id(game), 0),
+        ]
+    };
+    for path in (1..=4).flat_map(files) {
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("created");
+        std::fs::write(path, "{}").expect("written");
+    }
+    let left = |game: u8| files(game).iter().filter(|path| path.exists()).count();
+    let retention = Retention::new(rooms);
+    let deleted = retention.delete(vec![Id([1; 16]), Id([2; 16])]).await;
+    assert_eq!(deleted, Ok(1));
+    assert_eq!([1, 2, 3, 4].map(left), [2, 0, 2, 2]);
+
+    let pruning = folder.path().join("pruning");
+    assert!(!pruning.exists());
+    std::fs::write(&pruning, format!("{}\n{}", id(1), id(4))).expect("written");
+    retention.prune(newest(1)).await.expect("deleted");
+    assert_eq!([1, 2, 3, 4].map(left), [2, 0, 2, 0]);
+    assert!(!pruning.exists());
 }

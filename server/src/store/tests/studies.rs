@@ -65,11 +65,11 @@ fn every_change() -> Vec<Change> {
         },
         Change::Answered {
             number,
-            answers: vec![
+            answers: Arc::new([
                 answer(0, Answer::Number(-3), Some(0)),
                 answer(1, Answer::Options(vec![0, 4]), None),
                 answer(2, Answer::Text("words".to_owned()), Some(9)),
-            ],
+            ]),
             at_ms,
         },
         Change::Placed {

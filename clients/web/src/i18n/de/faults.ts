@@ -112,6 +112,8 @@ export const faults: Texts["faults"] = {
     TOO_MANY_PARTICIPANTS: "Zu dieser Studie können keine Teilnehmer mehr hinzugefügt werden.",
     PARTICIPATION_OVER: "Diese Teilnahme ist zu Ende.",
     ANSWER_REFUSED: "Eine Antwort gehört nicht zu den möglichen. Prüfe deine Antworten.",
+    TOO_MANY_ANSWERS:
+      "Der Server hat keinen Speicher für weitere Antworten. Kürze deine, oder frage die Person, von der du den Link hast.",
     GAME_NOT_OVER: "Die Partie ist noch nicht zu Ende.",
     COUNT_REFUSED: "Gib eine Zahl von 1 bis 1000 ein.",
   },

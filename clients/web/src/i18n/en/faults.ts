@@ -106,6 +106,8 @@ export const faults = {
     TOO_MANY_PARTICIPANTS: "No more participants can be added to this study.",
     PARTICIPATION_OVER: "This participation is over.",
     ANSWER_REFUSED: "An answer is not one of those possible. Check your answers.",
+    TOO_MANY_ANSWERS:
+      "The server has no memory for more answers. Shorten yours, or ask the person who gave you the link.",
     GAME_NOT_OVER: "The game is not over yet.",
     COUNT_REFUSED: "Enter a number from 1 to 1000.",
   },

@@ -109,6 +109,8 @@ export const faults: Texts["faults"] = {
     TOO_MANY_PARTICIPANTS: "No se pueden añadir más participantes a este estudio.",
     PARTICIPATION_OVER: "Esta participación ha terminado.",
     ANSWER_REFUSED: "Una respuesta no está entre las posibles. Revisa tus respuestas.",
+    TOO_MANY_ANSWERS:
+      "El servidor no tiene memoria para más respuestas. Acorta las tuyas, o pregunta a quien te dio el enlace.",
     GAME_NOT_OVER: "La partida todavía no ha terminado.",
     COUNT_REFUSED: "Escribe un número del 1 al 1000.",
   },

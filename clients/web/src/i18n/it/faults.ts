@@ -105,6 +105,8 @@ export const faults: Texts["faults"] = {
     TOO_MANY_PARTICIPANTS: "Non si possono aggiungere altri partecipanti a questo studio.",
     PARTICIPATION_OVER: "Questa partecipazione è finita.",
     ANSWER_REFUSED: "Una risposta non è fra quelle possibili. Controlla le tue risposte.",
+    TOO_MANY_ANSWERS:
+      "Il server non ha memoria per altre risposte. Accorcia le tue, oppure chiedi a chi ti ha dato il link.",
     GAME_NOT_OVER: "La partita non è ancora finita.",
     COUNT_REFUSED: "Inserisci un numero da 1 a 1000.",
   },

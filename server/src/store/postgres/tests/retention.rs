@@ -71,6 +71,52 @@ async fn a_record_takes_no_id_of_a_game_that_another_node_plays() {
     second.close().await;
 }
 
+/// Neither sees what the other has not committed.
+#[tokio::test]
+async fn a_record_and_a_game_take_one_id_only_once_at_the_same_time() {
+    for (import_first, trigger) in [
+        (true, "TRIGGER held BEFORE INSERT ON games FOR EACH ROW"),
+        (false, "TRIGGER held BEFORE INSERT ON owned FOR EACH ROW"),
+    ] {
+        let database = chefshat_postgres::database();
+        let (first, second) = (node(&database).await, node(&database).await);
+        let mut holder = hold(&database, trigger).await;
+        let played = header(1, None, Durability::Ephemeral);
+        let id = played.game_id;
+        let import = || async {
+            let imported = second.import(id, *summary(1), Arc::from([])).await;
+            imported.expect("it answers")
+        };
+        let create = || async {
+            let created = first.create(Arc::clone(&played), vec![entry(1)]).await;
+            match created {
+                Ok(_) => true,
+                Err(StoreError::Taken(_)) => false,
+                Err(error) => panic!("{error}"),
+            }
+        };
+        let (earlier, later): (BoxFuture<'_, bool>, BoxFuture<'_, bool>) = match import_first {
+            true => (import().boxed(), create().boxed()),
+            false => (create().boxed(), import().boxed()),
+        };
+        let later = async {
+            waiting(&mut holder, "advisory").await;
+            tokio::pin!(later);
+            // It waits. If it does not, this is long enough for it.
+            let early = tokio::time::timeout(Duration::from_secs(1), &mut later).await;
+            run(&mut holder, "SELECT pg_advisory_unlock(1)").await;
+            match early {
+                Ok(taken) => taken,
+                Err(_) => later.await,
+            }
+        };
+        let taken = tokio::join!(earlier, later);
+        assert_eq!(taken, (true, false), "import first: {import_first}");
+        first.close().await;
+        second.close().await;
+    }
+}
+
 #[tokio::test]
 async fn games_of_what_cannot_be_read_are_kept() {
     for (damage, kept) in [

@@ -654,8 +654,9 @@ class ParticipationServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def AnswerQuestionnaire(self, request, context):
-        """Answers the questionnaire of the step. INVALID_ARGUMENT (ANSWER_REFUSED; metadata `item`); else
-        as GiveConsent.
+        """Answers the questionnaire of the step. INVALID_ARGUMENT (ANSWER_REFUSED; metadata `item`);
+        RESOURCE_EXHAUSTED (TOO_MANY_ANSWERS if the answers of all studies, or of this caller, take too
+        much memory; DISK_NEARLY_FULL); else as GiveConsent.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -308,8 +308,9 @@ class ParticipationServiceStub:
     UNAVAILABLE (SHUTTING_DOWN).
     """
     AnswerQuestionnaire: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.AnswerQuestionnaireRequest, _study_service_pb2.AnswerQuestionnaireResponse]
-    """Answers the questionnaire of the step. INVALID_ARGUMENT (ANSWER_REFUSED; metadata `item`); else
-    as GiveConsent.
+    """Answers the questionnaire of the step. INVALID_ARGUMENT (ANSWER_REFUSED; metadata `item`);
+    RESOURCE_EXHAUSTED (TOO_MANY_ANSWERS if the answers of all studies, or of this caller, take too
+    much memory; DISK_NEARLY_FULL); else as GiveConsent.
     """
     ContinueStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.ContinueStudyRequest, _study_service_pb2.ContinueStudyResponse]
     """Continues from a text, a questionnaire on another site, or a game that has ended.
@@ -354,8 +355,9 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
     UNAVAILABLE (SHUTTING_DOWN).
     """
     AnswerQuestionnaire: _aio.UnaryUnaryMultiCallable[_study_service_pb2.AnswerQuestionnaireRequest, _study_service_pb2.AnswerQuestionnaireResponse]  # type: ignore[assignment]
-    """Answers the questionnaire of the step. INVALID_ARGUMENT (ANSWER_REFUSED; metadata `item`); else
-    as GiveConsent.
+    """Answers the questionnaire of the step. INVALID_ARGUMENT (ANSWER_REFUSED; metadata `item`);
+    RESOURCE_EXHAUSTED (TOO_MANY_ANSWERS if the answers of all studies, or of this caller, take too
+    much memory; DISK_NEARLY_FULL); else as GiveConsent.
     """
     ContinueStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.ContinueStudyRequest, _study_service_pb2.ContinueStudyResponse]  # type: ignore[assignment]
     """Continues from a text, a questionnaire on another site, or a game that has ended.
@@ -421,8 +423,9 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _study_service_pb2.AnswerQuestionnaireRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.AnswerQuestionnaireResponse, _abc.Awaitable[_study_service_pb2.AnswerQuestionnaireResponse]]:
-        """Answers the questionnaire of the step. INVALID_ARGUMENT (ANSWER_REFUSED; metadata `item`); else
-        as GiveConsent.
+        """Answers the questionnaire of the step. INVALID_ARGUMENT (ANSWER_REFUSED; metadata `item`);
+        RESOURCE_EXHAUSTED (TOO_MANY_ANSWERS if the answers of all studies, or of this caller, take too
+        much memory; DISK_NEARLY_FULL); else as GiveConsent.
         """
 
     @_abc_1.abstractmethod
