@@ -4,13 +4,15 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
 
 use chefshat_study::{ItemAnswer, Participant, Study};
 
-use super::RETRY_STUDIES;
 use crate::limits::{Held, Key, Places, Refused};
 use chefshat_room::ids::Id;
 
+/// When it is worth trying again to create a study, or to add to one.
+pub(super) const RETRY_STUDIES: Duration = Duration::from_secs(3_600);
 /// Bytes that the answers of a questionnaire take besides their content.
 const OVERHEAD_OF_ANSWERS: usize = 256;
 

@@ -13,7 +13,6 @@ mod tests;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::Duration;
 
 use chefshat_proto::cost::{Cost, shapes};
 use chefshat_proto::v1;
@@ -37,11 +36,8 @@ use crate::store::StoreError;
 use crate::store::studies::{StoredStudy, StudyHeader};
 use crate::tasks::{LongTask, named};
 use chefshat_room::ids::{Id, RequestKey, Token, random_bytes};
-use data::StudyData;
+use data::{RETRY_STUDIES, StudyData};
 use task::{Stop, Task};
-
-/// When it is worth trying again to create a study, or to add to one.
-const RETRY_STUDIES: Duration = Duration::from_secs(3_600);
 
 /// Why a study was not created.
 #[derive(Debug, thiserror::Error)]
