@@ -1,6 +1,7 @@
 //! Studies of a server whose clock is stopped: dropping out, and deleting a study.
 
 use std::sync::OnceLock;
+use std::time::Duration;
 
 use chefshat_study::{At, ParticipantLink, Status};
 use tokio::time::advance;
