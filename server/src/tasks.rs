@@ -1,9 +1,25 @@
 //! The tasks that live as long as the server, a room or a stream, by name. Such a task sleeps while
-//! nothing is due for it: the tests of this module count how often each is polled.
+//! nothing is due for it: `serve/idle_tests.rs` drives them on a stopped clock, through a shutdown
+//! and a drain, and counts how often each is polled. In every test, a task that does not sleep while
+//! the clock stands still ends the process of the tests.
 
-/// A task that lives long.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum LongTask {
+macro_rules! long_tasks {
+    ($($(#[$doc:meta])* $name:ident,)*) => {
+        /// A task that lives long.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+        pub(crate) enum LongTask {
+            $($(#[$doc])* $name,)*
+        }
+
+        #[cfg(test)]
+        impl LongTask {
+            /// All of them.
+            pub(crate) const ALL: &[Self] = &[$(Self::$name,)*];
+        }
+    };
+}
+
+long_tasks! {
     /// A room.
     Room,
     /// A tournament.
@@ -61,12 +77,13 @@ pub(crate) fn named<F: Future>(_: LongTask, future: F) -> F {
 }
 
 #[cfg(test)]
-pub(crate) use counting::{named, polls, spinning};
+pub(crate) use counting::{named, polls};
 
 #[cfg(test)]
 mod counting {
-    use std::cell::RefCell;
-    use std::collections::{BTreeMap, BTreeSet};
+    use std::cell::{Cell, RefCell};
+    use std::collections::BTreeMap;
+    use std::io::Write as _;
     use std::pin::Pin;
     use std::task::{Context, Poll};
 
@@ -80,11 +97,12 @@ mod counting {
     std::thread_local! {
         /// How often the tasks of this thread, which are those of one test, were polled.
         static POLLS: RefCell<BTreeMap<LongTask, u64>> = const { RefCell::new(BTreeMap::new()) };
-        static SPINS: RefCell<BTreeSet<LongTask>> = const { RefCell::new(BTreeSet::new()) };
+        /// The task that this test expects to spin.
+        static MAY_SPIN: Cell<Option<LongTask>> = const { Cell::new(None) };
     }
 
-    /// Names a task that is about to be spawned, and counts its polls. One that spins is stopped, so
-    /// that the clock of the test advances.
+    /// Names a task that is about to be spawned, and counts its polls. If it spins, the process of
+    /// the tests ends: the clock of its test would stand still for ever.
     pub(crate) fn named<F: Future>(task: LongTask, future: F) -> impl Future<Output = F::Output> {
         Counted {
             task,
@@ -109,11 +127,23 @@ mod counting {
             let (at, count) = self.at.filter(|(at, _)| *at == now).unwrap_or((now, 0));
             self.at = Some((at, count + 1));
             if count >= SPINNING {
-                SPINS.with_borrow_mut(|spins| spins.insert(task));
+                spins(task);
                 return Poll::Pending;
             }
             self.future.as_mut().poll(context)
         }
+    }
+
+    fn spins(task: LongTask) {
+        if MAY_SPIN.replace(None) == Some(task) {
+            return;
+        }
+        // Not by a panic, which the runtime catches, nor by a macro, whose output a test captures.
+        let thread = std::thread::current();
+        let test = thread.name().unwrap_or("a test");
+        let message = format!("{test}: the task {task:?} never sleeps although nothing is due\n");
+        let _ = std::io::stderr().write_all(message.as_bytes());
+        std::process::exit(101);
     }
 
     /// How often the tasks of this test have been polled.
@@ -121,9 +151,22 @@ mod counting {
         POLLS.with_borrow(Clone::clone)
     }
 
-    /// The tasks of this test that were polled again and again while no time passed.
-    pub(crate) fn spinning() -> BTreeSet<LongTask> {
-        SPINS.with_borrow(Clone::clone)
+    #[tokio::test(start_paused = true)]
+    async fn a_task_that_never_sleeps_is_noticed() {
+        MAY_SPIN.set(Some(LongTask::Webhooks));
+        let sleeping = tokio::spawn(named(LongTask::Retention, async {
+            for _ in 0..2 * SPINNING {
+                tokio::time::sleep(std::time::Duration::from_millis(1)).await;
+            }
+        }));
+        tokio::spawn(named(LongTask::Webhooks, async {
+            loop {
+                tokio::task::yield_now().await;
+            }
+        }));
+        sleeping.await.expect("it ends");
+        assert_eq!(MAY_SPIN.get(), None, "it was noticed");
+        assert!(polls()[&LongTask::Webhooks] > SPINNING);
     }
 }
 
@@ -134,7 +177,7 @@ mod tests {
 
     /// Where tasks are spawned that end by themselves: by file, how many and why. All others have a
     /// name, and sleep while nothing is due.
-    const SHORT: [(&str, usize, &str); 21] = [
+    const SHORT: [(&str, usize, &str); 22] = [
         (
             "cluster/node.rs",
             7,
@@ -168,6 +211,7 @@ mod tests {
         ("tls.rs", 1, "one handshake, within its time limit"),
         ("tournaments/games.rs", 1, "one message"),
         ("tournaments/handle.rs", 1, "one message"),
+        ("web/preview.rs", 1, "a program that draws one picture"),
     ];
     /// The same of files whose tasks are found by another name.
     const OTHERS: [(&str, usize, &str); 4] = [

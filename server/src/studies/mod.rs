@@ -107,7 +107,7 @@ impl Studies {
     }
 
     /// As [`Studies::new`], with this clock.
-    fn at(now: TimeOfDay, rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
+    pub(crate) fn at(now: TimeOfDay, rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
         let places = Places::new(MAX_STUDIES, rooms.shares());
         let memory = Places::new(MAX_STUDY_MEMORY / 1024, rooms.shares());
         Arc::new(Self {
