@@ -24,7 +24,7 @@ use crate::access::{AccessSettings, Mode};
 use crate::cluster::tests::fake::{Database, FakeStore};
 use crate::config::KeepGames;
 use crate::store::SqliteStore;
-use crate::tasks::{LongTask, polls};
+use crate::tasks::{LongTask, polls, short_polls};
 use crate::tls::TlsFiles;
 use crate::webhooks::WebhookSettings;
 
@@ -110,14 +110,42 @@ fn bound(task: LongTask, time: Duration) -> u64 {
 /// Polls because of what happens: a stream ends, a participant goes, a game is suspended.
 const FOR_EVENTS: u64 = 10;
 
-/// Checks how often tasks were polled since `before`.
-fn assert_slept(before: &BTreeMap<LongTask, u64>, time: Duration, when: &str) {
-    for (task, now) in polls() {
-        let polled = now - before.get(&task).unwrap_or(&0);
-        let most = bound(task, time);
+/// Most polls of all short tasks in such a time: a node asks its database a few times in a second.
+fn bound_of_short(time: Duration) -> u64 {
+    20 * FOR_EVENTS + 4 * time.as_secs()
+}
+
+/// How often tasks have been polled.
+struct Polls {
+    long: BTreeMap<LongTask, u64>,
+    short: u64,
+    at: Instant,
+}
+
+impl Polls {
+    fn now() -> Self {
+        Self {
+            long: polls(),
+            short: short_polls(),
+            at: Instant::now(),
+        }
+    }
+
+    /// Checks how often tasks have been polled since.
+    fn assert_few_since(&self, when: &str) {
+        let time = self.at.elapsed();
+        for (task, now) in polls() {
+            let polled = now - self.long.get(&task).unwrap_or(&0);
+            let most = bound(task, time);
+            assert!(
+                polled <= most,
+                "{task:?} was polled {polled} times in {time:?}, of {most}: {when}"
+            );
+        }
+        let (polled, most) = (short_polls() - self.short, bound_of_short(time));
         assert!(
             polled <= most,
-            "{task:?} was polled {polled} times in {time:?}, of {most}: {when}"
+            "short tasks were polled {polled} times in {time:?}, of {most}: {when}"
         );
     }
 }
@@ -341,10 +369,10 @@ async fn the_tasks_of_a_server_sleep_while_nothing_is_due() {
     // What has just begun.
     sleep(Duration::from_secs(60)).await;
 
-    let before = polls();
+    let before = Polls::now();
     sleep(QUIET).await;
-    assert_slept(&before, QUIET, "nothing happens");
-    let driven: Vec<LongTask> = before.into_keys().collect();
+    before.assert_few_since("nothing happens");
+    let driven: Vec<LongTask> = before.long.into_keys().collect();
     let mut wanted = OF_A_SERVER.to_vec();
     wanted.sort_unstable();
     assert_eq!(driven, wanted);
@@ -353,7 +381,7 @@ async fn the_tasks_of_a_server_sleep_while_nothing_is_due() {
         "all are read"
     );
 
-    let (before, began) = (polls(), Instant::now());
+    let before = Polls::now();
     stop.send(()).expect("it serves");
     sleep(Duration::from_secs(1)).await;
     // A participant goes while the server ends: its place is due to others before the grace is over.
@@ -361,7 +389,7 @@ async fn the_tasks_of_a_server_sleep_while_nothing_is_due() {
     let served = timeout(longest + Duration::from_secs(1), serving).await;
     let served = served.expect("it ends in time").expect("no panic");
     served.expect("nothing failed");
-    assert_slept(&before, began.elapsed(), "the server ends");
+    before.assert_few_since("the server ends");
     for stream in streams {
         stream.await.expect("no panic");
     }
@@ -399,21 +427,21 @@ async fn the_tasks_of_a_node_sleep_while_nothing_is_due() {
     let room = room.expect("a room").handle.id();
     sleep(Duration::from_secs(60)).await;
 
-    let before = polls();
+    let before = Polls::now();
     sleep(QUIET).await;
-    assert_slept(&before, QUIET, "nothing happens");
+    before.assert_few_since("nothing happens");
     for task in OF_A_NODE {
-        assert!(before.contains_key(&task), "{task:?}");
+        assert!(before.long.contains_key(&task), "{task:?}");
     }
 
     // It hands its room over, although no other node is there, and leaves.
-    let (before, began) = (polls(), Instant::now());
+    let before = Polls::now();
     drop(rooms);
     database.ask_to_drain(store.node());
     let served = timeout(longest + Duration::from_secs(1), serving).await;
     let served = served.expect("it ends in time").expect("no panic");
     served.expect("nothing failed");
-    assert_slept(&before, began.elapsed(), "the node hands over");
+    before.assert_few_since("the node hands over");
     assert_eq!(database.owner(room), None);
 }
 

@@ -24,6 +24,7 @@ use crate::grpc::takeover::{is_changing, waits};
 use crate::outbox::StreamEnd;
 use crate::room::subscriber::DeliveryOptions;
 use crate::room::{AttachRequest, NotAttached, RoomGone, Supersedes};
+use crate::tasks::short;
 use crate::wire::Updates;
 use chefshat_room::ids::Token;
 
@@ -124,9 +125,10 @@ impl Reader {
         parking.poll_found(context, |first, all| {
             let reach = Reach::new(Arc::clone(rooms), Arc::clone(tournaments));
             let caller = caller.clone();
-            AbortOnDropHandle::new(tokio::spawn(async move {
-                search(first, all, |token| look_once(&reach, &caller, token)).await
-            }))
+            AbortOnDropHandle::new(tokio::spawn(short(
+                "one search for a room, within its time limit",
+                async move { search(first, all, |token| look_once(&reach, &caller, token)).await },
+            )))
         })
     }
 
