@@ -19,6 +19,8 @@ use tokio::time::timeout;
 use tokio_rustls::TlsConnector;
 use tokio_util::task::AbortOnDropHandle;
 
+use crate::tasks::short;
+
 /// Why a request has no answer.
 #[derive(Debug, thiserror::Error)]
 pub enum PostError {
@@ -168,7 +170,7 @@ async fn exchange_over(
     longest: usize,
 ) -> Result<Answer, PostError> {
     let (mut sender, connection) = http1::handshake(TokioIo::new(stream)).await?;
-    let _running = AbortOnDropHandle::new(tokio::spawn(connection));
+    let _running = AbortOnDropHandle::new(tokio::spawn(short("one request", connection)));
     let (head, body) = sender.send_request(request).await?.into_parts();
     let retry_after = head.headers.get(header::RETRY_AFTER);
     let retry_after = retry_after.and_then(|it| it.to_str().ok()?.trim().parse().ok());

@@ -10,6 +10,7 @@ use tracing::{error, info};
 use crate::convert;
 use crate::limits::{Background, Key};
 use crate::store::{Store, StoredGame};
+use crate::tasks::short;
 use chefshat_room::ids::Id;
 
 /// Writes records to the folder of records of a data directory.
@@ -56,7 +57,8 @@ impl RecordWriter {
     pub fn write_record(&self, game: Id, charged: Key) {
         if let Some(data_dir) = self.data_dir.clone() {
             let writer = self.clone();
-            self.tracker.spawn(writer.write(game, charged, data_dir));
+            self.tracker
+                .spawn(short("one record", writer.write(game, charged, data_dir)));
         }
     }
 

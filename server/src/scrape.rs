@@ -29,6 +29,7 @@ use crate::clock::ProcessClock;
 use crate::metrics::Metrics;
 use crate::rooms::Rooms;
 use crate::store::DiskUsage;
+use crate::tasks::short;
 use crate::tournaments::Tournaments;
 use crate::web::{OriginLayer, Origins};
 
@@ -71,11 +72,11 @@ async fn serve_within(
             TokioIo::new(stream),
             TowerToHyperService::new(checked.clone()),
         );
-        tokio::spawn(async move {
+        tokio::spawn(short("one connection, within its time limit", async move {
             // A client that fails or is too slow is disconnected.
             let _ = tokio::time::timeout(time_limit, connection).await;
             drop(place);
-        });
+        }));
     }
 }
 

@@ -5,6 +5,8 @@
 mod budget;
 #[cfg(test)]
 mod fuzz;
+#[cfg(test)]
+mod idle_tests;
 
 use std::future::Future;
 use std::io;

@@ -1,9 +1,25 @@
 //! The tasks that live as long as the server, a room or a stream, by name. Such a task sleeps while
-//! nothing is due for it: the tests of this module count how often each is polled.
+//! nothing is due for it: `serve/idle_tests.rs` drives them on a stopped clock, through a shutdown
+//! and a drain, and counts how often each is polled. In every test, a task that does not sleep while
+//! the clock stands still ends the process of the tests.
 
-/// A task that lives long.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum LongTask {
+macro_rules! long_tasks {
+    ($($(#[$doc:meta])* $name:ident,)*) => {
+        /// A task that lives long.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+        pub(crate) enum LongTask {
+            $($(#[$doc])* $name,)*
+        }
+
+        #[cfg(test)]
+        impl LongTask {
+            /// All of them.
+            pub(crate) const ALL: &[Self] = &[$(Self::$name,)*];
+        }
+    };
+}
+
+long_tasks! {
     /// A room.
     Room,
     /// A tournament.
@@ -60,13 +76,20 @@ pub(crate) fn named<F: Future>(_: LongTask, future: F) -> F {
     future
 }
 
+/// Marks a task that is about to be spawned and ends by itself. `_does`: what it does.
+#[cfg(not(test))]
+pub(crate) fn short<F: Future>(_does: &'static str, future: F) -> F {
+    future
+}
+
 #[cfg(test)]
-pub(crate) use counting::{named, polls, spinning};
+pub(crate) use counting::{named, polls, short, short_polls};
 
 #[cfg(test)]
 mod counting {
-    use std::cell::RefCell;
-    use std::collections::{BTreeMap, BTreeSet};
+    use std::cell::{Cell, RefCell};
+    use std::collections::BTreeMap;
+    use std::io::Write as _;
     use std::pin::Pin;
     use std::task::{Context, Poll};
 
@@ -77,15 +100,35 @@ mod counting {
     /// A task that is polled more often at one instant of a stopped clock never sleeps.
     const SPINNING: u64 = 20_000;
 
-    std::thread_local! {
-        /// How often the tasks of this thread, which are those of one test, were polled.
-        static POLLS: RefCell<BTreeMap<LongTask, u64>> = const { RefCell::new(BTreeMap::new()) };
-        static SPINS: RefCell<BTreeSet<LongTask>> = const { RefCell::new(BTreeSet::new()) };
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+    enum Task {
+        Long(LongTask),
+        /// What it does.
+        Short(&'static str),
     }
 
-    /// Names a task that is about to be spawned, and counts its polls. One that spins is stopped, so
-    /// that the clock of the test advances.
+    std::thread_local! {
+        /// How often the tasks of this thread, which are those of one test, were polled.
+        static POLLS: RefCell<BTreeMap<Task, u64>> = const { RefCell::new(BTreeMap::new()) };
+        /// The task that this test expects to spin.
+        static MAY_SPIN: Cell<Option<Task>> = const { Cell::new(None) };
+    }
+
+    /// Names a task that is about to be spawned, and counts its polls. If it spins, the process of
+    /// the tests ends: the clock of its test would stand still for ever.
     pub(crate) fn named<F: Future>(task: LongTask, future: F) -> impl Future<Output = F::Output> {
+        counted(Task::Long(task), future)
+    }
+
+    /// The same of a task that ends by itself.
+    pub(crate) fn short<F: Future>(
+        does: &'static str,
+        future: F,
+    ) -> impl Future<Output = F::Output> {
+        counted(Task::Short(does), future)
+    }
+
+    fn counted<F: Future>(task: Task, future: F) -> Counted<F> {
         Counted {
             task,
             future: Box::pin(future),
@@ -94,7 +137,7 @@ mod counting {
     }
 
     struct Counted<F> {
-        task: LongTask,
+        task: Task,
         future: Pin<Box<F>>,
         /// When it was polled last, and how often at that instant.
         at: Option<(Instant, u64)>,
@@ -109,76 +152,80 @@ mod counting {
             let (at, count) = self.at.filter(|(at, _)| *at == now).unwrap_or((now, 0));
             self.at = Some((at, count + 1));
             if count >= SPINNING {
-                SPINS.with_borrow_mut(|spins| spins.insert(task));
+                spins(task);
                 return Poll::Pending;
             }
             self.future.as_mut().poll(context)
         }
     }
 
-    /// How often the tasks of this test have been polled.
-    pub(crate) fn polls() -> BTreeMap<LongTask, u64> {
-        POLLS.with_borrow(Clone::clone)
+    fn spins(task: Task) {
+        if MAY_SPIN.replace(None) == Some(task) {
+            return;
+        }
+        // Not by a panic, which the runtime catches, nor by a macro, whose output a test captures.
+        let thread = std::thread::current();
+        let test = thread.name().unwrap_or("a test");
+        let message = format!("{test}: {task:?} never sleeps although nothing is due\n");
+        let _ = std::io::stderr().write_all(message.as_bytes());
+        std::process::exit(101);
     }
 
-    /// The tasks of this test that were polled again and again while no time passed.
-    pub(crate) fn spinning() -> BTreeSet<LongTask> {
-        SPINS.with_borrow(Clone::clone)
+    /// How often the tasks of this test that live long have been polled.
+    pub(crate) fn polls() -> BTreeMap<LongTask, u64> {
+        let of = |(task, polls): (&Task, &u64)| match task {
+            Task::Long(task) => Some((*task, *polls)),
+            Task::Short(_) => None,
+        };
+        POLLS.with_borrow(|polls| polls.iter().filter_map(of).collect())
+    }
+
+    /// How often the others have been polled.
+    pub(crate) fn short_polls() -> u64 {
+        let is_short = |(task, _): &(&Task, &u64)| matches!(task, Task::Short(_));
+        POLLS.with_borrow(|polls| polls.iter().filter(is_short).map(|(_, polls)| polls).sum())
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_task_that_never_sleeps_is_noticed() {
+        MAY_SPIN.set(Some(Task::Short("one record")));
+        let sleeping = tokio::spawn(named(LongTask::Retention, async {
+            for _ in 0..2 * SPINNING {
+                tokio::time::sleep(std::time::Duration::from_millis(1)).await;
+            }
+        }));
+        tokio::spawn(short("one record", async {
+            loop {
+                tokio::task::yield_now().await;
+            }
+        }));
+        sleeping.await.expect("it ends");
+        assert_eq!(MAY_SPIN.get(), None, "it was noticed");
+        assert!(short_polls() > SPINNING);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
     use std::path::{Path, PathBuf};
 
-    /// Where tasks are spawned that end by themselves: by file, how many and why. All others have a
-    /// name, and sleep while nothing is due.
-    const SHORT: [(&str, usize, &str); 21] = [
-        (
-            "cluster/node.rs",
-            7,
-            "one request to the database, within its time limit",
-        ),
-        ("grpc/admin.rs", 2, "one call"),
-        ("grpc/analysis.rs", 1, "one call"),
-        (
-            "grpc/play/attaching.rs",
-            1,
-            "one search for a room, within its time limit",
-        ),
-        ("grpc/records.rs", 2, "one call"),
-        ("grpc/studies.rs", 1, "one export"),
-        (
-            "grpc/vector.rs",
-            1,
-            "waits for the client alone, within its time limit",
-        ),
-        ("host.rs", 1, "the server itself, for samples"),
-        ("limits/background.rs", 1, "one pause"),
-        ("post.rs", 1, "one request"),
-        ("record_writer.rs", 1, "one record"),
-        ("room/task.rs", 1, "one search"),
-        ("rooms/creation.rs", 1, "one room"),
-        ("scrape.rs", 1, "one connection, within its time limit"),
-        ("store/postgres/reader.rs", 1, "gives one connection back"),
-        ("studies/games.rs", 1, "one message"),
-        ("studies/handle.rs", 1, "one message"),
-        ("studies/mod.rs", 2, "one study"),
-        ("tls.rs", 1, "one handshake, within its time limit"),
-        ("tournaments/games.rs", 1, "one message"),
-        ("tournaments/handle.rs", 1, "one message"),
+    /// How a call that spawns a task begins. The task has a name, or is said to end by itself.
+    const NAMED: [&str; 5] = [
+        "named(",
+        "short(",
+        "tasks::named(",
+        "until_closing(",
+        "running)",
     ];
-    /// The same of files whose tasks are found by another name.
-    const OTHERS: [(&str, usize, &str); 4] = [
+    /// The other calls, by file, and why they need no name.
+    const OTHERS: [(&str, &str, &str); 3] = [
         (
-            "room/handle.rs",
-            1,
-            "the call that spawns the task of a room",
+            "host.rs",
+            "serve(listener, config, store, stopped)),",
+            "the server itself",
         ),
-        ("threads.rs", 1, "work for a pool of threads"),
-        ("tournaments/mod.rs", 1, "one tournament"),
-        ("tournaments/shared.rs", 1, "one computation"),
+        ("threads.rs", "move || {", "work for a pool of threads"),
+        ("web/preview.rs", ");", "another process"),
     ];
 
     fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
@@ -192,8 +239,8 @@ mod tests {
         }
     }
 
-    /// The number of tasks that are spawned in a file without a name.
-    fn unnamed(source: &str) -> usize {
+    /// What a file spawns without a name: the beginning of each call.
+    fn unnamed(source: &str) -> Vec<String> {
         let is_module = |rest: &str| rest.lines().next().is_some_and(|line| line.ends_with('{'));
         // Up to the tests in the file.
         let parts = source.split("#[cfg(test)]\nmod ");
@@ -203,13 +250,11 @@ mod tests {
             .map(|(_, part)| part)
             .collect();
         let code = code.concat();
-        let spawned = code.split("spawn(").skip(1);
-        let has_name = |rest: &str| {
-            let rest = rest.trim_start();
-            let named = ["named(", "tasks::named(", "until_closing(", "running)"];
-            named.iter().any(|start| rest.starts_with(start))
-        };
-        spawned.filter(|rest| !has_name(rest)).count()
+        let spawned = code.split("spawn(").skip(1).map(str::trim_start);
+        let unnamed = spawned.filter(|rest| !NAMED.iter().any(|start| rest.starts_with(start)));
+        unnamed
+            .map(|rest| rest.chars().take_while(|it| *it != '\n').collect())
+            .collect()
     }
 
     #[test]
@@ -217,29 +262,28 @@ mod tests {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
         let mut files = Vec::new();
         sources(&root, &mut files);
-        let mut found = BTreeMap::new();
+        let mut found = Vec::new();
         for path in files {
-            let name = path
-                .strip_prefix(&root)
-                .expect("below it")
-                .display()
-                .to_string();
+            let name = path.strip_prefix(&root).expect("below it");
+            let name = name.display().to_string();
             let is_test =
                 name.contains("tests") || name.starts_with("serve/fuzz") || name == "tasks.rs";
             let source = std::fs::read_to_string(&path).expect("readable");
-            // Functions that spawn are not calls.
-            let count = unnamed(&source.replace("fn spawn(", ""));
-            if count > 0 && !is_test {
-                found.insert(name, count);
+            // Functions that spawn, and their calls.
+            let source = ["fn spawn(", "self.spawn(", " task::spawn("]
+                .iter()
+                .fold(source, |source, own| source.replace(own, ""));
+            let unnamed = unnamed(&source);
+            if !is_test {
+                found.extend(unnamed.into_iter().map(|call| (name.clone(), call)));
             }
         }
-        let known = SHORT.iter().chain(&OTHERS);
-        let known: BTreeMap<String, usize> = known
-            .map(|(file, count, _)| ((*file).to_owned(), *count))
-            .collect();
+        found.sort();
+        let known = OTHERS.map(|(file, call, _)| (file.to_owned(), call.to_owned()));
         assert_eq!(
             found, known,
-            "name a task that lives long (`tasks::named`), or list it here"
+            "name a task that lives long (`tasks::named`), say of a short one what it does \
+             (`tasks::short`), or list the call here"
         );
     }
 }

@@ -26,6 +26,7 @@ use tracing::{debug, error, info};
 use crate::file_watch::FileWatch;
 use crate::handshakes::{Handshake, Handshakes};
 use crate::limits::Key;
+use crate::tasks::short;
 
 /// How long a client may take for the handshake.
 const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
@@ -233,11 +234,11 @@ impl Tls {
                             Ok(connection) => {
                                 let (tls, limits) = (Arc::clone(&tls), Arc::clone(&limits));
                                 let key = key_of(&connection);
-                                handshakes.spawn(async move {
+                                handshakes.spawn(short("one handshake, within its time limit", async move {
                                     // Others' handshakes do not use up the time of this one.
                                     let admitted = timeout(HANDSHAKE_TIMEOUT, limits.admit(key));
                                     tls.handshake(connection, admitted.await.ok()??).await
-                                });
+                                }));
                             }
                             Err(error) => return Some((Err(error), (incoming, handshakes))),
                         },

@@ -9,7 +9,7 @@ mod located;
 mod node;
 mod peers;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod turns;
 mod units;
 

@@ -21,7 +21,7 @@ use super::turns::Turns;
 use super::units::{Hosted, Resumed, Units};
 use crate::store::StoreError;
 use crate::store::cluster::{ClusterStore, Epoch, NodeId, NodeInfo};
-use crate::tasks::{LongTask, named};
+use crate::tasks::{LongTask, named, short};
 use chefshat_room::ids::Id;
 
 /// How long an answer of the database is awaited, except to a beat. After that, the next beat says
@@ -455,14 +455,17 @@ impl Task {
     /// Starts work whose event comes in any case: the core keeps a mark for what it waits for, and
     /// without an answer it would wait forever.
     fn spawn(&mut self, work: impl Future<Output = Event> + Send + 'static, if_it_panics: Event) {
-        self.answers.spawn(async move {
-            // Nothing that it leaves behind is used again, but by locks that say so.
-            let worked = AssertUnwindSafe(work).catch_unwind().await;
-            worked.unwrap_or_else(|_| {
-                error!("work for the cluster has failed");
-                if_it_panics
-            })
-        });
+        self.answers.spawn(short(
+            "one request to the database, within its time limit",
+            async move {
+                // Nothing that it leaves behind is used again, but by locks that say so.
+                let worked = AssertUnwindSafe(work).catch_unwind().await;
+                worked.unwrap_or_else(|_| {
+                    error!("work for the cluster has failed");
+                    if_it_panics
+                })
+            },
+        ));
     }
 
     /// Joins as a new node: the database has removed this one, which was away for long.

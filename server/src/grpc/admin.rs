@@ -35,6 +35,7 @@ use crate::limits::Key;
 use crate::participants::{DataError, Participants, StudiesElsewhere};
 use crate::retention::Retention;
 use crate::store::{ForgetError, Keep};
+use crate::tasks::short;
 use chefshat_room::ids::Id;
 
 /// Most clients in a page.
@@ -210,7 +211,7 @@ impl AdminService for AdminCalls {
             }
             (sender, count)
         };
-        tokio::spawn(async move {
+        tokio::spawn(short("one call", async move {
             let (gathered, (sender, count)) = tokio::join!(gathering, forwarding);
             let last = match gathered {
                 Ok(skipped) if count == 0 && skipped.named.is_empty() => Err(status(
@@ -227,7 +228,7 @@ impl AdminService for AdminCalls {
             };
             // The client may have gone.
             let _ = sender.send_timeout(last, FOLLOW_SEND_TIMEOUT).await;
-        });
+        }));
         Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
     }
 
@@ -242,12 +243,12 @@ impl AdminService for AdminCalls {
         let who = given(request.name, request.name_fingerprint)?;
         let participants = Arc::clone(&self.participants);
         // Runs to completion even if the client goes.
-        let deleting = tokio::spawn(async move {
+        let deleting = tokio::spawn(short("one call", async move {
             match step.filter(|_| is_from_peer) {
                 Some(step) => for_another_node(&participants, who, &step).await,
                 None => everywhere(&participants, who, &elsewhere).await,
             }
-        });
+        }));
         let deleted = deleting.await.map_err(|error| {
             tracing::error!(%error, "deleting a participant's data failed");
             store_failed()

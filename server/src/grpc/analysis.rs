@@ -33,6 +33,7 @@ use crate::config::{
     MIN_ANALYSIS_UPDATE,
 };
 use crate::limits::{Payer, Places, Queued, Refused, SLICE, WorkQueue};
+use crate::tasks::short;
 use crate::threads::{Priority, Threads};
 
 /// Most deals from which the likely hands are averaged.
@@ -173,7 +174,7 @@ impl AnalysisService for Analyses {
         let analysis = Analysis::new(knowledge, plan, due);
         let (responses, stream) = mpsc::channel(1);
         let service = self.clone();
-        tokio::spawn(async move {
+        tokio::spawn(short("one call", async move {
             let _held = held;
             let updates = responses.clone();
             // A client that reads slowly misses some.
@@ -184,7 +185,7 @@ impl AnalysisService for Analyses {
             };
             // It fails only if the client has gone.
             let _ = responses.send(answer).await;
-        });
+        }));
         Ok(Response::new(ReceiverStream::new(stream)))
     }
 

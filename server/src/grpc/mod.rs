@@ -20,6 +20,8 @@ mod reach;
 mod recorded;
 mod records;
 mod refusals;
+#[cfg(test)]
+mod repeated_tests;
 mod room_service;
 mod spectate;
 pub mod status;

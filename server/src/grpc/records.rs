@@ -36,6 +36,7 @@ use crate::config::{
 };
 use crate::limits::{Held, Key, Places, Shares};
 use crate::store::{Listed, Part, StoreError};
+use crate::tasks::short;
 use crate::tournaments::Tournaments;
 use chefshat_room::ids::Id;
 
@@ -247,12 +248,12 @@ impl RecordService for Records {
         let shown = move |lines, sight| seen(sight, key.as_deref(), lines);
         let lines = self.recorded.of_game(&caller, &game_id, shown).await?;
         let (sender, responses) = channel();
-        tokio::spawn(async move {
+        tokio::spawn(short("one call", async move {
             let response = |lines| v1::GetRecordResponse { lines };
             let sent = send(&sender, lines, response).await;
             drop(place);
             end(&sender, sent).await;
-        });
+        }));
         Ok(Response::new(responses))
     }
 
@@ -267,12 +268,12 @@ impl RecordService for Records {
         let filter = checked(request.filter.take())?;
         let service = self.clone();
         let (sender, responses) = channel();
-        tokio::spawn(async move {
+        tokio::spawn(short("one call", async move {
             let charged = (key, gateway.as_ref());
             let sending = service.send_all(&caller, &request, &filter, charged, &sender);
             let sent = sending.await;
             end(&sender, sent).await;
-        });
+        }));
         Ok(Response::new(responses))
     }
 

@@ -41,7 +41,7 @@ use crate::metrics::StreamKind;
 use crate::studies::{
     CreateProblem, ExportError, ExportedFile, NotAdded, Stopped, Studies, StudyHandle,
 };
-use crate::tasks::{LongTask, named};
+use crate::tasks::{LongTask, named, short};
 use chefshat_room::ids::{Id, RequestKey};
 
 type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
@@ -346,7 +346,10 @@ impl StudyService for StudyCalls {
             }
         };
         let closing = self.closing.clone();
-        tokio::spawn(closing.run_until_cancelled_owned(exporting));
+        tokio::spawn(short(
+            "one export",
+            closing.run_until_cancelled_owned(exporting),
+        ));
         Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
     }
 

@@ -38,6 +38,7 @@ use crate::config::{
 };
 use crate::limits::{Held, Key, Places, Refused};
 use crate::metrics::{Counted, Metrics, StreamKind};
+use crate::tasks::short;
 use crate::threads::{Priority, Threads, caught};
 use chefshat_room::ids::random_bytes;
 
@@ -105,7 +106,10 @@ impl VectorService for Vectors {
             _place: place,
             _counted: self.metrics().stream(StreamKind::Vector),
         };
-        tokio::spawn(runner.run(request.into_inner()));
+        tokio::spawn(short(
+            "waits for the client alone, within its time limit",
+            runner.run(request.into_inner()),
+        ));
         Ok(Response::new(ReceiverStream::new(stream)))
     }
 }

@@ -9,6 +9,7 @@ use std::time::Duration;
 use rayon::ThreadPoolBuildError;
 
 use super::{Held, Key, Places, Rate, Shares};
+use crate::tasks::short;
 use crate::threads::{Priority, Threads};
 
 /// Games of built-in agents that are played at a time; others wait for their first decision.
@@ -84,10 +85,10 @@ impl Background {
         if wait.is_zero() {
             drop(slice);
         } else {
-            tokio::spawn(async move {
+            tokio::spawn(short("one pause", async move {
                 tokio::time::sleep(wait).await;
                 drop(slice);
-            });
+            }));
         }
         Some((result, game))
     }

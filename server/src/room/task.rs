@@ -50,7 +50,7 @@ use crate::outbox::{OnSpace, StreamEnd};
 use crate::record_writer::RecordWriter;
 use crate::signing::Signer;
 use crate::store::{Journal, Store};
-use crate::tasks::{LongTask, named};
+use crate::tasks::{LongTask, named, short};
 use crate::webhooks::Webhooks;
 
 /// Most inputs that are applied before one commit.
@@ -548,7 +548,7 @@ fn is_connection(subscriber: &Subscriber, connection: ConnectionId) -> bool {
 fn spawned<T: Send + 'static>(
     work: impl Future<Output = T> + Send + 'static,
 ) -> impl Future<Output = Option<T>> + Send {
-    AbortOnDropHandle::new(tokio::spawn(work)).map(Result::ok)
+    AbortOnDropHandle::new(tokio::spawn(short("one search", work))).map(Result::ok)
 }
 
 /// Answers a caller, which may have gone.

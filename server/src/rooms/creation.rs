@@ -16,6 +16,7 @@ use crate::config::SERVER_VERSION;
 use crate::limits::{Held, Key, Payer, Refused};
 use crate::room::{Handle, TaskContext, spawn_room};
 use crate::store::StoreError;
+use crate::tasks::short;
 use chefshat_room::Core;
 use chefshat_room::ids::{Id, RequestKey, Token, join_code, random_bytes};
 use chefshat_room::journal::{
@@ -170,7 +171,10 @@ impl Rooms {
         }
         // Runs to completion even if the caller is cancelled: a half-created room would be stored
         // and belong to nobody.
-        let creating = self.context.tracker.spawn(reservation.create(new));
+        let creating = self
+            .context
+            .tracker
+            .spawn(short("one room", reservation.create(new)));
         creating
             .await
             .map_err(|error| StoreError::Failed(format!("creating a room failed: {error}")))?

@@ -15,6 +15,7 @@ use crate::config::TOURNAMENT_RETRY;
 use crate::convert::PARTICIPANT_KIND;
 use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
 use crate::store::{StoreError, StoredGame};
+use crate::tasks::short;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Fill, GameStart, SeatedParticipant, StudyGame};
 
@@ -135,7 +136,9 @@ impl Task {
                 && let Some(handle) = self.rooms.get(room)
                 && self.closing.insert(room)
             {
-                tokio::spawn(async move { handle.close_without_token().await });
+                tokio::spawn(short("one message", async move {
+                    handle.close_without_token().await
+                }));
             }
         }
     }

@@ -18,6 +18,7 @@ use crate::limits::{Held, Key, Refused};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::studies::{StoredTraces, StudyHeader};
+use crate::tasks::short;
 use chefshat_room::ids::{Id, SecretHash, Token};
 
 /// Most interface traces in one request.
@@ -519,9 +520,9 @@ impl Drop for Presence {
         // The mailbox may be full: the message must not be lost. Without a runtime the server has
         // ended.
         if let Ok(runtime) = tokio::runtime::Handle::try_current() {
-            runtime.spawn(async move {
+            runtime.spawn(short("one message", async move {
                 let _ = handle.mailbox.send(Message::Gone { number, stream }).await;
-            });
+            }));
         }
     }
 }

@@ -34,7 +34,7 @@ use crate::limits::{Held, Key, Places, Refused};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::studies::{StoredStudy, StudyHeader};
-use crate::tasks::{LongTask, named};
+use crate::tasks::{LongTask, named, short};
 use chefshat_room::ids::{Id, RequestKey, Token, random_bytes};
 use data::{RETRY_STUDIES, StudyData};
 use task::{Stop, Task};
@@ -107,7 +107,7 @@ impl Studies {
     }
 
     /// As [`Studies::new`], with this clock.
-    fn at(now: TimeOfDay, rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
+    pub(crate) fn at(now: TimeOfDay, rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
         let places = Places::new(MAX_STUDIES, rooms.shares());
         let memory = Places::new(MAX_STUDY_MEMORY / 1024, rooms.shares());
         let data = Places::new(MAX_STUDY_DATA, rooms.shares());
@@ -175,7 +175,7 @@ impl Studies {
         // without running.
         let studies = Arc::clone(self);
         let making = async move { studies.make(settings, checked, owner, charged).await };
-        (self.tracker.spawn(making).await)
+        (self.tracker.spawn(short("one study", making)).await)
             .map_err(|error| StoreError::Failed(format!("creating a study failed: {error}")))?
     }
 
@@ -325,7 +325,7 @@ impl Studies {
     ) -> Result<Result<(usize, usize), usize>, Stopped> {
         let studies = Arc::clone(self);
         // Runs to completion even if the caller is cancelled.
-        let deleting = self.tracker.spawn(async move {
+        let deleting = self.tracker.spawn(short("one study", async move {
             let games = match handle.delete(force).await? {
                 Ok(games) => games,
                 Err(active) => return Ok(Err(active)),
@@ -333,7 +333,7 @@ impl Studies {
             studies.lock().remove(handle.id());
             let participants = handle.read(|study| study.participants().len());
             Ok(Ok((participants, games)))
-        });
+        }));
         deleting.await.map_err(|_| Stopped)?
     }
 

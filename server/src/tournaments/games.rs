@@ -20,6 +20,7 @@ use crate::convert;
 use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
 use crate::store::tournaments::TournamentEntry;
 use crate::store::{StoreError, StoredGame};
+use crate::tasks::short;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
 
@@ -180,7 +181,9 @@ impl Task {
                     && self.retired.insert((number, *participant))
                     && let Some(room) = self.rooms.get(*room)
                 {
-                    tokio::spawn(async move { room.retire(Seat::new(seat)).await });
+                    tokio::spawn(short("one message", async move {
+                        room.retire(Seat::new(seat)).await
+                    }));
                 }
             }
         }

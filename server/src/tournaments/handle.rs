@@ -20,6 +20,7 @@ use crate::limits::Key;
 use crate::outbox::StreamEnd;
 use crate::rooms::Rooms;
 use crate::store::tournaments::{TournamentEntry, TournamentHeader};
+use crate::tasks::short;
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::Visibility;
@@ -400,7 +401,9 @@ impl TournamentHandle {
             if rooms.is_over(room) == Some(false)
                 && let Some(room) = rooms.get(room)
             {
-                tokio::spawn(async move { room.close_without_token().await });
+                tokio::spawn(short("one message", async move {
+                    room.close_without_token().await
+                }));
             }
         }
     }

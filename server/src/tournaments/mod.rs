@@ -39,7 +39,7 @@ use crate::limits::{Held, Key, Places, Refused};
 use crate::rooms::{CODES_TRIED, Rooms};
 use crate::store::StoreError;
 use crate::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use crate::tasks::{LongTask, named};
+use crate::tasks::{LongTask, named, short};
 use chefshat_room::ids::{Id, RequestKey, Token, join_code, normal_code, random_bytes};
 use handle::TournamentState;
 use shared::Shared;
@@ -142,9 +142,10 @@ impl Tournaments {
         check_start(plan.start_at_ms)?;
         // Runs to completion even if the caller is cancelled: a half-created tournament would be
         // stored and restored with the server.
-        let creating = self
-            .tracker
-            .spawn(reservation.make(name.to_owned(), plan, core, charged));
+        let creating = self.tracker.spawn(short(
+            "one tournament",
+            reservation.make(name.to_owned(), plan, core, charged),
+        ));
         creating
             .await
             .map_err(|error| StoreError::Failed(format!("creating a tournament failed: {error}")))?

@@ -7,6 +7,7 @@ use chefshat_tournament::State;
 use tokio::sync::Mutex;
 
 use crate::store::StoreError;
+use crate::tasks::short;
 
 /// Why a computation failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -73,11 +74,11 @@ impl<T: Send + Sync + 'static> Shared<T> {
         if let Some(value) = known.as_ref().filter(|value| is_current(value)) {
             return Ok(Arc::clone(value));
         }
-        let working = tokio::spawn(async move {
+        let working = tokio::spawn(short("one computation", async move {
             let value = Arc::new(work.await?);
             *known = Some(Arc::clone(&value));
             Ok(value)
-        });
+        }));
         working.await?
     }
 }

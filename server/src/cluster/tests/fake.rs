@@ -30,7 +30,7 @@ enum Row {
 }
 
 /// What all nodes share.
-pub(super) struct Database {
+pub(crate) struct Database {
     began: Instant,
     tables: Mutex<Tables<Id, Row>>,
     games: Mutex<BTreeMap<Id, Arc<GameHeader>>>,
@@ -43,7 +43,7 @@ pub(super) struct Database {
 }
 
 impl Database {
-    pub(super) fn new() -> Arc<Self> {
+    pub(crate) fn new() -> Arc<Self> {
         Arc::new(Self {
             began: Instant::now(),
             tables: Mutex::new(Tables::new(LeaseTimes::DEFAULT)),
@@ -71,14 +71,14 @@ impl Database {
     }
 
     /// Makes a room one of another version of the rules.
-    pub(super) fn make_foreign(&self, room: Id) {
+    pub(crate) fn make_foreign(&self, room: Id) {
         let mut games = self.games.lock().expect("no test panics here");
         let header = games.get_mut(&room).expect("it exists");
         Arc::make_mut(header).rules_version += 1;
     }
 
     /// Makes a room one of this version again.
-    pub(super) fn make_native(&self, room: Id) {
+    pub(crate) fn make_native(&self, room: Id) {
         let mut games = self.games.lock().expect("no test panics here");
         let header = games.get_mut(&room).expect("it exists");
         Arc::make_mut(header).rules_version -= 1;
@@ -89,12 +89,12 @@ impl Database {
     }
 
     /// The owner of a unit.
-    pub(super) fn owner(&self, unit: Id) -> Option<NodeId> {
+    pub(crate) fn owner(&self, unit: Id) -> Option<NodeId> {
         self.tables().owner(unit)
     }
 
     /// Gives a unit to another node although its owner has a lease.
-    pub(super) fn take_away(&self, unit: Id, node: NodeId) {
+    pub(crate) fn take_away(&self, unit: Id, node: NodeId) {
         let mut tables = self.tables();
         let epoch = tables.epoch(unit).expect("it exists");
         tables.release(unit, epoch);
@@ -103,20 +103,20 @@ impl Database {
     }
 
     /// Removes the nodes whose leases have expired, once they own nothing.
-    pub(super) fn remove_expired(&self) {
+    pub(crate) fn remove_expired(&self) {
         self.tables().remove_expired(self.now_ms());
     }
 
-    pub(super) fn ask_to_drain(&self, node: NodeId) {
+    pub(crate) fn ask_to_drain(&self, node: NodeId) {
         *self.drain.lock().expect("no test panics here") = Some(node);
     }
 
-    pub(super) fn knows(&self, node: NodeId) -> bool {
+    pub(crate) fn knows(&self, node: NodeId) -> bool {
         self.tables().last_beat(node).is_some()
     }
 
     /// The names of those seated by the journal of a room, in order.
-    pub(super) fn seated(&self, room: Id) -> Vec<String> {
+    pub(crate) fn seated(&self, room: Id) -> Vec<String> {
         let tables = self.tables();
         let rows = tables.journal(room).iter();
         let entries = rows.flat_map(|row| match &row.entries {
@@ -132,38 +132,38 @@ impl Database {
 }
 
 /// The store of one node.
-pub(super) struct FakeStore {
+pub(crate) struct FakeStore {
     database: Arc<Database>,
     node: Mutex<NodeId>,
     /// The epochs of the tournaments of this node.
     epochs: Mutex<BTreeMap<Id, Epoch>>,
     /// Whether the database cannot be reached.
-    pub(super) cut_off: watch::Sender<bool>,
+    pub(crate) cut_off: watch::Sender<bool>,
     /// Whether beats do not reach it.
-    pub(super) beats_lost: watch::Sender<bool>,
+    pub(crate) beats_lost: watch::Sender<bool>,
     /// How many of the next beats are never answered.
-    pub(super) beats_unanswered: watch::Sender<u32>,
+    pub(crate) beats_unanswered: watch::Sender<u32>,
     /// How often a unit was read.
-    pub(super) loads: watch::Sender<u32>,
+    pub(crate) loads: watch::Sender<u32>,
     /// Whether reading a unit takes until this is over.
-    pub(super) loads_held: watch::Sender<bool>,
+    pub(crate) loads_held: watch::Sender<bool>,
     /// Whether new rooms are written but no answer comes.
-    pub(super) creations_unanswered: watch::Sender<bool>,
+    pub(crate) creations_unanswered: watch::Sender<bool>,
     /// Whether the ends of games are written but no answer comes.
-    pub(super) ends_unanswered: watch::Sender<bool>,
+    pub(crate) ends_unanswered: watch::Sender<bool>,
     /// How often the end of a game was read.
-    pub(super) ends_read: watch::Sender<u32>,
+    pub(crate) ends_read: watch::Sender<u32>,
     /// Whether reading the end of a game fails.
-    pub(super) ends_unreadable: watch::Sender<bool>,
+    pub(crate) ends_unreadable: watch::Sender<bool>,
     /// The next request of this kind to the database panics.
-    pub(super) panics_at: watch::Sender<&'static str>,
+    pub(crate) panics_at: watch::Sender<&'static str>,
     /// The join codes of new rooms that are refused, until as many have been tried.
-    pub(super) codes_taken: Mutex<(usize, Vec<String>)>,
+    pub(crate) codes_taken: Mutex<(usize, Vec<String>)>,
     released: AsyncMutex<broadcast::Receiver<(NodeId, Id, Epoch)>>,
 }
 
 impl FakeStore {
-    pub(super) fn new(database: &Arc<Database>) -> Arc<Self> {
+    pub(crate) fn new(database: &Arc<Database>) -> Arc<Self> {
         Arc::new(Self {
             database: Arc::clone(database),
             node: Mutex::new(NodeId(0)),
@@ -183,7 +183,7 @@ impl FakeStore {
         })
     }
 
-    pub(super) fn node(&self) -> NodeId {
+    pub(crate) fn node(&self) -> NodeId {
         *self.node.lock().expect("no test panics here")
     }
 

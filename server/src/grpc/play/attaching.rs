@@ -25,6 +25,7 @@ use crate::limits::Payer;
 use crate::outbox::StreamEnd;
 use crate::room::subscriber::DeliveryOptions;
 use crate::room::{AttachRequest, NotAttached, RoomGone, Supersedes};
+use crate::tasks::short;
 use crate::wire::Updates;
 use chefshat_room::ids::Token;
 
@@ -125,9 +126,10 @@ impl Reader {
         parking.poll_found(context, |first, all| {
             let reach = Reach::new(Arc::clone(rooms), Arc::clone(tournaments));
             let caller = caller.clone();
-            AbortOnDropHandle::new(tokio::spawn(async move {
-                search(first, all, |token| look_once(&reach, &caller, token)).await
-            }))
+            AbortOnDropHandle::new(tokio::spawn(short(
+                "one search for a room, within its time limit",
+                async move { search(first, all, |token| look_once(&reach, &caller, token)).await },
+            )))
         })
     }
 

@@ -21,6 +21,7 @@ use crate::store::codec::Codec;
 use crate::store::form::{self, Unreadable, check_form, stored_header};
 use crate::store::tournaments::StoredTournament;
 use crate::store::{Keep, Listed, Part, StoreError, StoredGame, listed};
+use crate::tasks::short;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
@@ -68,7 +69,10 @@ struct Lent {
 impl Drop for Lent {
     fn drop(&mut self) {
         if let Some(connection) = self.connection.take() {
-            tokio::spawn(give_back(connection, self.has_ended));
+            tokio::spawn(short(
+                "gives one connection back",
+                give_back(connection, self.has_ended),
+            ));
         }
     }
 }
