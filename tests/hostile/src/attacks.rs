@@ -98,7 +98,7 @@ fn a_record(target: Target) -> BoxFuture<'static, Result<(), Status>> {
     record_of(target, 50).boxed()
 }
 
-/// A record of so many decisions that their annotations can make it as large as is legal.
+/// A record with enough decisions for their annotations to make it as large as is legal.
 fn a_long_record(target: Target) -> BoxFuture<'static, Result<(), Status>> {
     record_of(target, 150).boxed()
 }

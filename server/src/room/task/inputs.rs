@@ -239,8 +239,8 @@ impl Room {
         self.releases.push(release);
     }
 
-    /// Executes a command of a seat. Whoever sends it is charged for what is stored that the game
-    /// does not need: a player uses up nobody else's share.
+    /// Executes a command of a seat. Its sender is charged for what is stored that the game does not
+    /// need: a player uses up nobody else's share.
     fn perform(
         &mut self,
         (seat, charged): (Seat, Key),
