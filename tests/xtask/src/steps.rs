@@ -11,8 +11,13 @@ use crate::failure::Failure;
 /// How a step ended.
 enum Outcome {
     Passed,
-    Failed,
-    Skipped { reason: String },
+    /// With the last lines that its program printed, if those were captured.
+    Failed {
+        output: String,
+    },
+    Skipped {
+        reason: String,
+    },
 }
 
 struct Step {
@@ -39,13 +44,23 @@ impl Steps {
         name: &str,
         work: impl FnOnce() -> Result<(), Failure>,
     ) -> Result<(), Failure> {
+        self.record(name, || (work(), String::new()))
+    }
+
+    /// Runs one step that returns also what it printed.
+    fn record(
+        &mut self,
+        name: &str,
+        work: impl FnOnce() -> (Result<(), Failure>, String),
+    ) -> Result<(), Failure> {
         println!("\n==> {name}");
         let start = Instant::now();
-        let result = work();
-        let outcome = if result.is_ok() {
-            Outcome::Passed
-        } else {
-            Outcome::Failed
+        let (result, output) = work();
+        let outcome = match result {
+            Ok(()) => Outcome::Passed,
+            Err(_) => Outcome::Failed {
+                output: last_lines(&output),
+            },
         };
         self.done.push(Step {
             name: name.to_owned(),
@@ -59,17 +74,16 @@ impl Steps {
     pub(crate) fn program(&mut self, name: &str, command: &mut Command) -> Result<(), Failure> {
         match self.in_lane {
             false => self.run(name, || command::run(command)),
-            true => self.run(name, || {
-                let result = command::run_captured(command);
-                let (output, result) = match result {
-                    Ok(output) => (output, Ok(())),
+            true => self.record(name, || {
+                let (result, output) = match command::run_captured(command) {
+                    Ok(output) => (Ok(()), output),
                     Err(failure) => {
                         let failed = Err(Failure::new("see its output"));
-                        (failure.to_string(), failed)
+                        (failed, failure.to_string())
                     }
                 };
                 println!("\n==> {name}, ended\n{}", output.trim_end());
-                result
+                (result, output)
             }),
         }
     }
@@ -119,9 +133,23 @@ impl Steps {
         });
     }
 
-    /// A line for each step that was reached.
+    /// The last lines of the failed programs, then a line for each step that was reached: where a log
+    /// is cut, its end tells what failed.
     pub(crate) fn summary(&self) -> String {
-        let mut text = String::from("\n");
+        let mut text = String::new();
+        for step in &self.done {
+            if let Outcome::Failed { output } = &step.outcome
+                && !output.is_empty()
+            {
+                let name = &step.name;
+                writeln!(
+                    text,
+                    "\n==> {name} failed; the end of its output:\n{output}"
+                )
+                .expect("a String grows as needed");
+            }
+        }
+        text.push('\n');
         let width = self
             .done
             .iter()
@@ -137,7 +165,7 @@ impl Steps {
             let seconds = took.as_secs_f64();
             let line = match outcome {
                 Outcome::Passed => format!("ok       {name:width$}  {seconds:6.1} s"),
-                Outcome::Failed => format!("FAILED   {name:width$}  {seconds:6.1} s"),
+                Outcome::Failed { .. } => format!("FAILED   {name:width$}  {seconds:6.1} s"),
                 Outcome::Skipped { reason } => format!("skipped  {name:width$}  {reason}"),
             };
             writeln!(text, "{line}").expect("a String grows as needed");
@@ -145,6 +173,22 @@ impl Steps {
         text
     }
 }
+
+/// The lines of a log that tell most about a failure: those that name it, then the last ones.
+fn last_lines(output: &str) -> String {
+    const NAMING: [&str; 5] = ["FAIL", "failed", "panicked", "Error", "error:"];
+    let lines: Vec<&str> = output.lines().collect();
+    let (earlier, last) = lines.split_at(lines.len().saturating_sub(LAST_LINES));
+    let naming = earlier
+        .iter()
+        .filter(|line| NAMING.iter().any(|word| line.contains(word)))
+        .take(LAST_LINES / 2);
+    naming.chain(last).copied().collect::<Vec<_>>().join("\n")
+}
+
+/// The most lines of a failed program that are shown again at the end, besides half as many that
+/// name failures.
+const LAST_LINES: usize = 60;
 
 #[cfg(test)]
 mod tests {
@@ -168,6 +212,17 @@ mod tests {
     }
 
     #[test]
+    fn of_a_long_output_the_failures_and_the_end_are_kept() {
+        let mut lines = vec!["progress".to_owned(); 500];
+        lines[10] = "a test failed: 1 is not 2".to_owned();
+        lines.push("the end".to_owned());
+        let kept = last_lines(&lines.join("\n"));
+        assert!(kept.starts_with("a test failed: 1 is not 2\n"), "{kept}");
+        assert!(kept.ends_with("\nthe end"), "{kept}");
+        assert_eq!(kept.lines().count(), LAST_LINES + 1);
+    }
+
+    #[test]
     fn lanes_end_alone_and_all_steps_and_failures_are_named() {
         let program = |steps: &mut Steps, name: &str, script: &str| {
             steps.program(name, Command::new("sh").args(["-c", script]))
@@ -186,5 +241,6 @@ mod tests {
         assert!(summary.contains("FAILED   first "), "{summary}");
         assert!(summary.contains("ok       second "), "{summary}");
         assert!(!summary.contains("never"), "{summary}");
+        assert!(summary.contains("words\n"), "{summary}");
     }
 }
