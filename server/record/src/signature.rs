@@ -124,7 +124,7 @@ pub enum Signed {
     /// This key signed it.
     By(PublicKey),
     /// A version before 0.3.0 signed it with this key, or somebody who says so. It wrote the entries
-    /// of maps in any order, and the signature fits none that was tried. It proves nothing.
+    /// of maps in any order, and there are too many orders to try. It proves nothing.
     Uncheckable(PublicKey),
 }
 
@@ -178,8 +178,8 @@ pub fn check(lines: &[v1::RecordLine], text: Option<TextHash>) -> Result<Signed,
     if signature.text_version == UNORDERED {
         match orders::find(lines, fits) {
             orders::Found::Fits => return Ok(Signed::By(key)),
-            orders::Found::None => return Ok(Signed::Uncheckable(key)),
-            orders::Found::NoMaps => {}
+            orders::Found::TooMany => return Ok(Signed::Uncheckable(key)),
+            orders::Found::NoMaps | orders::Found::None => {}
         }
     }
     Err(format!(

@@ -18,8 +18,10 @@ pub(super) enum Found {
     NoMaps,
     /// One of the texts fits.
     Fits,
-    /// None of those that were tried does.
+    /// None of them does: the record was changed.
     None,
+    /// There are too many to try.
+    TooMany,
 }
 
 /// A line that may have been written in several orders.
@@ -50,7 +52,7 @@ pub(super) fn find(lines: &[v1::RecordLine], fits: impl Fn(TextHash) -> bool) ->
     }
     let orders = |entries: usize| (1..=entries as u64).fold(1, u64::saturating_mul);
     if maps.into_iter().map(orders).fold(1, u64::saturating_mul) > MAX_TEXTS {
-        return Found::None;
+        return Found::TooMany;
     }
     let (mut before, mut parts) = (TextHash::default(), Vec::<Part>::new());
     let mut held = 0_u64;
@@ -63,7 +65,7 @@ pub(super) fn find(lines: &[v1::RecordLine], fits: impl Fn(TextHash) -> bool) ->
         }
         // Before they take memory: each of them would be hashed at least once.
         if held > MAX_BYTES {
-            return Found::None;
+            return Found::TooMany;
         }
         match (entries_of(line), parts.last_mut()) {
             (Some(entries), _) => parts.push(Part {
@@ -79,10 +81,12 @@ pub(super) fn find(lines: &[v1::RecordLine], fits: impl Fn(TextHash) -> bool) ->
         times = times.saturating_mul(part.texts.len() as u64);
         bytes = bytes.saturating_add(times.saturating_mul(part.bytes()));
     }
-    if bytes <= MAX_BYTES && any_fits(before, &parts, &fits) {
-        Found::Fits
-    } else {
-        Found::None
+    if bytes > MAX_BYTES {
+        return Found::TooMany;
+    }
+    match any_fits(before, &parts, &fits) {
+        true => Found::Fits,
+        false => Found::None,
     }
 }
 
@@ -172,9 +176,9 @@ mod tests {
             (&[0, 1][..], Found::NoMaps, 0),
             (&[1, 2, 0, 3], Found::None, 12),
             (&[2; 12], Found::None, 4_096),
-            (&[2; 13], Found::None, 0),
-            (&[7], Found::None, 0),
-            (&[100_000], Found::None, 0),
+            (&[2; 13], Found::TooMany, 0),
+            (&[7], Found::TooMany, 0),
+            (&[100_000], Found::TooMany, 0),
         ] {
             let lines: Vec<_> = keys.iter().map(|keys| annotated(*keys)).collect();
             let tried = Cell::new(0);
