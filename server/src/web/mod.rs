@@ -18,6 +18,7 @@ use bytes::Bytes;
 use futures::future::{BoxFuture, Either};
 use http::{Method, Request, Response, header};
 use rayon::ThreadPoolBuildError;
+use tokio::task::spawn_blocking;
 use tonic::body::Body;
 use tower::{BoxError, Layer, Service};
 
@@ -101,7 +102,7 @@ where
         Either::Right(Box::pin(async move {
             let request = request.map(drop);
             let answer = match Link::of(request.uri().path()) {
-                None => answer(find, &request),
+                None => of_files(request, |request| answer(find, request)).await,
                 Some(link) => page.previewed(link, services, &request).await,
             };
             Ok(answer.map(|bytes| Body::new(axum::body::Body::from(bytes))))
@@ -125,18 +126,32 @@ impl PageLayer {
             },
             Link::Replay(game) => {
                 let title = previews.title(game, services, extensions).await.ok();
-                let tagged = title.and_then(|title| {
-                    let origin = preview::origin(request, self.tls)?;
-                    let page = find(DOCUMENT)?;
-                    preview::document(&page.bytes, game, &title, &origin, previews.paints())
-                });
-                match tagged {
-                    Some(tagged) => generated(tagged, request),
-                    None => answer(find, request),
-                }
+                let tags =
+                    title.and_then(|title| Some((title, preview::origin(request, self.tls)?)));
+                let paints = previews.paints();
+                of_files(request.clone(), move |request| {
+                    let tagged = tags.and_then(|(title, origin)| {
+                        preview::document(&find(DOCUMENT)?.bytes, game, &title, &origin, paints)
+                    });
+                    match tagged {
+                        Some(tagged) => generated(tagged, request),
+                        None => answer(find, request),
+                    }
+                })
+                .await
             }
         }
     }
+}
+
+/// An answer that needs files of the page, which may have to be read from a disk.
+async fn of_files(
+    request: Request<()>,
+    make: impl FnOnce(&Request<()>) -> Response<Bytes> + Send + 'static,
+) -> Response<Bytes> {
+    let method = request.method().clone();
+    let making = spawn_blocking(move || make(&request));
+    making.await.unwrap_or_else(|_| absent(&method))
 }
 
 fn is_for_page<B>(request: &Request<B>) -> bool {
