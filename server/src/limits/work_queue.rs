@@ -235,6 +235,8 @@ impl WorkQueue {
     /// Gives free threads to those that wait: first to an address that has the fewest, and among these
     /// to the one whose last slice began longest ago; and in the same way to a caller at this address.
     fn grant(self: &Arc<Self>, mut state: MutexGuard<'_, State>) {
+        // Each slice that nobody takes any more would come back here, one call within the other.
+        state.waiting.retain(|(_, sender)| !sender.is_closed());
         let mut granted = Vec::new();
         while state.free > 0 {
             let rank = |key: Key| (state.running.get(&key), state.turns.get(&key));
