@@ -19,6 +19,8 @@ pub const MAX_INPUTS_PER_MESSAGE: usize = 64;
 pub const MAX_VECTOR_MESSAGE_BYTES: usize = 1024 * 1024;
 /// Largest request about a study, bytes.
 pub const MAX_STUDY_MESSAGE_BYTES: usize = 1024 * 1024;
+/// What players send to a node that does not have their room.
+const PLAY_OF_NODES: &str = "/chefshat.peer.v1.PeerService/Play";
 const KIB: usize = 1024;
 const MIB: usize = 1024 * KIB;
 /// Calls that opening a stream counts as.
@@ -95,6 +97,11 @@ impl Call {
     pub fn longest_message_of(service: &str) -> usize {
         let calls = Self::all().filter(|call| call.service() == service);
         calls.map(|call| call.message.bytes).max().unwrap_or(0)
+    }
+
+    /// Whether its messages are of players, whose turns do not wait for the messages of others.
+    pub fn plays(&self) -> bool {
+        self.service() == "chefshat.v1.PlayService" || self.path == PLAY_OF_NODES
     }
 
     /// The full name of its service.
@@ -456,7 +463,7 @@ pub const CALLS: &[Call] = &[
 /// The calls that only nodes make of each other, on a listener of their own. The rest of the server
 /// does not have them.
 const CALLS_OF_NODES: &[Call] = &[
-    call("/chefshat.peer.v1.PeerService/Play", Player, Compared)
+    call(PLAY_OF_NODES, Player, Compared)
         .sending()
         .takes(MAX_PEER_REQUEST_BYTES, 80_000, 9 * MIB),
     call("/chefshat.peer.v1.PeerService/Share", Anyone, Unlimited).sending(),

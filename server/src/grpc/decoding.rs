@@ -23,8 +23,8 @@ use super::limits::charged;
 use super::status::{Refusal, is_elsewhere, status};
 use crate::access::{Call, MessageLimits};
 use crate::limits::{
-    CallLimits, DECODED_BYTES_PER_CALL, Held, Key, MESSAGE_TIMEOUT, Refused, SMALL_DECODED,
-    SMALL_MESSAGE,
+    CallLimits, DECODED_BYTES_PER_CALL, Decoding, Held, Key, MESSAGE_TIMEOUT, Refused,
+    SMALL_DECODED, SMALL_MESSAGE,
 };
 use crate::wire::peer;
 
@@ -151,6 +151,7 @@ where
             partial: BytesMut::new(),
             state: State::Next,
             any: false,
+            until: None,
         };
         let answering =
             (self.services).call(request.map(|body| Body::new(Costed { body, messages })));
@@ -196,6 +197,9 @@ struct Messages {
     state: State,
     /// Whether there was a message.
     any: bool,
+    /// When what the client has begun must have arrived: the next message of a stream, or all of
+    /// another call. It begins when something does not arrive at once.
+    until: Option<Pin<Box<Sleep>>>,
 }
 
 /// Where a body is.
@@ -204,22 +208,16 @@ enum State {
     Next,
     /// A long message waits until it may be read.
     MayReceive(usize, BoxFuture<'static, Result<Held, Refused>>),
-    /// A message of this many bytes with its prefix is read.
-    Receiving(usize, Option<Reception>),
+    /// A message of this many bytes with its prefix is read. One that is not small has a permit.
+    Receiving(usize, Option<Held>),
     /// A message waits until it may be decoded.
     MayDecode {
         message: Bytes,
         permit: BoxFuture<'static, Result<Held, Refused>>,
-        _received: Option<Reception>,
+        _received: Option<Held>,
     },
     /// Nothing more is read.
     Refused,
-}
-
-/// What a message that is not small has while it is read.
-struct Reception {
-    _permit: Held,
-    until: Pin<Box<Sleep>>,
 }
 
 /// What a body does next.
@@ -243,46 +241,43 @@ impl Messages {
                     self.state = match length <= SMALL_MESSAGE {
                         true => State::Receiving(PREFIX + length, None),
                         false => {
-                            let permit = self.limits.decoding().receive(self.key, length);
+                            let permit = self.memory().receive(self.key, length);
                             State::MayReceive(PREFIX + length, Box::pin(permit))
                         }
                     };
                 }
                 State::MayReceive(length, permit) => {
                     let permit = ready!(permit.as_mut().poll(context));
-                    let reception = Reception {
-                        _permit: permit.map_err(|refused| Status::from(Refusal::from(refused)))?,
-                        until: Box::pin(sleep_until(Instant::now() + MESSAGE_TIMEOUT)),
-                    };
+                    let permit = permit.map_err(|refused| Status::from(Refusal::from(refused)))?;
                     let length = *length;
                     if self.input.len() < length {
                         self.partial.reserve(length);
                     }
-                    self.state = State::Receiving(length, Some(reception));
+                    self.state = State::Receiving(length, Some(permit));
                 }
-                State::Receiving(length, reception) => {
-                    let (length, late) = (*length, reception.as_mut());
-                    if late.is_some_and(|it| it.until.as_mut().poll(context).is_ready()) {
-                        return Poll::Ready(Err(too_slow()));
-                    }
+                State::Receiving(length, _) => {
+                    let length = *length;
                     if !self.has(length) {
                         return Poll::Ready(Ok(Step::Read));
                     }
-                    let State::Receiving(_, reception) =
+                    let State::Receiving(_, received) =
                         std::mem::replace(&mut self.state, State::Next)
                     else {
                         continue;
                     };
                     let message = self.take(length);
+                    if self.call.sends_many {
+                        self.until = None;
+                    }
                     let memory = self.cost(&message[PREFIX..])?;
                     if memory <= SMALL_DECODED {
                         return Poll::Ready(Ok(Step::Pass(message)));
                     }
-                    let permit = self.limits.decoding().decode(self.key, memory);
+                    let permit = self.memory().decode(self.key, memory);
                     self.state = State::MayDecode {
                         message,
                         permit: Box::pin(permit),
-                        _received: reception,
+                        _received: received,
                     };
                 }
                 State::MayDecode {
@@ -297,6 +292,33 @@ impl Messages {
                 }
             }
         }
+    }
+
+    /// The memory from which its messages take.
+    fn memory(&self) -> &Decoding {
+        match self.call.plays() {
+            true => self.limits.playing(),
+            false => self.limits.decoding(),
+        }
+    }
+
+    /// Nothing has arrived now: ready when what the client has begun is too slow. A stream may be
+    /// silent between its messages; another call is one message and its end.
+    fn is_late(&mut self, context: &mut Context<'_>) -> Poll<Status> {
+        let is_between = matches!(self.state, State::Next) && self.partial.is_empty();
+        if self.call.sends_many && is_between {
+            self.until = None;
+            return Poll::Pending;
+        }
+        let until = (self.until)
+            .get_or_insert_with(|| Box::pin(sleep_until(Instant::now() + MESSAGE_TIMEOUT)));
+        until.as_mut().poll(context).map(|()| too_slow())
+    }
+
+    /// Refuses to read more.
+    fn refuse(&mut self) {
+        self.state = State::Refused;
+        (self.input, self.partial) = Default::default();
     }
 
     /// Whether the first `length` bytes of the next message were read. Moves what there is of a
@@ -374,15 +396,19 @@ impl HttpBody for Costed {
                 Ok(Step::Pass(message)) => return Poll::Ready(Some(Ok(Frame::data(message)))),
                 Ok(Step::Read) => {}
                 Err(status) => {
-                    messages.state = State::Refused;
-                    (messages.input, messages.partial) = Default::default();
+                    messages.refuse();
                     return Poll::Ready(Some(Err(status)));
                 }
             }
             if matches!(messages.state, State::Refused) {
                 return Poll::Ready(None);
             }
-            let Some(frame) = ready!(Pin::new(&mut *body).poll_frame(context)?) else {
+            let Poll::Ready(frame) = Pin::new(&mut *body).poll_frame(context)? else {
+                let late = ready!(messages.is_late(context));
+                messages.refuse();
+                return Poll::Ready(Some(Err(late)));
+            };
+            let Some(frame) = frame else {
                 // The rest is not a message: the decoder refuses it.
                 let rest = std::mem::take(&mut messages.partial);
                 return Poll::Ready(match rest.is_empty() {
@@ -455,6 +481,7 @@ fn too_slow() -> Status {
 mod tests {
     use std::collections::BTreeMap;
     use std::convert::Infallible;
+    use std::time::Duration;
 
     use chefshat_proto::cost::{Filling, Method};
     use chefshat_proto::v1;
@@ -618,7 +645,7 @@ mod tests {
             .call(request(path, body))
             .await
             .expect("infallible");
-        assert_eq!(limits.decoding().taken(), 0);
+        assert_eq!(limits.decoding().taken() + limits.playing().taken(), 0);
         receiver.await.expect("read")
     }
 
@@ -713,6 +740,112 @@ mod tests {
         assert_eq!(limits.decoding().taken(), 0);
     }
 
+    #[tokio::test(start_paused = true)]
+    async fn a_call_that_does_not_arrive_whole_ends_however_small_it_is() {
+        let limits = limits();
+        let service = service_fn(async |request: Request<Body>| {
+            Ok::<_, Infallible>(match request.into_body().collect().await {
+                Ok(_) => Response::new(Body::empty()),
+                Err(status) => status.into_http(),
+            })
+        });
+        let mut services = DecodingLayer::new(limits).layer(service);
+        let unary = "/chefshat.v1.RoomService/GetRoom";
+        let stream = "/chefshat.v1.PlayService/Play";
+        let whole = framed(&[]);
+        for (path, sent) in [
+            (unary, Vec::new()),
+            (unary, vec![0, 0]),
+            (unary, vec![0, 0, 0, 0, 9, 1]),
+            // Its message has arrived, and its end has not.
+            (unary, whole.clone()),
+            (stream, vec![0, 0]),
+            (stream, [whole.as_slice(), &[0, 0, 0, 0, 9, 1]].concat()),
+        ] {
+            let begun = Instant::now();
+            let answer = services.call(request(path, stalled(sent.clone()))).await;
+            let answer = answer.expect("infallible");
+            let status = Status::from_header_map(answer.headers()).expect("a status");
+            let info = status.get_details_error_info().expect("a reason");
+            assert_eq!(info.reason, "MESSAGE_TOO_SLOW", "{path} {sent:?}");
+            assert_eq!(begun.elapsed(), MESSAGE_TIMEOUT, "{path} {sent:?}");
+        }
+        // A stream is silent as long as it likes between its messages.
+        let silent = services.call(request(stream, stalled(whole)));
+        let day = Duration::from_secs(24 * 60 * 60);
+        tokio::time::timeout(day, silent).await.expect_err("silent");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_stream_that_always_has_half_a_message_left_is_not_slow() {
+        let part = |_| async {
+            tokio::time::sleep(MESSAGE_TIMEOUT / 2).await;
+            // The second half of a message and the first half of the next.
+            Ok::<_, Status>(Frame::data(Bytes::from_static(&[0, 2, 8, 1, 0, 0, 0])))
+        };
+        let first = stream::iter([Ok(Frame::data(Bytes::from_static(&[0, 0, 0])))]);
+        let parts = first.chain(stream::iter(0..20).then(part));
+        let service = service_fn(async |request: Request<Body>| {
+            let read = request.into_body().collect().await;
+            let read = read.expect("each message arrives in time");
+            assert_eq!(read.to_bytes().len(), 20 * 7 + 3);
+            Ok::<_, Infallible>(Response::new(Body::empty()))
+        });
+        let mut services = DecodingLayer::new(limits()).layer(service);
+        let body = Body::new(StreamBody::new(parts));
+        let path = "/chefshat.v1.PlayService/Play";
+        services
+            .call(request(path, body))
+            .await
+            .expect("infallible");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn messages_of_players_do_not_wait_for_those_of_others() {
+        let limits = limits();
+        let mut taken = Vec::new();
+        for host in 0..=u8::MAX {
+            let key = Key::Address([192, 0, 2, host].into());
+            let share = Shares::default().of(key, crate::limits::MAX_DECODED);
+            let permit = limits.decoding().decode(key, share).now_or_never();
+            taken.extend(permit.and_then(Result::ok));
+        }
+        let service = service_fn(async |request: Request<Body>| {
+            Ok::<_, Infallible>(match request.into_body().collect().await {
+                Ok(_) => Response::new(Body::empty()),
+                Err(status) => status.into_http(),
+            })
+        });
+        let mut services = DecodingLayer::new(limits).layer(service);
+        let reason_of = |answer: Response<Body>| {
+            let status = Status::from_header_map(answer.headers())?;
+            Some(status.get_details_error_info()?.reason)
+        };
+        let play = v1::PlayRequest {
+            commands: vec![v1::SeatCommand::default(); 700],
+        };
+        let create = v1::CreateStudyRequest {
+            settings: Some(v1::StudySettings {
+                stages: vec![v1::StudyStage::default(); 100],
+                ..v1::StudySettings::default()
+            }),
+            ..v1::CreateStudyRequest::default()
+        };
+        for (path, message, reason) in [
+            (
+                "/chefshat.v1.StudyService/CreateStudy",
+                create.encode_to_vec(),
+                Some("TOO_MANY_LARGE_MESSAGES"),
+            ),
+            ("/chefshat.v1.PlayService/Play", play.encode_to_vec(), None),
+        ] {
+            let body = Body::new(http_body_util::Full::new(Bytes::from(framed(&message))));
+            let answer = services.call(request(path, body)).await;
+            let found = reason_of(answer.expect("infallible"));
+            assert_eq!(found.as_deref(), reason, "{path}");
+        }
+    }
+
     #[tokio::test]
     async fn a_permit_is_held_until_a_call_has_answered_and_a_stream_asks_for_more() {
         let limits = limits();
@@ -735,9 +868,9 @@ mod tests {
         let mut call = Box::pin(services.call(request("/chefshat.v1.PlayService/Play", body)));
         assert!((&mut call).now_or_never().is_none(), "it is executed");
         let size = size_of::<v1::SeatCommand>();
-        assert!(limits.decoding().taken() > 700 * size);
+        assert!(limits.playing().taken() > 700 * size);
         release.send(()).expect("waiting");
         call.await.expect("infallible");
-        assert_eq!(limits.decoding().taken(), 0);
+        assert_eq!(limits.playing().taken(), 0);
     }
 }

@@ -55,6 +55,7 @@ pub struct CallLimits {
     histories: Arc<Places>,
     waiting: Arc<Places>,
     decoding: Decoding,
+    playing: Decoding,
     calls: Rate,
     wrong_codes: Rate,
     all_wrong_codes: Rate,
@@ -116,6 +117,7 @@ impl CallLimits {
             histories: Places::new(MAX_HISTORY / HISTORY_STEP, shares),
             waiting: Places::new(MAX_WAITING, shares),
             decoding: Decoding::new(shares),
+            playing: Decoding::new(shares),
             calls: Rate::new(CALLS_PER_SECOND, CALLS_AT_ONCE),
             wrong_codes: Rate::new(WRONG_CODES_PER_SECOND, WRONG_CODES_AT_ONCE),
             all_wrong_codes: Rate::new(ALL_WRONG_CODES_PER_SECOND, ALL_WRONG_CODES_AT_ONCE),
@@ -135,6 +137,12 @@ impl CallLimits {
     /// The memory for messages that are received and decoded.
     pub fn decoding(&self) -> &Decoding {
         &self.decoding
+    }
+
+    /// As much memory for messages of players: none of theirs waits for a study, an import or a vector
+    /// stream.
+    pub fn playing(&self) -> &Decoding {
+        &self.playing
     }
 
     /// Admits a call that counts as `cost` calls, or a stream, at once, if its caller has made few.

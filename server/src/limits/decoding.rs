@@ -16,7 +16,7 @@ pub(crate) const MAX_DECODED: usize = 96 * 1024 * 1024;
 pub const SMALL_MESSAGE: usize = 4 * 1024;
 /// What takes at most this many bytes is decoded without a permit.
 pub const SMALL_DECODED: usize = 8 * 1024;
-/// How long a client may take to send one message that is not small.
+/// How long a client may take to send one message, and the end of a call that has only one.
 pub const MESSAGE_TIMEOUT: Duration = Duration::from_secs(30);
 /// Bytes of one place.
 const PLACE: usize = 1024;

@@ -127,20 +127,24 @@ fn of_all() -> String {
         (
             "bytes of messages that are received at a time, twice each, without those of up to 4 KiB",
             format!(
-                "{} MiB; others wait for {}. A message must arrive within {}",
+                "{} MiB, and as much for those of players; others wait for {}",
                 decoding::MAX_RECEIVED >> 20,
-                seconds(places::MAX_WAIT),
-                seconds(decoding::MESSAGE_TIMEOUT)
+                seconds(places::MAX_WAIT)
             ),
             "",
         ),
         (
             "memory of decoded messages, without those of up to 8 KiB",
             format!(
-                "{} MiB; others wait for {}",
+                "{} MiB, and as much for those of players; others wait for {}",
                 decoding::MAX_DECODED >> 20,
                 seconds(places::MAX_WAIT)
             ),
+            "",
+        ),
+        (
+            "time in which a message must arrive, and the end of a call that has only one",
+            seconds(decoding::MESSAGE_TIMEOUT),
             "",
         ),
         (
@@ -309,26 +313,38 @@ fn of_each() -> String {
     )
 }
 
-/// What the messages of each call may be, those of most calls in the first row.
+/// What the messages of each call may be, what a call counts as and which place it takes, those of
+/// most calls in the first row.
 fn of_messages() -> String {
     let kib = |bytes: usize| format!("{} KiB", number(bytes >> 10));
-    let row = |name: String, limits: &MessageLimits| {
-        let elements = number(limits.elements);
-        [name, kib(limits.bytes), elements, kib(limits.memory)]
+    let row = |name: String, limits: &MessageLimits, charge: u64, streams: bool| {
+        let place = if streams { "stream" } else { "call" };
+        [
+            name,
+            kib(limits.bytes),
+            number(limits.elements),
+            kib(limits.memory),
+            charge.to_string(),
+            place.to_owned(),
+        ]
     };
     let own = Call::all().filter(|call| call.path.starts_with("/chefshat.v1."));
-    let special = own.filter(|call| call.message != MessageLimits::USUAL);
+    let special =
+        own.filter(|call| call.message != MessageLimits::USUAL || call.charge != 1 || call.streams);
     let special = special.map(|call| {
         let name = call.path.trim_start_matches("/chefshat.v1.");
-        row(format!("`{}`", name.replace('/', ".")), &call.message)
+        let name = format!("`{}`", name.replace('/', "."));
+        row(name, &call.message, call.charge, call.streams)
     });
-    let usual = row("all others".to_owned(), &MessageLimits::USUAL);
+    let usual = row("all others".to_owned(), &MessageLimits::USUAL, 1, false);
     let rows: Vec<_> = std::iter::once(usual).chain(special).collect();
     let header = [
         "messages of a call",
         "longest",
         "submessages, texts in lists, entries of maps",
         "memory once decoded",
+        "counts as",
+        "place",
     ];
     table(header, &rows)
 }
