@@ -22,6 +22,7 @@ mod cli {
     mod migrate;
     mod participant;
     mod ratings;
+    mod records;
     mod render;
     mod room;
     mod run;
