@@ -29,8 +29,8 @@ use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down};
 use crate::access::Caller;
 use crate::config::{
-    ANALYSIS_TIME, MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_STEPS, MAX_ANALYSIS_TIME,
-    MIN_ANALYSIS_UPDATE,
+    ANALYSIS_PATIENCE, ANALYSIS_TIME, MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_STEPS,
+    MAX_ANALYSIS_TIME, MIN_ANALYSIS_PATIENCE, MIN_ANALYSIS_UPDATE,
 };
 use crate::limits::{Payer, Places, Queued, Refused, SLICE, WorkQueue};
 use crate::tasks::short;
@@ -213,8 +213,9 @@ impl AnalysisService for Analyses {
 /// An analysis that pauses between its slices.
 struct Analysis {
     plan: Plan,
-    /// When the client stops waiting.
-    due: Option<Instant>,
+    /// When it ends with what it has: before its client stops waiting, or when it has waited long
+    /// for threads.
+    due: Instant,
     /// Processor time of the slices that have ended.
     used: Duration,
     updated: Instant,
@@ -239,9 +240,12 @@ struct Evaluating {
 
 impl Analysis {
     fn new(knowledge: Knowledge, plan: Plan, due: Option<Instant>) -> Self {
+        let patience = (plan.time * ANALYSIS_PATIENCE).max(MIN_ANALYSIS_PATIENCE);
+        let patient = Instant::now() + patience;
+        let due = due.and_then(|due| due.checked_sub(BEFORE_DEADLINE));
         Self {
             plan,
-            due: due.and_then(|due| due.checked_sub(BEFORE_DEADLINE)),
+            due: due.map_or(patient, |due| due.min(patient)),
             used: Duration::ZERO,
             updated: Instant::now(),
             stage: Stage::Begun(Box::new(knowledge)),
@@ -278,7 +282,7 @@ impl Analysis {
         let due = self.due;
         let spent = |done: u64, all: u64, time: Duration| {
             let elapsed = (used + own.used()).as_secs_f64() / time.as_secs_f64();
-            let is_over = stopped() || due.is_some_and(|due| Instant::now() >= due);
+            let is_over = stopped() || Instant::now() >= due;
             let done = done as f64 / all as f64;
             if is_over { 1.0 } else { done.max(elapsed) }
         };
@@ -496,13 +500,13 @@ mod tests {
         Knowledge::new(rules, &game.observe(Viewer::Seat(seat)), &history).expect("known")
     }
 
-    fn analysis(due: Option<Instant>) -> Analysis {
+    fn analysis() -> Analysis {
         let message = v1::EvaluateRequest {
             rollouts: 1_000_000,
             time_ms: 10_000,
             ..v1::EvaluateRequest::default()
         };
-        Analysis::new(knowledge(), plan(&message).expect("allowed"), due)
+        Analysis::new(knowledge(), plan(&message).expect("allowed"), None)
     }
 
     #[test]
@@ -511,10 +515,12 @@ mod tests {
             let advanced = analysis.advance(OwnTime::start(), &|| stopped, |_| {});
             advanced.expect("possible deals")
         };
-        let mut analysis = analysis(None);
+        let mut analysis = analysis();
+        let patience = Instant::now() + Duration::from_secs(100);
+        assert!(analysis.due <= patience, "threads may never be free");
         assert!(advance(&mut analysis, false).is_none(), "much is left");
         assert!(analysis.used >= SLICE);
-        analysis.due = Some(Instant::now());
+        analysis.due = Instant::now();
         // The hands and each action take a few deals even then.
         let answer = std::iter::from_fn(|| Some(advance(&mut analysis, false))).take(100);
         let answer = answer.flatten().next().expect("an answer");
