@@ -1,7 +1,7 @@
 //! What a message costs its receiver, counted in its encoded bytes before they are decoded. An empty
 //! submessage takes 2 bytes and can decode into hundreds: a receiver that decodes first has already
 //! paid. [`Shape`] holds what decoding depends on: which fields are lists and how large the decoded
-//! messages are. `build/shapes.rs` generates one for each message.
+//! messages are. `tests/generated/shapes.rs` generates one for each message.
 
 mod worst;
 
@@ -16,7 +16,7 @@ pub use worst::Filling;
 pub mod shapes {
     use super::{Field, Kind, Method, Shape};
 
-    include!(concat!(env!("OUT_DIR"), "/shapes.rs"));
+    include!("../generated/shapes.rs");
 }
 
 /// Deepest nesting of messages that is counted. No message of the protocol needs half as much.

@@ -3,6 +3,7 @@
 //! beside this crate. The documentation of each item is the comment in its `.proto` file.
 
 pub mod cost;
+mod timestamp;
 
 /// Everything of package `chefshat.v1`.
 #[allow(
@@ -13,12 +14,11 @@ pub mod cost;
     reason = "generated code"
 )]
 pub mod v1 {
-    include!(concat!(env!("OUT_DIR"), "/chefshat.v1.rs"));
-    include!(concat!(env!("OUT_DIR"), "/chefshat.v1.serde.rs"));
+    include!("../generated/chefshat.v1.rs");
+    include!("../generated/chefshat.v1.serde.rs");
 }
 
-/// A point in time, for expressions.
-pub use pbjson_types::Timestamp;
+pub use timestamp::Timestamp;
 
 /// The encoded `FileDescriptorSet` of the protocol, for the reflection service.
-pub const DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/descriptors.bin"));
+pub const DESCRIPTORS: &[u8] = include_bytes!("../generated/descriptors.bin");

@@ -11,8 +11,8 @@ use serde::de::DeserializeOwned;
 
 /// The generated code.
 const GENERATED: [&str; 2] = [
-    include_str!(concat!(env!("OUT_DIR"), "/chefshat.v1.rs")),
-    include_str!(concat!(env!("OUT_DIR"), "/chefshat.v1.serde.rs")),
+    include_str!("../generated/chefshat.v1.rs"),
+    include_str!("../generated/chefshat.v1.serde.rs"),
 ];
 
 /// A map, and the check of its message.

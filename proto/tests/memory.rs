@@ -21,11 +21,21 @@ fn decoding_takes_no_more_memory_than_a_message_costs() {
         for filling in Filling::all(method.request) {
             let message = filling.longest(LONGEST);
             let cost = (method.request.cost(&message, MOST)).expect("within what is allowed");
-            MEMORY.reset_peak_usage();
-            let before = MEMORY.current_usage();
-            let request = (method.decode)(&message);
-            let taken = MEMORY.peak_usage() - before;
-            drop(request.expect("it can be decoded"));
+            let take = || {
+                MEMORY.reset_peak_usage();
+                let before = MEMORY.current_usage();
+                let request = (method.decode)(&message);
+                let taken = MEMORY.peak_usage() - before;
+                drop(request.expect("it can be decoded"));
+                taken
+            };
+            // What the thread of the test runner allocates meanwhile only adds.
+            let mut taken = take();
+            for _ in 0..10 {
+                if taken > cost.memory {
+                    taken = taken.min(take());
+                }
+            }
             assert!(
                 taken <= cost.memory,
                 "{}: {} of {} bytes takes {taken} bytes, and costs {cost:?}",

@@ -30,13 +30,13 @@ pub use received::Received;
 /// The streaming services, with [`Updates`] as their responses.
 pub mod service {
     #![allow(missing_docs, unreachable_pub, clippy::all, reason = "generated code")]
-    tonic::include_proto!("chefshat.v1");
+    include!("../../generated/chefshat.v1.rs");
 }
 
 /// Streams between nodes, with [`Updates`] as their responses.
 pub mod peer {
     #![allow(missing_docs, unreachable_pub, clippy::all, reason = "generated code")]
-    tonic::include_proto!("chefshat.peer.v1");
+    include!("../../generated/chefshat.peer.v1.rs");
 }
 
 /// Field of the updates in a response.

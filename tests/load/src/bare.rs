@@ -19,7 +19,7 @@ use proto::{Batch, Item};
 /// Generated from `proto/bare.proto`.
 #[allow(unreachable_pub, missing_docs, clippy::all, reason = "generated code")]
 pub(crate) mod proto {
-    tonic::include_proto!("chefshat.bare");
+    include!("../generated/chefshat.bare.rs");
 }
 
 /// Capacity of a room's mailbox, as in the game server.
