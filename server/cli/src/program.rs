@@ -2,6 +2,7 @@
 
 use std::io::{self, IsTerminal as _};
 use std::process::ExitCode;
+use std::sync::LazyLock;
 
 use clap::builder::FalseyValueParser;
 use clap::{Parser, Subcommand};
@@ -31,12 +32,21 @@ pub trait Commands: Subcommand {
     }
 }
 
+/// The version, with the commit of a release.
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    let version = env!("CARGO_PKG_VERSION");
+    match option_env!("CHEFSHAT_COMMIT") {
+        Some(commit) => format!("{version} ({commit})"),
+        None => version.to_owned(),
+    }
+});
+
 /// Chef's Hat: a game server for agents, robots and people.
 #[derive(Debug, Parser)]
 #[command(
     name = "chefshat",
     bin_name = "chefshat",
-    version,
+    version = VERSION.as_str(),
     propagate_version = true
 )]
 pub struct CommandLine<C: Subcommand> {

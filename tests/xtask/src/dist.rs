@@ -13,7 +13,7 @@ use crate::failure::Failure;
 use crate::places::{DEPLOYMENT, Places};
 use crate::setup::{self, at};
 use crate::steps::Steps;
-use crate::wheels::{self, tool};
+use crate::wheels::{self, published, tool};
 
 /// The programs: the server, and what only some need beside it.
 const PROGRAMS: [&str; 2] = ["chefshat", "chefshat-lab"];
@@ -69,7 +69,9 @@ pub(crate) fn run(
         date: read(git(places).args(["log", "-1", "--format=%ct"]))?,
     };
     steps.program("static binary", &mut release.static_binary())?;
-    steps.run("check that it is static", || release.check_static())?;
+    steps.run("check that it is static and names no folder", || {
+        release.check_static()
+    })?;
     steps.run("archive of the binary", || release.binary_archive())?;
     steps.run("Debian package", || release.debian())?;
     steps.program("package crates", &mut release.package_crates())?;
@@ -110,7 +112,7 @@ struct Release<'a> {
 
 impl Release<'_> {
     fn static_binary(&self) -> Command {
-        let mut build = tool(self.places, "cargo-zigbuild", "");
+        let mut build = published(self.places, tool(self.places, "cargo-zigbuild", ""));
         build.args(["zigbuild", "--locked", "--profile", "dist"]);
         build.args(["--target", TARGET]);
         for program in PROGRAMS {
@@ -141,12 +143,18 @@ impl Release<'_> {
                 .arg("--program-headers")
                 .arg(&binary),
         )?;
-        match headers.contains("INTERP") {
-            true => Err(Failure::new(format!(
-                "{} needs libraries",
-                binary.display()
-            ))),
-            false => Ok(()),
+        let shown = binary.display();
+        if headers.contains("INTERP") {
+            return Err(Failure::new(format!("{shown} needs libraries")));
+        }
+        let bytes = fs::read(&binary).map_err(|error| at(&binary, &error))?;
+        let root = self.places.root.display().to_string();
+        match bytes
+            .windows(root.len())
+            .position(|it| it == root.as_bytes())
+        {
+            Some(_) => Err(Failure::new(format!("{shown} names the folder {root}"))),
+            None => Ok(()),
         }
     }
 

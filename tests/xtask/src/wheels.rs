@@ -37,7 +37,7 @@ pub(crate) fn run(
         Ok(())
     })?;
     for package in BUILT_FROM_RUST {
-        let mut maturin = tool(places, "maturin", package);
+        let mut maturin = published(places, tool(places, "maturin", package));
         maturin
             .args(["build", "--profile", profile, "--out"])
             .arg(&wheels);
@@ -131,6 +131,27 @@ pub(crate) fn built(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
         .collect();
     wheels.sort();
     Ok(wheels)
+}
+
+/// The environment of a build whose program others run: it names its commit, and no folder of this
+/// machine.
+pub(crate) fn published(places: &Places, mut build: Command) -> Command {
+    let mut git = Command::new("git");
+    git.current_dir(&places.root);
+    if let Ok(commit) = read(git.args(["log", "-1", "--format=%h %cs"])) {
+        build.env("CHEFSHAT_COMMIT", commit);
+    }
+    let home = std::env::var_os("HOME")
+        .map(PathBuf::from)
+        .unwrap_or_default();
+    let of_cargo = std::env::var_os("CARGO_HOME").map_or(home.join(".cargo"), PathBuf::from);
+    let folders = [(&places.root, "."), (&of_cargo, "cargo")];
+    let remap =
+        |(from, to): (&PathBuf, &str)| format!("--remap-path-prefix={}={to}", from.display());
+    build.env("CARGO_ENCODED_RUSTFLAGS", folders.map(remap).join("\x1f"));
+    let remap = |(from, to): (&PathBuf, &str)| format!("-ffile-prefix-map={}={to}", from.display());
+    build.env("CFLAGS", folders.map(remap).join(" "));
+    build
 }
 
 /// A program of the builders' environment, in a folder of the source tree.
