@@ -3,6 +3,7 @@
 
 use std::ffi::OsStr;
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use crate::failure::Failure;
 use crate::places::Places;
@@ -54,21 +55,57 @@ pub(crate) fn run(command: &mut Command) -> Result<(), Failure> {
     }
 }
 
-/// Runs a command; what it prints is returned, or in the failure.
-pub(crate) fn run_captured(command: &mut Command) -> Result<String, Failure> {
-    let output = command
-        .stdin(Stdio::null())
-        .output()
-        .map_err(|error| cannot_start(command, &error))?;
-    let printed = [output.stdout, output.stderr].concat();
-    let printed = String::from_utf8_lossy(&printed).into_owned();
-    match output.status.success() {
-        true => Ok(printed),
+/// What a command printed, and the processor time that it and what it started took.
+pub(crate) struct Captured {
+    pub(crate) printed: String,
+    pub(crate) computed: Duration,
+    pub(crate) result: Result<(), Failure>,
+}
+
+/// Runs a command under the shell's `time`: on a busy machine, processor time says more about a step
+/// than the time on a clock.
+pub(crate) fn run_captured(command: &Command) -> Captured {
+    let mut shell = Command::new("bash");
+    shell.args(["-c", "TIMEFORMAT='%U %S'; time \"$@\"", "bash"]);
+    shell.arg(command.get_program()).args(command.get_args());
+    for (name, value) in command.get_envs() {
+        match value {
+            Some(value) => shell.env(name, value),
+            None => shell.env_remove(name),
+        };
+    }
+    if let Some(folder) = command.get_current_dir() {
+        shell.current_dir(folder);
+    }
+    let output = match shell.stdin(Stdio::null()).output() {
+        Ok(output) => output,
+        Err(error) => {
+            return Captured {
+                printed: String::new(),
+                computed: Duration::ZERO,
+                result: Err(cannot_start(&shell, &error)),
+            };
+        }
+    };
+    let errors = String::from_utf8_lossy(&output.stderr);
+    let (errors, times) = match errors.trim_end().rsplit_once('\n') {
+        Some((errors, times)) => (errors, times),
+        None => ("", errors.trim_end()),
+    };
+    let seconds = times.split(' ').map(|it| it.parse::<f64>().unwrap_or(0.0));
+    let printed = format!("{}{errors}", String::from_utf8_lossy(&output.stdout));
+    let result = match output.status.success() {
+        true => Ok(()),
         false => Err(Failure::new(format!(
-            "{printed}`{}`: {}",
+            "`{}`: {}",
             line(command),
             output.status
         ))),
+    };
+    Captured {
+        printed,
+        computed: Duration::from_secs_f64(seconds.sum()),
+        result,
     }
 }
 
@@ -126,6 +163,21 @@ mod tests {
                 .to_string()
                 .starts_with("cannot start `no-such-program`: ")
         );
+    }
+
+    #[test]
+    fn what_is_captured_comes_with_its_processor_time() {
+        let script =
+            "echo $WORD; echo wrong >&2; i=0; while [ $i -lt 200000 ]; do i=$((i+1)); done; exit 4";
+        let mut command = Command::new("sh");
+        command.args(["-c", script]).env("WORD", "said");
+        let captured = run_captured(&command);
+        assert_eq!(captured.printed, "said\nwrong");
+        assert!(captured.computed > Duration::ZERO);
+        let failure = captured.result.unwrap_err().to_string();
+        assert!(failure.ends_with(": exit status: 4"), "{failure}");
+        let missing = run_captured(&Command::new("no-such-program"));
+        assert!(missing.result.is_err() && missing.printed.contains("no-such-program"));
     }
 
     #[test]

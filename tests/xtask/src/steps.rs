@@ -24,6 +24,8 @@ struct Step {
     name: String,
     outcome: Outcome,
     took: Duration,
+    /// Processor time of its program, if that was captured.
+    computed: Option<Duration>,
 }
 
 /// Steps that run beside those of other lanes.
@@ -44,28 +46,30 @@ impl Steps {
         name: &str,
         work: impl FnOnce() -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        self.record(name, || (work(), String::new()))
+        self.record(name, || (work(), None))
     }
 
-    /// Runs one step that returns also what it printed.
+    /// Runs one step that returns also what its program printed and computed.
     fn record(
         &mut self,
         name: &str,
-        work: impl FnOnce() -> (Result<(), Failure>, String),
+        work: impl FnOnce() -> (Result<(), Failure>, Option<(String, Duration)>),
     ) -> Result<(), Failure> {
         println!("\n==> {name}");
         let start = Instant::now();
-        let (result, output) = work();
+        let (result, program) = work();
+        let computed = program.as_ref().map(|(_, computed)| *computed);
         let outcome = match result {
             Ok(()) => Outcome::Passed,
             Err(_) => Outcome::Failed {
-                output: last_lines(&output),
+                output: program.map_or_else(String::new, |(output, _)| last_lines(&output)),
             },
         };
         self.done.push(Step {
             name: name.to_owned(),
             outcome,
             took: start.elapsed(),
+            computed,
         });
         result.map_err(|failure| Failure::new(format!("{name} failed: {failure}")))
     }
@@ -75,15 +79,13 @@ impl Steps {
         match self.in_lane {
             false => self.run(name, || command::run(command)),
             true => self.record(name, || {
-                let (result, output) = match command::run_captured(command) {
-                    Ok(output) => (Ok(()), output),
-                    Err(failure) => {
-                        let failed = Err(Failure::new("see its output"));
-                        (failed, failure.to_string())
-                    }
-                };
-                println!("\n==> {name}, ended\n{}", output.trim_end());
-                (result, output)
+                let command::Captured {
+                    printed,
+                    computed,
+                    result,
+                } = command::run_captured(command);
+                println!("\n==> {name}, ended\n{}", printed.trim_end());
+                (result, Some((printed, computed)))
             }),
         }
     }
@@ -130,6 +132,7 @@ impl Steps {
             name: name.to_owned(),
             outcome,
             took: Duration::ZERO,
+            computed: None,
         });
     }
 
@@ -160,12 +163,18 @@ impl Steps {
             name,
             outcome,
             took,
+            computed,
         } in &self.done
         {
             let seconds = took.as_secs_f64();
+            let computed = computed.map_or_else(String::new, |computed| {
+                format!(", {:.1} s of processors", computed.as_secs_f64())
+            });
             let line = match outcome {
-                Outcome::Passed => format!("ok       {name:width$}  {seconds:6.1} s"),
-                Outcome::Failed { .. } => format!("FAILED   {name:width$}  {seconds:6.1} s"),
+                Outcome::Passed => format!("ok       {name:width$}  {seconds:6.1} s{computed}"),
+                Outcome::Failed { .. } => {
+                    format!("FAILED   {name:width$}  {seconds:6.1} s{computed}")
+                }
                 Outcome::Skipped { reason } => format!("skipped  {name:width$}  {reason}"),
             };
             writeln!(text, "{line}").expect("a String grows as needed");
@@ -236,7 +245,8 @@ mod tests {
             Box::new(move |steps| program(steps, "second", "exit 0")),
         ];
         let failure = steps.beside(lanes).unwrap_err();
-        assert_eq!(failure.to_string(), "first failed: see its output");
+        let failure = failure.to_string();
+        assert!(failure.starts_with("first failed: `sh -c "), "{failure}");
         let summary = steps.summary();
         assert!(summary.contains("FAILED   first "), "{summary}");
         assert!(summary.contains("ok       second "), "{summary}");
