@@ -24,6 +24,9 @@ pub(crate) enum LoadError {
     /// The counts of both sides differ.
     #[error("the counts do not agree: {0}")]
     Count(String),
+    /// Some scenarios, each with its error; the others are reported.
+    #[error("not measured to the end: {0}")]
+    Scenarios(String),
     /// Something exceeded its time limit.
     #[error("{0} did not come to an end")]
     Stuck(&'static str),

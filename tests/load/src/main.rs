@@ -58,18 +58,26 @@ async fn measure(load: &Load) -> Result<(), LoadError> {
     }
     let disk_syncs = (load.durability.then(|| disk::syncs_per_second(load))).transpose()?;
     let mut outcomes = Vec::new();
+    let mut failures = Vec::new();
     for scenario in scenario::scenarios(load) {
-        eprintln!("{} ...", scenario.name());
-        outcomes.push(scenario::run(load, scenario).await?);
+        let name = scenario.name();
+        eprintln!("{name} ...");
+        let (outcome, failed) = scenario::run(load, scenario).await;
+        // What was measured before is reported; hours of work may be in it.
+        outcomes.extend((!outcome.rounds.is_empty()).then_some(outcome));
+        failures.extend(failed.map(|error| format!("{name}: {error}")));
     }
-    let report = Report::new(load, &outcomes, disk_syncs);
+    let report = Report::new(load, &outcomes, disk_syncs, &failures);
     if load.json {
         let json = serde_json::to_string_pretty(&report).expect("a report is plain data");
         println!("{json}");
     } else {
         print!("{}", report.to_text());
     }
-    Ok(())
+    match failures.is_empty() {
+        true => Ok(()),
+        false => Err(LoadError::Scenarios(failures.join("; "))),
+    }
 }
 
 /// The runtime of one side. With `--pin`, binds the process to its core before the first thread

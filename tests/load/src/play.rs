@@ -11,6 +11,7 @@ use rand::rngs::SmallRng;
 use rand::{RngExt as _, SeedableRng as _};
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinSet;
+use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::codegen::http::uri::PathAndQuery;
 use tonic::transport::{Channel, Endpoint};
@@ -60,8 +61,8 @@ pub(crate) async fn segment(
     let mut senders = Vec::with_capacity(plan.streams);
     let mut streams = JoinSet::new();
     for number in 0..plan.streams {
-        let (requests, waiting) = mpsc::channel(REQUESTS);
-        let inbound = open(endpoint.connect().await?, waiting).await?;
+        let (requests, mut waiting) = mpsc::channel(REQUESTS);
+        let channel = endpoint.connect().await?;
         let stream = Stream {
             requests: requests.downgrade(),
             report: report.clone(),
@@ -72,7 +73,14 @@ pub(crate) async fn segment(
             tally: Tally::default(),
         };
         senders.push(requests);
-        streams.spawn(stream.run(inbound));
+        streams.spawn(async move {
+            // A server ends a stream that attaches nobody; thousands of rooms take a while.
+            let Some(first) = waiting.recv().await else {
+                return Ok(stream.tally);
+            };
+            let requests = tokio_stream::once(first).chain(ReceiverStream::new(waiting));
+            stream.run(open(channel, requests).await?).await
+        });
     }
     drop(report);
     let host = Host::new(endpoint.connect().await?, plan.clone(), senders, news);
@@ -122,14 +130,13 @@ pub(crate) async fn segment(
 /// Opens a stream like a generated client, but decodes only the necessary fields.
 pub(crate) async fn open(
     channel: Channel,
-    requests: mpsc::Receiver<v1::PlayRequest>,
+    requests: impl tokio_stream::Stream<Item = v1::PlayRequest> + Send + 'static,
 ) -> Result<Streaming<Weighed>, LoadError> {
     let mut client = tonic::client::Grpc::new(channel);
     client.ready().await?;
     let path = PathAndQuery::from_static("/chefshat.v1.PlayService/Play");
-    let requests = Request::new(ReceiverStream::new(requests));
     Ok(client
-        .streaming(requests, path, PlayCodec)
+        .streaming(Request::new(requests), path, PlayCodec)
         .await?
         .into_inner())
 }

@@ -36,6 +36,8 @@ pub(crate) struct Report {
     /// Small synced writes the disk takes per second; only for games on disk.
     disk_syncs_per_second: Option<f64>,
     goals: Vec<Goal>,
+    /// Scenarios that ended before their last round, each with its error.
+    failed: Vec<String>,
 }
 
 /// A scenario.
@@ -119,6 +121,7 @@ impl Report {
         load: &Load,
         outcomes: &[Outcome],
         disk_syncs_per_second: Option<f64>,
+        failed: &[String],
     ) -> Self {
         let scenarios: Vec<Figures> = outcomes.iter().map(Figures::new).collect();
         Self {
@@ -128,6 +131,7 @@ impl Report {
             goals: goals(outcomes, &scenarios),
             scenarios,
             disk_syncs_per_second,
+            failed: failed.to_vec(),
         }
     }
 

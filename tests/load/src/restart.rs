@@ -15,6 +15,7 @@ use futures::{StreamExt as _, TryStreamExt as _};
 use serde::Serialize;
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinSet;
+use tokio_stream::wrappers::ReceiverStream;
 use tonic::Streaming;
 use tonic::transport::{Channel, Endpoint};
 
@@ -295,7 +296,8 @@ impl Run {
             })
             .collect();
         let (requests, waiting) = mpsc::channel(attach.len().max(1));
-        let mut inbound = play::open(endpoint.connect().await?, waiting).await?;
+        let mut inbound =
+            play::open(endpoint.connect().await?, ReceiverStream::new(waiting)).await?;
         self.send(&requests, attach).await;
         let mut seats = Vec::new();
         while let Some(commands) = self.next(&mut inbound, &mut seats).await? {

@@ -169,8 +169,26 @@ impl Outcome {
     }
 }
 
-/// Runs one scenario.
-pub(crate) async fn run(load: &Load, scenario: Scenario) -> Result<Outcome, LoadError> {
+/// Runs one scenario: what it showed, and why it ended before its last round, if it did.
+pub(crate) async fn run(load: &Load, scenario: Scenario) -> (Outcome, Option<LoadError>) {
+    let mut outcome = Outcome {
+        scenario,
+        rounds: Vec::new(),
+        server_us: latencies(),
+        client_ns: latencies(),
+        other_ns: latencies(),
+        other_build_ns: latencies(),
+        counts: Counts::default(),
+        other_answers: 0,
+        traffic: Traffic::default(),
+    };
+    let failed = rounds(load, &mut outcome).await.err();
+    (outcome, failed)
+}
+
+/// Measures the rounds of a scenario.
+async fn rounds(load: &Load, outcome: &mut Outcome) -> Result<(), LoadError> {
+    let scenario = outcome.scenario.clone();
     let mut plan = Plan {
         rooms: scenario.rooms,
         streams: scenario.streams,
@@ -190,17 +208,6 @@ pub(crate) async fn run(load: &Load, scenario: Scenario) -> Result<Outcome, Load
         plan.window = Duration::from_mins(1);
     }
     let purpose = scenario.purpose;
-    let mut outcome = Outcome {
-        scenario,
-        rounds: Vec::new(),
-        server_us: latencies(),
-        client_ns: latencies(),
-        other_ns: latencies(),
-        other_build_ns: latencies(),
-        counts: Counts::default(),
-        other_answers: 0,
-        traffic: Traffic::default(),
-    };
     let this_build = Launcher::new(load);
     let other_build = Launcher::of_other_build(load);
     for _ in 0..outcome.scenario.rounds {
@@ -252,7 +259,7 @@ pub(crate) async fn run(load: &Load, scenario: Scenario) -> Result<Outcome, Load
         }
         outcome.rounds.push(round);
     }
-    Ok(outcome)
+    Ok(())
 }
 
 /// Plays on a server; also returns the memory its process had before the first connection.

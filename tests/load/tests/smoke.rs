@@ -69,6 +69,21 @@ fn two_builds_are_measured_beside_the_same_bare_room_at_several_scales() {
 }
 
 #[test]
+fn a_scenario_that_fails_is_named_in_the_report() {
+    let output = run(&["--server", "http://127.0.0.1:1", "--rooms", "1", "--json"]);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(
+        errors.contains("not measured to the end: 1 room"),
+        "{errors}"
+    );
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["scenarios"], serde_json::json!([]), "{report:#}");
+    let failed = report["failed"][0].as_str().unwrap();
+    assert!(failed.contains("the connection failed"), "{failed}");
+}
+
+#[test]
 fn durable_rooms_are_measured_beside_ephemeral_ones() {
     let output = run(&["--smoke", "--durability", "--json"]);
     let errors = String::from_utf8_lossy(&output.stderr);
