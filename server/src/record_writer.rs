@@ -84,9 +84,11 @@ impl RecordWriter {
             return;
         }
         let writing = self.background.run(move || {
-            let lines = convert::lines_of(&stored);
             let path = chefshat_record::jsonl::path_of(&data_dir, &game.to_string());
-            chefshat_record::jsonl::write_private(&path, &lines).map(|()| path)
+            let written = chefshat_record::jsonl::write_private(&path, |write| {
+                convert::each_line_of(&stored, |line| write(&line));
+            });
+            written.map(|()| path)
         });
         match writing.await {
             Some(Ok(path)) => {

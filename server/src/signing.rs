@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use chefshat_proto::v1;
 use chefshat_record::atomic_file::{AtomicFile, WriteError};
-use chefshat_record::signature::{PublicKey, SigningKey};
+use chefshat_record::signature::{PublicKey, SigningKey, TextHash};
 use futures::future::Either;
 use tokio::sync::Semaphore;
 use tracing::error;
@@ -147,8 +147,9 @@ impl Signer {
         let game = header.game_id;
         let entries = journal.entries().await?;
         let signing = move || {
-            let lines = convert::record_lines(&header, &entries);
-            key.sign(&lines)
+            let mut hash = TextHash::default();
+            convert::each_record_line(&header, &entries, |line| hash = hash.and_line(&line));
+            key.sign_hash(hash)
         };
         let signature = match background {
             Some((background, _)) => background.run(signing).await,

@@ -141,12 +141,16 @@ pub fn copy(from: &Path, to: &Path) -> Result<(), RecordFileError> {
     Ok(file.finish()?)
 }
 
-/// Writes a record into a data directory. Only its owner may look into the folder of the records,
-/// as into the database: they have expressions that were not public.
+/// Writes a record, whose lines `lines` passes on one by one, into a data directory. Only its owner
+/// may look into the folder of the records, as into the database: they have expressions that were
+/// not public.
 ///
 /// # Errors
 /// The first error of the file system; the record is then unchanged.
-pub fn write_private(path: &Path, lines: &[RecordLine]) -> Result<(), RecordFileError> {
+pub fn write_private(
+    path: &Path,
+    lines: impl FnOnce(&mut dyn FnMut(&RecordLine)),
+) -> Result<(), RecordFileError> {
     if let Some(folder) = path.parent() {
         let made = std::fs::create_dir_all(folder);
         #[cfg(unix)]
@@ -156,7 +160,15 @@ pub fn write_private(path: &Path, lines: &[RecordLine]) -> Result<(), RecordFile
         });
         made.map_err(|source| io_error(path, source))?;
     }
-    write_to(AtomicFile::create_private(path)?, path, lines)
+    let mut file = AtomicFile::create_private(path)?;
+    let mut written = Ok(());
+    lines(&mut |line| {
+        if written.is_ok() {
+            written = write_line(&mut file, line);
+        }
+    });
+    written.map_err(|source| io_error(path, source))?;
+    Ok(file.finish()?)
 }
 
 fn write_to(

@@ -39,9 +39,14 @@ impl SigningKey {
 
     /// The signature of a record. A signature that its footer already has does not count.
     pub fn sign(&self, lines: &[v1::RecordLine]) -> v1::RecordSignature {
+        self.sign_hash(TextHash::of(lines))
+    }
+
+    /// The signature of a record whose lines were hashed one by one.
+    pub fn sign_hash(&self, hash: TextHash) -> v1::RecordSignature {
         v1::RecordSignature {
             public_key: self.public().0.to_vec(),
-            signature: (self.0.sign(&TextHash::of(lines).message()).as_ref()).to_vec(),
+            signature: (self.0.sign(&hash.message()).as_ref()).to_vec(),
             text_version: TEXT_VERSION,
         }
     }

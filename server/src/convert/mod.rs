@@ -38,7 +38,7 @@ pub use policy::{
     millis, policy_from_proto, policy_to_proto, requested_policy, set_default_clock_of_models,
 };
 pub use ratings::{leaderboard, rating_to_proto};
-pub use record::{lines_of, record_lines};
+pub use record::{each_line_of, each_record_line, lines_of, record_lines};
 pub use room::{
     awaited_to_proto, describe, describe_at, display_names_from_proto, fills_from_proto,
     participants, seats_to_proto, tournament_id, wizards_from_proto,

@@ -22,11 +22,34 @@ use chefshat_room::journal::{Change, Decided, Entry, GameHeader};
 
 /// All lines of the record of a game, from its header and its journal.
 pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::RecordLine> {
+    let mut lines = Vec::with_capacity(journal.len() * 2);
+    each_record_line(header, journal, |line| lines.push(line));
+    lines
+}
+
+/// Passes the same lines on one by one: those of a long game take far more memory than its journal.
+pub fn each_record_line(
+    header: &Arc<GameHeader>,
+    journal: &[Entry],
+    mut take: impl FnMut(v1::RecordLine),
+) {
     if header.is_physical() {
-        return physical_record_lines(header, journal);
+        return physical_record_lines(header, journal)
+            .into_iter()
+            .for_each(take);
     }
+    let mut take = |mut line: Line| {
+        if !header.wizards.is_empty() {
+            by_wizard(header, &mut line);
+        }
+        take(v1::RecordLine { line: Some(line) });
+    };
+    // The first line says how the game ended.
+    let mut ended = Core::new(without_labels(header));
+    journal.iter().for_each(|entry| ended.refold(entry));
+    take(Line::Header(record_header(&ended)));
+    drop(ended);
     let mut core = Core::new(without_labels(header));
-    let mut body = Vec::with_capacity(journal.len() * 2);
     let mut attempts: Vec<u32> = Vec::new();
     let (mut decisions, mut hints) = (0, 0);
     for entry in journal {
@@ -39,13 +62,13 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
                     hints: std::mem::take(&mut hints),
                     ..decision(&core, entry, decided, &std::mem::take(&mut attempts))
                 };
-                body.push(Line::Decision(record));
+                take(Line::Decision(record));
             }
             Change::Expressed {
                 seat,
                 record_only: true,
                 expression,
-            } => body.push(Line::PrivateExpression(v1::PrivateExpression {
+            } => take(Line::PrivateExpression(v1::PrivateExpression {
                 seat: seat_number(*seat),
                 elapsed_ms: elapsed_ms(entry),
                 expression: v1::Expression::decode(expression.as_ref()).ok(),
@@ -54,29 +77,21 @@ pub fn record_lines(header: &Arc<GameHeader>, journal: &[Entry]) -> Vec<v1::Reco
         }
         let before = core.log().len();
         core.refold(entry);
-        if let Change::Marked(_) = entry.change {
-            body.extend(last_marker(&core).map(Line::Marker));
+        if let Change::Marked(_) = entry.change
+            && let Some(marker) = last_marker(&core)
+        {
+            take(Line::Marker(marker));
         }
-        body.extend(
-            (before..core.log().len())
-                .filter_map(|position| event_to_proto(&core, position, Viewer::Everything))
-                .map(Line::Event),
-        );
+        (before..core.log().len())
+            .filter_map(|position| event_to_proto(&core, position, Viewer::Everything))
+            .for_each(|event| take(Line::Event(event)));
     }
-    let footer = Line::Footer(v1::RecordFooter {
+    take(Line::Footer(v1::RecordFooter {
         state: state_to_proto(core.state()).into(),
         events: u64::try_from(core.log().len()).unwrap_or(u64::MAX),
         decisions,
         ..v1::RecordFooter::default()
-    });
-    if !header.wizards.is_empty() {
-        body.iter_mut().for_each(|line| by_wizard(header, line));
-    }
-    std::iter::once(Line::Header(record_header(&core)))
-        .chain(body)
-        .chain(std::iter::once(footer))
-        .map(|line| v1::RecordLine { line: Some(line) })
-        .collect()
+    }));
 }
 
 /// Sets the source of an expression of a seat that a person plays as another kind. Others in the room
@@ -99,15 +114,28 @@ fn by_wizard(header: &GameHeader, line: &mut Line) {
 /// All lines of the record of a stored game.
 pub fn lines_of(stored: &StoredGame) -> Cow<'_, [v1::RecordLine]> {
     match stored {
-        StoredGame::Hosted(header, journal, signature) => {
-            let mut lines = record_lines(header, journal);
-            if let Some(Line::Footer(footer)) = lines.last_mut().and_then(|it| it.line.as_mut()) {
-                footer.signature = signature.as_deref().cloned();
-                footer.participant_removed = header.participant_removed;
-            }
+        StoredGame::Hosted(..) => {
+            let mut lines = Vec::new();
+            each_line_of(stored, |line| lines.push(line.into_owned()));
             Cow::Owned(lines)
         }
         StoredGame::Imported(lines) => Cow::Borrowed(lines),
+    }
+}
+
+/// Passes the same lines on one by one.
+pub fn each_line_of<'a>(stored: &'a StoredGame, mut take: impl FnMut(Cow<'a, v1::RecordLine>)) {
+    match stored {
+        StoredGame::Hosted(header, journal, signature) => {
+            each_record_line(header, journal, |mut line| {
+                if let Some(Line::Footer(footer)) = &mut line.line {
+                    footer.signature = signature.as_deref().cloned();
+                    footer.participant_removed = header.participant_removed;
+                }
+                take(Cow::Owned(line));
+            });
+        }
+        StoredGame::Imported(lines) => lines.iter().for_each(|line| take(Cow::Borrowed(line))),
     }
 }
 

@@ -21,12 +21,15 @@ pub struct TextHash(pub(super) [u8; 32]);
 impl TextHash {
     /// The hash of a record in its canonical text.
     pub(super) fn of(lines: &[v1::RecordLine]) -> Self {
+        (lines.iter()).fold(Self::default(), |hash, line| hash.and_line(line))
+    }
+
+    /// Adds the next line of a record in its canonical text.
+    #[must_use]
+    pub fn and_line(self, line: &v1::RecordLine) -> Self {
         let mut text = Vec::new();
-        lines.iter().fold(Self::default(), |hash, line| {
-            text.clear();
-            write_text(line, &mut text);
-            hash.and(&text)
-        })
+        write_text(line, &mut text);
+        self.and(&text)
     }
 
     /// Adds a line as it stands in a file. The footer has no map, so that its text without the
