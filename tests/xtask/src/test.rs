@@ -1,11 +1,12 @@
 //! `cargo xtask test`: the tests of every language, with the paths of the others. The system tests,
 //! in Rust, start agents in Python, JavaScript and C++; the tests of those start the server.
 
+use std::collections::BTreeSet;
 use std::process::Command;
 
 use clap::ValueEnum;
 
-use crate::command::{cargo, python_command, with_environment};
+use crate::command::{cargo, python_command, read, with_environment};
 use crate::failure::Failure;
 use crate::lint::OPTIONAL_FEATURES;
 use crate::places::{
@@ -17,7 +18,7 @@ use crate::web;
 use crate::wheels;
 
 /// The tests of a language, or of docker/, which can be run separately.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
 pub(crate) enum Part {
     /// Engine, server, Rust SDK and system tests, with the agent in C++.
     Rust,
@@ -30,6 +31,56 @@ pub(crate) enum Part {
     /// Backups, the tournament of friends in docs/access.md, and the proxies and images of docker/,
     /// with agents in all languages and a browser.
     Deployment,
+    /// Those that the changes since origin/main can break, committed or not.
+    Changed,
+}
+
+/// All parts, in the order in which they are named.
+const ALL: [Part; 5] = [
+    Part::Rust,
+    Part::Python,
+    Part::Node,
+    Part::Web,
+    Part::Deployment,
+];
+
+/// The parts that a change of a file can break. The server and the protocol are in all of them.
+fn broken_by(file: &str) -> &'static [Part] {
+    use Part::{Deployment, Node, Python, Rust, Web};
+    let folders: [(&str, &'static [Part]); 8] = [
+        ("clients/web/", &[Web, Deployment]),
+        // The system tests start agents of each language.
+        ("clients/node/", &[Rust, Node, Deployment]),
+        ("clients/cpp/", &[Rust]),
+        ("clients/python/", &[Rust, Python, Deployment]),
+        ("clients/robot/", &[Python]),
+        ("docs/", &[Rust, Python, Deployment]),
+        ("docker/", &[Rust, Deployment]),
+        ("tests/deployment/", &[Deployment]),
+    ];
+    match folders.iter().find(|(folder, _)| file.starts_with(folder)) {
+        Some((_, parts)) => parts,
+        None if file.ends_with(".md") => &[Rust, Python, Deployment],
+        None => &ALL,
+    }
+}
+
+/// The parts that the changes since the last common commit with origin/main can break.
+fn changed(places: &Places) -> Result<Vec<Part>, Failure> {
+    let git = |arguments: &[&str]| {
+        read(
+            Command::new("git")
+                .current_dir(&places.root)
+                .args(arguments),
+        )
+    };
+    let base = git(&["merge-base", "HEAD", "origin/main"]).unwrap_or_else(|_| "HEAD".to_owned());
+    let tracked = git(&["diff", "--name-only", &base])?;
+    let new = git(&["ls-files", "--others", "--exclude-standard"])?;
+    let files = tracked.lines().chain(new.lines());
+    let parts: BTreeSet<Part> = files.flat_map(broken_by).copied().collect();
+    println!("    changed since {base}: {parts:?}");
+    Ok(parts.into_iter().collect())
 }
 
 /// Sets up and runs the tests of one part, or of all; if `slow`, also those that take long: of the
@@ -40,7 +91,16 @@ pub(crate) fn run(
     only: Option<Part>,
     slow: bool,
 ) -> Result<(), Failure> {
-    let wants = |part| only.is_none_or(|only| only == part);
+    let parts = match only {
+        None => ALL.to_vec(),
+        Some(Part::Changed) => changed(places)?,
+        Some(part) => vec![part],
+    };
+    if parts.is_empty() {
+        steps.skip("tests", "nothing has changed");
+        return Ok(());
+    }
+    let wants = |part| parts.contains(&part);
     let has_python = !places.python_packages().is_empty();
     let (has_node, has_web) = (places.has_node_package(), places.has_web_package());
     let deployment = wants(Part::Deployment);
@@ -239,4 +299,33 @@ fn cargo_command(places: &Places) -> Command {
     let mut command = with_environment(places, cargo());
     command.current_dir(&places.root);
     command
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_selects_what_it_can_break() {
+        for (file, parts) in [
+            (
+                "clients/web/src/main.tsx",
+                &[Part::Web, Part::Deployment][..],
+            ),
+            ("clients/robot/README.md", &[Part::Python]),
+            ("docker/Dockerfile", &[Part::Rust, Part::Deployment]),
+            ("README.md", &[Part::Rust, Part::Python, Part::Deployment]),
+            ("server/src/lib.rs", &ALL),
+            ("proto/chefshat/v1/room.proto", &ALL),
+            ("Cargo.lock", &ALL),
+        ] {
+            assert_eq!(broken_by(file), parts, "{file}");
+        }
+        // Every folder of clients is known.
+        let clients = Places::find().unwrap().root.join("clients");
+        for client in std::fs::read_dir(clients).unwrap() {
+            let name = client.unwrap().file_name().into_string().unwrap();
+            assert_ne!(broken_by(&format!("clients/{name}/file")), ALL, "{name}");
+        }
+    }
 }
