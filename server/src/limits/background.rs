@@ -19,9 +19,6 @@ const CORES: usize = 4;
 /// Longest time for which decisions may be made faster than the rate.
 pub(super) const BURST: Duration = Duration::from_secs(60);
 
-/// How often a game that waits for space on the disk looks again.
-const SPACE_PAUSE: Duration = Duration::from_secs(1);
-
 /// Plays the games of built-in agents.
 #[derive(Debug)]
 pub struct Background {
@@ -60,17 +57,8 @@ impl Background {
     }
 
     /// Waits for the next slice of a game, and before its first one for a place among the games
-    /// that are played. `has_space`: whether the disk has space besides what is reserved for games
-    /// with participants; without it, those that nobody plays wait.
-    pub async fn turn(
-        self: Arc<Self>,
-        key: Key,
-        game: Option<Held>,
-        has_space: impl Fn() -> bool + Send,
-    ) -> Turn {
-        while !has_space() {
-            tokio::time::sleep(SPACE_PAUSE).await;
-        }
+    /// that are played.
+    pub async fn turn(self: Arc<Self>, key: Key, game: Option<Held>) -> Turn {
         let game = match game {
             Some(game) => game,
             None => self.games.take(key).await,
@@ -117,31 +105,5 @@ impl Background {
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Option<T> {
         self.threads.run(work).await
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
-
-    use tokio::time::timeout;
-
-    use super::*;
-
-    #[tokio::test(start_paused = true)]
-    async fn a_game_that_nobody_plays_waits_for_space_and_holds_no_place_meanwhile() {
-        const DAY: Duration = Duration::from_secs(24 * 60 * 60);
-        let background = Background::new(Shares::ALL, 1_000).expect("threads");
-        let background = Arc::new(background);
-        let has_space = Arc::new(AtomicBool::new(false));
-        let seen = Arc::clone(&has_space);
-        let turn = Arc::clone(&background).turn(Key::Local, None, move || seen.load(Relaxed));
-        let mut turn = Box::pin(turn);
-        timeout(DAY, &mut turn).await.expect_err("no space");
-        let other = Arc::clone(&background).turn(Key::Local, None, || true);
-        drop(timeout(DAY, other).await.expect("of another disk"));
-        has_space.store(true, Relaxed);
-        let granted = timeout(2 * SPACE_PAUSE, turn).await;
-        granted.expect("there is space again");
     }
 }

@@ -285,10 +285,11 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
             (turn, room.place) = (None, None);
         } else if turn.is_none() {
             let background = Arc::clone(&room.context.background);
-            let store = Arc::clone(&room.context.store);
-            let has_space = move || store.has_space();
-            let (owner, place) = (room.context.owner, room.place.take());
-            turn = Some(background.turn(owner, place, has_space).boxed());
+            turn = Some(
+                background
+                    .turn(room.context.owner, room.place.take())
+                    .boxed(),
+            );
         }
         if let Some(started) = room.start_search() {
             search = Some(started);
