@@ -3621,8 +3621,8 @@ pub struct EvaluateRequest {
     pub rollouts: u64,
     /// Milliseconds of computing, at most 10,000; 0: 1,000. Counting the possible deals is included,
     /// waiting for a thread is not. An analysis that could not end by the deadline of its call is
-    /// refused (TOO_MANY_ANALYSES); one that waits for ten times as long, 30 s at least, ends with
-    /// what it has.
+    /// refused (TOO_MANY_ANALYSES). Where other programs leave it hardly any processor time, it ends
+    /// with what it has when its threads have had it for ten times `time_ms`, at least 30 s.
     #[prost(uint32, tag = "4")]
     pub time_ms: u32,
     /// The built-in agent that plays all seats in rollouts: "random", "greedy" or "trained"; empty:

@@ -66,8 +66,8 @@ pub const MAX_ANALYSIS_STEPS: u64 = 500_000;
 pub const ANALYSIS_TIME: Duration = Duration::from_secs(1);
 /// Longest time of an analysis.
 pub const MAX_ANALYSIS_TIME: Duration = Duration::from_secs(10);
-/// How many times its time an analysis may take before it ends with what it has: other programs on
-/// the machine may leave it hardly any processor time.
+/// How many times its time the slices of an analysis may take before it ends with what it has: other
+/// programs on the machine may leave it hardly any processor time.
 pub const ANALYSIS_PATIENCE: u32 = 10;
 /// The least such time.
 pub const MIN_ANALYSIS_PATIENCE: Duration = Duration::from_secs(30);

@@ -133,7 +133,10 @@ impl Analyses {
             }
             match advanced.map_err(|error| refused("position", error.to_string()))? {
                 Some(answer) => return Ok(answer),
-                None => queued.computed(own, passed),
+                None => {
+                    analysis.patience = analysis.patience.saturating_sub(passed);
+                    queued.computed(own, passed);
+                }
             }
             ended = Some(slice);
         }
@@ -213,9 +216,10 @@ impl AnalysisService for Analyses {
 /// An analysis that pauses between its slices.
 struct Analysis {
     plan: Plan,
-    /// When it ends with what it has: before its client stops waiting, or when it has waited long
-    /// for threads.
-    due: Instant,
+    /// When its client stops waiting.
+    due: Option<Instant>,
+    /// Time that its further slices may take on threads that others leave little processor time.
+    patience: Duration,
     /// Processor time of the slices that have ended.
     used: Duration,
     updated: Instant,
@@ -240,12 +244,10 @@ struct Evaluating {
 
 impl Analysis {
     fn new(knowledge: Knowledge, plan: Plan, due: Option<Instant>) -> Self {
-        let patience = (plan.time * ANALYSIS_PATIENCE).max(MIN_ANALYSIS_PATIENCE);
-        let patient = Instant::now() + patience;
-        let due = due.and_then(|due| due.checked_sub(BEFORE_DEADLINE));
         Self {
+            patience: (plan.time * ANALYSIS_PATIENCE).max(MIN_ANALYSIS_PATIENCE),
             plan,
-            due: due.map_or(patient, |due| due.min(patient)),
+            due: due.and_then(|due| due.checked_sub(BEFORE_DEADLINE)),
             used: Duration::ZERO,
             updated: Instant::now(),
             stage: Stage::Begun(Box::new(knowledge)),
@@ -279,10 +281,11 @@ impl Analysis {
             evaluation,
         } = evaluating.as_mut();
         let (plan, used) = (&self.plan, self.used);
-        let due = self.due;
+        let (due, patience, begun) = (self.due, self.patience, Instant::now());
         let spent = |done: u64, all: u64, time: Duration| {
             let elapsed = (used + own.used()).as_secs_f64() / time.as_secs_f64();
-            let is_over = stopped() || Instant::now() >= due;
+            let now = Instant::now();
+            let is_over = stopped() || now - begun >= patience || due.is_some_and(|due| now >= due);
             let done = done as f64 / all as f64;
             if is_over { 1.0 } else { done.max(elapsed) }
         };
@@ -516,16 +519,22 @@ mod tests {
             advanced.expect("possible deals")
         };
         let mut analysis = analysis();
-        let patience = Instant::now() + Duration::from_secs(100);
-        assert!(analysis.due <= patience, "threads may never be free");
         assert!(advance(&mut analysis, false).is_none(), "much is left");
         assert!(analysis.used >= SLICE);
-        analysis.due = Instant::now();
-        // The hands and each action take a few deals even then.
-        let answer = std::iter::from_fn(|| Some(advance(&mut analysis, false))).take(100);
-        let answer = answer.flatten().next().expect("an answer");
-        assert!(answer.rollouts < 1_000_000);
-        assert!(answer.actions.iter().all(|action| action.rollouts >= 4));
-        assert_eq!(answer.hands.len(), 4);
+        assert_eq!(analysis.patience, Duration::from_secs(100));
+        let late = |analysis: &mut Analysis| analysis.due = Some(Instant::now());
+        let starved = |analysis: &mut Analysis| {
+            analysis.due = None;
+            analysis.patience = Duration::ZERO;
+        };
+        for end in [&late as &dyn Fn(&mut Analysis), &starved] {
+            end(&mut analysis);
+            // The hands and each action take a few deals even then.
+            let answer = std::iter::from_fn(|| Some(advance(&mut analysis, false))).take(100);
+            let answer = answer.flatten().next().expect("an answer");
+            assert!(answer.rollouts < 1_000_000);
+            assert!(answer.actions.iter().all(|action| action.rollouts >= 4));
+            assert_eq!(answer.hands.len(), 4);
+        }
     }
 }
