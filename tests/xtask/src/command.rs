@@ -66,7 +66,8 @@ pub(crate) struct Captured {
 /// than the time on a clock.
 pub(crate) fn run_captured(command: &Command) -> Captured {
     let mut shell = Command::new("bash");
-    shell.args(["-c", "TIMEFORMAT='%U %S'; time \"$@\"", "bash"]);
+    shell.args(["-c", "TIMEFORMAT=$'\\n%U %S'; time \"$@\"", "bash"]);
+    shell.env("LC_NUMERIC", "C").env_remove("LC_ALL");
     shell.arg(command.get_program()).args(command.get_args());
     for (name, value) in command.get_envs() {
         match value {
@@ -88,11 +89,7 @@ pub(crate) fn run_captured(command: &Command) -> Captured {
         }
     };
     let errors = String::from_utf8_lossy(&output.stderr);
-    let (errors, times) = match errors.trim_end().rsplit_once('\n') {
-        Some((errors, times)) => (errors, times),
-        None => ("", errors.trim_end()),
-    };
-    let seconds = times.split(' ').map(|it| it.parse::<f64>().unwrap_or(0.0));
+    let (errors, computed) = without_times(errors.trim_end());
     let printed = format!("{}{errors}", String::from_utf8_lossy(&output.stdout));
     let result = match output.status.success() {
         true => Ok(()),
@@ -104,8 +101,22 @@ pub(crate) fn run_captured(command: &Command) -> Captured {
     };
     Captured {
         printed,
-        computed: Duration::from_secs_f64(seconds.sum()),
+        computed,
         result,
+    }
+}
+
+/// What a command wrote to standard error before the line with its user and system time, and their
+/// sum; nothing if another program wrote last.
+fn without_times(errors: &str) -> (&str, Duration) {
+    let (before, last) = errors.rsplit_once('\n').unwrap_or(("", errors));
+    let times: Option<Vec<Duration>> = last
+        .split(' ')
+        .map(|it| Duration::try_from_secs_f64(it.parse().ok()?).ok())
+        .collect();
+    match times.as_deref() {
+        Some([user, system]) => (before.trim_end(), *user + *system),
+        _ => (errors, Duration::ZERO),
     }
 }
 
@@ -176,6 +187,10 @@ mod tests {
         assert!(captured.computed > Duration::ZERO);
         let failure = captured.result.unwrap_err().to_string();
         assert!(failure.ends_with(": exit status: 4"), "{failure}");
+        for last in ["", "words", "1", "1 2 3", "-1 2", "nan 1", "inf 1", "1,5 2"] {
+            let errors = format!("wrong\n{last}");
+            assert_eq!(without_times(&errors), (&*errors, Duration::ZERO), "{last}");
+        }
         let missing = run_captured(&Command::new("no-such-program"));
         assert!(missing.result.is_err() && missing.printed.contains("no-such-program"));
     }

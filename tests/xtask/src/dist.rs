@@ -148,7 +148,7 @@ impl Release<'_> {
             return Err(Failure::new(format!("{shown} needs libraries")));
         }
         let bytes = fs::read(&binary).map_err(|error| at(&binary, &error))?;
-        let root = self.places.root.display().to_string();
+        let root = format!("{}/server/", self.places.root.display());
         match bytes
             .windows(root.len())
             .position(|it| it == root.as_bytes())

@@ -188,15 +188,19 @@ fn last_lines(output: &str) -> String {
     const NAMING: [&str; 5] = ["FAIL", "failed", "panicked", "Error", "error:"];
     let lines: Vec<&str> = output.lines().collect();
     let (earlier, last) = lines.split_at(lines.len().saturating_sub(LAST_LINES));
-    let naming = earlier
-        .iter()
-        .filter(|line| NAMING.iter().any(|word| line.contains(word)))
-        .take(LAST_LINES / 2);
-    naming.chain(last).copied().collect::<Vec<_>>().join("\n")
+    let passed = |line: &str| line.contains(" 0 failed") || line.ends_with("... ok");
+    let mut naming: Vec<&str> = (earlier.iter().rev())
+        .filter(|line| NAMING.iter().any(|word| line.contains(word)) && !passed(line))
+        .take(LAST_LINES)
+        .copied()
+        .collect();
+    naming.reverse();
+    naming.extend(last);
+    naming.join("\n")
 }
 
-/// The most lines of a failed program that are shown again at the end, besides half as many that
-/// name failures.
+/// The most lines of a failed program that are shown again at the end, besides as many that name
+/// failures.
 const LAST_LINES: usize = 60;
 
 #[cfg(test)]
@@ -224,6 +228,8 @@ mod tests {
     fn of_a_long_output_the_failures_and_the_end_are_kept() {
         let mut lines = vec!["progress".to_owned(); 500];
         lines[10] = "a test failed: 1 is not 2".to_owned();
+        lines[20] = "test result: ok. 3 passed; 0 failed".to_owned();
+        lines[30] = "test what_failed_is_named ... ok".to_owned();
         lines.push("the end".to_owned());
         let kept = last_lines(&lines.join("\n"));
         assert!(kept.starts_with("a test failed: 1 is not 2\n"), "{kept}");
