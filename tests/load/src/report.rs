@@ -159,6 +159,9 @@ impl Report {
             }
             text.push_str(&format!("{table}\n"));
         }
+        for failed in &self.failed {
+            text.push_str(&format!("not measured to the end: {failed}\n"));
+        }
         let kept = match self.disk_syncs_per_second {
             Some(syncs) => {
                 format!("Games are on disk, which takes {syncs:.0} small synced writes a second.")

@@ -169,26 +169,38 @@ impl Outcome {
     }
 }
 
-/// Runs one scenario: what it showed, and why it ended before its last round, if it did.
-pub(crate) async fn run(load: &Load, scenario: Scenario) -> (Outcome, Option<LoadError>) {
-    let mut outcome = Outcome {
-        scenario,
-        rounds: Vec::new(),
-        server_us: latencies(),
-        client_ns: latencies(),
-        other_ns: latencies(),
-        other_build_ns: latencies(),
-        counts: Counts::default(),
-        other_answers: 0,
-        traffic: Traffic::default(),
-    };
-    let failed = rounds(load, &mut outcome).await.err();
-    (outcome, failed)
+impl Outcome {
+    /// Nothing yet.
+    fn of(scenario: Scenario) -> Self {
+        Self {
+            scenario,
+            rounds: Vec::new(),
+            server_us: latencies(),
+            client_ns: latencies(),
+            other_ns: latencies(),
+            other_build_ns: latencies(),
+            counts: Counts::default(),
+            other_answers: 0,
+            traffic: Traffic::default(),
+        }
+    }
+
+    /// Adds a round that was measured to its end.
+    fn add(&mut self, round: Self) {
+        self.rounds.extend(round.rounds);
+        self.server_us += round.server_us;
+        self.client_ns += round.client_ns;
+        self.other_ns += round.other_ns;
+        self.other_build_ns += round.other_build_ns;
+        self.counts.add(&round.counts);
+        self.other_answers += round.other_answers;
+        self.traffic.add(&round.traffic);
+    }
 }
 
-/// Measures the rounds of a scenario.
-async fn rounds(load: &Load, outcome: &mut Outcome) -> Result<(), LoadError> {
-    let scenario = outcome.scenario.clone();
+/// Runs one scenario: what its finished rounds showed, and why it ended before its last one, if it
+/// did.
+pub(crate) async fn run(load: &Load, scenario: Scenario) -> (Outcome, Option<LoadError>) {
     let mut plan = Plan {
         rooms: scenario.rooms,
         streams: scenario.streams,
@@ -207,59 +219,67 @@ async fn rounds(load: &Load, outcome: &mut Outcome) -> Result<(), LoadError> {
         plan.decisions = Some(SMOKE_DECISIONS);
         plan.window = Duration::from_mins(1);
     }
-    let purpose = scenario.purpose;
-    let this_build = Launcher::new(load);
-    let other_build = Launcher::of_other_build(load);
+    let mut outcome = Outcome::of(scenario);
     for _ in 0..outcome.scenario.rounds {
         plan.seed = plan.seed.wrapping_add(plan.streams as u64);
-        let ephemeral = Plan {
-            durable: false,
-            ..plan.clone()
-        };
-        let (played, idle_bytes) = match &load.server {
-            Some(url) => (play::segment(url, None, &plan).await?, None),
-            None => on_server(load, this_build, &plan, purpose).await?,
-        };
-        outcome.server_us += &played.server_us;
-        outcome.client_ns += &played.client_ns;
-        outcome.counts.add(&played.counts);
-        outcome.traffic.add(&played.traffic);
-        let mut round =
-            Round {
-                server: played.window,
-                other: None,
-                other_build: None,
-                beside_other_build: None,
-                bytes_per_seat: played.window.playing_bytes.zip(idle_bytes).map(
-                    |(playing, idle)| {
-                        playing.saturating_sub(idle) as f64 / outcome.scenario.seats() as f64
-                    },
-                ),
-            };
-        if let Some(launcher) = other_build {
-            let (played, _) = on_server(load, launcher, &plan, purpose).await?;
-            outcome.other_build_ns += &played.client_ns;
-            round.other_build = Some(played.window);
+        match round(load, &plan, outcome.scenario.clone()).await {
+            Ok(measured) => outcome.add(measured),
+            Err(error) => return (outcome, Some(error)),
         }
-        if purpose == Purpose::Durability {
-            let (played, _) = on_server(load, this_build, &ephemeral, purpose).await?;
-            outcome.other_ns += &played.client_ns;
-            outcome.other_answers += played.counts.answers;
-            round.other = Some(played.window);
-            if let Some(launcher) = other_build {
-                let (played, _) = on_server(load, launcher, &ephemeral, purpose).await?;
-                round.beside_other_build = Some(played.window);
-            }
-        } else if load.server.is_none() {
-            let pinged = on_bare_room(this_build, &plan, outcome.sizes()).await?;
-            outcome.other_ns += &pinged.client_ns;
-            outcome.other_answers += pinged.answers;
-            round.other = Some(pinged.window);
-            round.beside_other_build = other_build.map(|_| pinged.window);
-        }
-        outcome.rounds.push(round);
     }
-    Ok(())
+    (outcome, None)
+}
+
+/// Measures each side once.
+async fn round(load: &Load, plan: &Plan, scenario: Scenario) -> Result<Outcome, LoadError> {
+    let mut outcome = Outcome::of(scenario);
+    let purpose = outcome.scenario.purpose;
+    let this_build = Launcher::new(load);
+    let other_build = Launcher::of_other_build(load);
+    let ephemeral = Plan {
+        durable: false,
+        ..plan.clone()
+    };
+    let (played, idle_bytes) = match &load.server {
+        Some(url) => (play::segment(url, None, plan).await?, None),
+        None => on_server(load, this_build, plan, purpose).await?,
+    };
+    outcome.server_us += &played.server_us;
+    outcome.client_ns += &played.client_ns;
+    outcome.counts.add(&played.counts);
+    outcome.traffic.add(&played.traffic);
+    let grown = (played.window.playing_bytes.zip(idle_bytes))
+        .map(|(playing, idle)| playing.saturating_sub(idle));
+    let mut round = Round {
+        server: played.window,
+        other: None,
+        other_build: None,
+        beside_other_build: None,
+        bytes_per_seat: grown.map(|bytes| bytes as f64 / outcome.scenario.seats() as f64),
+    };
+    if let Some(launcher) = other_build {
+        let (played, _) = on_server(load, launcher, plan, purpose).await?;
+        outcome.other_build_ns += &played.client_ns;
+        round.other_build = Some(played.window);
+    }
+    if purpose == Purpose::Durability {
+        let (played, _) = on_server(load, this_build, &ephemeral, purpose).await?;
+        outcome.other_ns += &played.client_ns;
+        outcome.other_answers += played.counts.answers;
+        round.other = Some(played.window);
+        if let Some(launcher) = other_build {
+            let (played, _) = on_server(load, launcher, &ephemeral, purpose).await?;
+            round.beside_other_build = Some(played.window);
+        }
+    } else if load.server.is_none() {
+        let pinged = on_bare_room(this_build, plan, outcome.sizes()).await?;
+        outcome.other_ns += &pinged.client_ns;
+        outcome.other_answers += pinged.answers;
+        round.other = Some(pinged.window);
+        round.beside_other_build = other_build.map(|_| pinged.window);
+    }
+    outcome.rounds.push(round);
+    Ok(outcome)
 }
 
 /// Plays on a server; also returns the memory its process had before the first connection.
