@@ -99,9 +99,11 @@ impl Call {
         calls.map(|call| call.message.bytes).max().unwrap_or(0)
     }
 
-    /// Whether its messages are of players, whose turns do not wait for the messages of others.
+    /// Whether its messages are of players, or make the decisions at a physical table: they do not
+    /// wait for the messages of others.
     pub fn plays(&self) -> bool {
-        self.service() == "chefshat.v1.PlayService" || self.path == PLAY_OF_NODES
+        let services = ["chefshat.v1.PlayService", "chefshat.v1.TableService"];
+        services.contains(&self.service()) || self.path == PLAY_OF_NODES
     }
 
     /// The full name of its service.

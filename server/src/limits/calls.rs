@@ -139,8 +139,8 @@ impl CallLimits {
         &self.decoding
     }
 
-    /// As much memory for messages of players: none of theirs waits for a study, an import or a vector
-    /// stream.
+    /// Memory for messages of players, separate from `decoding`, so that they never wait for studies,
+    /// imports or vector streams.
     pub fn playing(&self) -> &Decoding {
         &self.playing
     }

@@ -143,7 +143,7 @@ fn of_all() -> String {
             "",
         ),
         (
-            "time in which a message must arrive, and the end of a call that has only one",
+            "time for a message, or a whole call with one message, to arrive",
             seconds(decoding::MESSAGE_TIMEOUT),
             "",
         ),

@@ -18,7 +18,6 @@ use bytes::Bytes;
 use futures::future::{BoxFuture, Either};
 use http::{Method, Request, Response, header};
 use rayon::ThreadPoolBuildError;
-use tokio::task::spawn_blocking;
 use tonic::body::Body;
 use tower::{BoxError, Layer, Service};
 
@@ -144,13 +143,24 @@ impl PageLayer {
     }
 }
 
-/// An answer that needs files of the page, which may have to be read from a disk.
+/// An answer that needs files of the page, which are in this program.
+#[cfg(feature = "embedded-page")]
+#[allow(clippy::unused_async, reason = "other builds read a disk")]
+async fn of_files(
+    request: Request<()>,
+    make: impl FnOnce(&Request<()>) -> Response<Bytes>,
+) -> Response<Bytes> {
+    make(&request)
+}
+
+/// An answer that needs files of the page, which are read from a disk.
+#[cfg(not(feature = "embedded-page"))]
 async fn of_files(
     request: Request<()>,
     make: impl FnOnce(&Request<()>) -> Response<Bytes> + Send + 'static,
 ) -> Response<Bytes> {
     let method = request.method().clone();
-    let making = spawn_blocking(move || make(&request));
+    let making = tokio::task::spawn_blocking(move || make(&request));
     making.await.unwrap_or_else(|_| absent(&method))
 }
 
