@@ -113,7 +113,8 @@ class EvaluateRequest(_message.Message):
     time_ms: _builtins.int
     """Milliseconds of computing, at most 10,000; 0: 1,000. Counting the possible deals is included,
     waiting for a thread is not. An analysis that could not end by the deadline of its call is
-    refused (TOO_MANY_ANALYSES).
+    refused (TOO_MANY_ANALYSES). Where other programs leave it hardly any processor time, it ends
+    with what it has when its threads have had it for ten times `time_ms`, at least 30 s.
     """
     agent: _builtins.str
     """The built-in agent that plays all seats in rollouts: "random", "greedy" or "trained"; empty:
