@@ -241,12 +241,13 @@ impl Scheduler {
     }
 
     /// Checks the first game blocked by each of these participants that can play again, and the
-    /// first that waits for this game's table if one is free.
+    /// first that waits for a table if one is free: also after a game that no longer needs its own,
+    /// because its participant at the table has left the tournament.
     fn release(&mut self, state: &TournamentState, game: &Game) {
         for &who in game.seats.iter().filter(|who| state.has_capacity(**who)) {
             self.to_check.extend(self.blocked[who].pop_first());
         }
-        if game.physical && state.has_free_table() {
+        if state.has_free_table() {
             self.to_check.extend(self.without_table.pop_first());
         }
     }

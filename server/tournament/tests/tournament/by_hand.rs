@@ -689,3 +689,47 @@ fn a_void_game_whose_deal_was_seen_gets_a_new_one() {
         assert!(deal.is_some_and(|deal| tournament.is_deal_open(deal)));
     }
 }
+
+/// Two games need the only physical table. The participant at it leaves the tournament during its
+/// game: played again without it, that game needs no table, and the other one gets it.
+#[test]
+fn a_table_that_its_participant_gives_up_goes_to_the_next_game() {
+    let with_two_games_at_tables = (0..).find_map(|seed| {
+        let mut tournament = Tournament::new(Settings {
+            players: 2,
+            points: vec![1, 0],
+            rounds: Some(1),
+            physical_tables: 1,
+            draw_seed: [seed; 32],
+            ..settings(Format::Swiss)
+        })
+        .unwrap();
+        for number in 0..4 {
+            let change = tournament.join(Entrant {
+                at_table: number < 2,
+                ..entrant(&format!("entrant {number}"))
+            });
+            tournament.fold(&change.unwrap());
+            tournament.set_present(number, true);
+        }
+        for change in tournament.begin().unwrap() {
+            tournament.fold(&change);
+        }
+        follow(&mut tournament, 0);
+        let at_tables = tournament.games().iter().filter(|game| game.physical);
+        (at_tables.count() == 2).then_some(tournament)
+    });
+    let mut tournament = with_two_games_at_tables.unwrap();
+    let [game] = *tournament.playing().collect::<Vec<_>>() else {
+        panic!("one table, one game");
+    };
+    let seats = &tournament.games()[game].seats;
+    let at_table = *seats.iter().find(|who| **who < 2).unwrap();
+    let withdrawn = tournament.withdraw(at_table, Leaving::Removed).unwrap();
+    tournament.fold(&withdrawn.unwrap());
+    assert_eq!(follow(&mut tournament, 0), [], "the table is still in use");
+    end(&mut tournament, game, Ended::Aborted);
+    follow(&mut tournament, 0);
+    assert_eq!(tournament.playing().count(), 2);
+    play_through(&mut tournament);
+}
