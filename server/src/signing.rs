@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use chefshat_proto::v1;
 use chefshat_record::atomic_file::{AtomicFile, WriteError};
-use chefshat_record::signature::{PublicKey, SigningKey, TextHash};
+use chefshat_record::signature::{PublicKey, SigningKey};
 use futures::future::Either;
 use tokio::sync::Semaphore;
 use tracing::error;
@@ -147,9 +147,7 @@ impl Signer {
         let game = header.game_id;
         let entries = journal.entries().await?;
         let signing = move || {
-            let mut hash = TextHash::default();
-            convert::each_record_line(&header, &entries, |line| hash = hash.and_line(&line));
-            key.sign_hash(hash)
+            key.sign_each(|add| convert::each_record_line(&header, &entries, |line| add(&line)))
         };
         let signature = match background {
             Some((background, _)) => background.run(signing).await,

@@ -124,7 +124,8 @@ pub fn write(path: &Path, lines: &[RecordLine]) -> Result<(), RecordFileError> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).map_err(|source| io_error(path, source))?;
     }
-    write_to(AtomicFile::create(path)?, path, lines)
+    let file = AtomicFile::create(path)?;
+    write_to(file, path, |write| lines.iter().for_each(write))
 }
 
 /// Copies the text of a record atomically, creating parent folders.
@@ -160,7 +161,14 @@ pub fn write_private(
         });
         made.map_err(|source| io_error(path, source))?;
     }
-    let mut file = AtomicFile::create_private(path)?;
+    write_to(AtomicFile::create_private(path)?, path, lines)
+}
+
+fn write_to(
+    mut file: AtomicFile,
+    path: &Path,
+    lines: impl FnOnce(&mut dyn FnMut(&RecordLine)),
+) -> Result<(), RecordFileError> {
     let mut written = Ok(());
     lines(&mut |line| {
         if written.is_ok() {
@@ -168,17 +176,6 @@ pub fn write_private(
         }
     });
     written.map_err(|source| io_error(path, source))?;
-    Ok(file.finish()?)
-}
-
-fn write_to(
-    mut file: AtomicFile,
-    path: &Path,
-    lines: &[RecordLine],
-) -> Result<(), RecordFileError> {
-    for line in lines {
-        write_line(&mut file, line).map_err(|source| io_error(path, source))?;
-    }
     Ok(file.finish()?)
 }
 

@@ -39,11 +39,16 @@ impl SigningKey {
 
     /// The signature of a record. A signature that its footer already has does not count.
     pub fn sign(&self, lines: &[v1::RecordLine]) -> v1::RecordSignature {
-        self.sign_hash(TextHash::of(lines))
+        self.sign_each(|add| lines.iter().for_each(add))
     }
 
-    /// The signature of a record whose lines were hashed one by one.
-    pub fn sign_hash(&self, hash: TextHash) -> v1::RecordSignature {
+    /// The signature of a record whose lines `lines` passes on one by one.
+    pub fn sign_each(
+        &self,
+        lines: impl FnOnce(&mut dyn FnMut(&v1::RecordLine)),
+    ) -> v1::RecordSignature {
+        let mut hash = TextHash::default();
+        lines(&mut |line| hash = hash.and_line(line));
         v1::RecordSignature {
             public_key: self.public().0.to_vec(),
             signature: (self.0.sign(&hash.message()).as_ref()).to_vec(),

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use chefshat_proto::v1;
 use chefshat_record::convert::seat_number;
 use chefshat_record::pseudonym::{Named, ParticipantSeats, Pseudonym, Redactions};
-use chefshat_record::signature::{SigningKey, TextHash};
+use chefshat_record::signature::SigningKey;
 use chefshat_tournament::Change as TournamentChange;
 use prost::Message as _;
 
@@ -162,9 +162,7 @@ fn signature_of(
     entries: Arc<[Entry]>,
 ) -> v1::RecordSignature {
     let left = StoredGame::Hosted(header, entries, None);
-    let mut hash = TextHash::default();
-    convert::each_line_of(&left, |line| hash = hash.and_line(&line));
-    key.sign_hash(hash)
+    key.sign_each(|add| convert::each_line_of(&left, |line| add(&line)))
 }
 
 /// Removes a participant from a game in memory that is over. If it changes, it is signed again by who

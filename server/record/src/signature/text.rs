@@ -25,8 +25,7 @@ impl TextHash {
     }
 
     /// Adds the next line of a record in its canonical text.
-    #[must_use]
-    pub fn and_line(self, line: &v1::RecordLine) -> Self {
+    pub(super) fn and_line(self, line: &v1::RecordLine) -> Self {
         let mut text = Vec::new();
         write_text(line, &mut text);
         self.and(&text)
@@ -35,12 +34,10 @@ impl TextHash {
     /// Adds a line as it stands in a file. The footer has no map, so that its text without the
     /// signature is the canonical one.
     pub(crate) fn and_read(self, line: &v1::RecordLine, text: &[u8]) -> Self {
-        if signature_of(line).is_none() {
-            return self.and(text);
+        match signature_of(line) {
+            None => self.and(text),
+            Some(_) => self.and_line(line),
         }
-        let mut unsigned = Vec::new();
-        write_text(line, &mut unsigned);
-        self.and(&unsigned)
     }
 
     /// Adds the text of a line.
