@@ -697,6 +697,20 @@ mod tests {
         check(study, twice, "MESSAGE_MALFORMED").await;
     }
 
+    /// A service that reads a request to its end.
+    async fn read_whole(request: Request<Body>) -> Result<Response<Body>, Infallible> {
+        Ok(match request.into_body().collect().await {
+            Ok(_) => Response::new(Body::empty()),
+            Err(status) => status.into_http(),
+        })
+    }
+
+    /// Why a call was refused, if it was.
+    fn reason_of(answer: &Response<Body>) -> Option<String> {
+        let status = Status::from_header_map(answer.headers())?;
+        Some(status.get_details_error_info()?.reason)
+    }
+
     /// A body that sends these bytes and then nothing, and does not end.
     fn stalled(bytes: Vec<u8>) -> Body {
         let parts = stream::iter([Ok::<_, Status>(Frame::data(bytes.into()))]);
@@ -706,13 +720,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_message_waits_for_its_permit_before_it_is_read_and_ends_if_it_is_slow() {
         let limits = limits();
-        let service = service_fn(async |request: Request<Body>| {
-            Ok::<_, Infallible>(match request.into_body().collect().await {
-                Ok(_) => Response::new(Body::empty()),
-                Err(status) => status.into_http(),
-            })
-        });
-        let mut services = DecodingLayer::new(Arc::clone(&limits)).layer(service);
+        let mut services = DecodingLayer::new(Arc::clone(&limits)).layer(service_fn(read_whole));
         let half = [&[0, 0, 8, 0, 0], [0; 1_000].as_slice()].concat();
         let path = "/chefshat.v1.ParticipationService/AnswerQuestionnaire";
         let mut calls = Vec::new();
@@ -727,9 +735,8 @@ mod tests {
         let mut reasons = BTreeMap::new();
         for answer in futures::future::join_all(calls).await {
             let answer = answer.expect("infallible");
-            let status = Status::from_header_map(answer.headers()).expect("a status");
-            let info = status.get_details_error_info().expect("a reason");
-            *reasons.entry(info.reason).or_insert(0) += 1;
+            let reason = reason_of(&answer).expect("a reason");
+            *reasons.entry(reason).or_insert(0) += 1;
         }
         let expected = [("MESSAGE_TOO_SLOW", 16), ("TOO_MANY_LARGE_MESSAGES", 4)];
         assert_eq!(
@@ -743,13 +750,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn a_call_that_does_not_arrive_whole_ends_however_small_it_is() {
         let limits = limits();
-        let service = service_fn(async |request: Request<Body>| {
-            Ok::<_, Infallible>(match request.into_body().collect().await {
-                Ok(_) => Response::new(Body::empty()),
-                Err(status) => status.into_http(),
-            })
-        });
-        let mut services = DecodingLayer::new(limits).layer(service);
+        let mut services = DecodingLayer::new(limits).layer(service_fn(read_whole));
         let unary = "/chefshat.v1.RoomService/GetRoom";
         let stream = "/chefshat.v1.PlayService/Play";
         let whole = framed(&[]);
@@ -764,10 +765,9 @@ mod tests {
         ] {
             let begun = Instant::now();
             let answer = services.call(request(path, stalled(sent.clone()))).await;
-            let answer = answer.expect("infallible");
-            let status = Status::from_header_map(answer.headers()).expect("a status");
-            let info = status.get_details_error_info().expect("a reason");
-            assert_eq!(info.reason, "MESSAGE_TOO_SLOW", "{path} {sent:?}");
+            let reason = reason_of(&answer.expect("infallible"));
+            let expected = Some("MESSAGE_TOO_SLOW");
+            assert_eq!(reason.as_deref(), expected, "{path} {sent:?}");
             assert_eq!(begun.elapsed(), MESSAGE_TIMEOUT, "{path} {sent:?}");
         }
         // A stream is silent as long as it likes between its messages.
@@ -810,17 +810,7 @@ mod tests {
             let permit = limits.decoding().decode(key, share).now_or_never();
             taken.extend(permit.and_then(Result::ok));
         }
-        let service = service_fn(async |request: Request<Body>| {
-            Ok::<_, Infallible>(match request.into_body().collect().await {
-                Ok(_) => Response::new(Body::empty()),
-                Err(status) => status.into_http(),
-            })
-        });
-        let mut services = DecodingLayer::new(limits).layer(service);
-        let reason_of = |answer: Response<Body>| {
-            let status = Status::from_header_map(answer.headers())?;
-            Some(status.get_details_error_info()?.reason)
-        };
+        let mut services = DecodingLayer::new(limits).layer(service_fn(read_whole));
         let play = v1::PlayRequest {
             commands: vec![v1::SeatCommand::default(); 700],
         };
@@ -841,7 +831,7 @@ mod tests {
         ] {
             let body = Body::new(http_body_util::Full::new(Bytes::from(framed(&message))));
             let answer = services.call(request(path, body)).await;
-            let found = reason_of(answer.expect("infallible"));
+            let found = reason_of(&answer.expect("infallible"));
             assert_eq!(found.as_deref(), reason, "{path}");
         }
     }
