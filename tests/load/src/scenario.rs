@@ -167,9 +167,7 @@ impl Outcome {
             response: mean(self.traffic.response_bytes),
         }
     }
-}
 
-impl Outcome {
     /// Nothing yet.
     fn of(scenario: Scenario) -> Self {
         Self {

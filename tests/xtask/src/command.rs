@@ -29,6 +29,13 @@ pub(crate) fn python_command(places: &Places, package: &str, module: &str) -> Co
     command
 }
 
+/// Git, in the source tree.
+pub(crate) fn git(places: &Places) -> Command {
+    let mut git = Command::new("git");
+    git.current_dir(&places.root);
+    git
+}
+
 /// Tells tests where the server, the other languages and the protocol are.
 pub(crate) fn with_environment(places: &Places, mut command: Command) -> Command {
     command.env("CHEFSHAT_BIN", places.chefshat());

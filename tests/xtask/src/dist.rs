@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::book;
-use crate::command::{cargo, python_command, read, run as run_command, succeeds};
+use crate::command::{cargo, git, python_command, read, run as run_command, succeeds};
 use crate::failure::Failure;
 use crate::places::{DEPLOYMENT, Places};
 use crate::setup::{self, at};
@@ -149,12 +149,9 @@ impl Release<'_> {
         }
         let bytes = fs::read(&binary).map_err(|error| at(&binary, &error))?;
         let root = format!("{}/server/", self.places.root.display());
-        match bytes
-            .windows(root.len())
-            .position(|it| it == root.as_bytes())
-        {
-            Some(_) => Err(Failure::new(format!("{shown} names the folder {root}"))),
-            None => Ok(()),
+        match bytes.windows(root.len()).any(|it| it == root.as_bytes()) {
+            true => Err(Failure::new(format!("{shown} names the folder {root}"))),
+            false => Ok(()),
         }
     }
 
@@ -444,12 +441,6 @@ impl Release<'_> {
         tar.arg(self.dist.join(format!("{name}.tar.gz")));
         run_command(tar.arg("-C").arg(folder).args(what))
     }
-}
-
-fn git(places: &Places) -> Command {
-    let mut git = Command::new("git");
-    git.current_dir(&places.root);
-    git
 }
 
 /// A release is what a commit contains.

@@ -6,7 +6,7 @@ use std::process::Command;
 
 use clap::ValueEnum;
 
-use crate::command::{cargo, python_command, read, with_environment};
+use crate::command::{cargo, git, python_command, read, with_environment};
 use crate::failure::Failure;
 use crate::lint::OPTIONAL_FEATURES;
 use crate::places::{
@@ -67,13 +67,7 @@ fn broken_by(file: &str) -> &'static [Part] {
 
 /// The parts that the changes since the last common commit with origin/main can break.
 fn changed(places: &Places) -> Result<Vec<Part>, Failure> {
-    let git = |arguments: &[&str]| {
-        read(
-            Command::new("git")
-                .current_dir(&places.root)
-                .args(arguments),
-        )
-    };
+    let git = |arguments: &[&str]| read(git(places).args(arguments));
     let base = git(&["merge-base", "HEAD", "origin/main"]).unwrap_or_else(|_| "HEAD".to_owned());
     let tracked = git(&["diff", "--name-only", &base])?;
     let new = git(&["ls-files", "--others", "--exclude-standard"])?;

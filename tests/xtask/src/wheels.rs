@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::command::{read, run as run_command};
+use crate::command::{git, read, run as run_command};
 use crate::failure::Failure;
 use crate::places::Places;
 use crate::setup::{self, at};
@@ -136,9 +136,7 @@ pub(crate) fn built(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 /// The environment of a build whose program others run: it names its commit, and no folder of this
 /// machine.
 pub(crate) fn published(places: &Places, mut build: Command) -> Command {
-    let mut git = Command::new("git");
-    git.current_dir(&places.root);
-    if let Ok(commit) = read(git.args(["log", "-1", "--format=%h %cs"])) {
+    if let Ok(commit) = read(git(places).args(["log", "-1", "--format=%h %cs"])) {
         build.env("CHEFSHAT_COMMIT", commit);
     }
     let home = std::env::var_os("HOME")
