@@ -41,7 +41,7 @@ pub(crate) const MAX_PREVIEWS: usize = 2;
 /// Most requests that wait for that; further ones are refused.
 pub(crate) const MAX_PREVIEWS_WAITING: usize = 1_024;
 /// Longest time until a picture is sent.
-pub(crate) const PICTURE_PATIENCE: Duration = Duration::from_secs(10);
+pub(crate) const PICTURE_PATIENCE: Duration = Duration::from_secs(30);
 /// Longest time until the document is sent, if necessary without tags: people wait for it.
 const DOCUMENT_PATIENCE: Duration = Duration::from_secs(1);
 /// Pictures that are kept, each some hundred kilobytes.
