@@ -1,5 +1,6 @@
 //! `cargo xtask lint`: all checks that do not run the project.
 
+use std::path::Path;
 use std::process::Command;
 
 use crate::command::{self, cargo, python_command};
@@ -17,39 +18,60 @@ const RELEASED_PROTOCOL: &str = "proto/frozen/v1.binpb";
 /// What is off by default and still checked and tested, in one build with the rest.
 pub(crate) const OPTIONAL_FEATURES: &str = "chefshat/otlp";
 
+/// What Clippy is told: a warning is an error.
+const CLIPPY_ARGUMENTS: [&str; 2] = ["-D", "warnings"];
+
 /// Runs all checks, cheapest first.
 pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
-    let fmt = ["fmt", "--all", "--check"];
-    steps.program("cargo fmt", in_root(places, cargo()).args(fmt))?;
-    steps.run("arrows between crates", || arrows::check(places))?;
-    steps.run("circles between files", || circles::check(places))?;
+    sources(places, steps)?;
     steps.beside(vec![
-        Box::new(|steps| rust(places, steps)),
-        Box::new(|steps| others(places, steps)),
+        Box::new(|steps| {
+            let what = ["clippy", "--workspace", "--all-targets"];
+            let features = ["--features", OPTIONAL_FEATURES, "--"];
+            let mut clippy = in_root(places, cargo());
+            clippy.args(what).args(features).args(CLIPPY_ARGUMENTS);
+            steps.program("cargo clippy", &mut clippy)
+        }),
+        Box::new(|steps| {
+            documents(places, steps)?;
+            if places.python_packages().is_empty() {
+                steps.skip("ruff, mypy", NO_PYTHON_PACKAGE);
+            } else {
+                steps.run("set up Python", || setup::python_packages(places))?;
+                python(places, steps)?;
+            }
+            if places.has_web_package() {
+                steps.run("set up web", || setup::web_package(places))?;
+                web::check(places, steps)
+            } else {
+                steps.skip("tsc, biome", NO_WEB_PACKAGE);
+                Ok(())
+            }
+        }),
     ])
 }
 
-/// The linter of Rust, and the licences of what is built with.
-fn rust(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
-    let clippy = [
-        "clippy",
-        "--workspace",
-        "--all-targets",
-        "--features",
-        OPTIONAL_FEATURES,
-        "--",
-        "-D",
-        "warnings",
-    ];
-    steps.program("cargo clippy", in_root(places, cargo()).args(clippy))?;
-    steps.run("cargo deny", || {
-        let deny = ["--workspace", "check", "licenses", "bans", "sources"];
-        command::run(in_root(places, setup::cargo_deny(places)?).args(deny))
-    })
+/// Makes Cargo build with Clippy in place of the compiler for the crates of the workspace: one build
+/// is checked and tested. Clippy takes its arguments from the environment, as `cargo clippy` gives
+/// them.
+pub(crate) fn with_clippy(cargo: &mut Command) {
+    let driver = Path::new(cargo.get_program()).with_file_name("clippy-driver");
+    cargo.env("RUSTC_WORKSPACE_WRAPPER", driver);
+    let arguments = CLIPPY_ARGUMENTS.map(|argument| format!("{argument}__CLIPPY_HACKERY__"));
+    cargo.env("CLIPPY_ARGS", arguments.concat());
 }
 
-/// The checks of everything but Rust.
-fn others(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
+/// The checks that only read sources of Rust.
+pub(crate) fn sources(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
+    let fmt = ["fmt", "--all", "--check"];
+    steps.program("cargo fmt", in_root(places, cargo()).args(fmt))?;
+    steps.run("arrows between crates", || arrows::check(places))?;
+    steps.run("circles between files", || circles::check(places))
+}
+
+/// The checks of everything but programs: protocol, book, files of docker/, licences of what is
+/// built with. And the format of the agent in C++, which the same environment checks.
+pub(crate) fn documents(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.run("set up checkers", || setup::tools(places))?;
     steps.program("buf lint", tool(places, "buf").args(["lint", "proto"]))?;
     let breaking = ["breaking", "proto", "--against", RELEASED_PROTOCOL];
@@ -76,27 +98,16 @@ fn others(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
         "hadolint",
         tool(places, "hadolint").arg("docker/Dockerfile"),
     )?;
-
     let format = ["--dry-run", "--Werror", "clients/cpp/agent.cpp"];
     steps.program("clang-format", tool(places, "clang-format").args(format))?;
-
-    if places.python_packages().is_empty() {
-        steps.skip("ruff, mypy", NO_PYTHON_PACKAGE);
-    } else {
-        steps.run("set up Python", || setup::python_packages(places))?;
-        python(places, steps)?;
-    }
-    if places.has_web_package() {
-        steps.run("set up web", || setup::web_package(places))?;
-        web::check(places, steps)?;
-    } else {
-        steps.skip("tsc, biome", NO_WEB_PACKAGE);
-    }
-    Ok(())
+    steps.run("cargo deny", || {
+        let deny = ["--workspace", "check", "licenses", "bans", "sources"];
+        command::run(in_root(places, setup::cargo_deny(places)?).args(deny))
+    })
 }
 
 /// The linter, formatter and type checker of the Python packages, which must be set up.
-fn python(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
+pub(crate) fn python(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     for package in places.python_packages() {
         let checks = [
             ("ruff check", "ruff", &["check", "."][..]),

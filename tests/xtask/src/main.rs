@@ -26,7 +26,6 @@ use clap::{Parser, Subcommand};
 
 use crate::places::Places;
 use crate::steps::Steps;
-use crate::test::Part;
 
 /// Set up, test and lint everything in every language.
 #[derive(Parser)]
@@ -42,15 +41,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Task {
     /// Run all tests; sets up what they need, inside the build folder.
-    Test {
-        /// Run only the tests of one part.
-        #[arg(long, value_enum)]
-        only: Option<Part>,
-        /// Also run the tests that take many minutes: the wheels and the images
-        /// built from source, idle streams.
-        #[arg(long)]
-        slow: bool,
-    },
+    Test(test::Options),
     /// Check format, lints, protocol, licences and images.
     Lint,
     /// Build the book of `docs/` into `target/book`, and check its links.
@@ -100,7 +91,7 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let mut steps = Steps::default();
     let outcome = Places::find().and_then(|places| match cli.task {
-        Task::Test { only, slow } => test::run(&places, &mut steps, only, slow),
+        Task::Test(options) => test::run(&places, &mut steps, &options),
         Task::Lint => lint::run(&places, &mut steps),
         Task::Book => book::run(&places, &mut steps),
         Task::Web => web::run(&places, &mut steps),

@@ -8,7 +8,7 @@ use clap::ValueEnum;
 
 use crate::command::{cargo, git, python_command, read, with_environment};
 use crate::failure::Failure;
-use crate::lint::OPTIONAL_FEATURES;
+use crate::lint::{self, OPTIONAL_FEATURES};
 use crate::places::{
     CLIENTS, DEPLOYMENT, NO_NODE_PACKAGE, NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places,
 };
@@ -77,14 +77,31 @@ fn changed(places: &Places) -> Result<Vec<Part>, Failure> {
     Ok(parts.into_iter().collect())
 }
 
-/// Sets up and runs the tests of one part, or of all; if `slow`, also those that take long: of the
-/// wheels and of docker/.
+/// What is run.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// Run only the tests of one part.
+    #[arg(long, value_enum)]
+    only: Option<Part>,
+    /// Also run the tests that take many minutes: the wheels and the images
+    /// built from source, idle streams.
+    #[arg(long)]
+    slow: bool,
+    /// Also run the checks of `cargo xtask lint`, in the same build.
+    #[arg(long, conflicts_with = "only")]
+    lint: bool,
+}
+
+/// Sets up and runs the tests of one part, or of all.
 pub(crate) fn run(
     places: &Places,
     steps: &mut Steps,
-    only: Option<Part>,
-    slow: bool,
+    Options { only, slow, lint }: &Options,
 ) -> Result<(), Failure> {
+    let (only, slow, lint) = (*only, *slow, *lint);
+    if lint {
+        lint::sources(places, steps)?;
+    }
     let parts = match only {
         None => ALL.to_vec(),
         Some(Part::Changed) => changed(places)?,
@@ -107,14 +124,20 @@ pub(crate) fn run(
         // Libraries, programs and tests together: otherwise hundreds of crates would be built twice,
         // with the features of the server and with those of its tests.
         Box::new(|steps| {
-            let what = ["--lib", "--bins", "--tests", "--examples"];
-            let mut build = cargo_command(places);
+            let what: &[&str] = match lint {
+                true => &["--all-targets"],
+                false => &["--lib", "--bins", "--tests", "--examples"],
+            };
+            let mut build = cargo_command(places, lint);
             build.args(["build", "--workspace", "--features", OPTIONAL_FEATURES]);
             steps.program("build", build.args(what))
         }),
         Box::new(|steps| {
             if needs_python {
                 steps.run("set up Python", || setup::python_packages(places))?;
+            }
+            if lint && has_python {
+                lint::python(places, steps)?;
             }
             if wants(Part::Python) && has_python {
                 for which in VERSIONS {
@@ -130,6 +153,9 @@ pub(crate) fn run(
             }
             if needs_page {
                 web::run(places, steps)?;
+            }
+            if lint && has_web {
+                web::check(places, steps)?;
             }
             Ok(())
         }),
@@ -151,6 +177,9 @@ pub(crate) fn run(
             if wants(Part::Rust) {
                 steps.run("build the agent in C++", || setup::cpp_agent(places))?;
             }
+            if lint {
+                lint::documents(places, steps)?;
+            }
             Ok(())
         }),
     ])?;
@@ -170,7 +199,7 @@ pub(crate) fn run(
             steps.skip("commands at a terminal", &failure.to_string());
         }
         lanes.push(Box::new(|steps| {
-            let mut tests = cargo_command(places);
+            let mut tests = cargo_command(places, lint);
             tests.args(["test", "--workspace", "--features", OPTIONAL_FEATURES]);
             tests.arg("--no-fail-fast");
             // Most tests wait for servers and clocks.
@@ -284,14 +313,20 @@ fn pytest(places: &Places, package: &str, options: &[&str]) -> (String, Command)
     let cache = places.own.join("pytest").join(package);
     let cache = format!("cache_dir={}", cache.display());
     let mut pytest = python_command(places, package, "pytest");
-    pytest.args(["-o", &cache]).args(options);
+    // The tests that take long are named, so that growth is seen.
+    pytest.args(["-o", &cache, "--durations=15", "--durations-min=5"]);
+    pytest.args(options);
     let step = format!("pytest, {package} {}", options.join(" "));
     (step.trim_end().to_owned(), pytest)
 }
 
-fn cargo_command(places: &Places) -> Command {
+/// Cargo; if `lint`, its build is also checked.
+fn cargo_command(places: &Places, lint: bool) -> Command {
     let mut command = with_environment(places, cargo());
     command.current_dir(&places.root);
+    if lint {
+        lint::with_clippy(&mut command);
+    }
     command
 }
 
