@@ -17,7 +17,9 @@ use futures::task::AtomicWaker;
 use futures::{FutureExt as _, Stream, stream};
 use socket2::{SockRef, TcpKeepalive};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
+#[cfg(unix)]
+use tokio::net::UnixListener;
+use tokio::net::{TcpListener, TcpStream};
 use tokio::time::Instant;
 use tokio_util::either::Either;
 use tonic::transport::server::{Connected, TcpConnectInfo};
@@ -56,6 +58,7 @@ pub enum Listener {
     /// On an address and port.
     Tcp(TcpListener),
     /// On a path of this machine, for a proxy.
+    #[cfg(unix)]
     Unix(UnixListener),
 }
 
@@ -65,6 +68,7 @@ impl From<TcpListener> for Listener {
     }
 }
 
+#[cfg(unix)]
 impl From<UnixListener> for Listener {
     fn from(listener: UnixListener) -> Self {
         Self::Unix(listener)
@@ -81,12 +85,19 @@ impl Listener {
                 }
                 Ok((Either::Left(stream), Some(address)))
             }
+            #[cfg(unix)]
             Self::Unix(listener) => Ok((Either::Right(listener.accept().await?.0), None)),
         }
     }
 }
 
-type Socket = Either<TcpStream, UnixStream>;
+#[cfg(unix)]
+type Local = tokio::net::UnixStream;
+/// There are none.
+#[cfg(not(unix))]
+type Local = tokio::io::Empty;
+
+type Socket = Either<TcpStream, Local>;
 
 /// Limits of connections.
 #[derive(Debug, Clone)]
@@ -380,6 +391,7 @@ impl Reserve {
     }
 }
 
+#[cfg(unix)]
 fn is_out_of_descriptors(error: &io::Error) -> bool {
     use rustix::io::Errno;
     let code = error.raw_os_error();
@@ -388,16 +400,36 @@ fn is_out_of_descriptors(error: &io::Error) -> bool {
         .any(|errno| code == Some(errno.raw_os_error()))
 }
 
+#[cfg(not(unix))]
+fn is_out_of_descriptors(error: &io::Error) -> bool {
+    /// `WSAEMFILE` of Windows.
+    const TOO_MANY_SOCKETS: i32 = 10_024;
+    error.raw_os_error() == Some(TOO_MANY_SOCKETS)
+}
+
+/// Sockets are not counted with files.
+#[cfg(not(unix))]
+fn raise_descriptor_limit() -> usize {
+    usize::MAX
+}
+
 /// Raises the limit of open files to what the system allows and returns it.
+#[cfg(unix)]
 fn raise_descriptor_limit() -> usize {
     use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+    /// `OPEN_MAX` of macOS, which refuses more although it names no limit.
+    const OPEN_MAX: u64 = 10_240;
     let limit = getrlimit(Resource::Nofile);
+    let allowed = match (cfg!(target_os = "macos"), limit.maximum) {
+        (true, maximum) => Some(maximum.map_or(OPEN_MAX, |it| it.min(OPEN_MAX))),
+        (false, maximum) => maximum,
+    };
     let raised = Rlimit {
-        current: limit.maximum,
+        current: allowed,
         maximum: limit.maximum,
     };
     let current = match setrlimit(Resource::Nofile, raised) {
-        Ok(()) => limit.maximum,
+        Ok(()) => allowed,
         Err(_) => limit.current,
     };
     // No limit at all is none that matters.

@@ -2,9 +2,8 @@
 //! that may block. A room is only asked whose ticket it is.
 
 use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
-use std::fs::{DirBuilder, File, OpenOptions};
+use std::fs::File;
 use std::io::{self, Write as _};
-use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -12,7 +11,7 @@ use std::time::Duration;
 use chefshat_engine::Seat;
 use chefshat_proto::v1::SampleChunk;
 use chefshat_record::convert::FieldProblem;
-use chefshat_record::samples;
+use chefshat_record::{private, samples};
 use chefshat_room::ids::Id;
 
 /// Most bytes of the samples of one seat: 8 channels, 30 times a second, for more than 15 hours.
@@ -223,7 +222,7 @@ impl Samples {
 impl SeatFile {
     fn open(data_dir: &Path, path: &Path) -> io::Result<Self> {
         let folder = samples::folder_of(data_dir);
-        (DirBuilder::new().recursive(true).mode(0o700)).create(folder)?;
+        private::create_folder(&folder)?;
         let mut streams = BTreeMap::new();
         let bytes = samples::read(path, |chunk| {
             let last_us = chunk.elapsed_us.last().copied().unwrap_or_default();
@@ -233,8 +232,8 @@ impl SeatFile {
             };
             streams.insert(chunk.stream, end);
         })?;
-        let mut options = OpenOptions::new();
-        let file = (options.create(true).append(true).mode(0o600)).open(path)?;
+        let mut options = private::options();
+        let file = options.create(true).append(true).open(path)?;
         // Without what was not written completely.
         file.set_len(bytes)?;
         Ok(Self {
@@ -320,7 +319,7 @@ mod tests {
             if first == 54_000 {
                 // Killed while it wrote.
                 let path = samples::path_of(folder.path(), &game.to_string(), 2);
-                let mut file = OpenOptions::new().append(true).open(path).expect("there");
+                let mut file = File::options().append(true).open(path).expect("there");
                 let half = samples::encode(&chunk("affect", first, 300));
                 file.write_all(&half[..half.len() / 2]).expect("written");
                 server = start();

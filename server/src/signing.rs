@@ -3,7 +3,6 @@
 
 use std::fs;
 use std::io;
-use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -55,9 +54,13 @@ pub fn key_of(data_dir: &Path) -> Result<Option<SigningKey>, KeyError> {
         }
         text => text.map_err(failed)?,
     };
-    let metadata = fs::metadata(&path).map_err(failed)?;
-    if is_exposed(metadata.mode(), metadata.uid(), metadata.gid()) {
-        return Err(KeyError::Exposed(path));
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt as _;
+        let metadata = fs::metadata(&path).map_err(failed)?;
+        if is_exposed(metadata.mode(), metadata.uid(), metadata.gid()) {
+            return Err(KeyError::Exposed(path));
+        }
     }
     let mut seed = [0; 32];
     let digits = text.trim_end().strip_prefix(PREFIX);
@@ -69,6 +72,7 @@ pub fn key_of(data_dir: &Path) -> Result<Option<SigningKey>, KeyError> {
 
 /// Whether others can read a file of this user and group. If it is root's, a group other than
 /// root's may read it, as with PostgreSQL: Kubernetes mounts secrets so.
+#[cfg(unix)]
 fn is_exposed(mode: u32, user: u32, group: u32) -> bool {
     let readers = match (user, group) {
         (0, 1..) => 0o740,
@@ -160,7 +164,7 @@ impl Signer {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use std::os::unix::fs::PermissionsExt as _;
 

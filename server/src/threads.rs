@@ -20,6 +20,7 @@ pub(crate) enum Priority {
 
 impl Priority {
     /// How much a thread gives way, in the units of `nice`: the last one is the most there is.
+    #[cfg(target_os = "linux")]
     pub(crate) fn niceness(self) -> i32 {
         match self {
             Self::Searches => 5,
@@ -84,11 +85,12 @@ pub(crate) fn caught<T>(work: impl FnOnce() -> T) -> Option<T> {
 /// Lets the calling thread give way. On Linux the niceness is that of the thread; elsewhere it may be
 /// that of the process, so it stays as it is.
 fn give_way(priority: Priority) {
-    if cfg!(target_os = "linux")
-        && let Err(error) = rustix::process::nice(priority.niceness())
-    {
+    #[cfg(target_os = "linux")]
+    if let Err(error) = rustix::process::nice(priority.niceness()) {
         error!(%error, "a thread in the background does not give way to others");
     }
+    #[cfg(not(target_os = "linux"))]
+    let _ = priority;
 }
 
 #[cfg(test)]

@@ -4,15 +4,14 @@
 
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
-use std::fs::{self, File, Permissions};
+use std::fs::{self, File};
 use std::io;
-use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use chefshat_record::atomic_file::sync_folder_of;
 use chefshat_record::jsonl::folder_of;
-use chefshat_record::samples;
+use chefshat_record::{private, samples};
 use chefshat_server::store::{DATABASE_FILE, DatabaseCopy, LOCK_FILE, check_copy, copy_database};
 use clap::Args;
 use serde_json::json;
@@ -57,10 +56,12 @@ impl Backup {
             _ => Path::new("."),
         };
         // Only its owner can open it. Removed if anything fails.
-        let part = tempfile::Builder::new()
-            .prefix(&[name, OsStr::new(".")].join(OsStr::new("")))
-            .suffix(".part")
-            .permissions(Permissions::from_mode(0o700))
+        let prefix = [name, OsStr::new(".")].join(OsStr::new(""));
+        let mut part = tempfile::Builder::new();
+        part.prefix(&prefix).suffix(".part");
+        #[cfg(unix)]
+        part.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
+        let part = part
             .tempdir_in(parent)
             .map_err(|error| at(parent, &error))?;
         // A record that is written later belongs to a game that the copy of the database may know
@@ -77,8 +78,7 @@ impl Backup {
         copy_files(&source, part.path(), &others)?;
         let records = copy_files(&folder_of(&source), &folder_of(part.path()), &records)?;
         copy_samples(&source, part.path())?;
-        // One call for any number of files.
-        rustix::fs::sync();
+        sync();
         fs::rename(part.keep(), &target).map_err(|error| at(&target, &error))?;
         sync_folder_of(&target).map_err(|error| at(&target, &error))?;
         report(self.json, "backup", &target, &copied, records, "")
@@ -124,7 +124,7 @@ impl Restore {
         // another attempt, and used by no server.
         let part = target.join(format!("{DATABASE_FILE}.{PART}"));
         copy_file(&source.join(DATABASE_FILE), &part)?;
-        rustix::fs::sync();
+        sync();
         let database = target.join(DATABASE_FILE);
         fs::rename(&part, &database).map_err(|error| at(&database, &error))?;
         sync_folder_of(&database).map_err(|error| at(&database, &error))?;
@@ -211,13 +211,19 @@ fn copy_samples(from: &Path, to: &Path) -> Result<(), CommandError> {
 /// Copies files into a folder, which is created. Skips those that have been deleted meanwhile.
 /// Returns the number of copied files.
 fn copy_files(from: &Path, to: &Path, names: &BTreeSet<OsString>) -> Result<u64, CommandError> {
-    let made = fs::DirBuilder::new().recursive(true).mode(0o700).create(to);
-    made.map_err(|error| at(to, &error))?;
+    private::create_folder(to).map_err(|error| at(to, &error))?;
     let mut copied = 0;
     for name in names {
         copied += u64::from(copy_file(&from.join(name), &to.join(name))?);
     }
     Ok(copied)
+}
+
+/// Brings what was copied to the disk: one call for any number of files. Where there is none, each was
+/// synced when it was copied.
+fn sync() {
+    #[cfg(unix)]
+    rustix::fs::sync();
 }
 
 /// Copies a file so that only its owner can read it. Returns `false` if it does not exist.
@@ -227,9 +233,14 @@ fn copy_file(from: &Path, to: &Path) -> Result<bool, CommandError> {
         source => source.map_err(|error| at(from, &error))?,
     };
     let mut copy = || {
-        let mut options = File::options();
-        let mut target = options.write(true).create_new(true).mode(0o600).open(to)?;
-        io::copy(&mut source, &mut target).map(drop)
+        let mut options = private::options();
+        let mut target = options.write(true).create_new(true).open(to)?;
+        io::copy(&mut source, &mut target)?;
+        // Elsewhere one call syncs all files.
+        match cfg!(unix) {
+            true => Ok(()),
+            false => target.sync_all(),
+        }
     };
     copy().map_err(|error| at(to, &error))?;
     Ok(true)

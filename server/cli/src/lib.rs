@@ -42,6 +42,7 @@ mod room;
 pub mod rules_args;
 mod secret_file;
 mod serve;
+pub mod stops;
 mod study;
 mod table;
 pub mod threads;

@@ -4,11 +4,15 @@
 use std::fmt;
 use std::io;
 use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
+#[cfg(unix)]
+use std::path::Path;
+use std::path::PathBuf;
 
 use chefshat_server::connections::Listener;
 use listenfd::ListenFd;
-use tokio::net::{TcpListener, UnixListener};
+use tokio::net::TcpListener;
+#[cfg(unix)]
+use tokio::net::UnixListener;
 
 use crate::error::CommandError;
 
@@ -21,6 +25,7 @@ pub(super) enum Address {
     /// On an address and port.
     Ip(SocketAddr),
     /// On a unix socket.
+    #[cfg_attr(not(unix), expect(dead_code, reason = "there are none"))]
     Unix(PathBuf),
 }
 
@@ -71,11 +76,22 @@ pub(super) async fn listen(address: &str) -> Result<(Listener, Address), Command
         let address = Address::Ip(listener.local_addr()?);
         return Ok((listener.into(), address));
     };
-    let path = Path::new(path);
-    let listener = unix(path).map_err(|error| {
-        format!("cannot listen on {address}: {error}; choose another path with --listen")
-    })?;
-    Ok((listener.into(), Address::Unix(path.to_owned())))
+    #[cfg(unix)]
+    {
+        let path = Path::new(path);
+        let listener = unix(path).map_err(|error| {
+            format!("cannot listen on {address}: {error}; choose another path with --listen")
+        })?;
+        Ok((listener.into(), Address::Unix(path.to_owned())))
+    }
+    #[cfg(not(unix))]
+    {
+        let system = std::env::consts::OS;
+        Err(format!(
+            "cannot listen on the unix socket {path} on {system}; use HOST:PORT with --listen"
+        )
+        .into())
+    }
 }
 
 /// A socket on an address and port. `flag`: its setting, for errors.
@@ -96,15 +112,21 @@ fn activated(passed: &mut ListenFd) -> io::Result<(Listener, Address)> {
         let address = Address::Ip(listener.local_addr()?);
         return Ok((TcpListener::from_std(listener)?.into(), address));
     }
-    let listener = passed.take_unix_listener(0)?;
-    let listener = listener.expect("the only socket was not taken before");
-    listener.set_nonblocking(true)?;
-    let path = listener.local_addr()?.as_pathname().map(Path::to_owned);
-    let listener = UnixListener::from_std(listener)?;
-    Ok((listener.into(), Address::Unix(path.unwrap_or_default())))
+    #[cfg(unix)]
+    {
+        let listener = passed.take_unix_listener(0)?;
+        let listener = listener.expect("the only socket was not taken before");
+        listener.set_nonblocking(true)?;
+        let path = listener.local_addr()?.as_pathname().map(Path::to_owned);
+        let listener = UnixListener::from_std(listener)?;
+        Ok((listener.into(), Address::Unix(path.unwrap_or_default())))
+    }
+    #[cfg(not(unix))]
+    Err(io::Error::other("it is not a TCP socket"))
 }
 
 /// Listens on a path. Removes the socket of a server that has died.
+#[cfg(unix)]
 fn unix(path: &Path) -> io::Result<UnixListener> {
     match UnixListener::bind(path) {
         Err(error) if error.kind() == io::ErrorKind::AddrInUse && is_dead(path) => {
@@ -115,6 +137,7 @@ fn unix(path: &Path) -> io::Result<UnixListener> {
     }
 }
 
+#[cfg(unix)]
 fn is_dead(path: &Path) -> bool {
     let connected = std::os::unix::net::UnixStream::connect(path);
     connected.is_err_and(|error| error.kind() == io::ErrorKind::ConnectionRefused)

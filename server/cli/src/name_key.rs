@@ -50,7 +50,7 @@ fn create(path: &Path) -> Result<Vec<u8>, WriteError> {
     Ok(key.into())
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use std::os::unix::fs::PermissionsExt as _;
 

@@ -71,6 +71,7 @@ mod tests {
         SecretFile::prepare(file, "--code-file", "a join code")
     }
 
+    #[cfg(unix)]
     #[test]
     fn a_secret_is_left_for_its_owner_alone() {
         use std::os::unix::fs::PermissionsExt as _;

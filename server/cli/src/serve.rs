@@ -8,14 +8,13 @@ use std::time::Duration;
 use clap::Args;
 use clap::builder::{FalseyValueParser, RangedU64ValueParser};
 use futures::future::OptionFuture;
-use sd_notify::NotifyState;
 use tokio::net::TcpListener;
-use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::oneshot;
 
 use super::cluster::{NewNode, NodeSettings};
 use super::listen::{self, Address};
 use super::numbers::duration;
+use super::stops::Stops;
 use super::{CommandError, data_dir, lab, lan, say};
 use chefshat_server::access::{Access, AccessSettings, Mode, Role};
 use chefshat_server::cluster::LeaseTimes;
@@ -312,8 +311,7 @@ impl Serve {
             .map(TcpListener::local_addr)
             .transpose()?;
         // Before the address is printed, so that an immediate signal is handled.
-        let mut terminate = signal(SignalKind::terminate())?;
-        let mut interrupt = signal(SignalKind::interrupt())?;
+        let mut stops = Stops::catch()?;
         let kept_in = data_dir.clone();
         let grace = settings.grace;
         let is_node = settings.node.database.is_some();
@@ -391,16 +389,16 @@ impl Serve {
         if !web::is_built() {
             eprintln!("the web page is not built yet; `cargo xtask web` builds it");
         }
-        // A failure only delays systemd, which says so itself.
-        let _ = sd_notify::notify(&[NotifyState::Ready]);
+        #[cfg(target_os = "linux")]
+        tell_systemd(sd_notify::NotifyState::Ready);
         let input_ends = self.until_stdin_closes.then(end_of_input);
         let stop = async move {
             tokio::select! {
-                _ = terminate.recv() => {}
-                _ = interrupt.recv() => {}
+                _ = stops.next() => {}
                 Some(_) = OptionFuture::from(input_ends) => {}
             }
-            let _ = sd_notify::notify(&[NotifyState::Stopping]);
+            #[cfg(target_os = "linux")]
+            tell_systemd(sd_notify::NotifyState::Stopping);
             let (then, at_once) = match is_node {
                 true => (
                     format!("other nodes take durable games over, others may end within {grace} s"),
@@ -415,10 +413,7 @@ impl Serve {
             };
             eprintln!("stopping: no new rooms; {then}; stop again to end at once");
             tokio::spawn(async move {
-                tokio::select! {
-                    _ = terminate.recv() => {}
-                    _ = interrupt.recv() => {}
-                }
+                stops.next().await;
                 eprintln!("stopped at once: {at_once}, all others are lost");
                 std::process::exit(1);
             });
@@ -427,6 +422,13 @@ impl Serve {
         eprintln!("stopped");
         Ok(ExitCode::SUCCESS)
     }
+}
+
+/// Tells systemd how far the server is, if it has started it. A failure only delays systemd, which says
+/// so itself.
+#[cfg(target_os = "linux")]
+fn tell_systemd(state: sd_notify::NotifyState<'_>) {
+    let _ = sd_notify::notify(&[state]);
 }
 
 /// Where the games of a server are stored.

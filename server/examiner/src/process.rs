@@ -9,6 +9,7 @@ use std::process::{ExitStatus, Stdio};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+#[cfg(unix)]
 use rustix::process::{Pid, Signal, kill_process_group};
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::process::{Child, Command};
@@ -90,10 +91,12 @@ impl AgentCommand {
     }
 }
 
-/// A running process. Dropping it kills the process and everything it started.
+/// A running process. Dropping it kills the process and, where processes have groups, everything it
+/// started.
 #[derive(Debug)]
 pub(super) struct AgentProcess {
     child: Child,
+    #[cfg(unix)]
     group: Option<Pid>,
     log: Arc<Mutex<Log>>,
     readers: Vec<JoinHandle<()>>,
@@ -118,14 +121,17 @@ impl AgentProcess {
         };
         let mut words = command.filled(places).into_iter();
         let program = words.next().unwrap_or_default();
-        let mut child = Command::new(program)
+        let mut command = Command::new(program);
+        command
             .args(words)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
-            .process_group(0)
-            .kill_on_drop(true)
-            .spawn()?;
+            .kill_on_drop(true);
+        #[cfg(unix)]
+        command.process_group(0);
+        let mut child = command.spawn()?;
+        #[cfg(unix)]
         let group = child
             .id()
             .and_then(|id| i32::try_from(id).ok())
@@ -145,6 +151,7 @@ impl AgentProcess {
         }
         Ok(Self {
             child,
+            #[cfg(unix)]
             group,
             log: kept,
             readers,
@@ -166,11 +173,14 @@ impl AgentProcess {
         self.last_lines(most)
     }
 
-    fn kill(&self) {
+    fn kill(&mut self) {
+        // What is killed may be gone already.
+        #[cfg(unix)]
         if let Some(group) = self.group {
-            // The group may be gone already.
             let _gone = kill_process_group(group, Signal::KILL);
         }
+        #[cfg(not(unix))]
+        let _gone = self.child.start_kill();
     }
 
     fn last_lines(&self, most: usize) -> Vec<String> {

@@ -9,12 +9,11 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anstyle::{AnsiColor, Style};
-use clap::Args;
-use tokio::signal::unix::{SignalKind, signal};
-
 use chefshat_cli::error::{CommandError, say};
+use chefshat_cli::stops::{Stop, Stops};
 use chefshat_examiner::case::{CASES, Case, Patience};
 use chefshat_examiner::{AgentCommand, Examination, Outcome, Waiting};
+use clap::Args;
 
 /// Time to wait for an agent that a person starts.
 const BY_HAND: Duration = Duration::from_secs(600);
@@ -72,15 +71,14 @@ impl CheckAgent {
         if self.list {
             return self.print_list();
         }
-        let mut terminate = signal(SignalKind::terminate())?;
+        let mut stops = Stops::catch()?;
         tokio::select! {
             code = self.examine() => code,
             // Returning ends the agent's processes, which are in a process group of their own.
-            pressed = tokio::signal::ctrl_c() => {
-                pressed?;
-                Ok(ExitCode::from(INTERRUPTED))
-            }
-            _ = terminate.recv() => Ok(ExitCode::FAILURE),
+            stop = stops.next() => Ok(match stop {
+                Stop::Interrupt => ExitCode::from(INTERRUPTED),
+                _ => ExitCode::FAILURE,
+            }),
         }
     }
 

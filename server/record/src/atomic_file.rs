@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{NamedTempFile, PersistError};
 
+use crate::private;
+
 /// A failed write. The target is unchanged.
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: {source}")]
@@ -40,10 +42,8 @@ impl AtomicFile {
     /// # Errors
     /// The file cannot be created.
     pub fn create_private(path: &Path) -> Result<Self, WriteError> {
-        let mut options = File::options();
+        let mut options = private::options();
         options.write(true).create_new(true);
-        #[cfg(unix)]
-        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
         Self::opened_by(path, |part| options.open(part))
     }
 

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use chefshat_proto::v1::{RecordLine, record_line::Line};
 
 use crate::atomic_file::{AtomicFile, WriteError};
+use crate::private;
 use crate::signature::TextHash;
 pub use lists::{Excess, excess};
 
@@ -153,13 +154,7 @@ pub fn write_private(
     lines: impl FnOnce(&mut dyn FnMut(&RecordLine)),
 ) -> Result<(), RecordFileError> {
     if let Some(folder) = path.parent() {
-        let made = std::fs::create_dir_all(folder);
-        #[cfg(unix)]
-        let made = made.and_then(|()| {
-            use std::os::unix::fs::PermissionsExt;
-            std::fs::set_permissions(folder, PermissionsExt::from_mode(0o700))
-        });
-        made.map_err(|source| io_error(path, source))?;
+        private::create_folder(folder).map_err(|source| io_error(path, source))?;
     }
     write_to(AtomicFile::create_private(path)?, path, lines)
 }

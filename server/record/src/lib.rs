@@ -10,6 +10,7 @@ pub mod import;
 pub mod jsonl;
 pub mod outcome;
 pub mod players;
+pub mod private;
 pub mod pseudonym;
 pub mod rated;
 pub mod replay;

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use chefshat_record::atomic_file::{AtomicFile, WriteError};
+use chefshat_record::private;
 use chefshat_room::ids::{Id, SecretHash, random_bytes};
 use serde::{Deserialize, Serialize};
 
@@ -214,10 +215,8 @@ impl TokenFile {
     fn lock(&self) -> Result<File, TokenFileError> {
         let path = self.path.with_file_name(LOCK_FILE);
         let open = || {
-            let mut options = File::options();
+            let mut options = private::options();
             options.create(true).write(true).truncate(false);
-            #[cfg(unix)]
-            std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
             let file = options.open(&path)?;
             file.lock()?;
             Ok(file)

@@ -10,11 +10,11 @@ use ratatui::DefaultTerminal;
 use ratatui::Frame;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use ratatui::crossterm::terminal::is_raw_mode_enabled;
-use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::mpsc;
 use tokio::time::{Instant, Interval, MissedTickBehavior, interval};
 
 use super::super::CommandError;
+use crate::stops::Stops;
 
 /// Keys that may wait to be handled.
 const KEYS: usize = 64;
@@ -45,8 +45,7 @@ pub(crate) struct Screen {
     keys: mpsc::Receiver<Key>,
     ticks: Interval,
     opened: Instant,
-    /// Interrupt, terminate, hang up.
-    signals: [Signal; 3],
+    stops: Stops,
 }
 
 impl Screen {
@@ -56,11 +55,7 @@ impl Screen {
     /// # Errors
     /// The terminal or the signals are unavailable.
     pub(crate) fn open(tick: Duration) -> Result<Self, CommandError> {
-        let signals = [
-            signal(SignalKind::interrupt())?,
-            signal(SignalKind::terminate())?,
-            signal(SignalKind::hangup())?,
-        ];
+        let stops = Stops::catch()?.with_hang_up()?;
         let mut ticks = interval(tick);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
         let terminal = ratatui::try_init()?;
@@ -71,7 +66,7 @@ impl Screen {
             keys,
             ticks,
             opened: Instant::now(),
-            signals,
+            stops,
         })
     }
 
@@ -82,13 +77,10 @@ impl Screen {
 
     /// Waits for a key, a signal or the next tick. Cancel safe.
     pub(crate) async fn next(&mut self) -> Wake {
-        let [interrupt, terminate, hang_up] = &mut self.signals;
         tokio::select! {
             key = self.keys.recv() => Wake::Key(key.unwrap_or(Key::Interrupt)),
             _ = self.ticks.tick() => Wake::Tick,
-            _ = interrupt.recv() => Wake::Key(Key::Interrupt),
-            _ = terminate.recv() => Wake::Key(Key::Interrupt),
-            _ = hang_up.recv() => Wake::Key(Key::Interrupt),
+            _ = self.stops.next() => Wake::Key(Key::Interrupt),
         }
     }
 

@@ -13,14 +13,13 @@ use std::net::SocketAddr;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use clap::Args;
-use rmcp::ServiceExt as _;
-use rmcp::service::ServerInitializeError;
-use tokio::signal::unix::{SignalKind, signal};
-
 use chefshat_cli::connect::ServerArg;
 use chefshat_cli::error::CommandError;
 use chefshat_cli::name_key::NameKeyArg;
+use chefshat_cli::stops::Stops;
+use clap::Args;
+use rmcp::ServiceExt as _;
+use rmcp::service::ServerInitializeError;
 use seats::{Handles, Seats};
 use server::{Server, Settings};
 
@@ -123,11 +122,6 @@ async fn over_stdio(settings: Arc<Settings>) -> Result<(), CommandError> {
 /// # Errors
 /// The operating system has no place for the signals.
 async fn asked_to_stop() -> Result<(), CommandError> {
-    let mut terminate = signal(SignalKind::terminate())?;
-    let mut interrupt = signal(SignalKind::interrupt())?;
-    tokio::select! {
-        _ = terminate.recv() => {}
-        _ = interrupt.recv() => {}
-    }
+    Stops::catch()?.next().await;
     Ok(())
 }

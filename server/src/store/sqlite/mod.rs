@@ -57,7 +57,7 @@ use chefshat_room::policy::Durability;
 use errors::explain;
 use journals::{DurableJournal, Whole, WriteQueue};
 use reader::Reader;
-use space::Space;
+use space::{Disk, Space};
 use writer::WriteCommand;
 
 /// Stores games in the database of a data directory.
@@ -272,12 +272,12 @@ impl Store for SqliteStore {
     }
 
     fn disk(&self) -> Option<DiskUsage> {
-        let disk = rustix::fs::statvfs(&self.data_dir).ok()?;
+        let disk = Disk::of(&self.data_dir).ok()?;
         let files = ["", "-wal"].map(|ending| format!("{DATABASE_FILE}{ending}"));
         let sizes = files.map(|file| self.data_dir.join(file).metadata().map_or(0, |it| it.len()));
         Some(DiskUsage {
             bytes: sizes.iter().sum(),
-            free_bytes: disk.f_bavail * disk.f_frsize,
+            free_bytes: disk.free_bytes,
         })
     }
 

@@ -2,9 +2,9 @@
 //! can read it. Refuses it otherwise, before anything is written.
 
 use std::fs::File;
-use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
+use chefshat_record::private;
 use sqlx::migrate::{MigrateError, Migration, MigrationType, Migrator};
 use sqlx::sqlite::{
     SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqlitePool, SqlitePoolOptions,
@@ -311,10 +311,9 @@ fn check_log(path: &Path) -> Result<(), OpenError> {
 /// Creates the database file, if it is missing, unreadable for other users: it contains the seeds
 /// of running games.
 pub(super) fn make_private(path: &Path) -> Result<(), OpenError> {
-    File::options()
+    private::options()
         .create(true)
         .append(true)
-        .mode(0o600)
         .open(path)
         .map(drop)
         .map_err(|source| OpenError::Io {

@@ -3,7 +3,7 @@
 //! that would follow from it, until there is space or the server stops. Deletions go first.
 
 use std::fs::File;
-use std::io::Write as _;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -33,6 +33,40 @@ const REMINDER: Duration = Duration::from_secs(60);
 /// even reading a database needs some. Its name begins with that of the database, so no backup has it.
 const BALLAST: &str = "games.sqlite3.reserve";
 const BALLAST_BYTES: usize = 256 * 1024;
+
+/// The file system of a data directory.
+#[derive(Debug)]
+pub(super) struct Disk {
+    /// Its size.
+    bytes: u64,
+    /// What programs without privileges can still use of it.
+    pub(super) free_bytes: u64,
+}
+
+impl Disk {
+    /// The file system that contains a path.
+    ///
+    /// # Errors
+    /// The system does not tell.
+    pub(super) fn of(path: &Path) -> io::Result<Self> {
+        #[cfg(unix)]
+        {
+            let disk = rustix::fs::statvfs(path)?;
+            Ok(Self {
+                bytes: disk.f_blocks * disk.f_frsize,
+                free_bytes: disk.f_bavail * disk.f_frsize,
+            })
+        }
+        #[cfg(not(unix))]
+        {
+            let disk = fs4::statvfs(path)?;
+            Ok(Self {
+                bytes: disk.total_space(),
+                free_bytes: disk.available_space(),
+            })
+        }
+    }
+}
 
 /// The space of a data directory.
 #[derive(Debug)]
@@ -76,11 +110,10 @@ impl Space {
         if self.is_full() {
             return false;
         }
-        match rustix::fs::statvfs(&self.data_dir) {
+        match Disk::of(&self.data_dir) {
             Ok(disk) => {
-                let size = disk.f_blocks * disk.f_frsize;
                 let games = self.games.load(Ordering::Relaxed) as u64;
-                disk.f_bavail * disk.f_frsize >= reserve(size, games)
+                disk.free_bytes >= reserve(disk.bytes, games)
             }
             // If the free space is unknown, try.
             Err(_) => true,
@@ -90,8 +123,7 @@ impl Space {
     /// Whether an error of a commit means that the disk is full.
     pub(super) fn explains(&self, error: &sqlx::Error) -> bool {
         is_full(error, || {
-            rustix::fs::statvfs(&self.data_dir)
-                .is_ok_and(|disk| disk.f_bavail * disk.f_frsize < NO_SPACE_BYTES)
+            Disk::of(&self.data_dir).is_ok_and(|disk| disk.free_bytes < NO_SPACE_BYTES)
         })
     }
 
