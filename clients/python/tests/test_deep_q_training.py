@@ -187,6 +187,7 @@ def test_a_file_that_is_not_a_network_is_reported(tmp_path: Path, capsys: pytest
     assert "is not a network" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.server
 def test_parameters_are_tuned_and_trained_with(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = tmp_path / "tuned.json"

@@ -407,23 +407,19 @@ def test_after_ten_illegal_actions_a_random_legal_one_is_taken(quick_run: Path) 
 def test_the_same_seed_gives_the_same_result(
     quick_run: Path, real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    arguments = ["mechanics", "--quick", "--out", str(tmp_path), "--address", real_address, "--json"]
+    # Without an address a server is started.
+    arguments = ["mechanics", "--quick", "--out", str(tmp_path), "--json"]
     assert main(arguments) == 0
     (again,) = json.loads(capsys.readouterr().out)["results"]
     before = json.loads(command.results_file(quick_run, "mechanics").read_text(encoding="utf-8"))
     for key in ("tables", "values", "rules", "settings", "seeds"):
         assert again[key] == before[key]
-    assert main([*arguments, "--seed", "2"]) == 0
+    assert main([*arguments, "--address", real_address, "--seed", "2"]) == 0
     (other,) = json.loads(capsys.readouterr().out)["results"]
     assert other["values"] != before["values"]
 
 
-@pytest.mark.server
-def test_a_server_is_started_without_an_address(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["mechanics", "--quick", "--out", str(tmp_path), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["results"][0]["values"]
-
-
+@pytest.mark.slow
 @pytest.mark.server
 def test_trained_agents_are_the_same_with_the_same_seed(quick_run: Path, real_address: str, tmp_path: Path) -> None:
     assert main(["rules", "--quick", "--out", str(tmp_path), "--address", real_address]) == 0

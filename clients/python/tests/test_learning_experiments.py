@@ -132,6 +132,7 @@ def never(*_: object, **__: object) -> Learned:
     raise AssertionError("learned again")
 
 
+@pytest.mark.slow
 @pytest.mark.server
 def test_experiment_3_begins_with_the_networks_of_2(real_address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     quiet = Progress(show=False)

@@ -250,6 +250,7 @@ def test_a_decision_without_the_start_of_its_shift() -> None:
         search.position(decision)
 
 
+@pytest.mark.slow
 def test_the_search_agent_beats_greedy() -> None:
     # Chance is 2.5 of 10.
     places = sample_module("search_agent").play(games=10, rollouts=1000)

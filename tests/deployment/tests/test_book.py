@@ -27,6 +27,9 @@ TYPED_BY = {
     "docs/releases.md": "tests/deployment/tests/test_release.py",
 }
 
+#: Pages whose commands take long, and why.
+SLOW = {"docs/index.md": "cameras, people and a robot play a Shift; so they do in clients/robot/tests/test_rehearsal.py"}
+
 #: What sets up a machine: `cargo xtask test` has done it.
 SET_UP = re.compile(r"(cargo (build|install|xtask)|pip install|python3[.\d]* -m venv|npm ci|cd clients/|apt-get install|cmake) ?")
 
@@ -203,7 +206,7 @@ def reader(tmp_path: Path, record: Path) -> Iterator[Reader]:
     server.leave()
 
 
-@pytest.mark.parametrize("page", RUN)
+@pytest.mark.parametrize("page", [pytest.param(page, marks=pytest.mark.slow) if page in SLOW else page for page in RUN])
 def test_the_commands_of_a_page_run(page: str, reader: Reader) -> None:
     for command in commands(page):
         if reason(command) is None:

@@ -29,7 +29,7 @@ const LIFE: Duration = Duration::from_millis(150);
 const LIVES_LONGER: Duration = Duration::from_millis(10);
 /// Messages per burst of the flooding agent, and the pause between bursts.
 const FLOOD: u32 = 500;
-const BETWEEN_FLOODS: Duration = Duration::from_millis(20);
+const BETWEEN_FLOODS: Duration = Duration::from_millis(100);
 
 fn options() -> PlayOptions {
     PlayOptions {

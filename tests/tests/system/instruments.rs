@@ -19,6 +19,7 @@ use chefshat_server::webhooks::WebhookSettings;
 use chefshat_tests::{
     TestNodes, TestServer, attach_all, one_shift, patiently, play_out, random_agents, room_of_four,
 };
+use futures::future::select_all;
 use http_body_util::BodyExt as _;
 use hyper_util::rt::TokioIo;
 use serde_json::Value;
@@ -410,10 +411,9 @@ async fn samples_of_a_seat_are_in_a_file_beside_the_records() {
     let early = add(&tickets[1], chunk(1)).await;
     assert_eq!(early, refused("GAME_NOT_STARTED"));
     let mut seats = attach_all(&server, &tickets).await;
-    for seat in &mut seats {
-        // The game has started when a seat has heard of it.
-        patiently("an update", seat.next()).await;
-    }
+    // The game has started when a seat has heard of it. The others hear of it when they decide.
+    let first = select_all(seats.iter_mut().map(|seat| Box::pin(seat.next())));
+    patiently("an update", first).await;
     assert_eq!(add(&tickets[1], chunk(1)).await, Ok(2));
     assert_eq!(add(&tickets[1], chunk(2)).await, Ok(1), "one is known");
     let wrong = add(&tickets[1], v1::SampleChunk::default()).await;

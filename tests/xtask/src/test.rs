@@ -204,6 +204,9 @@ pub(crate) fn run(
             tests.arg("--no-fail-fast");
             // Most tests wait for servers and clocks.
             tests.env("RUST_TEST_THREADS", "4");
+            if slow {
+                tests.env("CHEFSHAT_FAULTS", "200");
+            }
             steps.program("cargo test", &mut tests)
         }));
     }
@@ -230,6 +233,8 @@ pub(crate) fn run(
                 outcomes.push(steps.program(&name, &mut pytest));
             }
             if slow {
+                let (name, mut pytest) = pytest(places, CLIENTS, &["-m", "slow"]);
+                outcomes.push(steps.program(&name, &mut pytest));
                 outcomes.push(wheels::run(places, steps, "release", true));
             }
             all_of(outcomes)

@@ -59,7 +59,7 @@ OF_DEFAULTS = ("all", "without_jokers", "without_exchange")
 # Games as long as the paper's whole run; 100,000 Shifts.
 FULL = Size(games=400, shifts_per_game=paper.SHIFTS)
 # Shorter games, because the longest game determines the duration of a batch.
-QUICK = Size(games=100, shifts_per_game=4)
+QUICK = Size(games=64, shifts_per_game=4)
 
 
 @dataclass(frozen=True)
