@@ -41,7 +41,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let (outer, file) = (folder.path().join("outer"), folder.path().join("file"));
         create_folder(&outer.join("inner")).expect("created");
-        std::fs::set_permissions(&outer, std::os::unix::fs::PermissionsExt::from_mode(0o755)).expect("ours");
+        std::fs::set_permissions(&outer, std::os::unix::fs::PermissionsExt::from_mode(0o755))
+            .expect("ours");
         create_folder(&outer).expect("closed");
         options()
             .create_new(true)
