@@ -1,5 +1,8 @@
 """A policy with its observation function plays live as on a vector environment."""
 
+from pathlib import Path
+from typing import Literal
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -7,8 +10,11 @@ from numpy.typing import NDArray
 import chefshat
 from chefshat import Client, Decision, VectorEnv, pb
 from chefshat.columns import Situations
+from chefshat.learn import network
 from chefshat.learn.features import classic_of, table_of
+from chefshat.learn.play import NetworkAgent
 
+NETWORKS = Path(__file__).parents[3] / "tests" / "fixtures" / "network"
 SEED = bytes(range(32))
 
 
@@ -57,6 +63,43 @@ def test_the_same_function_plays_live_and_on_a_vector_environment(real_address: 
             env.step([action])
     assert len(seen) > 20
     assert live.seen == seen
+
+
+class LiveNetwork(NetworkAgent):
+    """Plays by a network, and keeps the kinds of its decisions and what it did."""
+
+    def __init__(self, net: network.Network) -> None:
+        super().__init__(net)
+        self.seen: list[tuple[int, int]] = []
+
+    def decide(self, request: Decision) -> int:
+        action = super().decide(request)
+        self.seen.append((request.kind, action))
+        return action
+
+
+@pytest.mark.server
+@pytest.mark.parametrize("name", ["table-actions", "classic-turns"])
+def test_a_network_plays_live_as_on_a_vector_environment(real_address: str, name: str) -> None:
+    net = network.load(NETWORKS / f"{name}.safetensors")
+    live, rules = LiveNetwork(net), pb.RuleSet(target_shifts=40)
+    with Client(real_address) as client:
+        seats = [None, "greedy", "greedy", "greedy"]
+        room = client.create_room("live", seats=seats, rules=rules, game_seed=SEED, policy=pb.RoomPolicy(pace_ms=0))
+        client.play(live, client.join_room(room.join_code, "live").ticket)
+    decisions: Literal["all", "turns"] = "turns" if net.info.output == "turns" else "all"
+    seen = []
+    with VectorEnv(
+        real_address, client_seats=[0], opponents="greedy", rules=rules, seed=[SEED], total_games=1, decisions=decisions
+    ) as env:
+        while not env.batch.done:
+            action = int(net.actions_of(env.batch)[0])
+            seen.append((int(env.batch.kinds[0]), action))
+            env.step([action])
+    kinds = {kind for kind, _ in live.seen}
+    assert kinds == {pb.DECISION_KIND_TURN, pb.DECISION_KIND_EXCHANGE, pb.DECISION_KIND_SPECIAL_ACTION}
+    # At the others, a network of turns takes the default action.
+    assert [each for each in live.seen if each[0] == pb.DECISION_KIND_TURN or decisions == "all"] == seen
 
 
 def test_a_decision_before_the_start_of_its_game_has_no_table() -> None:

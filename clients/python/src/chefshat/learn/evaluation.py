@@ -110,7 +110,7 @@ def evaluate(
             if batch.done:
                 break
             if isinstance(player, Network):
-                actions: npt.ArrayLike = player.actions(batch.observations, batch.seats, batch.kinds, batch.mask_bits)
+                actions: npt.ArrayLike = player.actions_of(batch)
             else:
                 actions = player(batch)
             batch = env.step(actions)

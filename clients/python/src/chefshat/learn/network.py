@@ -16,7 +16,7 @@ import numpy.typing as npt
 import safetensors
 import safetensors.numpy
 
-from chefshat.columns import Observations
+from chefshat.columns import Observations, Situations
 from chefshat.files import check_readable, write_atomically
 from chefshat.learn import features
 
@@ -180,6 +180,10 @@ class Network:
         """
         # Before the tanh, which preserves order but rounds values far from 0 to the same number.
         return best_legal(self._sums(self.inputs(observations, seats, kinds, mask_bits)), mask_bits)
+
+    def actions_of(self, situations: Situations) -> Actions:
+        """Returns the action of each row of a batch, or of `Decision.situations`: (R,) u16. See `actions`."""
+        return self.actions(situations.observations, situations.seats, situations.kinds, situations.mask_bits)
 
 
 def best_legal(outputs: Floats, mask_bits: features.Bytes) -> Actions:

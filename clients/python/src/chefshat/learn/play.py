@@ -6,11 +6,7 @@ illegal action.
 
 import argparse
 
-import numpy as np
-import numpy.typing as npt
-
 from chefshat import Agent, Client, Decision, SeatInfo, join_options, outcome, pb
-from chefshat.columns import NO_SEAT, Observations, Sizes
 from chefshat.errors import exit_code
 from chefshat.learn import features, network
 from chefshat.learn.network import Network, NetworkFileError
@@ -35,10 +31,7 @@ class NetworkAgent(Agent):
         self._check(request.seat_info)
         if self._network.info.output == "turns" and request.kind != pb.DECISION_KIND_TURN:
             return request.default_action
-        kinds = np.array([request.kind], np.uint8)
-        seats = np.array([request.seat], np.uint8)
-        mask_bits = np.frombuffer(request.mask_bytes, np.uint8)[np.newaxis]
-        return int(self._network.actions(observations_of(request), seats, kinds, mask_bits)[0])
+        return int(self._network.actions_of(request.situations())[0])
 
     def _check(self, seat: SeatInfo) -> None:
         if seat.game_started is not None:
@@ -56,19 +49,6 @@ class NetworkAgent(Agent):
                 f"the network {info.name!r} plays with {info.players} players, {info.faces} faces and hands of {info.hand_size} "
                 f"cards; this game has {players}, {faces} and {hand_size}"
             )
-
-
-def observations_of(request: Decision) -> Observations:
-    """Converts the observation of a decision to a table of one row."""
-    sizes = Sizes(len(request.cards_left), request.faces, features.MAX_JOKERS, 0, request.size, request.turn_actions)
-    columns: dict[str, npt.ArrayLike] = {name: getattr(request, name) for name in Observations.columns() if hasattr(request, name)}
-    columns |= {"shifts": request.shift, "pizzas": request.pizza}
-    columns["boards"] = [request.board_face, request.board_size, request.board_jokers]
-    columns["board_owners"] = NO_SEAT if request.board_owner is None else request.board_owner
-    columns["points"] = np.minimum(request.points, np.iinfo(np.uint32).max)
-    # The message omits empty gifts, which are then zeros.
-    rows = {name: np.array(value)[np.newaxis] for name, value in columns.items() if np.size(value)}
-    return Observations.of(1, sizes, rows)
 
 
 def run(options: argparse.Namespace) -> int:
