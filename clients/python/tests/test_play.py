@@ -207,6 +207,41 @@ def test_exceptions_of_coroutines_propagate(fake: FakeServer) -> None:
         play_asyncio(fake.address, {ticket: BrokenLater()})
 
 
+class Offline(aio.Client):
+    """Never reconnects. Lets the test wait until the connection is lost."""
+
+    def __init__(self, address: str) -> None:
+        super().__init__(address)
+        self.offline = asyncio.Event()
+
+    async def _wait(self, failures: int, error: ChefsHatError) -> None:
+        self.offline.set()
+        await asyncio.Event().wait()
+
+
+class BrokenOffline(Agent):
+    """Raises when the connection has been lost."""
+
+    def __init__(self, client: Offline) -> None:
+        self._client = client
+
+    async def decide(self, request: Decision) -> int:
+        await self._client.offline.wait()
+        raise ZeroDivisionError("an agent's own mistake")
+
+
+def test_exceptions_between_connections_propagate(fake: FakeServer) -> None:
+    first, second = (ticket for _ in range(2) for ticket in seats(fake, played=1))
+    fake.fault = lambda game, seat, answer: "before"
+
+    async def run() -> None:
+        async with asyncio.timeout(60), Offline(fake.address) as client:
+            await client.play_many({first: BrokenOffline(client), second: RandomAgent()})
+
+    with pytest.raises(ZeroDivisionError, match="own mistake"):
+        asyncio.run(run())
+
+
 def test_an_unknown_ticket_stops_only_its_seat(fake: FakeServer, play: Player) -> None:
     (ticket,) = seats(fake, played=1)
     results = play(fake.address, {"nonsense": RandomAgent(), ticket: RandomAgent()})

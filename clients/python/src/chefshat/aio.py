@@ -31,33 +31,36 @@ class Client(AsyncCalls):
     async def _play_session(self, session: PlaySession) -> None:
         """Plays until the session is done, reconnecting as needed."""
         failures = 0
-        run = _Run(session)
         try:
-            while not session.done:
-                before = session.progress
-                error = await run.connection(self._play.Play())
-                session.lost()
-                if session.done:
-                    break
-                failures = 1 if session.progress > before else failures + 1
-                try:
-                    await self._wait(failures, error)
-                except ChefsHatError as final:
-                    session.give_up(final)
-        finally:
-            await run.end()
+            # An agent that fails ends the session at any time, also between connections.
+            async with asyncio.TaskGroup() as group:
+                run = _Run(session, group)
+                while not session.done:
+                    before = session.progress
+                    error = await run.connection(self._play.Play())
+                    session.lost()
+                    if session.done:
+                        break
+                    failures = 1 if session.progress > before else failures + 1
+                    try:
+                        await self._wait(failures, error)
+                    except ChefsHatError as final:
+                        session.give_up(final)
+                run.end()
+        except BaseExceptionGroup as failed:
+            raise failed.exceptions[0] from None
 
 
 class _Run:
     """A session in play: the current connection, and the agents that are deciding."""
 
-    def __init__(self, session: PlaySession) -> None:
+    def __init__(self, session: PlaySession, group: asyncio.TaskGroup) -> None:
         self._session = session
+        self._group = group
         self._call: PlayCall | None = None
         # gRPC permits one write at a time.
         self._writing = asyncio.Lock()
         self._thinking: set[asyncio.Task[None]] = set()
-        self._failure: BaseException | None = None
 
     async def connection(self, call: PlayCall) -> ChefsHatError:
         """Plays over one connection until it is lost or the session is done. Returns the error that ended it."""
@@ -78,22 +81,15 @@ class _Run:
             return from_rpc_error(error)
         except asyncio.InvalidStateError:
             return connection_lost()  # The call ended before a write.
-        except asyncio.CancelledError:
-            # Either an agent's failure cancelled the call (below), or the caller's task was cancelled.
-            if self._failure is not None:
-                raise self._failure from None
-            raise
         finally:
             self._call = None
             call.cancel()
         return connection_lost()
 
-    async def end(self) -> None:
+    def end(self) -> None:
         """Cancels agents that are still deciding."""
-        thinking = list(self._thinking)
-        for task in thinking:
+        for task in self._thinking:
             task.cancel()
-        await asyncio.gather(*thinking, return_exceptions=True)
 
     def _decide(self, ask: Ask) -> None:
         """Lets the agent decide: at once, or in a task if `decide` is a coroutine."""
@@ -101,19 +97,13 @@ class _Run:
         if type(action) is int or not isinstance(action, Awaitable):
             self._session.answer(ask, action)
             return
-        task = asyncio.ensure_future(self._think(ask, action))
+        task = self._group.create_task(self._think(ask, action))
         self._thinking.add(task)
         task.add_done_callback(self._thinking.discard)
 
     async def _think(self, ask: Ask, action: Awaitable[int]) -> None:
         """Waits for an agent's answer and sends it over the then current connection."""
-        try:
-            self._session.answer(ask, await action)
-        except Exception as failure:
-            self._failure = failure
-            if self._call is not None:
-                self._call.cancel()
-            return
+        self._session.answer(ask, await action)
         call = self._call
         if call is None:
             return  # The answer goes out when the seat is attached again.
