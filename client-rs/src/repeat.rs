@@ -1,5 +1,5 @@
-//! Repeats requests whose response was lost, or whose room or tournament is just changing servers.
-//! They change nothing, or their id tells the server that they are the same. `GetServerInfo` is not
+//! Repeats requests whose response was lost, whose room or tournament is just changing servers, or
+//! whose server is stopping, until it is back. They change nothing, or their id tells the server that they are the same. `GetServerInfo` is not
 //! repeated: it tells at once whether the server answers. The Python SDK repeats the same calls.
 
 use std::time::Duration;
@@ -15,12 +15,17 @@ const ATTEMPTS: u32 = 5;
 /// Maximum number of attempts while the server of a room or tournament cannot be reached: another
 /// one takes over within ten seconds.
 const OWNER_ATTEMPTS: u32 = 20;
+/// Maximum number of attempts while the server stops, and then is away: its running games may end
+/// first, and then it starts again. Two minutes.
+const RESTART_ATTEMPTS: u32 = 125;
 /// Pause after the first attempt; it doubles with each further one.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// Longest pause.
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 /// Reason of a server that cannot reach the one that runs a room or tournament.
 const OWNER_UNREACHABLE: &str = "OWNER_UNREACHABLE";
+/// Reason of a server that is stopping.
+const SHUTTING_DOWN: &str = "SHUTTING_DOWN";
 
 /// Gives a request an id unless the caller has.
 ///
@@ -36,28 +41,33 @@ pub(crate) fn identify(request_id: &mut Vec<u8>) {
     }
 }
 
-/// Sends a request, and again if the connection is lost before its response arrives, or the server of
-/// its room or tournament cannot be reached.
+/// Sends a request, and again if the connection is lost before its response arrives, the server of
+/// its room or tournament cannot be reached, or the server is stopping.
 pub(crate) async fn repeated<T, F>(send: impl Fn() -> F) -> Result<T, Error>
 where
     F: Future<Output = Result<Response<T>, Status>>,
 {
     let mut attempt = 1;
+    let mut lost = ATTEMPTS;
     loop {
         let error = match send().await {
             Ok(response) => return Ok(response.into_inner()),
             Err(status) => Error::from(status),
         };
         let attempts = match error.reason() {
-            None if may_retry(error.code()) => ATTEMPTS,
+            None if may_retry(error.code()) => lost,
             Some(OWNER_UNREACHABLE) => OWNER_ATTEMPTS,
+            Some(SHUTTING_DOWN) => {
+                lost = RESTART_ATTEMPTS;
+                lost
+            }
             // The server has refused it.
             _ => 1,
         };
         if attempt >= attempts {
             return Err(error);
         }
-        let pause = FIRST_PAUSE * 2_u32.pow(attempt - 1);
+        let pause = FIRST_PAUSE * 2_u32.pow((attempt - 1).min(8));
         tokio::time::sleep(pause.min(LONGEST_PAUSE)).await;
         attempt += 1;
     }
@@ -115,33 +125,45 @@ mod tests {
         assert_eq!(sent.load(Ordering::Relaxed), 1);
     }
 
+    /// Answers of a server: a refusal with this reason, a lost connection without one, or success.
+    fn answers(
+        reasons: impl Fn(u32) -> Option<&'static str>,
+        until: u32,
+    ) -> impl Fn() -> std::future::Ready<Result<Response<u32>, Status>> {
+        let sent = AtomicU32::new(0);
+        move || {
+            let number = sent.fetch_add(1, Ordering::Relaxed);
+            std::future::ready(match (number < until, reasons(number)) {
+                (false, _) => Ok(Response::new(number)),
+                (true, None) => Err(Status::unavailable("connection lost")),
+                (true, Some(reason)) => {
+                    let details = ErrorDetails::with_error_info(reason, "chefshat", []);
+                    let code = Code::Unavailable;
+                    Err(Status::with_error_details(code, "try again", details))
+                }
+            })
+        }
+    }
+
     #[tokio::test(start_paused = true)]
     async fn a_room_that_changes_servers_is_awaited_but_not_for_ever() {
-        let sent = AtomicU32::new(0);
-        let changes_servers_until = |attempt: u32| {
-            sent.store(0, Ordering::Relaxed);
-            let sent = &sent;
-            move || {
-                let unreachable = || {
-                    let details = ErrorDetails::with_error_info(OWNER_UNREACHABLE, "chefshat", []);
-                    Status::with_error_details(Code::Unavailable, "try again", details)
-                };
-                let number = sent.fetch_add(1, Ordering::Relaxed);
-                std::future::ready(match number < attempt {
-                    true => Err(unreachable()),
-                    false => Ok(Response::new(number)),
-                })
-            }
-        };
+        let unreachable = |_| Some(OWNER_UNREACHABLE);
         let began = tokio::time::Instant::now();
-        let found = repeated(changes_servers_until(OWNER_ATTEMPTS - 1)).await;
+        let found = repeated(answers(unreachable, OWNER_ATTEMPTS - 1)).await;
         assert_eq!(found.expect("the last attempt"), OWNER_ATTEMPTS - 1);
         assert!(began.elapsed() > Duration::from_secs(10), "a takeover");
-        let never = repeated(changes_servers_until(u32::MAX)).await;
-        assert_eq!(
-            never.expect_err("given up").reason(),
-            Some(OWNER_UNREACHABLE)
-        );
-        assert_eq!(sent.load(Ordering::Relaxed), OWNER_ATTEMPTS);
+        let never = repeated(answers(unreachable, OWNER_ATTEMPTS)).await;
+        let never = never.expect_err("given up");
+        assert_eq!(never.reason(), Some(OWNER_UNREACHABLE));
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_server_that_stops_and_starts_again_is_awaited_but_not_for_ever() {
+        // First it answers that it stops, then it is away.
+        let stops = |attempt| (attempt < 40).then_some(SHUTTING_DOWN);
+        let found = repeated(answers(stops, 60)).await;
+        assert_eq!(found.expect("it is back"), 60);
+        let never = repeated(answers(stops, RESTART_ATTEMPTS)).await;
+        never.expect_err("given up");
     }
 }

@@ -1,8 +1,12 @@
 """Refusals over a real connection, and the delays between connection attempts."""
 
+import asyncio
 import json
 import random
 import re
+import socket
+import threading
+from collections.abc import Iterator
 
 import grpc
 import pytest
@@ -34,8 +38,6 @@ async def async_refusal(address: str) -> ChefsHatError:
 
 
 def test_a_refusal_is_the_same_under_asyncio(fake: FakeServer) -> None:
-    import asyncio
-
     error = asyncio.run(async_refusal(fake.address))
     assert (error.reason, error.metadata) == ("ROOM_UNKNOWN", {"room_id": "nowhere"})
 
@@ -63,6 +65,65 @@ def test_without_details_the_code_is_the_reason() -> None:
 def test_a_slow_connection_is_awaited(fake: FakeServer) -> None:
     with Proxy(fake.address, delay_s=0.5) as proxy, chefshat.Client(proxy.address) as client:
         assert client.server_info().server_version == "fake"
+
+
+@pytest.fixture
+def silent() -> Iterator[str]:
+    """The address of a server that accepts connections and never answers."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        yield f"127.0.0.1:{listener.getsockname()[1]}"
+
+
+def test_a_call_without_an_answer_ends(silent: str) -> None:
+    async def asynchronous() -> None:
+        async with aio.Client(silent, timeout=0.2) as client:
+            await client.create_room()
+
+    with chefshat.Client(silent, timeout=0.2) as client, pytest.raises(ChefsHatError, match="longer timeout=") as caught:
+        client.create_room()
+    assert caught.value.reason == "DEADLINE_EXCEEDED"
+    with pytest.raises(ChefsHatError, match="DEADLINE_EXCEEDED"):
+        asyncio.run(asynchronous())
+
+
+def test_a_closed_client_says_so_in_every_thread(fake: FakeServer, silent: str) -> None:
+    client = chefshat.Client(fake.address)
+    client.close()
+    for call in (client.server_info, lambda: client.play(chefshat.RandomAgent(), "ticket"), lambda: list(client.record("game"))):
+        with pytest.raises(ChefsHatError, match="CLIENT_CLOSED"):
+            call()
+    waiting = chefshat.Client(silent, timeout=None)
+    errors: list[ChefsHatError] = []
+
+    def wait() -> None:
+        with pytest.raises(ChefsHatError) as caught:
+            waiting.create_room()
+        errors.append(caught.value)
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    # Whether it is closed before or after the call has begun.
+    waiting.close()
+    thread.join()
+    assert errors[0].reason in ("CLIENT_CLOSED", "CANCELLED")
+
+
+def test_a_client_of_asyncio_that_is_closed_during_a_call_says_so(silent: str) -> None:
+    async def close_during_a_call() -> None:
+        client = aio.Client(silent, timeout=None)
+        call = asyncio.create_task(client.create_room())
+        await asyncio.sleep(0)
+        await client.close()
+        await call
+
+    async def cancel() -> None:
+        async with aio.Client(silent, timeout=None) as client, asyncio.timeout(0.1):
+            await client.create_room()
+
+    with pytest.raises(ChefsHatError, match="CLIENT_CLOSED"):
+        asyncio.run(close_during_a_call())
+    with pytest.raises(TimeoutError):
+        asyncio.run(cancel())
 
 
 def test_addresses() -> None:

@@ -28,12 +28,20 @@ class Lost(grpc.RpcError):
 class Unreachable(Lost):
     """The answer of a server that cannot reach the one that runs a room or tournament."""
 
+    reason = "OWNER_UNREACHABLE"
+
     def trailing_metadata(self) -> tuple[Any, ...]:
         """The reason."""
         detail = any_pb2.Any()
-        detail.Pack(error_details_pb2.ErrorInfo(reason="OWNER_UNREACHABLE", domain="chefshat"))
+        detail.Pack(error_details_pb2.ErrorInfo(reason=self.reason, domain="chefshat"))
         status = status_pb2.Status(code=grpc.StatusCode.UNAVAILABLE.value[0], details=[detail])
         return ((DETAILS_KEY, status.SerializeToString()),)
+
+
+class Stopping(Unreachable):
+    """The answer of a server that stops."""
+
+    reason = "SHUTTING_DOWN"
 
 
 class Method:
@@ -59,7 +67,8 @@ class Method:
 def no_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
     """Removes the pauses between attempts."""
     monkeypatch.setattr(requests, "PAUSES_S", (0.0, 0.0, 0.0))
-    monkeypatch.setattr(requests, "OWNER_PAUSES_S", len(requests.OWNER_PAUSES_S) * (0.0,))
+    for name in ("OWNER_PAUSES_S", "RESTART_PAUSES_S"):
+        monkeypatch.setattr(requests, name, len(getattr(requests, name)) * (0.0,))
 
 
 @pytest.mark.parametrize("asynchronous", [False, True])
@@ -107,6 +116,24 @@ def test_a_room_that_changes_servers_is_awaited_but_not_for_ever(request_: pb.Jo
     with pytest.raises(ChefsHatError, match="OWNER_UNREACHABLE"):
         requests.called(method, request_)
     assert len(method.ids) == attempts
+
+
+def test_a_server_that_stops_and_starts_again_is_awaited_but_not_for_ever() -> None:
+    request = pb.CreateRoomRequest()
+    stopping, away = [Stopping()] * 30, [Lost()] * 20
+    method = Method(*stopping, *away)
+    assert requests.called(method, request) == "joined"
+    assert len(set(method.ids)) == 1
+    attempts = 1 + len(requests.RESTART_PAUSES_S)
+    method = Method(*[Stopping()] * attempts)
+    with pytest.raises(ChefsHatError, match="SHUTTING_DOWN"):
+        requests.called(method, request)
+    assert len(method.ids) == attempts
+    # What is not safe to repeat is not repeated.
+    method = Method(Stopping())
+    with pytest.raises(ChefsHatError, match="SHUTTING_DOWN"):
+        requests.called(method, pb.CloseRoomRequest())
+    assert len(method.ids) == 1
 
 
 class Lines:

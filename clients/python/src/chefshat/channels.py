@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, cast
 from urllib.parse import urlsplit
 
 from chefshat.address import CA, TOKEN, ServerAddress
-from chefshat.errors import ChefsHatError
+from chefshat.errors import ChefsHatError, closed
 from chefshat.network import grpc
 
 # Metadata that shows an owner token or a ticket.
@@ -35,6 +35,10 @@ CHANNEL_OPTIONS: list[tuple[str, int]] = [
 ]
 
 
+#: Seconds that a call with one answer waits for it, unless a client has another limit.
+TIMEOUT_S = 15.0
+
+
 class Target(NamedTuple):
     """The address of a server: gRPC's authority, and whether to use TLS."""
 
@@ -52,27 +56,31 @@ def target(address: str) -> Target:
     return Target(rest.rstrip("/"), tls=scheme == "https")
 
 
-def channel(server: ServerAddress, options: Sequence[tuple[str, int]] = ()) -> grpc.Channel:
-    """Opens a blocking channel. `options` are added to `CHANNEL_OPTIONS`, or replace them."""
+def channel(server: ServerAddress, options: Sequence[tuple[str, int]] = (), *, timeout: float | None = TIMEOUT_S) -> grpc.Channel:
+    """Opens a blocking channel.
+
+    Args:
+        server: where, and what it requires.
+        options: added to `CHANNEL_OPTIONS`, or replace them.
+        timeout: seconds that a call with one answer waits for it; None: for ever.
+    """
     where = target(server.address)
     together = list({**dict(CHANNEL_OPTIONS), **dict(options)}.items())
     if where.tls:
         opened = grpc.secure_channel(where.authority, _credentials(server.ca), together)
     else:
         opened = grpc.insecure_channel(where.authority, together)
-    metadata = _metadata(server, where)
-    return cast(grpc.Channel, _WithMetadata(opened, metadata)) if metadata else opened
+    return cast(grpc.Channel, _Calling(opened, _metadata(server, where), timeout))
 
 
-def async_channel(server: ServerAddress) -> grpc.aio.Channel:
-    """Opens a channel of asyncio. Call it where the event loop runs."""
+def async_channel(server: ServerAddress, *, timeout: float | None = TIMEOUT_S) -> grpc.aio.Channel:
+    """Opens a channel of asyncio, like `channel`. Call it where the event loop runs."""
     where = target(server.address)
     if where.tls:
         opened = grpc.aio.secure_channel(where.authority, _credentials(server.ca), CHANNEL_OPTIONS)
     else:
         opened = grpc.aio.insecure_channel(where.authority, CHANNEL_OPTIONS)
-    metadata = _metadata(server, where)
-    return cast(grpc.aio.Channel, _WithMetadata(opened, metadata)) if metadata else opened
+    return cast(grpc.aio.Channel, _Calling(opened, _metadata(server, where), timeout))
 
 
 def _metadata(server: ServerAddress, where: Target) -> tuple[tuple[str, str], ...]:
@@ -122,33 +130,44 @@ def _refused(reason: str, message: str) -> ChefsHatError:
     return ChefsHatError(reason, message, code=grpc.StatusCode.INVALID_ARGUMENT)
 
 
-class _WithMetadata:
-    """A channel that sends metadata with every call.
+class _Calling:
+    """A channel that sends metadata with every call and limits the time of those with one answer.
 
     Unlike interceptors it leaves the call objects of asyncio as they are, and unlike call credentials it does not need TLS.
     """
 
-    def __init__(self, opened: grpc.Channel | grpc.aio.Channel, metadata: tuple[tuple[str, str], ...]) -> None:
+    def __init__(
+        self, opened: grpc.Channel | grpc.aio.Channel, metadata: tuple[tuple[str, str], ...], timeout: float | None
+    ) -> None:
         self._channel = opened
         self._metadata = metadata
+        self._timeout = timeout
+        self._closed = False
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - Whatever the channel has.
         return getattr(self._channel, name)
 
+    def close(self, *arguments: Any) -> object:  # noqa: ANN401 - The channel's own.
+        """Closes the channel. Further calls raise `ChefsHatError`."""
+        self._closed = True
+        return self._channel.close(*arguments)
+
     def unary_unary(self, *arguments: Any, **options: Any) -> Callable[..., object]:  # noqa: ANN401 - The channel's own.
-        return self._with_metadata(self._channel.unary_unary(*arguments, **options))
+        return self._calls(self._channel.unary_unary(*arguments, **options), self._timeout)
 
     def unary_stream(self, *arguments: Any, **options: Any) -> Callable[..., object]:  # noqa: ANN401 - The channel's own.
-        return self._with_metadata(self._channel.unary_stream(*arguments, **options))
+        return self._calls(self._channel.unary_stream(*arguments, **options))
 
     def stream_unary(self, *arguments: Any, **options: Any) -> Callable[..., object]:  # noqa: ANN401 - The channel's own.
-        return self._with_metadata(self._channel.stream_unary(*arguments, **options))
+        return self._calls(self._channel.stream_unary(*arguments, **options))
 
     def stream_stream(self, *arguments: Any, **options: Any) -> Callable[..., object]:  # noqa: ANN401 - The channel's own.
-        return self._with_metadata(self._channel.stream_stream(*arguments, **options))
+        return self._calls(self._channel.stream_stream(*arguments, **options))
 
-    def _with_metadata(self, method: Callable[..., object]) -> Callable[..., object]:
+    def _calls(self, method: Callable[..., object], timeout: float | None = None) -> Callable[..., object]:
         def call(*inputs: object) -> object:
-            return method(*inputs, metadata=self._metadata)
+            if self._closed:
+                raise closed()
+            return method(*inputs, metadata=self._metadata or None, timeout=timeout)
 
         return call

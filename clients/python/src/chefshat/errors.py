@@ -74,6 +74,11 @@ def connection_lost(message: str = "the server ended the stream before the game 
     return ChefsHatError("CONNECTION_LOST", message, code=grpc.StatusCode.UNAVAILABLE)
 
 
+def closed() -> ChefsHatError:
+    """Returns the error for a call of a client that has been closed."""
+    return ChefsHatError("CLIENT_CLOSED", "this client has been closed: create another one")
+
+
 def from_refused(refused: pb.Refused) -> ChefsHatError:
     """Converts a refusal inside a stream."""
     from chefshat.network import grpc
@@ -97,6 +102,8 @@ def from_rpc_error(error: "grpc.RpcError") -> ChefsHatError:
         return ChefsHatError(TLS_FAILED, f"no secure connection ({message}); {how}", code=code)
     if reason == "TOKEN_MISSING":
         message = f"{message}; give it as token=, --token or CHEFSHAT_TOKEN"
+    elif code is grpc.StatusCode.DEADLINE_EXCEEDED and not reason:
+        message = "the server did not answer in time: try again, or give the client a longer timeout="
     elif code is grpc.StatusCode.UNAVAILABLE and not reason:
         # gRPC's message includes the address.
         message = f"no server answers ({message}): check that `chefshat serve` runs there, and give its address as HOST:PORT"

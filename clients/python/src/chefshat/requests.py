@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterat
 from typing import Protocol, TypeAlias, TypeVar
 
 from chefshat import pb
-from chefshat.errors import from_rpc_error
+from chefshat.errors import closed, from_rpc_error
 from chefshat.network import grpc
 
 
@@ -53,6 +53,9 @@ PAUSES_S = (0.1, 0.2, 0.4)
 # The same while the server that runs its room or tournament cannot be reached: another one takes over within ten seconds.
 OWNER_PAUSES_S = (0.1, 0.2, 0.4, 0.8) + 15 * (1.0,)
 OWNER_UNREACHABLE = "OWNER_UNREACHABLE"
+# The same while the server stops, and then is away: its running games may end first, and then it starts again.
+RESTART_PAUSES_S = (0.1, 0.2, 0.4, 0.8) + 120 * (1.0,)
+SHUTTING_DOWN = "SHUTTING_DOWN"
 
 Asked = TypeVar("Asked")
 Answered = TypeVar("Answered")
@@ -187,7 +190,8 @@ def attach(
 def called(method: Callable[[Asked], Answered], request: Asked) -> Answered:
     """Makes a unary call. Raises a gRPC error as `ChefsHatError`.
 
-    Repeats it, if that is safe, when its response was lost or its room or tournament is just changing servers.
+    Repeats it, if that is safe, when its response was lost, its room or tournament is just changing servers, or the server is
+    stopping: for two minutes, in which it may start again.
     """
     pauses = _pauses(request)
     while True:
@@ -206,6 +210,12 @@ async def awaited(method: Callable[[Asked], Awaitable[Answered]], request: Asked
             return await method(request)
         except grpc.RpcError as error:
             pause = _pause_after(error, pauses)
+        except asyncio.CancelledError:
+            task = asyncio.current_task()
+            if task is not None and task.cancelling():
+                raise
+            # Closing the channel cancelled the call.
+            raise closed() from None
         await asyncio.sleep(pause)
 
 
@@ -257,12 +267,18 @@ def _pauses(request: object) -> dict[str, Iterator[float]]:
         request.request_id = request.request_id or secrets.token_bytes(REQUEST_ID_BYTES)
     elif not isinstance(request, READING):
         return {}
-    return {grpc.StatusCode.UNAVAILABLE.name: iter(PAUSES_S), OWNER_UNREACHABLE: iter(OWNER_PAUSES_S)}
+    return {
+        grpc.StatusCode.UNAVAILABLE.name: iter(PAUSES_S),
+        OWNER_UNREACHABLE: iter(OWNER_PAUSES_S),
+        SHUTTING_DOWN: iter(RESTART_PAUSES_S),
+    }
 
 
 def _pause_after(error: grpc.RpcError, pauses: dict[str, Iterator[float]]) -> float:
     """Returns the pause before the next attempt; raises the error if the server refused the call or no attempt is left."""
     failure = from_rpc_error(error)
+    if failure.reason == SHUTTING_DOWN and pauses:
+        pauses[grpc.StatusCode.UNAVAILABLE.name] = pauses[SHUTTING_DOWN]
     pause = next(pauses.get(failure.reason, iter(())), None)
     if pause is None:
         raise failure from error

@@ -26,7 +26,7 @@ from chefshat._gen.chefshat.v1.tournament_service_pb2_grpc import TournamentServ
 from chefshat.address import ServerAddress, server_address
 from chefshat.agents import Agent
 from chefshat.backoff import Backoff
-from chefshat.channels import async_channel
+from chefshat.channels import TIMEOUT_S, async_channel
 from chefshat.clock import READINGS, TIME_OF_DAY, ClockReading, LocalClock
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
 from chefshat.network import grpc
@@ -53,6 +53,7 @@ class AsyncCalls(ABC):
         ca: Path | str | None = None,
         secrets: Sequence[str] = (),
         backoff: Backoff | None = None,
+        timeout: float | None = TIMEOUT_S,
     ) -> None:
         """Sets the server.
 
@@ -63,11 +64,13 @@ class AsyncCalls(ABC):
             secrets: owner tokens and tickets, at most 16, shown with every call: with them private rooms and tournaments can be
                 read and watched, lists contain unlisted and private ones, and so do lists of records.
             backoff: delays between connection attempts while playing or watching.
+            timeout: seconds that a call with one answer waits for it, then raises "DEADLINE_EXCEEDED"; None: for ever. Playing,
+                watching and other streams have no such limit.
         """
         server = server_address(address, token, ca, secrets)
         #: The address of the server, without what it requires.
         self.address = server.address
-        self._channel = async_channel(server)
+        self._channel = async_channel(server, timeout=timeout)
         self._backoff = backoff or Backoff()
         self._rng = random.Random()
         self._rooms = RoomServiceStub(self._channel)
