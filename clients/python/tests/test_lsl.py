@@ -18,6 +18,7 @@ import pytest
 import chefshat
 from chefshat import RandomAgent, pb
 from chefshat._gen.chefshat.v1.study_service_pb2_grpc import ParticipationServiceStub, StudyServiceStub
+from chefshat.clock import DRIFT, WANTED_ERROR_S, RoomClock
 from chefshat.network import grpc
 
 pylsl = pytest.importorskip("pylsl")
@@ -33,6 +34,9 @@ CLOSE_S = 0.020
 # Events have times in milliseconds.
 ROUNDING_S = 0.001
 ONE_SHIFT = pb.RuleSet(target_shifts=1)
+# The kinds of events: their names in JSON, and those of a seat.
+KINDS = {field.name: field.json_name for field in pb.GameEvent.DESCRIPTOR.oneofs_by_name["kind"].fields}
+WITH_SEAT = {name for name in KINDS if "seat" in type(getattr(pb.GameEvent(), name)).DESCRIPTOR.fields_by_name}
 
 
 def inlet(source: str) -> Any:
@@ -49,7 +53,11 @@ def received(stream: Any) -> Iterator[tuple[dict[str, Any], float]]:
     while True:
         sample, at = stream.pull_sample(timeout=WAIT_S)
         assert sample is not None, "no marker"
-        marker = json.loads(sample[0])
+        code, event = sample
+        marker = json.loads(event)
+        kind, *seat = code.split()
+        inside = marker[KINDS[kind]]
+        assert seat == ([str(inside.get("seat", 0))] if kind in WITH_SEAT else [])
         yield marker, at
         if "gameEnded" in marker or "gameAborted" in marker:
             return
@@ -124,15 +132,15 @@ def test_each_event_of_the_record_is_one_marker_with_its_time(real_address: str)
 def test_the_clock_is_read_again_and_keeps_the_better_reading(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
         room = client.create_room("clock").room
-        with lsl.RoomClock(client, room.room_id, interval_s=0.01) as clock:
+        with RoomClock(client, room.room_id, local=pylsl.local_clock, interval_s=0.01) as clock:
             first = clock.reading
             until = time.monotonic() + WAIT_S
             while clock.readings < 10 and time.monotonic() < until:
                 time.sleep(0.01)
             assert clock.readings >= 10
-            assert clock.reading.error <= first.error + lsl.DRIFT * WAIT_S
+            assert clock.reading.error <= first.error + DRIFT * WAIT_S
             now = clock.reading
-            assert abs(now.local(0) - first.local(0)) <= now.error + first.error + lsl.DRIFT * WAIT_S
+            assert abs(now.local(0) - first.local(0)) <= now.error + first.error + DRIFT * WAIT_S
 
 
 def test_a_seat_sends_what_it_sees(real_address: str) -> None:
@@ -149,7 +157,7 @@ def test_a_seat_sends_what_it_sees(real_address: str) -> None:
         (hands,) = [marker["shiftStarted"]["hands"] for marker, _ in sent if "shiftStarted" in marker]
         assert [hand.get("seat", 0) for hand in hands] == [0]
         clock = client.clock(room.room_id, local=pylsl.local_clock)
-        check_times(client, room, sent, max(clock.error, lsl.WANTED_ERROR_S))
+        check_times(client, room, sent, max(clock.error, WANTED_ERROR_S))
         marked.close()
 
 
@@ -234,7 +242,7 @@ def test_the_command_sends_all_games_of_a_participant_of_a_study(
                 assert [int(marker["sequence"]) for marker, _ in sent] == [event.sequence for event in events]
                 room = pb.Room(room_id=game.room_id, game_id=game.game_id)
                 clock = owner.clock(game.room_id, local=pylsl.local_clock)
-                check_times(owner, room, sent, max(clock.error, lsl.WANTED_ERROR_S))
+                check_times(owner, room, sent, max(clock.error, WANTED_ERROR_S))
         studies.CloseStudy(pb.CloseStudyRequest(**owned))
         _, said = processes[-1].communicate(timeout=WAIT_S)
         assert processes[-1].returncode == 0, said

@@ -1,7 +1,10 @@
-"""Streams of samples of a seat: their times, their chunks, and what happens after a refusal."""
+"""Streams of samples of a seat: their times, their chunks, and what happens while the server is away or refuses."""
 
 import itertools
 import math
+import socket
+import time
+from collections.abc import Callable
 
 import pytest
 from fake_server import FakeServer
@@ -10,49 +13,122 @@ import chefshat
 from chefshat import ChefsHatError
 from chefshat.samples import MAX_SAMPLES, SampleStream
 
+# The stream sends when the test flushes.
+NEVER_S = 3_600.0
 
-def test_samples_are_sent_once_a_second_with_times_of_the_room(fake: FakeServer) -> None:
+
+def seated(client: chefshat.Client) -> tuple[str, str]:
+    """A room, and the ticket of a seat in it."""
+    created = client.create_room("samples")
+    return created.room.room_id, client.join_room(created.join_code, "Ada").ticket
+
+
+def test_samples_are_sent_with_times_of_the_room(fake: FakeServer) -> None:
     now = 100.0
     with chefshat.Client(fake.address) as client:
-        created = client.create_room("samples")
-        ticket = client.join_room(created.join_code, "Ada").ticket
+        room_id, ticket = seated(client)
+        channels = ["valence", "arousal"]
         # The clock of this machine stands still, except between samples.
-        stream = SampleStream(client, ticket, created.room.room_id, "affect", ["valence", "arousal"], local=lambda: now)
-        for number in range(60):
-            stream.push([number / 60, math.nan])
-            now += 1 / 30
-        assert len(fake.samples) == 1
-        stream.flush()
-        first, second = fake.samples
-        assert (first.stream, list(first.channels)) == ("affect", ["valence", "arousal"])
-        times = [*first.elapsed_us, *second.elapsed_us]
-        assert len(times) == 60
-        steps = [later - earlier for earlier, later in itertools.pairwise(times)]
-        assert all(33_332 <= step <= 33_335 for step in steps)
-        assert first.values[2] == pytest.approx(1 / 60)
-        assert math.isnan(first.values[1])
-        stream.push([0.0, 0.0], at=0.0)
-        stream.flush()
-        assert fake.samples[2].elapsed_us[0] == times[-1] + 1, "times ascend"
-        with pytest.raises(ValueError, match="1 values for 2 channels"):
-            stream.push([0.0])
+        with SampleStream(client, ticket, room_id, "affect", channels, local=lambda: now, interval_s=NEVER_S) as stream:
+            for number in range(60):
+                stream.push([number / 60, math.nan])
+                now += 1 / 30
+            assert fake.samples == []
+            stream.flush()
+            (chunk,) = fake.samples
+            assert (chunk.stream, list(chunk.channels)) == ("affect", channels)
+            times = list(chunk.elapsed_us)
+            assert len(times) == 60
+            steps = [later - earlier for earlier, later in itertools.pairwise(times)]
+            assert all(33_332 <= step <= 33_335 for step in steps)
+            assert chunk.values[2] == pytest.approx(1 / 60)
+            assert math.isnan(chunk.values[1])
+            stream.push([0.0, 0.0], at=0.0)
+            with pytest.raises(ValueError, match="1 values for 2 channels"):
+                stream.push([0.0])
+        assert fake.samples[1].elapsed_us[0] == times[-1] + 1, "times ascend, and the end of the stream sends what waits"
+
+
+def test_samples_are_sent_in_a_thread(fake: FakeServer) -> None:
+    with chefshat.Client(fake.address) as client:
+        room_id, ticket = seated(client)
+        with SampleStream(client, ticket, room_id, "affect", ["valence"], interval_s=0.01) as stream:
+            stream.push([1.0])
+            wait_for(lambda: bool(fake.samples))
 
 
 def test_what_was_not_received_is_sent_again_in_chunks(fake: FakeServer) -> None:
-    now = 100.0
+    count = MAX_SAMPLES + 10
     with chefshat.Client(fake.address) as client:
-        created = client.create_room("samples")
-        ticket = client.join_room(created.join_code, "Ada").ticket
-        stream = SampleStream(client, "nobody's", created.room.room_id, "affect", ["valence"], local=lambda: now)
-        refused = 0
-        for number in range(MAX_SAMPLES + 10):
-            now += 1e-4
-            try:
-                stream.push([float(number)])
-            except ChefsHatError:
-                refused += 1
-        assert refused == 11
+        room_id, ticket = seated(client)
+        stream = SampleStream(client, "nobody's", room_id, "affect", ["valence"], interval_s=NEVER_S)
+        for number in range(count):
+            stream.push([float(number)])
+        with pytest.raises(ChefsHatError, match="TICKET_UNKNOWN"):
+            stream.flush()
         stream._seat = ticket
-        stream.flush()
+        stream.close()
         assert [len(chunk.elapsed_us) for chunk in fake.samples] == [MAX_SAMPLES, 10]
-        assert [value for chunk in fake.samples for value in chunk.values] == [float(number) for number in range(MAX_SAMPLES + 10)]
+        assert [value for chunk in fake.samples for value in chunk.values] == [float(number) for number in range(count)]
+
+
+def test_a_refusal_in_the_thread_is_raised_by_a_push(fake: FakeServer) -> None:
+    with chefshat.Client(fake.address) as client:
+        room_id, ticket = seated(client)
+        stream = SampleStream(client, "nobody's", room_id, "affect", ["valence"], interval_s=0.01)
+        pushed, refusal = 0, None
+        while refusal is None:
+            pushed += 1
+            try:
+                stream.push([0.0])
+            except ChefsHatError as error:
+                refusal = error.reason
+            time.sleep(0.01)
+        assert refusal == "TICKET_UNKNOWN"
+        stream._seat = ticket
+        stream.close()
+        assert sum(len(chunk.elapsed_us) for chunk in fake.samples) == pushed
+
+
+def test_an_outage_loses_no_sample_and_moves_none() -> None:
+    begun = time.monotonic()
+    taken = [begun + number / 100 for number in range(1_200)]
+    with chefshat.Client(f"127.0.0.1:{free_port()}", timeout=1.0) as client:
+        port = int(client.address.rsplit(":", 1)[1])
+        with FakeServer(port=port) as before:
+            room_id, ticket = seated(client)
+            stream = SampleStream(client, ticket, room_id, "affect", ["valence"], interval_s=0.01)
+            for at in taken[:100]:
+                stream.push([at - begun], at)
+            stream.flush()
+        for at in taken[100:1_100]:
+            stream.push([at - begun], at)
+        with pytest.raises(ChefsHatError, match="UNAVAILABLE"):
+            stream.flush()
+        with FakeServer(port=port) as after:
+            after.games.extend(before.games)
+            for at in taken[1_100:]:
+                stream.push([at - begun], at)
+            wait_for(lambda: sum(len(chunk.elapsed_us) for chunk in after.samples) >= 1_100)
+            stream.close()
+    chunks = [*before.samples, *after.samples]
+    # What was received before its acknowledgement was lost comes twice; the server ignores it.
+    received = dict(pair for chunk in chunks for pair in zip(chunk.elapsed_us, chunk.values, strict=True))
+    assert len(received) == len(taken)
+    first = min(received)
+    for moment, at in zip(sorted(received), taken, strict=True):
+        assert received[moment] == pytest.approx(at - begun)
+        # As precise as the clock of the room is known.
+        assert (moment - first) / 1e6 == pytest.approx(at - begun, abs=0.1)
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    """Waits until a condition holds."""
+    while not condition():
+        time.sleep(0.01)
+
+
+def free_port() -> int:
+    """A port that is free now."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        return int(listener.getsockname()[1])

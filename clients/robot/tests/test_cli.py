@@ -65,7 +65,6 @@ def test_the_libraries_of_a_subcommand_are_imported_only_for_it() -> None:
     [
         ["affect", "--ticket", "TICKET", "--listen", "127.0.0.1:0"],
         ["bridge", "{folder}", "--ticket", "TICKET"],
-        ["markers", "ROOM"],
         ["rehearse"],
         ["robot", "--room", "CODE", "--name", "Pepe"],
         ["wizard", "--room", "ROOM", "--seat", "0"],

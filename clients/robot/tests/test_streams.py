@@ -1,4 +1,4 @@
-"""Affect in and markers out: analysers on a socket or on Lab Streaming Layer, and the game's events as markers."""
+"""Affect: analysers on a socket or on Lab Streaming Layer."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from typing import Any
 
 import chefshat
 import pytest
-from chefshat import Decision, RandomAgent, aio, pb
+from chefshat import Decision, aio, pb
 
 from chefshat_robot import cli
 from chefshat_robot.affect import Forwarder, expression_of, forward_stream, serve_lines, stream_affects
 from chefshat_robot.drivers.driver import Affect, RobotError
-from chefshat_robot.markers import send_markers
 from tests.loop import run
 
 pylsl = pytest.importorskip("pylsl")
@@ -157,69 +156,6 @@ def test_readings_are_complete_expressions() -> None:
     assert (expression.valence, expression.arousal, expression.dominance, expression.confidence) == (0.5, -0.5, 0.25, 0.75)
     assert (expression.source, expression.record_only) == (pb.EXPRESSION_SOURCE_SELF_REPORT, True)
     assert expression.taken_at.ToNanoseconds() == 12_500_000_000
-
-
-@pytest.mark.server
-def test_every_event_of_a_game_is_a_marker(server_address: str) -> None:
-    markers: list[tuple[dict[str, Any], float]] = []
-    # An outlet that is gone delivers nothing more: this one stays until everything is recorded.
-    outlets: list[Any] = []
-
-    async def record(room_id: str) -> None:
-        """What a recorder does: finds the stream and fetches its samples until the game's end."""
-        found = await asyncio.to_thread(pylsl.resolve_byprop, "source_id", f"chefshat-{room_id}", 1, 60)
-        assert (found[0].name(), found[0].type(), found[0].nominal_srate()) == ("ChefsHat streams", "Markers", 0.0)
-        inlet = pylsl.StreamInlet(found[0])
-        while not markers or markers[-1][0]["kind"] != "game_ended":
-            sample, stamp = await asyncio.to_thread(inlet.pull_sample, 60)
-            assert sample is not None
-            markers.append((json.loads(sample[0]), stamp))
-
-    async def test() -> list[pb.GameEvent]:
-        async with aio.Client(server_address) as client:
-            async with Game(client) as game:
-                recording = asyncio.create_task(record(game.room_id))
-
-                async def recorded(outlet: Any) -> None:
-                    outlets.append(outlet)
-                    assert await asyncio.to_thread(outlet.wait_for_consumers, 60)
-
-                sending = asyncio.create_task(send_markers(client, game.room_id, linger_s=0, ready=recorded))
-                while not markers:
-                    await asyncio.sleep(0.005)
-                game.agent.start.set()
-                await recording
-                assert await sending == len(markers)
-            return [event async for event in client.watch(game.room_id)]
-
-    events = run(test())
-    assert [marker["sequence"] for marker, _ in markers] == [event.sequence for event in events]
-    assert [marker["elapsed_ms"] for marker, _ in markers] == [event.elapsed_ms for event in events]
-    assert [marker["kind"] for marker, _ in markers] == [event.WhichOneof("kind") for event in events]
-    stamps = [stamp for _, stamp in markers]
-    assert stamps == sorted(stamps)
-    past = [marker["past"] for marker, _ in markers]
-    assert past[0] is True
-    assert past[-1] is False
-    assert past == sorted(past, reverse=True)
-    play = next(marker for marker, _ in markers if marker["kind"] == "play")
-    assert {"seat", "face", "quantity", "jokers", "cards_left"} <= play["fields"].keys()
-    assert isinstance(play["fields"]["decision_time_us"], int)
-    # Nobody's cards are in a marker.
-    dealt = next(marker for marker, _ in markers if marker["kind"] == "shift_started")
-    assert dealt["fields"]["hands"] == []
-
-
-@pytest.mark.server
-def test_the_command_sends_markers_until_the_game_is_over(server_address: str) -> None:
-    async def finished() -> str:
-        async with aio.Client(server_address) as client:
-            made = await client.create_room("done", seats=[None, "greedy", "random", "greedy"], rules=ONE_SHIFT)
-            seat = await client.join_room(made.join_code, "Ada")
-            await client.play(RandomAgent(1), seat.ticket)
-            return made.room.room_id
-
-    assert cli.main(["markers", "--address", server_address, run(finished())]) == 0
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ NOT_RUN = {
     r"chefshat-robot perceive --replay recording": "a recording of a camera",
     r"chefshat-robot robot .*--driver ros2": "needs ROS 2; clients/robot/tests has a peer that speaks its protocol",
     r"chefshat-robot wizard ": "needs NAOqi; clients/robot/tests has a peer that speaks its protocol",
-    r"chefshat-robot (affect|markers) ": "needs a network of Lab Streaming Layer; clients/robot/tests",
+    r"chefshat-robot affect ": "needs a network of Lab Streaming Layer; clients/robot/tests",
     r"python -m chefshat\.lsl ": "needs a network of Lab Streaming Layer; clients/python/tests",
     r"python (-m chefshat\.(learn|experiments)|benchmarks/) ?": "minutes to hours; clients/python/tests has short ones",
     r"(RAY_ADDRESS=auto )?python clients/python/samples/cluster/": "needs Ray, with older dependencies: see CONTRIBUTING.md",

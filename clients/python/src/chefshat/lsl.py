@@ -9,7 +9,6 @@ clock (`Client.clock`), not the time at which it arrived. docs/instruments.md de
 import argparse
 import contextlib
 import sys
-import threading
 import time
 from collections.abc import Awaitable, Sequence
 from types import TracebackType
@@ -27,24 +26,19 @@ from chefshat import join_options, pb
 from chefshat.agent import make_agent
 from chefshat.agents import Agent
 from chefshat.client import Client
-from chefshat.clock import ClockReading
+from chefshat.clock import RoomClock
 from chefshat.decision import Decision, SeatInfo
 from chefshat.errors import ChefsHatError, exit_code
 from chefshat.result import SeatResult
 
-# Seconds between two readings of the server's clock.
-CLOCK_INTERVAL_S = 5.0
-# A clock that is known less precisely is read again, this often before the first marker.
-WANTED_ERROR_S = 0.005
-FIRST_READINGS = 5
-# How much two clocks drift apart at most, seconds per second: a reading becomes less precise with age.
-DRIFT = 2e-4
 # Seconds for which a command waits for recorders to receive the last markers.
 LINGER_S = 2.0
 # Seconds until a game of a study is looked for again whose room is just being created.
 ROOM_INTERVAL_S = 0.2
-# Name of the stream, unless another is given.
-NAME = "Chef's Hat"
+# Name of the stream, unless another is given. Without an apostrophe, which ends a text in the queries of LSL.
+NAME = "ChefsHat"
+# What a marker says: labels and units of the channels.
+CHANNELS = {"code": "kind of the event and seat", "event": "JSON of chefshat.v1.GameEvent"}
 
 EXAMPLE = """examples:
   python -m chefshat.lsl --address 127.0.0.1:50051 --room BCDF2345
@@ -53,85 +47,10 @@ EXAMPLE = """examples:
   python -m chefshat.lsl --address 127.0.0.1:50051 --ticket TICKET --agent my_module:MyAgent
 
 Start it before the game, and the recorder (LabRecorder, for example) after it; --wait holds the markers back until something
-records them. The stream is called "Chef's Hat" and has the type Markers.
+records them. The stream is called "ChefsHat" and has the type Markers.
 
 exit code: 0 the game or study is over, 1 the server refused or was lost, 2 wrong arguments, 130 interrupted
 """
-
-
-class RoomClock:
-    """The clock of a room on LSL's clock, read again in a thread of its own, since clocks drift; a context manager."""
-
-    def __init__(self, client: Client, room_id: str, *, interval_s: float = CLOCK_INTERVAL_S) -> None:
-        """Reads the clock for the first time.
-
-        Args:
-            client: a connection to the server.
-            room_id: the room.
-            interval_s: seconds between two readings.
-
-        Raises:
-            ChefsHatError: the server refuses, or cannot be reached.
-        """
-        self._client = client
-        self._room_id = room_id
-        self._interval_s = interval_s
-        self._lock = threading.Lock()
-        self._readings = 1
-        self._reading, self._read_at = self._read()
-        for _ in range(FIRST_READINGS - 1):
-            if self._reading.error <= WANTED_ERROR_S:
-                break
-            self.read()
-        self._closed = threading.Event()
-        self._thread = threading.Thread(target=self._follow, name="chefshat-lsl-clock", daemon=True)
-        self._thread.start()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, traceback: TracebackType | None) -> None:
-        self.close()
-
-    @property
-    def reading(self) -> ClockReading:
-        """The reading in use."""
-        with self._lock:
-            return self._reading
-
-    @property
-    def readings(self) -> int:
-        """How often the clock has been read."""
-        with self._lock:
-            return self._readings
-
-    def lsl(self, event: pb.GameEvent) -> float:
-        """The time of an event on LSL's clock, in seconds."""
-        return self.reading.local(event.elapsed_ms)
-
-    def read(self, *, jumped: bool = False) -> None:
-        """Reads the clock again. A less precise reading does not replace a recent one, unless the server's clock has jumped."""
-        reading, at = self._read()
-        with self._lock:
-            self._readings += 1
-            aged = self._reading.error + DRIFT * (at - self._read_at)
-            if jumped or reading.error <= aged:
-                self._reading, self._read_at = reading, at
-
-    def close(self) -> None:
-        """Stops reading."""
-        self._closed.set()
-        self._thread.join()
-
-    def _read(self) -> tuple[ClockReading, float]:
-        return self._client.clock(self._room_id, local=pylsl.local_clock), pylsl.local_clock()
-
-    def _follow(self) -> None:
-        while not self._closed.wait(self._interval_s):
-            try:
-                self.read()
-            except ChefsHatError:
-                continue  # The last reading is used until the server answers again. A room that is over is forgotten some time.
 
 
 class MarkerStream:
@@ -154,15 +73,17 @@ class MarkerStream:
         """
         self._client = client
         server = client.server_info()
-        self.clock = RoomClock(client, room_id)
+        self.clock = RoomClock(client, room_id, local=pylsl.local_clock)
         reading = self.clock.reading
         # With the same id a recorder resumes the stream after a restart of this program.
         source = source or f"chefshat {reading.game_id} {viewer}"
-        info = pylsl.StreamInfo(name, "Markers", 1, pylsl.IRREGULAR_RATE, pylsl.cf_string, source)
+        info = pylsl.StreamInfo(name, "Markers", len(CHANNELS), pylsl.IRREGULAR_RATE, pylsl.cf_string, source)
         description = info.desc()
-        channel = description.append_child("channels").append_child("channel")
-        for key, value in (("label", "event"), ("type", "Marker"), ("unit", "JSON of chefshat.v1.GameEvent")):
-            channel.append_child_value(key, value)
+        channels = description.append_child("channels")
+        for label, unit in CHANNELS.items():
+            channel = channels.append_child("channel")
+            for key, value in (("label", label), ("type", "Marker"), ("unit", unit)):
+                channel.append_child_value(key, value)
         game = description.append_child("game")
         for key, value in {
             "room_id": room_id,
@@ -199,7 +120,7 @@ class MarkerStream:
         Raises:
             ChefsHatError: the server refuses, or cannot be reached.
         """
-        clock = RoomClock(self._client, room_id)
+        clock = RoomClock(self._client, room_id, local=pylsl.local_clock)
         self.clock.close()
         self.clock = clock
         self._last = 0
@@ -212,7 +133,7 @@ class MarkerStream:
             # If the server does not answer, the thread of the clock tries again.
             with contextlib.suppress(ChefsHatError):
                 self.clock.read(jumped=True)
-        self._open().push_sample([MessageToJson(event, indent=None)], self.clock.lsl(event))
+        self._open().push_sample([code_of(event), MessageToJson(event, indent=None)], self.clock.local(event))
         self._last = event.sequence
 
     def close(self, linger_s: float = 0.0) -> None:
@@ -227,6 +148,15 @@ class MarkerStream:
         if self._outlet is None:
             raise ValueError("the stream is closed")
         return self._outlet
+
+
+def code_of(event: pb.GameEvent) -> str:
+    """The kind of an event in a word, as event.proto names it, and its seat if it has one: "play 2", "pizza_ended"."""
+    kind = event.WhichOneof("kind")
+    if kind is None:
+        return "unknown"
+    what = getattr(event, kind)
+    return f"{kind} {what.seat}" if "seat" in what.DESCRIPTOR.fields_by_name else kind
 
 
 class MarkedAgent(Agent):

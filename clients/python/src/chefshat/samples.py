@@ -1,21 +1,28 @@
 """Streams of samples of a seat, such as thirty a second of affect: `SampleStream`."""
 
+import threading
 from collections.abc import Sequence
+from types import TracebackType
+from typing import Self
 
 from chefshat import pb
 from chefshat.client import Client
-from chefshat.clock import TIME_OF_DAY, ClockReading, LocalClock
+from chefshat.clock import MONOTONIC, LocalClock, RoomClock
+from chefshat.errors import ChefsHatError
 
 # Most samples of a chunk.
 MAX_SAMPLES = 512
+# Most samples that wait while the server cannot be reached: nine hours of thirty a second.
+MAX_WAITING = 1_000_000
 # Seconds between two chunks.
 INTERVAL_S = 1.0
-# Seconds between two readings of the server's clock.
-CLOCK_INTERVAL_S = 30.0
 
 
 class SampleStream:
-    """Collects samples of a seat and sends them about once a second, in the thread that pushes them. Not thread-safe."""
+    """Collects samples of a seat, and sends them about once a second in a thread of its own; a context manager.
+
+    While the server cannot be reached, samples wait, with the times at which they were taken. One thread pushes.
+    """
 
     def __init__(
         self,
@@ -26,7 +33,8 @@ class SampleStream:
         channels: Sequence[str],
         *,
         seat: int | None = None,
-        local: LocalClock = TIME_OF_DAY,
+        local: LocalClock = MONOTONIC,
+        interval_s: float = INTERVAL_S,
     ) -> None:
         """Reads the clock of the room.
 
@@ -37,55 +45,100 @@ class SampleStream:
             stream: name of the stream, 1..=32 ASCII letters, digits, `_`, `-` or `.`.
             channels: names of its 1..=16 channels.
             seat: the seat, from 0, if the token of the owner is given.
-            local: the clock of this machine that times are from, in seconds; default: the time of day.
+            local: the clock of this machine that times are from, in seconds; default: `time.monotonic`, which nobody sets.
+            interval_s: seconds between two chunks.
+
+        Raises:
+            ChefsHatError: the server refuses, or cannot be reached.
         """
         self._client = client
         self._seat = ticket if seat is None else pb.OwnedSeat(room_id=room_id, owner_token=ticket, seat=seat)
-        self._room_id = room_id
-        self._local = local
-        self._chunk = pb.SampleChunk(stream=stream, channels=channels)
-        self._reading, self._read_at = self._read()
-        self._sent_at = self._read_at
+        self._interval_s = interval_s
+        self._waiting = pb.SampleChunk(stream=stream, channels=channels)
         self._last_us = -1
+        self._refusal: ChefsHatError | None = None
+        #: Locks what waits.
+        self._lock = threading.Lock()
+        #: Held by the thread that sends.
+        self._sending = threading.Lock()
+        self._closed = threading.Event()
+        self.clock = RoomClock(client, room_id, local=local)
+        self._thread = threading.Thread(target=self._follow, name="chefshat-samples", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, traceback: TracebackType | None) -> None:
+        self.close()
 
     def push(self, values: Sequence[float], at: float | None = None) -> None:
-        """Adds a sample, and sends those that wait if the last were sent a second ago.
+        """Adds a sample. Never waits for the server.
 
         Args:
             values: one for each channel; NaN where there is none.
             at: when it was taken, on the local clock; None: now.
 
         Raises:
-            ChefsHatError: the server refuses, or cannot be reached. The samples are sent again with the next ones.
+            ChefsHatError: the server has refused earlier samples, or was away for so long that no more can wait (SAMPLES_WAITING).
         """
-        if len(values) != len(self._chunk.channels):
-            raise ValueError(f"{len(values)} values for {len(self._chunk.channels)} channels")
-        now = self._local()
-        if now - self._read_at > CLOCK_INTERVAL_S:
-            self._reading, self._read_at = self._read()
-        offset = self._reading.room_offset or 0.0
-        # Times ascend, also if the clocks were read anew meanwhile.
-        moment = max(round(((now if at is None else at) + offset) * 1e6), self._last_us + 1, 0)
-        self._last_us = moment
-        self._chunk.elapsed_us.append(moment)
-        self._chunk.values.extend(values)
-        if now - self._sent_at >= INTERVAL_S or len(self._chunk.elapsed_us) >= MAX_SAMPLES:
-            self.flush()
+        if len(values) != len(self._waiting.channels):
+            raise ValueError(f"{len(values)} values for {len(self._waiting.channels)} channels")
+        moment = self.clock.elapsed_us(at)
+        with self._lock:
+            if len(self._waiting.elapsed_us) >= MAX_WAITING:
+                raise ChefsHatError("SAMPLES_WAITING", f"{MAX_WAITING} samples wait for a server that does not answer")
+            # Times ascend, also if the clock was read anew meanwhile.
+            self._last_us = max(moment, self._last_us + 1, 0)
+            self._waiting.elapsed_us.append(self._last_us)
+            self._waiting.values.extend(values)
+            refusal, self._refusal = self._refusal, None
+        if refusal is not None:
+            raise refusal
 
     def flush(self) -> None:
-        """Sends the samples that wait."""
-        while self._chunk.elapsed_us:
-            width = len(self._chunk.channels)
-            first = pb.SampleChunk(
-                stream=self._chunk.stream,
-                channels=self._chunk.channels,
-                elapsed_us=self._chunk.elapsed_us[:MAX_SAMPLES],
-                values=self._chunk.values[: MAX_SAMPLES * width],
-            )
-            self._client.add_samples(self._seat, first)
-            del self._chunk.elapsed_us[:MAX_SAMPLES]
-            del self._chunk.values[: MAX_SAMPLES * width]
-        self._sent_at = self._local()
+        """Sends the samples that wait.
 
-    def _read(self) -> tuple[ClockReading, float]:
-        return self._client.clock(self._room_id, local=self._local), self._local()
+        Raises:
+            ChefsHatError: the server refuses, or cannot be reached. The samples wait for the next attempt.
+        """
+        with self._sending:
+            while (chunk := self._first()) is not None:
+                self._client.add_samples(self._seat, chunk)
+                with self._lock:
+                    del self._waiting.elapsed_us[: len(chunk.elapsed_us)]
+                    del self._waiting.values[: len(chunk.values)]
+
+    def close(self) -> None:
+        """Sends the samples that wait, and ends the stream.
+
+        Raises:
+            ChefsHatError: the server refuses, or cannot be reached.
+        """
+        self._closed.set()
+        self._thread.join()
+        self.clock.close()
+        self.flush()
+
+    def _first(self) -> pb.SampleChunk | None:
+        """A chunk of what has waited longest."""
+        with self._lock:
+            waiting = self._waiting
+            if not waiting.elapsed_us:
+                return None
+            return pb.SampleChunk(
+                stream=waiting.stream,
+                channels=waiting.channels,
+                elapsed_us=waiting.elapsed_us[:MAX_SAMPLES],
+                values=waiting.values[: MAX_SAMPLES * len(waiting.channels)],
+            )
+
+    def _follow(self) -> None:
+        while not self._closed.wait(self._interval_s):
+            try:
+                self.flush()
+            except ChefsHatError as error:
+                if error.retryable:
+                    continue
+                with self._lock:
+                    self._refusal = error

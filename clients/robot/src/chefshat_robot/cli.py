@@ -51,7 +51,6 @@ COMMANDS = {
     "robot": Entry("robot", "robots", "play a seat with a robot, whose decisions an agent makes"),
     "wizard": Entry("wizard", "robots", "let a robot do what a person on the page plays for it (Wizard of Oz)"),
     "affect": Entry("affect", "lsl", "forward what analysers of faces and voices read to the game"),
-    "markers": Entry("markers", "lsl", "send the events of games as markers of Lab Streaming Layer"),
     "bridge": Entry("command_bridge", "vision", "report what a camera sees to a physical table"),
     "calibrate": Entry("vision.command_calibrate", "vision", "measure the lens of a camera"),
     "perceive": Entry("vision.command_perceive", "vision", "watch the table through a camera and print what happens"),
