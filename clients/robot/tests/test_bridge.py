@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import AsyncIterator, Iterator
 from typing import cast
 
+import grpc
 import numpy as np
 import pytest
-from chefshat import ChefsHatError, pb
+from chefshat import Backoff, ChefsHatError, pb
 
 from chefshat_robot.bridge import Bridge
 from chefshat_robot.deck import Card, deck
@@ -241,6 +243,61 @@ def test_a_game_that_a_remote_seat_ended_ends_the_bridge(table: Table, eyes: Eye
     assert table.reports == []
 
 
+def test_no_two_questions_have_one_id_and_the_open_ones_end_with_the_bridge(table: Table, bridge: Bridge) -> None:
+    async def test() -> None:
+        for cards in (CARDS[9][:2], CARDS[8][:2]):
+            await bridge.observed(laid(cards))
+            await bridge.observed(laid([CARDS[12][0]], first=5))
+        await bridge.observed(Doubt(0, 0.0, 4, "pass 2", 0.0, ()))
+        await bridge.run(iter([FRAME]))
+
+    run(test())
+    asked = [report.question.question_id for report in table.reports if report.HasField("question")]
+    withdrawn = [report.answer.question_id for report in table.reports if report.HasField("answer")]
+    assert len(set(asked)) == len(asked) == 3
+    assert withdrawn == asked
+
+
+class Away(Table):
+    """A table whose server is away for the first attempts of each report."""
+
+    def __init__(self, attempts: int) -> None:
+        super().__init__()
+        self.attempts = attempts
+        self.ids: list[str] = []
+        self.away = asyncio.Event()
+
+    async def report(self, table_ticket: str, report: pb.TableReport, *, report_id: str = "") -> pb.ReportResponse:
+        self.ids.append(report_id)
+        if self.ids.count(report_id) <= self.attempts:
+            self.away.set()
+            raise ChefsHatError("UNAVAILABLE", "no server answers", code=grpc.StatusCode.UNAVAILABLE)
+        return await super().report(table_ticket, report, report_id=report_id)
+
+
+def test_frames_are_watched_while_a_report_is_tried_again(eyes: Eyes) -> None:
+    table = Away(attempts=3)
+    bridge = Bridge(table, "ticket", cast("Perception", eyes), backoff=Backoff(first_s=0.01, max_s=0.01))
+    eyes.events = [[laid(CARDS[9][:2])], [], [laid(CARDS[7][:2])]]
+    watched: list[int] = []
+
+    def frames() -> Iterator[Frame]:
+        for number in range(4):
+            # The last frames come while the first report is being tried again.
+            while number == 2 and not table.away.is_set():
+                time.sleep(0.001)
+            watched.append(len(table.reports))
+            yield FRAME
+
+    run(bridge.run(frames()))
+    assert [list(report.laid.cards.cards) for report in table.reports] == [[9, 9], [7, 7]]
+    # A report keeps its id when it is repeated.
+    assert [table.ids.count(number) for number in dict.fromkeys(table.ids)] == [4, 4]
+    lasting = Bridge(Away(attempts=3), "ticket", cast("Perception", eyes), backoff=Backoff(first_s=0.0, attempts=2))
+    with pytest.raises(ChefsHatError, match="UNAVAILABLE"):
+        run(lasting.observed(laid(CARDS[9][:2])))
+
+
 class Hand:
     """A hand reader that sees one more card in each frame."""
 
@@ -263,3 +320,30 @@ def test_a_whole_hand_is_reported_when_the_table_waits_for_it(table: Table, brid
     run(bridge.watch_hand(2, cast("HandReader", Hand()), frames()))
     (report,) = table.reports
     assert (report.hand.seat, list(report.hand.cards.cards)) == (2, [1, 2, 2])
+
+
+class Same:
+    """A hand reader that sees the same three cards in each frame."""
+
+    def see(self, frame: Frame) -> HandSeen:
+        return HandSeen(frame.index, frame.time, tuple(deck(0)[:3]))
+
+
+def test_a_hand_that_was_refused_is_not_reported_in_each_frame(
+    table: Table, bridge: Bridge, caplog: pytest.LogCaptureFixture
+) -> None:
+    table.state = pb.TableState(version=1, stage=pb.TABLE_STAGE_HAND, seat=2)
+    table.state.observation.cards_left = bytes([17, 17, 3, 17])
+    table.verdicts = [pb.REPORT_VERDICT_VIOLATION] * 9
+    bridge.state = table.state
+
+    def frames() -> Iterator[Frame]:
+        yield from [FRAME] * 4
+        table.state.observation.shift = 2
+        bridge.state = table.state
+        yield from [FRAME] * 4
+
+    run(bridge.watch_hand(2, cast("HandReader", Same()), frames()))
+    assert table.kinds() == ["hand", "hand"]
+    # The camera ended before the game.
+    assert "no more pictures" in caplog.text

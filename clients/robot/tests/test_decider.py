@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import random
+
+import pytest
+
 from chefshat_robot import field
 from chefshat_robot.deck import Card, Piece, PieceKind
 from chefshat_robot.vision import Cleared, Doubt, DoubtResolved, Laid, Observed, PassShown, TakenBack
@@ -220,3 +224,59 @@ def test_a_card_that_was_covered_for_a_moment_is_asked_about_once() -> None:
     table.wait(DOUBTED)
     (doubt,) = table.said()
     assert isinstance(doubt, Doubt)
+
+
+def answer_by_chance(table: Table, doubts: dict[int, Doubt], chance: random.Random) -> None:
+    """Answers one of the open doubts, rightly or not, as somebody may who looks at the table later."""
+    number = chance.choice(list(doubts))
+    doubt = doubts.pop(number)
+    if doubt.place.startswith("pass "):
+        table.events += table.decider.answer(number, chance.random() < 0.5)
+    else:
+        cards: list[Card | bool] = [*doubt.options, *table.decider.answers(int(doubt.place)), False]
+        table.events += table.decider.answer(number, chance.choice(cards))
+
+
+def note(table: Table, doubts: dict[int, Doubt]) -> None:
+    """Keeps the doubts that are open."""
+    for event in table.said():
+        if isinstance(event, Doubt):
+            doubts[event.number] = event
+        elif isinstance(event, DoubtResolved):
+            doubts.pop(event.number, None)
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_whatever_happens_and_whenever_it_is_answered_every_doubt_is_closed(seed: int) -> None:
+    chance = random.Random(seed)
+    table, doubts = Table(), dict[int, Doubt]()
+    for _ in range(40):
+        spots = chance.sample(range(4), chance.randint(1, 3))
+        match chance.choice(["lay", "lay", "cover", "sweep", "sweep all", "pass", "answer", "answer"]):
+            case "lay":
+                cards = tuple(chance.sample([*NINES, *FOURS], len(spots)))
+                table.put(*spots, cards=cards)
+            case "cover":
+                table.put(*spots)
+            case "sweep":
+                table.sweep(*spots)
+            case "sweep all":
+                table.sweep(*range(4))
+            case "pass":
+                table.change(PASS_1, chance.choice([None, Piece(PieceKind.PASS, 0, 1)]), empty=chance.random() < 0.3)
+            case _ if doubts:
+                answer_by_chance(table, doubts, chance)
+        table.wait(chance.choice([1, 4, 8, DOUBTED]))
+        note(table, doubts)
+    table.sweep(*range(4))
+    table.change(PASS_1, None, empty=True)
+    table.wait(2 * DOUBTED)
+    note(table, doubts)
+    while doubts:
+        answer_by_chance(table, doubts, chance)
+        table.wait(2 * DOUBTED)
+        note(table, doubts)
+    # Nothing waits any more: what is laid now is said.
+    table.put(5, cards=(Card(0, 20),))
+    table.wait()
+    assert any(isinstance(event, Laid) and Card(0, 20) in event.cards for event in table.said())

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -9,6 +12,7 @@ from chefshat_robot.deck import Card
 from chefshat_robot.synthetic.sheets import hand_frames
 from chefshat_robot.vision import Camera, Frame
 from chefshat_robot.vision.hand import HAND_FRAMES, HandReader, HandSeen
+from chefshat_robot.vision.tags import TagReader
 
 CAMERA = Camera(
     960,
@@ -55,3 +59,27 @@ def test_frames_of_other_proportions_are_refused() -> None:
     (frame, _), *_ = hand_frames(CAMERA, [FULL[:4]], 1, seed=1)
     with pytest.raises(ValueError, match="calibrate again"):
         HandReader(CAMERA).see(Frame(0, 0.0, np.ascontiguousarray(frame.image[:, 100:])))
+
+
+def test_two_cameras_are_read_at_the_same_time() -> None:
+    # One detector in two threads corrupts the memory of the process.
+    seen = [frame for frame, _ in hand_frames(CAMERA, [FULL], HAND_FRAMES, seed=1)]
+
+    def hands() -> list[list[Card]]:
+        reader = HandReader(CAMERA)
+        return [list(hand.cards) for frame in seen if (hand := reader.see(frame)) is not None]
+
+    with ThreadPoolExecutor(2) as threads:
+        both = [threads.submit(hands) for _ in range(2)]
+        assert [each.result() for each in both] == [[FULL]] * 2
+
+
+def test_a_detector_has_one_reader_at_a_time() -> None:
+    first, second = TagReader(70.0), TagReader(70.0)
+    detectors = {first._detector, first._fine_detector, second._detector, second._fine_detector}
+    assert len(detectors) == 4
+    del second
+    gc.collect()
+    third = TagReader(70.0)
+    assert third._detector in detectors
+    assert third._detector is not first._detector

@@ -8,15 +8,18 @@ attendant answers on the page, in the terminal, or by the robot's voice.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
+import random
 import secrets
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import aclosing
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Protocol, TypeAlias
 
 import cv2
-from chefshat import ChefsHatError, pb
+from chefshat import Backoff, ChefsHatError, pb
 
 from chefshat_robot.deck import FACES, Card
 from chefshat_robot.vision import Cleared, Doubt, DoubtResolved, FieldChanged, FieldState, Frame, Laid, Observed, Picture, TakenBack
@@ -72,6 +75,19 @@ class _Play:
     complete: bool
 
 
+@dataclass(frozen=True)
+class _Question:
+    """An open question.
+
+    Attributes:
+        number: Its id, which no other question has.
+        on_answer: What is done with the answer.
+    """
+
+    number: str
+    on_answer: OnAnswer
+
+
 @dataclass
 class Bridge:
     """Joins perception and a physical table.
@@ -81,6 +97,7 @@ class Bridge:
         ticket: The ticket of the table.
         perception: What watches the field.
         on_report: Called with each report and its response, for a display or a log.
+        backoff: The delays between attempts to report while the server is away.
 
     Attributes:
         state: The newest state of the table; None before the first.
@@ -91,40 +108,64 @@ class Bridge:
     perception: Perception
     on_report: Callable[[pb.TableReport, pb.ReportResponse], None] = lambda _report, _response: None
     state: pb.TableState | None = None
+    backoff: Backoff = field(default_factory=Backoff)
     _session: str = field(default_factory=lambda: secrets.token_hex(4))
     _reports: int = 0
     _play: _Play | None = None
-    _asked: dict[str, OnAnswer] = field(default_factory=dict)
+    _questions: int = 0
+    _asked: dict[str, _Question] = field(default_factory=dict)
+    """The open questions, by their names."""
+    _perceiving: asyncio.Lock = field(default_factory=asyncio.Lock)
+    _seen: asyncio.Queue[list[Observed]] = field(default_factory=asyncio.Queue)
+    """What is to be reported, in the order in which it happened."""
 
     async def run(self, frames: Iterator[Frame], after: Callable[[Frame], Awaitable[None]] | None = None) -> None:
-        """Watches until the frames or the game end.
+        """Watches until the frames or the game end. Frames are watched also while a report waits for the server.
 
         Args:
             frames: The frames of the camera.
-            after: Called after each frame has been reported.
+            after: Called after each frame has been reported; the next one then waits for it.
 
         Raises:
             ChefsHatError: The server refused a report or could not be reached any more.
         """
-        watching = asyncio.create_task(self._watch())
+        self._seen = asyncio.Queue()
+        watching, seeing = asyncio.create_task(self._watch()), asyncio.create_task(self._see(frames, after))
+        for task in (watching, seeing):
+            # Its end is noticed below.
+            task.add_done_callback(lambda _: self._seen.put_nowait([]))
         try:
-            while not self._is_over():
-                frame = await asyncio.to_thread(next, frames, None)
-                if frame is None:
-                    return
-                for event in await asyncio.to_thread(self.perception.see, frame):
+            # What the last answers lead to is reported, too.
+            while not self._is_over() and not (seeing.done() and self._seen.empty()):
+                for event in await self._seen.get():
                     await self.observed(event)
                 await self._take_answers()
-                if after is not None:
-                    await after(frame)
-                if watching.done():
-                    watching.result()
+                self._seen.task_done()
+                for task in (watching, seeing):
+                    if task.done():
+                        task.result()
         except ChefsHatError as error:
             # A remote seat may end the game before its last cards are laid.
             if error.reason != "GAME_OVER":
                 raise
         finally:
-            watching.cancel()
+            for task in (watching, seeing):
+                task.cancel()
+            await asyncio.gather(watching, seeing, return_exceptions=True)
+            await self._withdraw_all()
+
+    async def _see(self, frames: Iterator[Frame], after: Callable[[Frame], Awaitable[None]] | None) -> None:
+        """Watches the frames."""
+        while (frame := await asyncio.to_thread(next, frames, None)) is not None:
+            await self._perceived(partial(self.perception.see, frame))
+            if after is not None:
+                await self._seen.join()
+                await after(frame)
+
+    async def _perceived(self, perceive: Callable[[], list[Observed]]) -> None:
+        """Lets perception see or hear something, and reports what it makes of it after all that it has told before."""
+        async with self._perceiving:
+            self._seen.put_nowait(await asyncio.to_thread(perceive))
 
     async def watch_hand(self, seat: int, reader: HandReader, frames: Iterator[Frame]) -> None:
         """Watches the hand of a seat and reports it whenever the table waits for it.
@@ -138,12 +179,21 @@ class Bridge:
             ChefsHatError: The server refused a report or could not be reached any more.
         """
         hand: list[Card] = []
+        reported: tuple[int, list[Card]] | None = None
         while not self._is_over() and (frame := await asyncio.to_thread(next, frames, None)) is not None:
             seen = await asyncio.to_thread(reader.see, frame)
             if seen is not None:
                 hand = list(seen.cards)
-            if self._awaits_hand(seat, len(hand)):
+            # One that was refused is not reported again in the same Shift.
+            if self._awaits_hand(seat, len(hand)) and (now := (self._shift(), hand)) != reported:
+                reported = now
                 await self._report(pb.TableReport(hand=pb.HandSeen(seat=seat, cards=seen_cards(hand))))
+        if not self._is_over():
+            LOG.warning("the camera at the hand of %s gives no more pictures", self._name(seat))
+
+    def _shift(self) -> int:
+        """The number of the Shift; 0 before the first state."""
+        return self.state.observation.shift if self.state is not None else 0
 
     def _awaits_hand(self, seat: int, size: int) -> bool:
         """Whether the table waits for the hand of a seat, and as many cards are seen as it has."""
@@ -262,34 +312,59 @@ class Bridge:
             text = f"{' or '.join(names) if len(names) <= 3 else 'Which card lies'} at place {doubt.place}?"
 
         async def answer(option: int) -> None:
-            for event in self.perception.answer(doubt.number, readings[option]):
-                await self.observed(event)
+            await self._perceived(partial(self.perception.answer, doubt.number, readings[option]))
 
         await self._ask(f"doubt-{doubt.number}", text, names, answer, doubt.picture)
 
     async def _ask(self, name: str, text: str, options: list[str], on_answer: OnAnswer, picture: Picture | None = None) -> None:
-        """Asks the people at the table."""
-        question = pb.TableQuestion(question_id=f"{self._session}-{name}", text=text, options=options, picture=_encoded(picture))
-        self._asked[question.question_id] = on_answer
+        """Asks the people at the table. A question of the same name that is still open is withdrawn."""
+        await self._withdraw(name)
+        self._questions += 1
+        number = f"{self._session}-{name}-{self._questions}"
+        self._asked[name] = _Question(number, on_answer)
+        question = pb.TableQuestion(question_id=number, text=text, options=options, picture=_encoded(picture))
         await self._report(pb.TableReport(question=question))
 
     async def _withdraw(self, name: str) -> None:
         """Withdraws a question that needs no answer any more."""
-        question = f"{self._session}-{name}"
-        if self._asked.pop(question, None) is not None:
-            await self._report(pb.TableReport(answer=pb.QuestionAnswered(question_id=question)))
+        question = self._asked.pop(name, None)
+        if question is not None:
+            await self._report(pb.TableReport(answer=pb.QuestionAnswered(question_id=question.number)))
+
+    async def _withdraw_all(self) -> None:
+        """Withdraws the open questions: nobody would hear the answers."""
+        with contextlib.suppress(ChefsHatError):
+            for name in list(self._asked):
+                await self._withdraw(name)
 
     async def _take_answers(self) -> None:
-        """Gives the answers that arrived to perception."""
-        for answer in self.state.answers if self.state is not None else ():
-            on_answer = self._asked.pop(answer.question_id, None)
-            if on_answer is not None and answer.HasField("option"):
-                await on_answer(answer.option)
+        """Does what the answers that arrived ask for."""
+        answers = {answer.question_id: answer for answer in self.state.answers} if self.state is not None else {}
+        for name, question in list(self._asked.items()):
+            answer = answers.get(question.number)
+            # What an earlier answer led to may have withdrawn it.
+            if answer is None or self._asked.get(name) is not question:
+                continue
+            del self._asked[name]
+            if answer.HasField("option"):
+                await question.on_answer(answer.option)
 
     async def _report(self, report: pb.TableReport) -> pb.ReportResponse:
+        """Reports something. Repeats it while the server is away."""
         report.source = pb.REPORT_SOURCE_CAMERA
         self._reports += 1
-        response = await self.table.report(self.ticket, report, report_id=f"{self._session}-{self._reports}")
+        number = f"{self._session}-{self._reports}"
+        failures = 0
+        while True:
+            try:
+                response = await self.table.report(self.ticket, report, report_id=number)
+                break
+            except ChefsHatError as error:
+                failures += 1
+                if not error.retryable or failures > self.backoff.attempts:
+                    raise
+                LOG.warning("the server does not take a report, which is tried again: %s", error)
+                await asyncio.sleep(self.backoff.delay_s(failures, random.Random()))
         self._newer(response.state)
         self.on_report(report, response)
         return response

@@ -75,12 +75,14 @@ def run(arguments: argparse.Namespace) -> int:
                     perception = Perception(camera, arguments.deck, recorder)
                     bridge = Bridge(client, arguments.ticket, perception, on_report=report_printer(arguments.json))
                     readers = [(seat, HandReader(deck=arguments.deck), source) for seat, source in hands]
-                    watched = [asyncio.create_task(bridge.watch_hand(*reader)) for reader in readers]
                     try:
-                        await bridge.run(frames)
-                    finally:
-                        for task in watched:
-                            task.cancel()
+                        async with asyncio.TaskGroup() as group:
+                            watched = [group.create_task(bridge.watch_hand(*reader)) for reader in readers]
+                            await bridge.run(frames)
+                            for task in watched:
+                                task.cancel()
+                    except BaseExceptionGroup as failed:
+                        raise failed.exceptions[0] from None
                     return 0
 
             return run_command(watch)

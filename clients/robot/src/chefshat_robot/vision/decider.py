@@ -287,9 +287,10 @@ class Decider:
         for play in self._queue:
             if isinstance(play, _Play) and play is not doubt.play:
                 for read, spot in list(play.cards.items()):
-                    if spot == doubt.spot and (
-                        read == card or (read.face == card.face and self._known[_piece(read)].told is False)
-                    ):
+                    # A card that was read may have been cleared meanwhile.
+                    known = self._known.get(_piece(read))
+                    was_read = known is None or not known.told
+                    if spot == doubt.spot and (read == card or (read.face == card.face and was_read)):
                         del play.cards[read]
                         doubt.play.cards[read] = spot
                         if not play.cards and not play.doubts:

@@ -7,8 +7,8 @@ synthetic table (166 pieces in three Shifts), OpenCV's detector found a tag of 7
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass
-from functools import cache
 
 import cv2
 import numpy as np
@@ -50,28 +50,38 @@ class _LastingDetector(Detector):  # type: ignore[misc]
     """A detector that is never destroyed.
 
     `Detector.__del__` of pupil-apriltags 1.0.4 frees the family of tags before the detector that still writes to it, which corrupts
-    the heap. There are at most four detectors, so they may live as long as the process.
+    the heap. Readers that come later use it again.
     """
 
     def __del__(self) -> None:
         """Does nothing."""
 
 
-@cache
-def _detector(decimate: float) -> _LastingDetector:
-    return _LastingDetector(families="tag36h11", nthreads=1, quad_decimate=decimate)
+#: Detectors that no reader uses, by decimation: a detector can be used by one thread at a time.
+_IDLE: dict[float, list[_LastingDetector]] = {}
+
+
+def _detector(decimate: float, owner: object) -> _LastingDetector:
+    """A detector for an owner alone, until the owner is gone."""
+    idle = _IDLE.setdefault(decimate, [])
+    try:
+        detector = idle.pop()
+    except IndexError:
+        detector = _LastingDetector(families="tag36h11", nthreads=1, quad_decimate=decimate)
+    weakref.finalize(owner, idle.append, detector)
+    return detector
 
 
 class TagReader:
-    """Reads the AprilTags 36h11 of pictures, on one thread.
+    """Reads the AprilTags 36h11 of pictures, in one thread at a time.
 
     Args:
         tag_pixels: About how long the edge of a tag is in the pictures. Big tags are searched for in fewer pixels, which is faster.
     """
 
     def __init__(self, tag_pixels: float) -> None:
-        self._detector = _detector(next((factor for pixels, factor in _DECIMATION if tag_pixels >= pixels), 1.0))
-        self._fine_detector = _detector(_ENLARGEMENT)
+        self._detector = _detector(next((factor for pixels, factor in _DECIMATION if tag_pixels >= pixels), 1.0), self)
+        self._fine_detector = _detector(_ENLARGEMENT, self)
         self._sharpness = tag_pixels / _SHARPENED_PART
 
     def read(
