@@ -1,6 +1,8 @@
 """The Gymnasium and PettingZoo environments: the libraries' checkers on the real server, details on the toy server."""
 
+import copy
 import io
+import pickle
 import subprocess
 import sys
 import warnings
@@ -319,6 +321,28 @@ def test_a_closed_environment_stays_closed(toy: FakeVector, make: Any) -> None:
     env.close()
     with pytest.raises(gymnasium.error.ClosedEnvironmentError, match="make a new one"):
         env.reset()
+
+
+@pytest.mark.parametrize("make", [ChefsHatEnv, ChefsHatVectorEnv, chefshat_v1.raw_env])
+def test_an_environment_is_neither_pickled_nor_copied(toy: FakeVector, make: Any) -> None:
+    env = make(toy.address)
+    for copied in (pickle.dumps, copy.copy, copy.deepcopy):
+        with pytest.raises(TypeError, match="cannot be pickled or copied: make another one"):
+            copied(env)
+    env.close()
+
+
+def test_each_agent_samples_on_its_own(toy: FakeVector) -> None:
+    env = chefshat_v1.raw_env(toy.address, observation="columns")
+    first, second = (env.observation_space(agent) for agent in env.possible_agents[:2])
+    first.seed(1)
+    second.seed(2)
+    before = first.sample()
+    first.seed(1)
+    second.seed(3)
+    again = first.sample()
+    assert all((before["observation"][name] == again["observation"][name]).all() for name in before["observation"])
+    env.close()
 
 
 def test_a_mask_can_be_sampled(toy: FakeVector) -> None:

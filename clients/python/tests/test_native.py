@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -344,3 +345,49 @@ def test_without_the_module_a_local_server_plays(monkeypatch: pytest.MonkeyPatch
         assert str(env.server).startswith("127.0.0.1:")
         assert f"on {env.server}" in repr(env)
         env.step(env.sample())
+
+
+def contents(table: Table) -> dict[str, Any]:
+    """All columns of a table, as lists."""
+    return {name: array.tolist() for name, array in table.as_dict().items()}
+
+
+@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda table: pickle.loads(pickle.dumps(table))])
+def test_batches_are_copied_with_all_their_tables(again: Callable[[Batch], Batch]) -> None:
+    with VectorEnv(games=4, seed=1, episode="shift", shift_statistics=True, transitions=True, history=3) as env:
+        while not (len(env.batch.endings) and len(env.batch.transitions)):
+            env.step(env.sample())
+        batch = env.batch
+        copied = again(batch)
+        assert (copied.step, copied.done, copied.totals) == (batch.step, batch.done, batch.totals)
+        for one, other in (
+            (batch, copied),
+            (batch.observations, copied.observations),
+            (batch.endings, copied.endings),
+            (batch.endings.observations, copied.endings.observations),
+            (batch.beginnings, copied.beginnings),
+            (batch.shifts, copied.shifts),
+            (batch.transitions, copied.transitions),
+            (batch.transitions.before, copied.transitions.before),
+        ):
+            assert one is not None
+            assert other is not None
+            assert contents(one) == contents(other)
+        assert contents(copied.take(np.array([0]))) == contents(batch.take(np.array([0])))
+
+
+def test_threads_that_read_one_batch_see_the_same() -> None:
+    with VectorEnv(games=64, seed=2) as env, ThreadPoolExecutor(8) as threads:
+        for _ in range(50):
+            batch = env.step(env.sample())
+            found = list(threads.map(lambda _: (batch.games.tolist(), len(batch.beginnings)), range(8)))  # noqa: B023 - Awaited.
+            assert all(one == found[0] for one in found)
+            assert len(found[0][0]) == len(batch)
+
+
+def test_an_engine_of_another_version_is_refused() -> None:
+    from chefshat import _native
+
+    _native._check_version(chefshat_native.__version__)
+    with pytest.raises(ImportError, match=r"chefshat-native 0\.0\.1 does not fit chefshat .*: pip install chefshat-native=="):
+        _native._check_version("0.0.1")

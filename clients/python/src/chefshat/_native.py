@@ -1,5 +1,8 @@
 """Games that this process plays for a `VectorEnv`, with the native engine (the package `chefshat-native`)."""
 
+import contextlib
+import importlib.metadata
+import threading
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, NoReturn, TypeVar, cast
@@ -16,6 +19,32 @@ from chefshat.columns import Beginnings, Endings, Packed, ShiftStatistics, Sizes
 from chefshat.errors import ChefsHatError
 
 AnyTable = TypeVar("AnyTable", bound=Table)
+Value = TypeVar("Value")
+
+
+def _check_version(native: str) -> None:
+    """Refuses an engine of another version: it would have other columns, or other rules."""
+    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+        own = importlib.metadata.version("chefshat")
+        if own != native:
+            raise ImportError(f"chefshat-native {native} does not fit chefshat {own}: pip install chefshat-native=={own}")
+
+
+_check_version(chefshat_native.__version__)
+
+
+class _once(cached_property[Value]):
+    """A cached property that is computed once, also if threads ask for it at the same time: the engine hands a table over once."""
+
+    # One for all batches: what it protects takes microseconds.
+    _lock = threading.RLock()
+
+    def __get__(self, batch: Any, owner: type[Any] | None = None) -> Any:  # noqa: ANN401 - As the class above.
+        if batch is None:
+            return self
+        with self._lock:
+            name = self.attrname
+            return batch.__dict__[name] if name in batch.__dict__ else super().__get__(batch, owner)
 
 
 class NativeBatch(Batch):
@@ -43,23 +72,27 @@ class NativeBatch(Batch):
         """Creates a batch from arrays."""
         return Batch.of(rows, sizes, columns)
 
-    @cached_property
-    def packed(self) -> Packed:  # type: ignore[override] # Only tables with few rows are packed before they are used.
+    @property
+    def _made_of_arrays(self) -> type[Table]:
+        return Batch
+
+    @_once
+    def packed(self) -> Packed:  # Only tables with few rows are packed before they are used.
         """The columns of the open decisions."""
         _, columns = self._native.decisions()
         return Packed(columns, self._layouts["decisions"])
 
-    @cached_property
+    @_once
     def endings(self) -> Endings:
         """The episodes of the client's seats that have ended."""
         return self._table(Endings, "endings", *self._native.endings())
 
-    @cached_property
+    @_once
     def beginnings(self) -> Beginnings:
         """The games that have begun."""
         return self._table(Beginnings, "beginnings", *self._native.beginnings())
 
-    @cached_property
+    @_once
     def shifts(self) -> ShiftStatistics | None:
         """The Shifts that have ended, with statistics."""
         found = self._native.shifts()

@@ -6,7 +6,7 @@ Columns are in `columns`; the stream of batches is in `vector`.
 import os
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -139,6 +139,10 @@ class Batch(Situations):
         if self._transitions is None:
             raise AttributeError("there are no transitions: create the VectorEnv with transitions=True")
         return self._transitions
+
+    def _contents(self) -> dict[str, Any]:
+        names = ("endings", "beginnings", "shifts", "totals", "step", "done", "records", "_transitions")
+        return super()._contents() | {name: getattr(self, name) for name in names}
 
     def complete(self, memory: Memory, reward_function: RewardFunction | None) -> None:
         """Computes the transitions, and the rewards of a `reward_function`. The env calls it once."""

@@ -5,6 +5,11 @@ and are read-only. The stream is in `vector`, pairs of decisions are in `transit
 
 R is the number of rows, N of seats, F of faces, A of actions (by default N=4, F=11, A=214). Arrays of cards are F+1 wide: index
 f-1 counts face f, index F the jokers. Arrays of seats are N wide.
+
+Counts are unsigned: a difference that would be negative wraps around (2 - 3 is 255 in u1). Convert them first, for instance
+`batch.observations.points.astype(np.int64)`.
+
+Tables can be pickled and copied; what comes back is made of arrays, whatever the table was made from.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -189,6 +194,18 @@ class Table:
         """Returns the columns that tables of these sizes have, by name: without a history also without its columns."""
         return {name: column for name, column in cls.columns().items() if 0 not in column.shape(1, sizes)}
 
+    def _contents(self) -> dict[str, Any]:
+        """All that a copy needs, by attribute. Subclasses add what is not a column."""
+        return self.as_dict()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self._made_of_arrays, len(self), self.sizes, self._contents())
+
+    @property
+    def _made_of_arrays(self) -> "type[Table]":
+        """The class of a copy."""
+        return type(self)
+
     def as_dict(self) -> dict[str, NDArray[Any]]:
         """Returns the columns as arrays, by name."""
         return {name: getattr(self, name) for name in self.columns_of(self.sizes)}
@@ -205,6 +222,11 @@ class Table:
         columns = {name: array[rows] for name, array in self.as_dict().items()}
         count = int(np.count_nonzero(rows)) if rows.dtype == np.bool_ else len(rows)
         return self.of(count, self.sizes, columns)
+
+
+def _restored(kind: type[Table], rows: int, sizes: Sizes, contents: Mapping[str, Any]) -> Table:
+    """Creates a table that was pickled or copied."""
+    return kind.of(rows, sizes, contents)
 
 
 class Observations(Table):
@@ -269,6 +291,9 @@ class Situations(Table):
     def masks(self) -> NDArray[np.bool_]:
         """(R, A): whether each action is legal."""
         return unpack(self.mask_bits, self.sizes.num_actions)
+
+    def _contents(self) -> dict[str, Any]:
+        return super()._contents() | {"observations": self.observations}
 
     @classmethod
     def concatenated(cls, tables: Sequence[Self]) -> Self:

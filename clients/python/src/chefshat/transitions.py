@@ -56,6 +56,9 @@ class Transitions(Table):
         """(R,): kind of the decision, values of `pb.DecisionKind`."""
         return self.before.kinds
 
+    def _contents(self) -> dict[str, Any]:
+        return super()._contents() | {"before": self.before, "after": self.after}
+
     def take(self, rows: NDArray[Any]) -> Self:
         """Returns the rows with these indices (or where this mask is true)."""
         taken = super().take(rows)

@@ -3,6 +3,7 @@
 One seat against built-in agents is in `gymnasium_env`. Seats decide in turn, so there is no parallel form.
 """
 
+import copy
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,6 +18,7 @@ except ImportError as error:
     raise ImportError("chefshat_v1 needs PettingZoo: pip install 'chefshat[envs]'") from error
 
 from chefshat.columns import Situations
+from chefshat.envs.copying import NotCopied
 from chefshat.envs.gymnasium_env import check_open, wait_for_a_row
 from chefshat.envs.illegal import penalties, with_limit
 from chefshat.envs.observing import Form, ObservationFunction, mask_space
@@ -32,7 +34,7 @@ def env(address: str | ServerAddress | None = None, **options: Any) -> "AECEnv[s
     return wrappers.OrderEnforcingWrapper(checked)
 
 
-class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no types.
+class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no types.
     """The environment without checks. The agents are "player_0" to "player_{N-1}", by seat.
 
     An observation is a dictionary: "observation", of the form chosen, and "action_mask", A numbers of 0 or 1 (default 214), all 0
@@ -78,9 +80,7 @@ class raw_env(AECEnv[str, Any, Any]):  # type: ignore[misc]  # PettingZoo has no
         self._form = Form(observation, sizes, self.vector.batch)
         seen = spaces.Dict({"observation": self._form.space, "action_mask": mask_space(sizes)})
         # Separate spaces, because each has its own seed.
-        self._observation_spaces: dict[str, spaces.Space[Any]] = {
-            agent: spaces.Dict(dict(seen.spaces)) for agent in self.possible_agents
-        }
+        self._observation_spaces: dict[str, spaces.Space[Any]] = {agent: copy.deepcopy(seen) for agent in self.possible_agents}
         self._action_spaces: dict[str, spaces.Space[Any]] = {
             agent: spaces.Discrete(sizes.num_actions) for agent in self.possible_agents
         }

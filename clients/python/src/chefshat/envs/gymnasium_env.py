@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from chefshat.address import ServerAddress
 from chefshat.columns import Endings, Situations
+from chefshat.envs.copying import NotCopied
 from chefshat.envs.illegal import penalties, with_limit
 from chefshat.envs.observing import Form, ObservationFunction
 from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
@@ -38,7 +39,7 @@ def check_open(vector: VectorEnv) -> None:
         raise gymnasium.error.ClosedEnvironmentError("the environment is closed: make a new one")
 
 
-class ChefsHatEnv(gymnasium.Env[Any, Any]):
+class ChefsHatEnv(NotCopied, gymnasium.Env[Any, Any]):
     """One seat of a game; the other seats are built-in agents of the server.
 
     An action is the index of one of A actions (default 214). `info["action_mask"]` has A numbers, 1 where an action is legal;

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from chefshat.address import ServerAddress
 from chefshat.columns import Endings
+from chefshat.envs.copying import NotCopied
 from chefshat.envs.gymnasium_env import check_open
 from chefshat.envs.illegal import penalties, with_limit
 from chefshat.envs.observing import Form, ObservationFunction, Observed
 from chefshat.vector import Batch, VectorEnv
 
 
-class ChefsHatVectorEnv(gymnasium.vector.VectorEnv[Any, Any, Any]):
+class ChefsHatVectorEnv(NotCopied, gymnasium.vector.VectorEnv[Any, Any, Any]):
     """Many games stepped together; the agent has the same seat in all of them, the others are built-in agents of the server.
 
     Observations, actions, rewards and episodes are those of `ChefsHatEnv`, one row per game. When an episode ends, the next one

@@ -16,10 +16,11 @@ except ImportError as error:
         "chefshat.envs.stable_baselines needs Stable-Baselines3: pip install stable-baselines3 sb3-contrib"
     ) from error
 
+from chefshat.envs.copying import NotCopied
 from chefshat.envs.gymnasium_vector import ChefsHatVectorEnv
 
 
-class ChefsHatVecEnv(VecEnv):  # type: ignore[misc]  # It may not be installed.
+class ChefsHatVecEnv(NotCopied, VecEnv):  # type: ignore[misc]  # It may not be installed.
     """A `ChefsHatVectorEnv` for Stable-Baselines3, stepped in one call. `MaskablePPO` of sb3-contrib finds its masks.
 
     The info of a game whose episode has ended has `terminal_observation`, `TimeLimit.truncated`, `place`, and `episode`, the
