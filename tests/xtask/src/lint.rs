@@ -61,6 +61,32 @@ pub(crate) fn with_clippy(cargo: &mut Command) {
     cargo.env("CLIPPY_ARGS", arguments.concat());
 }
 
+/// Systems for which the programs must compile besides this one: Windows and macOS.
+const PLATFORMS: [&str; 2] = ["x86_64-pc-windows-gnu", "aarch64-apple-darwin"];
+
+/// Compiles the programs and the SDK for other systems as far as that goes without their linkers.
+/// What is C is not compiled: nothing is linked.
+pub(crate) fn platforms(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
+    for target in PLATFORMS {
+        steps.run(&format!("set up {target}"), || setup::target(target))?;
+        let mut check = in_root(places, cargo());
+        check.args(["check", "--target", target]);
+        check.args([
+            "-p",
+            "chefshat",
+            "-p",
+            "chefshat-lab",
+            "-p",
+            "chefshat-client",
+        ]);
+        for tool in ["CC", "AR"] {
+            check.env(format!("{tool}_{}", target.replace('-', "_")), "true");
+        }
+        steps.program(&format!("cargo check for {target}"), &mut check)?;
+    }
+    Ok(())
+}
+
 /// The checks that only read sources of Rust.
 pub(crate) fn sources(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     let fmt = ["fmt", "--all", "--check"];

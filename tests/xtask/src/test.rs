@@ -83,8 +83,8 @@ pub(crate) struct Options {
     /// Run only the tests of one part.
     #[arg(long, value_enum)]
     only: Option<Part>,
-    /// Also run the tests that take many minutes: the wheels and the images
-    /// built from source, idle streams.
+    /// Also run what takes many minutes: long tests, the wheels and the images
+    /// built from source, idle streams, checks for Windows and macOS.
     #[arg(long)]
     slow: bool,
     /// Also run the checks of `cargo xtask lint`, in the same build.
@@ -206,6 +206,7 @@ pub(crate) fn run(
             tests.env("RUST_TEST_THREADS", "4");
             if slow {
                 tests.env("CHEFSHAT_FAULTS", "200");
+                lint::platforms(places, steps)?;
             }
             steps.program("cargo test", &mut tests)
         }));

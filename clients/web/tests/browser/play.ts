@@ -17,11 +17,14 @@ export async function sitDown(page: Page, server: Server, code: string, name: st
 
 /** Waits for a decision other than `before`. Returns its id, or undefined once the game is over. */
 export async function nextDecision(page: Page, before?: string): Promise<string | undefined> {
-  const found = await page.waitForFunction((before) => {
+  const waiting = page.waitForFunction((before) => {
     if (document.querySelector('[data-part~="result"] a[href^="/replay/"]')) return "over";
     const id = document.querySelector<HTMLElement>("[data-decision]")?.dataset.decision;
     return id !== before && id;
   }, before);
+  const found = await waiting.catch(async (cause) => {
+    throw new Error(`no decision after ${before} on the page: ${await page.locator("main").textContent()}`, { cause });
+  });
   const id = await found.jsonValue();
   return id === "over" || id === false ? undefined : id;
 }
@@ -126,11 +129,14 @@ export async function byCardKeys(page: Page): Promise<number> {
     await page.keyboard.press(key);
     pressed += 1;
   };
-  if (await page.locator('[data-action="decline"]').isVisible()) {
+  const decline = page.locator('[data-action="decline"]');
+  const free = page.locator('[data-part~="hand-card"][aria-disabled="false"]');
+  const pass = page.locator('[data-action="pass"][aria-disabled="false"]');
+  await decline.or(free).or(pass).first().waitFor();
+  if (await decline.isVisible()) {
     await press("n");
     return pressed;
   }
-  const free = page.locator('[data-part~="hand-card"][aria-disabled="false"]');
   if ((await free.count()) === 0) {
     await press("p");
     return pressed;
