@@ -186,9 +186,9 @@ async fn a_person_plays_a_tournament_of_built_in_agents_to_its_end() {
     terminal.wait_for("● connected").await;
     let decisions = terminal.play("final standings").await;
     assert!(decisions > 3, "{decisions} decisions only");
-    let end = terminal.wait_for("Enter ends").await;
+    let end = terminal.wait_for("q ends").await;
     assert!(end.contains("Ada (you)"), "{end}");
-    terminal.press("Enter");
+    terminal.press("q");
     let said = terminal.ended(0).await;
     assert!(said.contains("the tournament is over: you are"), "{said}");
 

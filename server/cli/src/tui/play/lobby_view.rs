@@ -52,10 +52,10 @@ pub(super) fn draw(frame: &mut Frame<'_>, theme: Theme, part: &Part, lobby: &Lob
     draw_standings(frame, theme, lobby, standings);
     let (words, style) = match &part.link {
         Link::Over(Some(why)) if !lobby.is_over() => (
-            format!(" ! Your place is lost: {why}. Enter ends."),
+            format!(" ! Your place is lost: {why}. q ends."),
             theme.warning(),
         ),
-        _ if part.is_over() && !part.peek => (" Enter ends.".to_owned(), theme.bold()),
+        _ if part.is_over() && !part.peek => (" q ends.".to_owned(), theme.bold()),
         Link::Lost(why) => (
             format!(" Connection lost, reconnecting: {why}"),
             theme.warning(),

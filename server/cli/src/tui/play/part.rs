@@ -280,7 +280,6 @@ impl Part {
         if std::mem::take(&mut self.peek) {
             return None;
         }
-        let over = self.is_over();
         match (&mut self.game, &mut self.lobby) {
             (Some(game), None) => {
                 let what = game.take(Input::Key(key), now_ms)?;
@@ -310,11 +309,11 @@ impl Part {
                     Some((game.table.game_id.clone(), what))
                 }
             },
+            // Not Enter: it may be meant for a result that has just left the screen.
             (None, lobby) => {
                 match (code, lobby) {
                     (KeyCode::Char('q') | KeyCode::Esc, _) => self.ask_to_leave(),
                     (KeyCode::Char('?'), _) => self.over = Some(Over::Help),
-                    (KeyCode::Enter, _) if over => self.left = true,
                     (code, Some(lobby)) => lobby.key(code),
                     _ => {}
                 }

@@ -66,11 +66,14 @@ fn games_follow_each_other_with_results_between() {
     session.handle(PartInput::Over(None));
     let end = session.screen();
     assert!(
-        end.contains("final standings") && end.contains("Enter ends"),
+        end.contains("final standings") && end.contains("q ends"),
         "{end}"
     );
     assert_screens(&[("lobby.txt", lobby, include_str!("screens/lobby.txt"))]);
+    // A second Enter for the result does not hide the final standings.
     session.press(KeyCode::Enter);
+    assert!(!session.part.left);
+    session.press(KeyCode::Char('q'));
     assert!(session.part.left);
 }
 
@@ -210,7 +213,7 @@ fn lost_connections_and_games_are_shown() {
             .screen()
             .contains("Your place is lost: another has it")
     );
-    session.press(KeyCode::Enter);
+    session.press(KeyCode::Char('q'));
     assert!(session.part.left);
     // The end may arrive before the last report.
     let mut session = TournamentSession::new();
@@ -219,7 +222,7 @@ fn lost_connections_and_games_are_shown() {
     session.handle(PartInput::Over(None));
     let screen = session.screen();
     assert!(
-        screen.contains("The tournament is over.") && screen.contains("Enter ends."),
+        screen.contains("The tournament is over.") && screen.contains("q ends."),
         "{screen}"
     );
     assert!(!screen.contains("next game"), "{screen}");
