@@ -206,6 +206,8 @@ pub(crate) fn run(
             tests.env("RUST_TEST_THREADS", "4");
             if slow {
                 tests.env("CHEFSHAT_FAULTS", "200");
+                tests.env("CHEFSHAT_SIMULATIONS", "300");
+                tests.env("CHEFSHAT_MODEL", "all");
                 lint::platforms(places, steps)?;
             }
             steps.program("cargo test", &mut tests)
