@@ -21,6 +21,10 @@ from chefshat.experiments import command, mechanics, page, plots, rules, tables 
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "experiments.md"
 
+# A learning experiment compiles a program for each kind of agent, and this one has most of them.
+WINNING = pytest.param("winning", marks=pytest.mark.slow)
+QUICKER = [name for name in command.EXPERIMENTS if name != "winning"]
+
 
 def a_result(experiment: str = "mechanics", *, quick: bool = False) -> Result:
     rows: list[list[results.Cell]] = [
@@ -335,15 +339,19 @@ def test_the_papers_figures() -> None:
 
 
 @pytest.fixture(scope="module")
-def quick_run(real_address: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a quick run of all experiments."""
+def quick_run(request: pytest.FixtureRequest, real_address: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a quick run of all experiments, except for the longest unless a test that is run needs it."""
     folder = tmp_path_factory.mktemp("experiments")
-    assert main(["all", "--quick", "--out", str(folder), "--address", real_address]) == 0
+    if any(item.get_closest_marker("slow") for item in request.session.items):
+        assert main(["all", "--quick", "--out", str(folder), "--address", real_address]) == 0
+        return folder
+    for name in QUICKER:
+        assert main([name, "--quick", "--out", str(folder), "--address", real_address]) == 0
     return folder
 
 
 @pytest.mark.server
-@pytest.mark.parametrize("name", command.EXPERIMENTS)
+@pytest.mark.parametrize("name", [*QUICKER, WINNING])
 def test_a_quick_run_writes_results_and_plots(quick_run: Path, name: str) -> None:
     result = results.read(command.results_file(quick_run, name))
     assert result.experiment == name
@@ -367,7 +375,7 @@ def test_a_quick_run_writes_results_and_plots(quick_run: Path, name: str) -> Non
     [
         ("mechanics", ["28%", "35%", "60%", "31", "33", "35"]),
         ("rules", ["0.5", "-0.82", "65", "62", "63", "60"]),
-        ("winning", ["215", "117", "45", "55", "33", "30%"]),
+        pytest.param("winning", ["215", "117", "45", "55", "33", "30%"], marks=pytest.mark.slow),
     ],
 )
 def test_the_papers_figures_are_beside_ours(quick_run: Path, name: str, reported: list[str]) -> None:
