@@ -166,7 +166,7 @@ pub fn longest_shutdown(grace: Duration) -> Duration {
 pub const MAX_NAME_CHARS: usize = 64;
 /// Most Shifts of a hosted game, and highest target in points.
 pub const MAX_HOSTED_SHIFTS: u32 = Limits::OF_SERVER.recorded_shifts;
-/// Interval of heartbeats on an idle Watch stream.
+/// Interval of heartbeats on an idle stream, unless its client asks for another.
 pub const HEARTBEAT: Duration = Duration::from_secs(15);
 
 /// How many games a server keeps by itself.

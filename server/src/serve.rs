@@ -420,6 +420,7 @@ impl Server {
                 config.painter.clone(),
             )?)
             .layer(tonic_web::GrpcWebLayer::new())
+            .layer(grpc::HeartbeatLayer)
             .layer(grpc::count_refusals(rooms.metrics()))
             .layer(option_layer(forwarding))
             .layer(grpc::AccessLayer::new(

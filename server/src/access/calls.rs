@@ -70,6 +70,8 @@ pub struct Call {
     pub reads_records: bool,
     /// Whether its requests or answers are a stream.
     pub streams: bool,
+    /// Whether its answers are a stream that carries heartbeats.
+    pub heartbeats: bool,
     /// Whether its request, a single message, may be about a room or tournament of another node.
     pub forwarded: bool,
     /// Whether its client sends a stream of messages.
@@ -120,6 +122,14 @@ impl Call {
         }
     }
 
+    /// Its client receives what happens, as it happens.
+    const fn following(self) -> Self {
+        Self {
+            heartbeats: true,
+            ..self.streaming()
+        }
+    }
+
     /// Its client sends a stream.
     const fn sending(self) -> Self {
         Self {
@@ -154,6 +164,7 @@ const fn call(path: &'static str, role: Role, scoped: Scoped) -> Call {
         scoped,
         reads_records: false,
         streams: false,
+        heartbeats: false,
         forwarded: false,
         sends_many: false,
         message: MessageLimits::USUAL,
@@ -177,16 +188,16 @@ pub const CALLS: &[Call] = &[
         .sending()
         .takes(MAX_MESSAGE_BYTES, 8_192, 3 * MIB),
     call("/chefshat.v1.PlayService/Watch", Player, Compared)
-        .streaming()
+        .following()
         .takes(16 * KIB, 256, 512 * KIB),
     call("/chefshat.v1.SpectatorService/Watch", Spectator, Compared)
-        .streaming()
+        .following()
         .forwarded(),
     call("/chefshat.v1.TableService/Report", Player, Compared)
         .forwarded()
         .takes(MAX_MESSAGE_BYTES, 512, 512 * KIB),
     call("/chefshat.v1.TableService/Watch", Player, Compared)
-        .streaming()
+        .following()
         .forwarded(),
     call("/chefshat.v1.InstrumentService/AddMarker", Host, Compared).forwarded(),
     call(
@@ -194,7 +205,7 @@ pub const CALLS: &[Call] = &[
         Host,
         Compared,
     )
-    .streaming()
+    .following()
     .forwarded(),
     call(
         "/chefshat.v1.InstrumentService/AddSamples",
@@ -230,7 +241,7 @@ pub const CALLS: &[Call] = &[
     .takes(320 * KIB, 2_048, MIB),
     call("/chefshat.v1.StudyService/ListStudyLinks", Host, Refused).forwarded(),
     call("/chefshat.v1.StudyService/FollowStudy", Spectator, Refused)
-        .streaming()
+        .following()
         .forwarded(),
     call(
         "/chefshat.v1.StudyService/RemoveStudyParticipant",
@@ -260,7 +271,7 @@ pub const CALLS: &[Call] = &[
         Player,
         Refused,
     )
-    .streaming()
+    .following()
     .forwarded(),
     call(
         "/chefshat.v1.ParticipationService/GiveConsent",
@@ -310,7 +321,7 @@ pub const CALLS: &[Call] = &[
         Spectator,
         Compared,
     )
-    .streaming()
+    .following()
     .forwarded(),
     call(
         "/chefshat.v1.TournamentService/GetTournamentResults",

@@ -17,12 +17,12 @@ use prost::Message as _;
 use tokio::sync::watch;
 use tonic::body::Body;
 
+use super::heartbeats::PREFIX;
 use super::status::room_gone;
 use crate::limits::{CallLimits, Key};
 use crate::proxies::FORWARDED_FOR;
 use crate::tasks::{LongTask, named};
 use log::{Reader, SharedStream};
-use message::PREFIX;
 
 /// The call whose streams are shared.
 const WATCH: &str = "/chefshat.v1.SpectatorService/Watch";

@@ -4,12 +4,12 @@
 use std::sync::Arc;
 
 use chefshat_proto::v1::{FollowTournamentResponse, TournamentState};
-use tokio::sync::{Semaphore, mpsc};
-use tokio::time::{Instant, sleep_until, timeout};
+use tokio::sync::{Semaphore, mpsc, watch};
+use tokio::time::{Instant, sleep_until};
 use tonic::{Code, Status};
 
 use super::status::{self, status};
-use crate::config::{FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT, HEARTBEAT};
+use crate::config::{FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT};
 use crate::tournaments::{ComputeError, TournamentHandle};
 
 type Sender = mpsc::Sender<Result<FollowTournamentResponse, Status>>;
@@ -39,9 +39,7 @@ pub(super) async fn follow(
             return Ok(());
         }
         sleep_until(sent + FOLLOW_INTERVAL).await;
-        while timeout(HEARTBEAT, changes.changed()).await.is_err() {
-            send(sender, FollowTournamentResponse::default()).await?;
-        }
+        changed(&mut changes, sender).await?;
     }
 }
 
@@ -50,6 +48,20 @@ pub(super) async fn end<M>(sender: &mpsc::Sender<Result<M, Status>>, followed: R
     if let Err(status) = followed {
         // It fails only if the client has gone.
         let _ = sender.send(Err(status)).await;
+    }
+}
+
+/// Waits for a change, as long as there is a follower to send it to.
+///
+/// # Errors
+/// Nothing will change any more, or the follower has gone: then the status is for nobody.
+pub(super) async fn changed<C, M>(
+    changes: &mut watch::Receiver<C>,
+    sender: &mpsc::Sender<M>,
+) -> Result<(), Status> {
+    tokio::select! {
+        changed = changes.changed() => changed.map_err(|_| status::shutting_down()),
+        () = sender.closed() => Err(Status::cancelled("the follower has gone")),
     }
 }
 
@@ -95,16 +107,29 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_follower_that_does_not_read_is_dropped() {
-        let handle = TournamentHandle::for_tests(4);
         let (sender, mut receiver) = mpsc::channel(1);
-        let permits = Arc::new(Semaphore::new(1));
-        // The first message goes into the channel, the heartbeat does not.
-        let ended = follow(&handle, &permits, &sender).await;
+        // The first message goes into the channel, the second does not.
+        send(&sender, 1).await.expect("there is space");
+        let ended = send(&sender, 2).await;
         let ended = ended.expect_err("the follower is too slow");
         let info = ended.get_details_error_info().expect("error info");
         assert_eq!(info.reason, "FOLLOWER_TOO_SLOW");
         let first = receiver.recv().await.expect("a message");
+        assert_eq!(first.expect("no error"), 1);
+    }
+
+    #[tokio::test]
+    async fn a_follower_that_has_gone_is_forgotten_while_nothing_changes() {
+        let handle = TournamentHandle::for_tests(4);
+        let (sender, mut receiver) = mpsc::channel(1);
+        let following = tokio::spawn(async move {
+            let permits = Arc::new(Semaphore::new(1));
+            follow(&handle, &permits, &sender).await
+        });
+        let first = receiver.recv().await.expect("a message");
         let tournament = first.expect("no error").tournament.expect("a tournament");
         assert_eq!(tournament.participants.len(), 4);
+        drop(receiver);
+        following.await.unwrap().expect_err("nobody follows");
     }
 }

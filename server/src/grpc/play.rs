@@ -19,7 +19,7 @@ use std::task::{Context, Poll};
 
 use chefshat_proto::v1::{self, act_request};
 use chefshat_record::convert::FieldProblem;
-use futures::{Stream, StreamExt as _};
+use futures::{Stream, StreamExt as _, TryStreamExt as _};
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status, Streaming};
 
@@ -29,7 +29,7 @@ use super::limits::Arrived;
 use super::reach::Reach;
 use super::status::{Refusal, field, request_id, room_unknown, stream_ended, ticket_unknown};
 use crate::access::Caller;
-use crate::config::{HEARTBEAT, MAX_SEATS_PER_WATCH};
+use crate::config::MAX_SEATS_PER_WATCH;
 use crate::convert;
 use crate::limits::{Executing, Hint, Key};
 use crate::metrics::StreamKind;
@@ -206,7 +206,7 @@ impl PlayService for Play {
             }
             reader.leave_all().await;
         }));
-        Ok(Response::new(Box::pin(with_heartbeats(updates))))
+        Ok(Response::new(Box::pin(updates.map_err(stream_ended))))
     }
 
     async fn act(
@@ -316,19 +316,6 @@ impl Stream for Responses {
             failure.cloned().unwrap_or_else(|| stream_ended(end))
         })
     }
-}
-
-/// The responses of a stream without requests, with heartbeats while nothing happens.
-pub(super) fn with_heartbeats(
-    updates: OutboxStream,
-) -> impl Stream<Item = Result<Updates, Status>> {
-    tokio_stream::StreamExt::timeout_repeating(updates, tokio::time::interval(HEARTBEAT)).map(
-        |message| {
-            message
-                .unwrap_or_else(|_| Ok(Updates::default()))
-                .map_err(stream_ended)
-        },
-    )
 }
 
 #[cfg(test)]

@@ -4,13 +4,12 @@ use std::pin::Pin;
 use std::sync::Arc;
 
 use chefshat_proto::v1::SpectatorServiceWatchRequest;
-use futures::Stream;
+use futures::{Stream, TryStreamExt as _};
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
-use super::play::with_heartbeats;
 use super::reach::Reach;
-use super::status::Refusal;
+use super::status::{Refusal, stream_ended};
 use crate::access::Caller;
 use crate::limits::Key;
 use crate::metrics::StreamKind;
@@ -71,6 +70,6 @@ impl SpectatorService for Spectate {
                 () = closing.cancelled() => outbox.end(StreamEnd::Complete),
             }
         }));
-        Ok(Response::new(Box::pin(with_heartbeats(messages))))
+        Ok(Response::new(Box::pin(messages.map_err(stream_ended))))
     }
 }

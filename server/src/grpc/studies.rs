@@ -15,12 +15,12 @@ use chefshat_study::{Refusal as StudyRefusal, SettingsProblem};
 use futures::Stream;
 use prost::Message as _;
 use tokio::sync::mpsc;
-use tokio::time::{Instant, sleep_until, timeout};
+use tokio::time::{Instant, sleep_until};
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Code, Request, Response, Status};
 
-use super::follow::{end, send};
+use super::follow::{self, end, send};
 use super::forward::Gateway;
 use super::limits::charged;
 use super::lists;
@@ -32,7 +32,7 @@ use super::status::{
 use crate::access::{Caller, Role};
 use crate::cluster::FoundBy;
 use crate::config::{
-    FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT, HEARTBEAT, MAX_FOLLOWERS, MAX_STUDY_ADDED,
+    FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT, MAX_FOLLOWERS, MAX_STUDY_ADDED,
     MAX_STUDY_PARTICIPANTS_SENT, MAX_STUDY_STREAMS,
 };
 use crate::convert;
@@ -427,9 +427,7 @@ async fn follow(
             return Ok(());
         }
         sleep_until(began + FOLLOW_INTERVAL).await;
-        while timeout(HEARTBEAT, changes.changed()).await.is_err() {
-            send(sender, v1::FollowStudyResponse::default()).await?;
-        }
+        follow::changed(&mut changes, sender).await?;
     }
 }
 

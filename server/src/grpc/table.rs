@@ -5,13 +5,11 @@ use std::pin::Pin;
 use chefshat_proto::v1::{self, table_service_server::TableService};
 use futures::{Stream, stream};
 use tokio::sync::watch;
-use tokio::time::timeout;
 use tonic::{Request, Response, Status};
 
 use super::reach::Reach;
 use super::status::{Refusal, room_gone, table_unknown};
 use crate::access::Caller;
-use crate::config::HEARTBEAT;
 use crate::room::{Handle, SentState};
 use chefshat_room::ids::Token;
 
@@ -67,19 +65,18 @@ impl TableService for TableCalls {
     }
 }
 
-/// The states of a table, with heartbeats while nothing changes, until its game is over.
+/// The states of a table until its game is over.
 fn followed(
     states: watch::Receiver<SentState>,
 ) -> impl Stream<Item = Result<v1::TableServiceWatchResponse, Status>> {
     stream::unfold(Some(states), |states| async move {
         let mut states = states?;
-        let state = match timeout(HEARTBEAT, states.changed()).await {
-            Err(_) => None,
-            Ok(Ok(())) => Some(states.borrow_and_update().as_ref().clone()),
-            Ok(Err(_)) => return Some((Err(room_gone()), None)),
-        };
-        let over = (state.as_ref()).is_some_and(|state| state.stage() == v1::TableStage::Over);
-        let response = v1::TableServiceWatchResponse { state };
+        if states.changed().await.is_err() {
+            return Some((Err(room_gone()), None));
+        }
+        let state = states.borrow_and_update().as_ref().clone();
+        let over = state.stage() == v1::TableStage::Over;
+        let response = v1::TableServiceWatchResponse { state: Some(state) };
         Some((Ok(response), (!over).then_some(states)))
     })
 }

@@ -5,9 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use chefshat_proto::v1;
 use chefshat_room::Core;
 use tokio::sync::watch::{self, error::RecvError};
-use tokio::time::timeout;
 
-use crate::config::HEARTBEAT;
 use crate::convert;
 
 /// Most streams that follow the markers of one room.
@@ -80,8 +78,7 @@ pub struct MarkerFollower {
 }
 
 impl MarkerFollower {
-    /// The next markers; none after a while without any. `None` when the game is over and all have
-    /// been returned.
+    /// The next markers. `None` when the game is over and all have been returned.
     ///
     /// # Errors
     /// The room is gone.
@@ -97,10 +94,7 @@ impl MarkerFollower {
             if published.over {
                 return Ok(None);
             }
-            match timeout(HEARTBEAT, self.published.changed()).await {
-                Err(_) => return Ok(Some(Vec::new())),
-                Ok(changed) => changed?,
-            }
+            self.published.changed().await?;
         }
     }
 }

@@ -11,12 +11,11 @@ use http::{HeaderMap, StatusCode};
 use http_body::Frame;
 use http_body_util::BodyExt as _;
 use tokio::sync::{Notify, watch};
-use tokio::time::{Instant, timeout};
+use tokio::time::Instant;
 use tonic::Status;
 use tonic::body::Body;
 
-use super::message::{HEARTBEAT, Message, Messages};
-use crate::config;
+use super::message::{Message, Messages};
 use crate::convert;
 use crate::grpc::status::{room_gone, spectator_too_slow};
 use crate::limits::{CallLimits, HISTORY_STEP, Held, Key};
@@ -336,11 +335,7 @@ impl Reader {
                 Read::Frame(frame) => return Some(Ok(frame)),
                 Read::Nothing => {}
                 Read::End(end) => return end.map(Err),
-                Read::Awaited => {
-                    if timeout(config::HEARTBEAT, grown).await.is_err() {
-                        return Some(Ok(Frame::data(HEARTBEAT)));
-                    }
-                }
+                Read::Awaited => grown.await,
             }
         }
     }

@@ -7,10 +7,8 @@ use prost::Message as _;
 use prost::encoding::{DecodeContext, decode_key, skip_field};
 use tokio::time::Duration;
 
-/// Bytes before a message: whether it is compressed, and its length.
-pub(super) const PREFIX: usize = 5;
-/// A message without anything, which shows that the stream is alive.
-pub(super) const HEARTBEAT: Bytes = Bytes::from_static(&[0; PREFIX]);
+use crate::grpc::heartbeats::PREFIX;
+
 /// Longest message, bytes: as much as clients receive by default.
 const MAX_LENGTH: usize = 4 * 1024 * 1024;
 /// Fields of `SpectatorServiceWatchResponse`.

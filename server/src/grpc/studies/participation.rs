@@ -8,14 +8,13 @@ use chefshat_record::convert::FieldProblem;
 use chefshat_study::{At, ParticipantLink, Refusal as StudyRefusal, SessionSecret};
 use prost::Message as _;
 use tokio::sync::mpsc;
-use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status};
 
 use super::{Responses, StudyCalls, not_added, refused, stopped};
-use crate::config::{FOLLOW_SEND_TIMEOUT, HEARTBEAT};
+use crate::config::FOLLOW_SEND_TIMEOUT;
 use crate::convert;
-use crate::grpc::follow::end;
+use crate::grpc::follow::{changed, end};
 use crate::grpc::limits::charged;
 use crate::grpc::status::{Refusal, field, shutting_down, status, store_failed};
 use crate::limits::{Key, Refused};
@@ -245,24 +244,22 @@ async fn follow(
         }
         let view = view_of(handle, number, rooms)?;
         if sent.as_ref() != Some(&view) {
-            send(sender, Some(view.clone())).await?;
+            send(sender, view.clone()).await?;
         }
         let ended = matches!(view.content, Some(v1::study_view::Content::End(_)));
         sent = Some(view);
         if ended {
             return Ok(());
         }
-        while timeout(HEARTBEAT, changes.changed()).await.is_err() {
-            send(sender, None).await?;
-        }
+        changed(&mut changes, sender).await?;
     }
 }
 
 async fn send(
     sender: &mpsc::Sender<Result<v1::FollowParticipationResponse, Status>>,
-    view: Option<v1::StudyView>,
+    view: v1::StudyView,
 ) -> Result<(), Status> {
-    let message = Ok(v1::FollowParticipationResponse { view });
+    let message = Ok(v1::FollowParticipationResponse { view: Some(view) });
     let sent = sender.send_timeout(message, FOLLOW_SEND_TIMEOUT).await;
     // The page follows again when it is read again.
     sent.map_err(|_| shutting_down())
