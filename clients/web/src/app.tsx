@@ -2,8 +2,10 @@
 // first visit, so that the lobby does not wait for the table.
 
 import type { ComponentType } from "preact";
-import { useEffect, useLayoutEffect, useState } from "preact/hooks";
+import { useEffect, useErrorBoundary, useLayoutEffect, useState } from "preact/hooks";
 import { t } from "./i18n";
+import { Button } from "./parts/Button";
+import { ErrorPage } from "./parts/ErrorPage";
 import { Layout } from "./parts/Layout";
 import { Notice } from "./parts/Notice";
 import { type Route, restoreScroll, route, startRouter } from "./router";
@@ -61,7 +63,10 @@ export function App() {
     const load = pages[here.page] as () => Promise<Shown["Page"]>;
     load().then(
       (Page) => current && setShown((before) => ({ visit: (before?.visit ?? 0) + 1, route: here, Page })),
-      () => current && setFailed(true),
+      async () => {
+        const reloads = await reloadsForNewVersion();
+        if (current && !reloads) setFailed(true);
+      },
     );
     return () => {
       current = false;
@@ -73,8 +78,46 @@ export function App() {
       {failed ? (
         <Notice kind="fault">{t().common.pageNotLoaded}</Notice>
       ) : (
-        shown && <shown.Page key={shown.visit} route={shown.route} />
+        shown && <Guarded key={shown.visit} {...shown} />
       )}
     </Layout>
   );
+}
+
+/** A page; where an exception ends it, what to do about that. */
+function Guarded({ Page, route }: Shown) {
+  const [error] = useErrorBoundary((thrown) => console.error(thrown));
+  if (error === undefined) return <Page route={route} />;
+  const words = t().common.pageBroken;
+  return (
+    <ErrorPage title={words.title} words={words.text}>
+      <Button look="main" onClick={() => location.reload()}>
+        {words.reload}
+      </Button>
+    </ErrorPage>
+  );
+}
+
+/** Key of sessionStorage: when the document was last loaded again for a new version. */
+const RELOADED = "chefshat.reloaded";
+/** Nothing is loaded again so soon after: another version is not what is missing. */
+const ONCE_IN_MS = 60_000;
+
+/**
+ * After the code of a page could not be loaded: loads the document again if the server answers, since
+ * a new version of the page has other files. Returns whether it does.
+ */
+async function reloadsForNewVersion(): Promise<boolean> {
+  try {
+    const before = Number(sessionStorage.getItem(RELOADED));
+    if (Date.now() - before < ONCE_IN_MS) return false;
+    const { ok } = await fetch("/", { method: "HEAD", cache: "no-store" });
+    if (!ok) return false;
+    sessionStorage.setItem(RELOADED, String(Date.now()));
+  } catch {
+    // The server does not answer, or this browser stores nothing and would load again for ever.
+    return false;
+  }
+  location.reload();
+  return true;
 }

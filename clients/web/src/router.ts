@@ -124,6 +124,15 @@ export function pathOf(route: Route): string {
 /** The current page. */
 export const route = signal<Route>(routeOf(location.pathname));
 
+/** Path and query of the page that is shown. */
+let shown = location.pathname + location.search;
+
+/** Changes the query of the address, and removes or changes its fragment; the page stays. */
+export function readdress(search: string, fragment = ""): void {
+  shown = location.pathname + search;
+  history.replaceState(history.state, "", shown + fragment);
+}
+
 /** Goes to a page; `replace` adds no entry to the browser's history. */
 export function navigate(to: Route, options: { replace?: boolean; search?: string } = {}): void {
   const address = pathOf(to) + (options.search ?? "");
@@ -177,10 +186,17 @@ function push(address: string): void {
   history.pushState({ entry }, "", address);
 }
 
+/**
+ * After Back, Forward and links to a place in the page, which stays as it is. A fragment that carries
+ * something, such as a ticket, is for the page to take.
+ */
 function goBack({ state }: PopStateEvent): void {
   scrolls.set(entry, window.scrollY);
   entry = state?.entry ?? newEntry();
-  arrive(scrolls.get(entry) ?? 0);
+  const scroll = scrolls.get(entry);
+  const stays = location.pathname + location.search === shown && !location.hash.includes("=");
+  if (!stays) arrive(scroll ?? 0);
+  else if (scroll !== undefined) window.scrollTo(0, scroll);
 }
 
 /** Before a reload, or before another site is shown. */
@@ -196,6 +212,7 @@ function storeScrolls(): void {
 function arrive(scroll: number): void {
   stopRestoring();
   wanted = scroll;
+  shown = location.pathname + location.search;
   route.value = routeOf(location.pathname);
 }
 

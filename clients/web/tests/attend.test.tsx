@@ -9,7 +9,7 @@ import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
 import { ViolatedRule } from "../src/gen/chefshat/v1/table_pb";
 import { TableStage, type TableState } from "../src/gen/chefshat/v1/table_service_pb";
 import { setLanguage } from "../src/i18n";
-import { root } from "./mounted";
+import { root, settle } from "./mounted";
 import { DEALT, OBSERVATION, stateOf } from "./table-state";
 
 let sent: ReportKind[];
@@ -111,6 +111,16 @@ describe("entering by hand", () => {
     await press("Ada lays 4 × 5 + joker");
     expect(sent).toEqual([{ case: "laid", value: { seat: 0, cards: { cards: [5, 5, 5, 5, 12], golden: false } } }]);
     expect(button("Report the play").getAttribute("aria-disabled")).toBe("true");
+  });
+
+  test("a play that is being entered stays with its seat when the table waits for another", async () => {
+    await show(stateOf());
+    await press("5, chilli");
+    await show(stateOf({ seat: 1 }));
+    await press("Ada lays 3 × 5");
+    expect(sent).toMatchObject([{ case: "laid", value: { seat: 0 } }]);
+    await press("Bo passes");
+    expect(sent).toMatchObject([{ case: "laid" }, { case: "pass", value: { seat: 1 } }]);
   });
 
   test("a play that is not allowed is marked, and can be reported all the same", async () => {
@@ -408,19 +418,44 @@ test("before the game there is nothing to enter", async () => {
   expect(OBSERVATION.shift).toBe(1);
 });
 
-test("a second press while a report is under way sends nothing", async () => {
-  let answer = () => {};
+/** A view whose reports wait until they are answered, one after another. */
+async function showWaiting(state: TableState): Promise<(outcome?: Outcome) => Promise<void>> {
+  const waiting: ((outcome: Outcome) => void)[] = [];
   const report = (what: ReportKind) => {
     sent.push(what);
-    return new Promise<Outcome>((resolve) => {
-      answer = () => resolve({ kind: "accepted" });
-    });
+    return new Promise<Outcome>((resolve) => waiting.push(resolve));
   };
-  await act(() => render(<AttendView state={stateOf()} trouble="" report={report} />, root));
+  await act(() => render(<AttendView state={state} trouble="" report={report} />, root));
+  return async (outcome = { kind: "accepted" }) => {
+    waiting.shift()?.(outcome);
+    await settle();
+  };
+}
+
+test("a button that is pressed twice reports once", async () => {
+  const answer = await showWaiting(stateOf());
   await press("Ada passes");
   await press("Ada passes");
+  await answer();
   expect(sent).toHaveLength(1);
-  await act(async () => answer());
   await press("Ada passes");
   expect(sent).toHaveLength(2);
+});
+
+test("another report waits for the one that is under way, and is not lost", async () => {
+  const answer = await showWaiting(stateOf());
+  await press("Ada passes");
+  await press("❚❚ Pause");
+  expect(sent.map((one) => one.case)).toEqual(["pass"]);
+  await answer();
+  expect(sent.map((one) => one.case)).toEqual(["pass", "pause"]);
+});
+
+test("what was pressed while a report was refused is not sent, and the page says so", async () => {
+  const answer = await showWaiting(stateOf());
+  await press("Ada passes");
+  await press("❚❚ Pause");
+  await answer({ kind: "violation" });
+  expect(sent.map((one) => one.case)).toEqual(["pass"]);
+  expect(root.textContent).toContain("Not sent");
 });

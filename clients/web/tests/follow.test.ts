@@ -3,11 +3,14 @@
 
 import { create } from "@bufbuild/protobuf";
 import { durationFromMs } from "@bufbuild/protobuf/wkt";
-import { Code, ConnectError } from "@connectrpc/connect";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { follow } from "../src/api/follow";
+import { Code, ConnectError, type UnaryRequest, type UnaryResponse } from "@connectrpc/connect";
+import { afterEach, beforeAll, beforeEach, expect, test, vi } from "vitest";
+import { wordsOf } from "../src/api/faults";
+import { askHeartbeats, follow } from "../src/api/follow";
 import { RetryInfoSchema } from "../src/gen/google/rpc/error_details_pb";
+import { setLanguage } from "../src/i18n";
 
+beforeAll(() => setLanguage("en"));
 beforeEach(() => {
   vi.useFakeTimers();
 });
@@ -74,6 +77,37 @@ test("a stream that a limit refuses is opened again when the server says so", as
   expect([following.link.value, opened]).toEqual(["ended", 2]);
 });
 
+test("an exception of the page is not a lost connection", async () => {
+  const log = vi.spyOn(console, "error").mockImplementation(() => {});
+  let opened = 0;
+  const following = follow(
+    () => {
+      opened += 1;
+      return stream(["a", "b"]);
+    },
+    () => {
+      throw new TypeError("no such card");
+    },
+  );
+  await vi.advanceTimersByTimeAsync(60_000);
+  expect(opened).toBe(1);
+  expect(following.link.value).toBe("failed");
+  expect(following.fault.value && wordsOf(following.fault.value)).toContain("Reload");
+  expect(log).toHaveBeenCalledOnce();
+  log.mockRestore();
+});
+
+test("streams ask for heartbeats, other calls do not", async () => {
+  for (const [isStream, asked] of [
+    [true, "3"],
+    [false, null],
+  ] as const) {
+    const request = { stream: isStream, header: new Headers() } as UnaryRequest;
+    await askHeartbeats(async () => ({}) as UnaryResponse)(request);
+    expect(request.header.get("chefshat-heartbeat")).toBe(asked);
+  }
+});
+
 test("a silent stream is reopened", async () => {
   let opened = 0;
   const following = follow(
@@ -86,13 +120,17 @@ test("a silent stream is reopened", async () => {
     },
     () => true,
   );
-  await vi.advanceTimersByTimeAsync(30_000);
+  await vi.advanceTimersByTimeAsync(8_000);
   expect(opened).toBe(1);
   expect(following.link.value).toBe("open");
-  await vi.advanceTimersByTimeAsync(20_000);
+  await vi.advanceTimersByTimeAsync(3_000);
   expect(opened).toBe(2);
+  // Those of the former network are dead.
+  window.dispatchEvent(new Event("online"));
+  await vi.advanceTimersByTimeAsync(300);
+  expect(opened).toBe(3);
   following.stop();
   await vi.advanceTimersByTimeAsync(120_000);
-  expect(opened).toBe(2);
+  expect(opened).toBe(3);
   expect(following.link.value).toBe("ended");
 });

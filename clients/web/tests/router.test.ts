@@ -1,7 +1,7 @@
 // Parsing and formatting addresses.
 
 import { expect, test } from "vitest";
-import { pathOf, type Route, routeOf } from "../src/router";
+import { navigate, pathOf, type Route, readdress, route, routeOf, startRouter } from "../src/router";
 
 const ROUTES: [string, Route][] = [
   ["/", { page: "lobby" }],
@@ -43,4 +43,25 @@ test.each(["/nowhere", "/rooms/1/2", "/lobby/x"])("%s is unknown", (path) => {
 
 test("a badly encoded part is kept as it is", () => {
   expect(routeOf("/people/%E0%A4%A")).toEqual({ page: "person", name: "%E0%A4%A", fingerprint: "" });
+});
+
+test("a link to a place in the page leaves the page as it is, one that carries a ticket does not", () => {
+  const stop = startRouter();
+  navigate({ page: "room", roomId: "0123" }, { search: "?lang=it" });
+  const shown = route.value;
+  /** As the browser follows a fragment. */
+  const follow = (fragment: string) => {
+    history.pushState(null, "", location.pathname + location.search + fragment);
+    window.dispatchEvent(new PopStateEvent("popstate", { state: null }));
+  };
+  follow("#content");
+  expect(route.value).toBe(shown);
+  readdress("");
+  follow("#content");
+  expect(route.value).toBe(shown);
+  follow("#ticket=abc");
+  expect(route.value).not.toBe(shown);
+  expect(route.value).toEqual(shown);
+  stop();
+  navigate({ page: "lobby" });
 });

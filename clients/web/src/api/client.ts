@@ -11,6 +11,7 @@ import { ServerService } from "../gen/chefshat/v1/server_service_pb";
 import { SpectatorService } from "../gen/chefshat/v1/spectator_service_pb";
 import { TableService } from "../gen/chefshat/v1/table_service_pb";
 import { TournamentService } from "../gen/chefshat/v1/tournament_service_pb";
+import { askHeartbeats } from "./follow";
 import { repeat } from "./repeat";
 import { showSecrets } from "./secrets";
 import { authorize } from "./token";
@@ -18,7 +19,7 @@ import { authorize } from "./token";
 /** gRPC-web to the origin of the page. */
 export const transport = createGrpcWebTransport({
   baseUrl: location.origin,
-  interceptors: [repeat, authorize, showSecrets],
+  interceptors: [repeat, authorize, showSecrets, askHeartbeats],
 });
 
 /** The server itself: version, limits, built-in agents, texts of actions. */

@@ -35,6 +35,9 @@ export function faultOf(thrown: unknown): Fault {
   };
 }
 
+/** Reason of an exception of this page itself. */
+export const PAGE_BROKEN = "PAGE_BROKEN";
+
 /** Reasons that end a stream or a call, which may be repeated. */
 const PASSING_REASONS = [
   "SHUTTING_DOWN",

@@ -1,9 +1,11 @@
 // Follows a server stream while a page is open: reconnects after a lost connection, at once when
 // the browser is back online, and drops a connection that has gone silent (the lid was closed). The
-// caller interprets the messages.
+// caller interprets the messages; an exception there is a fault of the page, which no new connection
+// mends.
 
+import { Code, type Interceptor } from "@connectrpc/connect";
 import { type Signal, signal } from "@preact/signals";
-import { type Fault, faultOf, isPassing } from "./faults";
+import { type Fault, faultOf, isPassing, PAGE_BROKEN } from "./faults";
 
 /**
  * The state of a stream: connecting, open, lost and about to reconnect, ended for good, or failed
@@ -20,14 +22,19 @@ export interface Following {
   stop(): void;
 }
 
-/**
- * The server sends a heartbeat every 15 seconds; after two missing ones the connection counts as
- * dead.
- */
-const SILENCE_MS = 35_000;
-const WATCH_EVERY_MS = 5_000;
+/** Seconds between the heartbeats that a stream asks for while nothing else is sent. */
+const HEARTBEAT_S = 3;
+/** After two missing heartbeats the connection counts as dead. */
+const SILENCE_MS = 9_000;
+const WATCH_EVERY_MS = 1_000;
 const SHORTEST_WAIT_MS = 250;
 const LONGEST_WAIT_MS = 8_000;
+
+/** Asks for heartbeats on the streams of the server, which leaves them out where there are none. */
+export const askHeartbeats: Interceptor = (next) => (request) => {
+  if (request.stream) request.header.set("chefshat-heartbeat", String(HEARTBEAT_S));
+  return next(request);
+};
 
 /**
  * Follows the stream that `open` opens. `onMessage` receives every message and returns whether more
@@ -49,20 +56,37 @@ export function follow<Message>(
     if (Date.now() - heardAtMs > SILENCE_MS) current.abort();
     wake();
   };
+  /** The connections of the former network are dead, even if nothing has shown it yet. */
+  const reopen = () => {
+    current.abort();
+    wake();
+  };
   const watchdog = setInterval(() => {
     if (Date.now() - heardAtMs > SILENCE_MS) current.abort();
   }, WATCH_EVERY_MS);
   document.addEventListener("visibilitychange", revive);
-  window.addEventListener("online", revive);
+  window.addEventListener("online", reopen);
 
   const end = (last: Link) => {
     stopped = true;
     link.value = last;
     clearInterval(watchdog);
     document.removeEventListener("visibilitychange", revive);
-    window.removeEventListener("online", revive);
+    window.removeEventListener("online", reopen);
     current.abort();
     wake();
+  };
+
+  /** Whether more messages will follow, after this one was handled. */
+  const handle = (message: Message): boolean => {
+    try {
+      return onMessage(message);
+    } catch (thrown) {
+      console.error(thrown);
+      fault.value = { reason: PAGE_BROKEN, code: Code.Internal, message: String(thrown), metadata: {} };
+      end("failed");
+      return true;
+    }
   };
 
   const run = async () => {
@@ -76,7 +100,7 @@ export function follow<Message>(
           heardAtMs = Date.now();
           failures = 0;
           link.value = "open";
-          if (!onMessage(message)) return end("ended");
+          if (!handle(message)) return end("ended");
         }
       } catch (thrown) {
         if (stopped) return;

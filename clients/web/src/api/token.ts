@@ -3,6 +3,7 @@
 // or shared by accident, and lasts as long as the tab. No link that this page makes contains it.
 
 import type { Interceptor } from "@connectrpc/connect";
+import { readdress } from "../router";
 
 const MARK = "token=";
 const STORED = "chefshat.token";
@@ -45,7 +46,7 @@ function take(): boolean {
   } catch {
     // Storage is blocked: the token lasts until the page is reloaded.
   }
-  history.replaceState(history.state, "", location.pathname + location.search + hash);
+  readdress(location.search, hash);
   return true;
 }
 

@@ -2,9 +2,16 @@
 // what to lay for remote players, entering reports by hand, and correcting them. It renders the
 // state from the server and sends reports; it has no rules of its own.
 
+import { create, equals } from "@bufbuild/protobuf";
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { DecisionKind } from "../gen/chefshat/v1/decision_pb";
-import { type CardsToLay, type TableQuestion, TableStage, type TableState } from "../gen/chefshat/v1/table_service_pb";
+import {
+  type CardsToLay,
+  type TableQuestion,
+  TableReportSchema,
+  TableStage,
+  type TableState,
+} from "../gen/chefshat/v1/table_service_pb";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { Button, ButtonLink } from "../parts/Button";
@@ -37,26 +44,40 @@ export function AttendView({ state, report, trouble }: AttendViewProps) {
   const [draft, setDraft] = useState<Draft>(NO_DRAFT);
   const [outcome, setOutcome] = useState<Outcome | undefined>(undefined);
   const [dismissed, setDismissed] = useState<bigint | undefined>(undefined);
-  const sending = useRef(false);
+  const sending = useRef<readonly ReportKind[]>([]);
+  const last = useRef<Promise<Outcome>>(Promise.resolve({ kind: "accepted" }));
   const heading = useRef<HTMLHeadingElement>(null);
   const keepFocus = useKeptFocus(heading);
   const words = t().attend;
   useAnnouncedState(state, table);
 
-  /** Sends a report unless one is under way. Returns whether it counts. */
+  /**
+   * Sends a report after those that are under way, unless one of them says the same (a button was
+   * pressed twice) or does not count: then the table is not as the attendant believed. Returns
+   * whether it counts.
+   */
   const send = async (what: ReportKind): Promise<boolean> => {
-    if (sending.current) return false;
-    sending.current = true;
-    setOutcome(undefined);
-    const came = await report(what);
-    sending.current = false;
+    if (sending.current.some((other) => saysTheSame(what, other))) return false;
+    const before = sending.current.length > 0 ? last.current : undefined;
+    sending.current = [...sending.current, what];
+    if (!before) setOutcome(undefined);
+    last.current = sent(what, before);
+    const came = await last.current;
+    sending.current = sending.current.filter((other) => other !== what);
     setOutcome(came);
     if (came.kind === "accepted") announce(words.outcome.accepted);
     return came.kind === "accepted" || came.kind === "void";
   };
+  /** What comes of a report after an earlier one. */
+  const sent = async (what: ReportKind, earlier: Promise<Outcome> | undefined): Promise<Outcome> => {
+    const before = (await earlier)?.kind;
+    const isInVain = before === "fault" || before === "violation";
+    return isInVain ? { kind: "fault", words: words.outcome.notSent } : report(what);
+  };
   const enter = async (what: ReportKind) => {
     setDismissed(undefined);
-    if (await send(what)) setDraft(NO_DRAFT);
+    // What is entered meanwhile is another report.
+    if (await send(what)) setDraft((current) => (current === draft ? NO_DRAFT : current));
   };
   const focusOn = (id: string) => document.getElementById(id)?.focus();
   const reenter = () => {
@@ -141,6 +162,12 @@ export function AttendView({ state, report, trouble }: AttendViewProps) {
       </div>
     </div>
   );
+}
+
+/** Whether two reports say the same. */
+function saysTheSame(one: ReportKind, other: ReportKind): boolean {
+  const [first, second] = [one, other].map((kind) => create(TableReportSchema, { kind }));
+  return first !== undefined && second !== undefined && equals(TableReportSchema, first, second);
 }
 
 interface AwaitedProps {

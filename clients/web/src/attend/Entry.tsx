@@ -77,8 +77,9 @@ export function Entry({ state, table, draft, outcome, onDraft, onSend }: EntryPr
   const kinds = entriesAt(state);
   const awaited = awaitedEntry(state);
   const kind = draft.kind && kinds.includes(draft.kind) ? draft.kind : kinds.includes(awaited) ? awaited : "turn";
-  const change = (changed: Partial<Draft>) => onDraft({ ...draft, ...changed });
   const seat = draft.seat ?? state.seat;
+  // What is entered is about this seat, also when the table waits for another meanwhile.
+  const change = (changed: Partial<Draft>) => onDraft({ ...draft, seat, ...changed });
   const props = { state, table, draft, seat, change, send: onSend };
   return (
     <section class={`${css.part} sheet`} data-part="entry" aria-labelledby="entry-title">

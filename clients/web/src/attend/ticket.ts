@@ -1,7 +1,7 @@
 // The ticket of a physical table: what this device may report about, and the link that gives the
 // same to a tablet beside the table. The link has it after "#", which browsers send to no server.
 
-import { pathOf } from "../router";
+import { pathOf, readdress } from "../router";
 import { recall, remember } from "../store";
 
 const MARK = "#ticket=";
@@ -39,6 +39,6 @@ export function takeTicket(roomId: string): string | null {
   const given = ticketIn(location.hash);
   if (given === null) return tableTicket(roomId);
   keepTableTicket(roomId, given);
-  history.replaceState(history.state, "", location.pathname + location.search);
+  readdress(location.search);
   return given;
 }

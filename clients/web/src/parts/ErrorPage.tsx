@@ -1,18 +1,27 @@
-// The page in place of one that cannot be shown: title, error, and a link to the lobby unless a
-// study hides links.
+// The page in place of one that cannot be shown: title, error, what to do, and a link to the lobby
+// unless a study hides links.
 
+import type { ComponentChildren } from "preact";
 import { hidden } from "../experiment/hiding";
 import { t } from "../i18n";
 import { ButtonLink } from "./Button";
 import { Notice } from "./Notice";
 import css from "./Notice.module.css";
 
+interface ErrorPageProps {
+  title: string;
+  words: string;
+  /** What to do. */
+  children?: ComponentChildren;
+}
+
 /** The error page. */
-export function ErrorPage({ title, words }: { title: string; words: string }) {
+export function ErrorPage({ title, words, children }: ErrorPageProps) {
   return (
     <section class={css.errorPage} data-part="error-page">
       <h1>{title}</h1>
       <Notice kind="fault">{words}</Notice>
+      {children && <p>{children}</p>}
       {!hidden.value.includes("pages") && (
         <p>
           <ButtonLink href="/">{t().common.notFound.link}</ButtonLink>

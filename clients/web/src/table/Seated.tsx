@@ -49,7 +49,7 @@ export function Seated({ acting, study, banner, tools, onward, below, onPick }: 
       own={own}
       decision={decision}
       awaited={awaited}
-      sending={acting.sending.value !== undefined}
+      sending={acting.sending.value}
       trouble={acting.trouble.value}
       banner={banner}
       tools={tools}
@@ -70,7 +70,7 @@ export function Seated({ acting, study, banner, tools, onward, below, onPick }: 
           table={table}
           decision={decision}
           hint={acting.hint.value}
-          sending={acting.sending.value !== undefined}
+          sending={acting.sending.value}
           onHint={table.policy?.hints ? acting.askHint : undefined}
           onAnswer={acting.answer}
           onExpress={acting.express}

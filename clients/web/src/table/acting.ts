@@ -2,9 +2,10 @@
 // updates come from a seat's stream (session.ts) or a tournament participant's
 // (tournaments/participation.ts).
 
-import { batch, type Signal, signal } from "@preact/signals";
+import { batch, computed, type ReadonlySignal, type Signal, signal } from "@preact/signals";
 import { CALL_LIMIT_MS, playApi } from "../api/client";
 import { faultOf, inWords, isPassing } from "../api/faults";
+import { type AnswerResult, AnswerStatus } from "../gen/chefshat/v1/decision_pb";
 import type { Hint, SeatUpdate } from "../gen/chefshat/v1/play_service_pb";
 import { recall } from "../store";
 import type { Gesture } from "./expressions";
@@ -31,9 +32,21 @@ export function asksForTimes(id: string): boolean {
   return recall(`timed.${id}`) !== null;
 }
 
-/** Attempts to send an answer while its decision is open, and the delay between them. */
-const MAX_ATTEMPTS = 5;
-const RETRY_MS = 400;
+/**
+ * Deadline of a call with an answer: on a connection that has died it is called again. The server
+ * counts an answer that it receives twice once.
+ */
+const ANSWER_LIMIT_MS = 5_000;
+/** Pauses before an answer is sent again while its decision is open; at once when back online. */
+const SHORTEST_PAUSE_MS = 250;
+const LONGEST_PAUSE_MS = 2_000;
+
+/** An answer as it is sent. */
+interface Answer {
+  decisionId: bigint;
+  action: number;
+  annotations?: { extra: Record<string, string> };
+}
 
 /** A hint for a decision. */
 export interface GivenHint {
@@ -44,8 +57,8 @@ export interface GivenHint {
 
 export interface Acting {
   readonly live: Signal<LiveState>;
-  /** The action being sent; undefined if none is. */
-  readonly sending: Signal<number | undefined>;
+  /** Whether an answer to the open decision is being sent. */
+  readonly sending: ReadonlySignal<boolean>;
   /** The last error in words; empty if there is none. */
   readonly trouble: Signal<string>;
   /** The last hint. */
@@ -65,7 +78,9 @@ export interface Acting {
 /** Starts acting with a seat's ticket; `timed` sends the decision time with each answer. */
 export function startActing(ticket: string, table: TableState, seat: number | undefined, timed: boolean): Acting {
   const live = signal(startLive(table, seat));
-  const sending = signal<number | undefined>(undefined);
+  /** The decision to which an answer is being sent. */
+  const answering = signal<bigint | undefined>(undefined);
+  const sending = computed(() => answering.value !== undefined && live.value.decision?.id === answering.value);
   const trouble = signal("");
   const hint = signal<GivenHint | undefined>(undefined);
   /** The open decision and when it was first rendered. */
@@ -87,36 +102,49 @@ export function startActing(ticket: string, table: TableState, seat: number | un
 
   const answer = async (action: number, automatic?: Automatic) => {
     const { decision } = live.peek();
-    if (!decision || sending.peek() !== undefined) return;
+    if (!decision || sending.peek()) return;
     const tookMs = shown.id === decision.id ? Math.round(performance.now() - shown.atMs) : undefined;
     const extra = {
       ...(timed && tookMs !== undefined ? { [PERSON_TIME_KEY]: String(tookMs) } : {}),
       ...(automatic ? { [AUTOMATIC_KEY]: automatic } : {}),
     };
     const noted = timed || automatic !== undefined;
-    const value = { decisionId: decision.id, action, ...(noted ? { annotations: { extra } } : {}) };
-    sending.value = action;
+    const value: Answer = { decisionId: decision.id, action, ...(noted ? { annotations: { extra } } : {}) };
+    answering.value = decision.id;
     trouble.value = "";
-    try {
-      for (let attempt = 1; live.peek().decision?.id === decision.id; attempt += 1) {
-        try {
-          const reply = await playApi.act({ ticket, command: { case: "answer", value } }, { timeoutMs: CALL_LIMIT_MS });
-          const { result } = reply;
-          if (result) {
-            apply([{ $typeName: "chefshat.v1.SeatUpdate", handle: 0, update: { case: "result", value: result } }]);
-            trouble.value = answerWords(result);
-          }
-          return;
-        } catch (thrown) {
-          if (!isPassing(faultOf(thrown)) || attempt >= MAX_ATTEMPTS) throw thrown;
-          await new Promise((resolve) => setTimeout(resolve, RETRY_MS * attempt));
-        }
+    const problem = await delivered(value);
+    // Another decision may be open by now, and be answered.
+    if (answering.peek() !== decision.id) return;
+    answering.value = undefined;
+    trouble.value = problem;
+  };
+
+  /**
+   * Sends an answer until the server has it or its decision is gone. Returns what is wrong with it,
+   * in words.
+   */
+  const delivered = async (value: Answer): Promise<string> => {
+    // On a new stream none is open until the server has requested it again.
+    const mayBeOpen = () => (live.peek().decision?.id ?? value.decisionId) === value.decisionId;
+    for (let pauseMs = SHORTEST_PAUSE_MS; mayBeOpen(); pauseMs = Math.min(2 * pauseMs, LONGEST_PAUSE_MS)) {
+      let result: AnswerResult | undefined;
+      try {
+        const command = { case: "answer" as const, value };
+        ({ result } = await playApi.act({ ticket, command }, { timeoutMs: ANSWER_LIMIT_MS }));
+      } catch (thrown) {
+        if (!mayBeOpen()) return "";
+        if (!isPassing(faultOf(thrown))) return inWords(thrown);
+        trouble.value = inWords(thrown);
+        await pauseOrOnline(pauseMs);
+        continue;
       }
-    } catch (thrown) {
-      trouble.value = inWords(thrown);
-    } finally {
-      sending.value = undefined;
+      if (!result) return "";
+      apply([{ $typeName: "chefshat.v1.SeatUpdate", handle: 0, update: { case: "result", value: result } }]);
+      // What closed the decision may be the answer itself, whose response was lost.
+      const isFirst = pauseMs === SHORTEST_PAUSE_MS;
+      return isFirst || result.status === AnswerStatus.INVALID ? answerWords(result) : "";
     }
+    return "";
   };
 
   const askHint = async () => {
@@ -156,4 +184,14 @@ export function startActing(ticket: string, table: TableState, seat: number | un
     express: (gesture) => void send({ case: "express", value: gesture }),
     resume: () => void send({ case: "resume", value: {} }),
   };
+}
+
+/** Waits, but not longer than until the browser is back online. */
+async function pauseOrOnline(pauseMs: number): Promise<void> {
+  const over = new AbortController();
+  await new Promise<unknown>((resolve) => {
+    setTimeout(resolve, pauseMs);
+    window.addEventListener("online", resolve, { signal: over.signal });
+  });
+  over.abort();
 }

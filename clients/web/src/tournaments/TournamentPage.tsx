@@ -14,7 +14,7 @@ import joinCss from "../lobby/Join.module.css";
 import { NO_KEY } from "../name-key";
 import { Button, ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import { pathOf } from "../router";
+import { pathOf, readdress } from "../router";
 import { Bracket } from "./Bracket";
 import { Countdown } from "./Countdown";
 import { Entrants } from "./Entrants";
@@ -90,7 +90,7 @@ function Visited({ live }: { live: LiveTournament }) {
   const open = tournament.state === TournamentState.OPEN;
   const arrive = () => {
     // The link has been used: a reload shows the place that was taken.
-    history.replaceState(history.state, "", location.pathname + languageOf(location.search));
+    readdress(languageOf(location.search));
     setHeld(heldPlace(tournamentId));
     setAnother(false);
   };

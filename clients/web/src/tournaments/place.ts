@@ -6,7 +6,7 @@ import { keepSecret } from "../api/secrets";
 import { ParticipantKind, Visibility } from "../gen/chefshat/v1/room_pb";
 import { canonical } from "../lobby/seat";
 import { nameKey } from "../name-key";
-import { pathOf } from "../router";
+import { pathOf, readdress } from "../router";
 import { recallObject, remember } from "../store";
 
 /** A place of this device in a tournament. */
@@ -76,7 +76,7 @@ export function placeFromLink(tournamentId: string): HeldPlace | null {
 
 /** Removes the place that the address brings from the address; stores the chosen one, if any. */
 export function decidePlace(tournamentId: string, chosen: HeldPlace | null): void {
-  history.replaceState(history.state, "", location.pathname + location.search);
+  readdress(location.search);
   if (!chosen) return;
   remember(`tournament.${tournamentId}`, JSON.stringify(chosen));
   // Whether it is needed is not known yet.

@@ -39,6 +39,19 @@ test("a room is created, and a guest with its invitation takes the seat reserved
   expect([...host.faults, ...guest.faults]).toEqual([]);
 });
 
+test("the link to the content leaves the page and what was typed as they are", async () => {
+  const { page, faults } = await person(browser);
+  await page.goto(`${server.url}/new`);
+  await page.getByLabel("Name of the room").fill("Friday evening");
+  await page.getByRole("link", { name: "Skip to content" }).press("Enter");
+  await page.waitForURL(/#content$/);
+  await page.waitForFunction(() => document.activeElement?.id === "content");
+  expect(await page.getByLabel("Name of the room").inputValue()).toBe("Friday evening");
+  await page.goBack();
+  expect(await page.getByLabel("Name of the room").inputValue()).toBe("Friday evening");
+  expect(faults).toEqual([]);
+});
+
 test("the newest rooms are shown first, and more on request", async () => {
   const { page } = await person(browser);
   for (let number = 1; number <= MANY; number += 1)

@@ -6,6 +6,7 @@ import { expect, test } from "vitest";
 import { byClicks, byKeys, focus, HAND, hearing, nextDecision, playOn, sitDown, tabTo } from "./play";
 import { agent, gameOf, newRoom, recordOf } from "./rooms";
 import { browser, person, server, startBrowser, useStage } from "./stage";
+import { Tap } from "./tap";
 
 const OPPONENTS = ["greedy", "random", "greedy"];
 
@@ -27,6 +28,23 @@ test("a person plays a complete Shift by clicking, and continues after a reload"
   expect(reloads).toBe(1);
   await expectEnd(page, roomId, taken);
   expect(faults).toEqual([]);
+});
+
+test("a play that is pressed while the network is gone arrives when it is back", async () => {
+  const { code } = await newRoom(server, { seats: ["person", ...OPPONENTS], faces: 5 });
+  const tap = await Tap.before(server);
+  const { page } = await person(browser);
+  await sitDown(page, tap, code, "Rosa");
+  const decision = await nextDecision(page);
+  tap.fallSilent();
+  await page.getByText("Connection lost. Reconnecting…").waitFor();
+  await byClicks(page);
+  await page.getByText("Sending…").waitFor();
+  tap.recover();
+  await nextDecision(page, decision);
+  await page.getByText("Connection lost. Reconnecting…").waitFor({ state: "detached" });
+  await page.close();
+  await tap.stop();
 });
 
 test("a person plays a complete Shift with the keyboard alone, and hears every turn", async () => {

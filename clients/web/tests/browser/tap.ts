@@ -1,7 +1,7 @@
 // A proxy between a browser and the server that records every response, uncompressed, and parses its
-// messages.
+// messages. It can fall silent, as a network does that is gone.
 
-import { createServer, type Server as HttpServer, request } from "node:http";
+import { createServer, type Server as HttpServer, type IncomingMessage, request } from "node:http";
 import type { AddressInfo } from "node:net";
 import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
 import { fromBinary } from "@bufbuild/protobuf";
@@ -27,12 +27,17 @@ export class Tap {
   /** All responses so far, including unfinished ones. */
   readonly answers: Answer[] = [];
 
+  private silent = false;
+  /** Responses that are under way. */
+  private readonly running = new Set<IncomingMessage>();
+
   private constructor(private readonly http: HttpServer) {}
 
   /** Starts listening on a free port. */
   static async before(server: Server): Promise<Tap> {
     const [host, port] = server.address.split(":");
     const http = createServer((asked, answered) => {
+      if (tap.silent) return;
       const { method, url: path = "" } = asked;
       const headers = { ...asked.headers, "accept-encoding": "identity" };
       const answer: Answer = { path, head: [], parts: [] };
@@ -43,6 +48,8 @@ export class Tap {
         answering.on("data", (part: Buffer) => {
           answer.parts.push(part);
         });
+        tap.running.add(answering);
+        answering.on("close", () => tap.running.delete(answering));
         answering.pipe(answered);
       });
       on.on("error", () => answered.destroy());
@@ -78,6 +85,18 @@ export class Tap {
       ({ head, parts }) => head.join().includes(text) || Buffer.concat(parts).includes(text),
     );
     return found.map(({ path }) => path);
+  }
+
+  /** Passes nothing on any more, in either direction, and closes nothing. */
+  fallSilent(): void {
+    this.silent = true;
+    for (const answering of this.running) answering.unpipe();
+  }
+
+  /** Passes on what comes over new connections; the former ones are gone. */
+  recover(): void {
+    this.silent = false;
+    this.http.closeAllConnections();
   }
 
   async stop(): Promise<void> {

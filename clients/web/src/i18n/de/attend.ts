@@ -145,6 +145,7 @@ export const attend: Texts["attend"] = {
     accepted: "Gemeldet.",
     known: "Das war schon bekannt.",
     held: "Das wartet auf die Antwort auf eine Frage.",
+    notSent: "Nicht gesendet, weil die Meldung davor nicht zählt. Sieh auf den Tisch und gib sie noch einmal ein.",
     violation: "Nicht erlaubt. Es zählt nicht.",
     void: (count) =>
       plural(count, {

@@ -97,5 +97,10 @@ export const common: Texts["common"] = {
   more: "Mehr",
   showMore: "Mehr anzeigen",
   pageNotLoaded: "Diese Seite konnte nicht geladen werden. Prüfe deine Verbindung und lade sie neu.",
+  pageBroken: {
+    title: "Auf dieser Seite ist ein Fehler aufgetreten",
+    text: "Ein Fehler der Seite selbst, nicht deiner Verbindung. Dein Platz und alles am Tisch bleiben erhalten.",
+    reload: "Neu laden",
+  },
   notFound: { title: "Seite nicht gefunden", text: "Unter dieser Adresse gibt es nichts.", link: "Zur Lobby" },
 };

@@ -138,6 +138,7 @@ export const attend = {
     accepted: "Reported.",
     known: "This was known already.",
     held: "This waits for the answer to a question.",
+    notSent: "Not sent, because the report before it did not count. Look at the table and enter it again.",
     violation: "Not allowed. It does not count.",
     void: (count: number) =>
       plural(count, {

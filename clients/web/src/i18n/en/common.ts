@@ -88,5 +88,10 @@ export const common = {
   more: "More",
   showMore: "Show more",
   pageNotLoaded: "This page could not be loaded. Check your connection and reload.",
+  pageBroken: {
+    title: "This page has met an error",
+    text: "An error of the page itself, not of your connection. Your seat and everything at the table are kept.",
+    reload: "Reload",
+  },
   notFound: { title: "Page not found", text: "There is nothing at this address.", link: "Go to the lobby" },
 };

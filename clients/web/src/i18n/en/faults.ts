@@ -9,6 +9,7 @@ export const faults = {
   tooMuch: "This was too much at once.",
   again: (ms: number) => `Try again in ${time(ms)}.`,
   byReason: {
+    PAGE_BROKEN: "This page has met an error of its own. Reload it: your seat and everything at the table are kept.",
     TOKEN_MISSING:
       "This server is open to invited people only. Ask its host for a link with a token, and open it here.",
     TOKEN_UNKNOWN:

@@ -145,6 +145,7 @@ export const attend: Texts["attend"] = {
     accepted: "Anotado.",
     known: "Ya se sabía.",
     held: "Espera la respuesta a una pregunta.",
+    notSent: "No se ha enviado, porque la anotación anterior no cuenta. Mira la mesa y escríbela de nuevo.",
     violation: "No permitido. No cuenta.",
     void: (count) =>
       plural(count, {

@@ -97,6 +97,11 @@ export const common: Texts["common"] = {
   more: "Más",
   showMore: "Mostrar más",
   pageNotLoaded: "No se ha podido cargar esta página. Comprueba tu conexión y vuelve a cargarla.",
+  pageBroken: {
+    title: "Se ha producido un error en esta página",
+    text: "Es un error de la propia página, no de tu conexión. Tu sitio y todo lo que hay en la mesa se conservan.",
+    reload: "Volver a cargar",
+  },
   notFound: {
     title: "Página no encontrada",
     text: "En esta dirección no hay nada.",

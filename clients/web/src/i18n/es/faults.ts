@@ -9,6 +9,8 @@ export const faults: Texts["faults"] = {
   tooMuch: "Demasiadas peticiones a la vez.",
   again: (ms: number) => `Inténtalo de nuevo dentro de ${time(ms)}.`,
   byReason: {
+    PAGE_BROKEN:
+      "Se ha producido un error en esta página. Vuelve a cargarla: tu sitio y todo lo que hay en la mesa se conservan.",
     TOKEN_MISSING:
       "Este servidor está abierto solo a personas invitadas. Pide un enlace con token a quien lo administra y ábrelo aquí.",
     TOKEN_UNKNOWN:

@@ -145,6 +145,7 @@ export const attend: Texts["attend"] = {
     accepted: "Segnalato.",
     known: "Si sapeva già.",
     held: "Aspetta la risposta a una domanda.",
+    notSent: "Non inviata, perché la segnalazione precedente non conta. Guarda il tavolo e inseriscila di nuovo.",
     violation: "Non permesso: non conta.",
     void: (count) =>
       plural(count, {

@@ -94,5 +94,10 @@ export const common: Texts["common"] = {
   more: "Altri",
   showMore: "Mostra altro",
   pageNotLoaded: "Non è stato possibile caricare questa pagina. Controlla la connessione e ricarica.",
+  pageBroken: {
+    title: "In questa pagina si è verificato un errore",
+    text: "È un errore della pagina stessa, non della connessione. Il tuo posto e tutto ciò che è sul tavolo restano.",
+    reload: "Ricarica",
+  },
   notFound: { title: "Questa pagina non esiste", text: "A questo indirizzo non c’è nulla.", link: "Vai alla sala" },
 };

@@ -9,6 +9,8 @@ export const faults: Texts["faults"] = {
   tooMuch: "Troppe richieste in una volta.",
   again: (ms: number) => `Riprova tra ${time(ms)}.`,
   byReason: {
+    PAGE_BROKEN:
+      "In questa pagina si è verificato un errore. Ricaricala: il tuo posto e tutto ciò che è sul tavolo restano.",
     TOKEN_MISSING:
       "Questo server è aperto solo agli invitati. Chiedi a chi lo gestisce un link con un token e aprilo qui.",
     TOKEN_UNKNOWN:
