@@ -11999,7 +11999,8 @@ pub struct HandSeen {
 /// Cards were laid on the board.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct CardsLaid {
-    /// The seat; unset: the one whose turn it is.
+    /// The seat; name it if it is known. Unset: it counts for the seat whose turn it is, until other
+    /// reports show that this seat had passed unseen (`AcceptedReport.assumed_seat`).
     #[prost(uint32, optional, tag = "1")]
     pub seat: ::core::option::Option<u32>,
     /// The cards laid, without those that lay there before.
@@ -12009,7 +12010,7 @@ pub struct CardsLaid {
 /// A seat passed, by its pass card or aloud.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct PassShown {
-    /// The seat; unset: the one whose turn it is.
+    /// The seat; unset: the one whose turn it is, as in `CardsLaid`.
     #[prost(uint32, optional, tag = "1")]
     pub seat: ::core::option::Option<u32>,
 }
@@ -12241,6 +12242,10 @@ pub struct AcceptedReport {
     /// The report as it counts; the cards of a hand are left out.
     #[prost(message, optional, tag = "5")]
     pub content: ::core::option::Option<TableReport>,
+    /// Whether the report named no seat: that it was this seat's turn is only assumed. A correction may
+    /// name another; later reports that named none then count for the seats after it.
+    #[prost(bool, tag = "6")]
+    pub assumed_seat: bool,
 }
 /// Who reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]

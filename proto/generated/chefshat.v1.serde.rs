@@ -181,6 +181,9 @@ impl serde::Serialize for AcceptedReport {
         if self.content.is_some() {
             len += 1;
         }
+        if self.assumed_seat {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.AcceptedReport", len)?;
         if self.report != 0 {
             #[allow(clippy::needless_borrow)]
@@ -201,6 +204,9 @@ impl serde::Serialize for AcceptedReport {
         if let Some(v) = self.content.as_ref() {
             struct_ser.serialize_field("content", v)?;
         }
+        if self.assumed_seat {
+            struct_ser.serialize_field("assumedSeat", &self.assumed_seat)?;
+        }
         struct_ser.end()
     }
 }
@@ -217,6 +223,8 @@ impl<'de> serde::Deserialize<'de> for AcceptedReport {
             "elapsed_ms",
             "elapsedMs",
             "content",
+            "assumed_seat",
+            "assumedSeat",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -226,6 +234,7 @@ impl<'de> serde::Deserialize<'de> for AcceptedReport {
             Text,
             ElapsedMs,
             Content,
+            AssumedSeat,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -252,6 +261,7 @@ impl<'de> serde::Deserialize<'de> for AcceptedReport {
                             "text" => Ok(GeneratedField::Text),
                             "elapsedMs" | "elapsed_ms" => Ok(GeneratedField::ElapsedMs),
                             "content" => Ok(GeneratedField::Content),
+                            "assumedSeat" | "assumed_seat" => Ok(GeneratedField::AssumedSeat),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -276,6 +286,7 @@ impl<'de> serde::Deserialize<'de> for AcceptedReport {
                 let mut text__ = None;
                 let mut elapsed_ms__ = None;
                 let mut content__ = None;
+                let mut assumed_seat__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Report => {
@@ -314,6 +325,12 @@ impl<'de> serde::Deserialize<'de> for AcceptedReport {
                             }
                             content__ = map_.next_value()?;
                         }
+                        GeneratedField::AssumedSeat => {
+                            if assumed_seat__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("assumedSeat"));
+                            }
+                            assumed_seat__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(AcceptedReport {
@@ -322,6 +339,7 @@ impl<'de> serde::Deserialize<'de> for AcceptedReport {
                     text: text__.unwrap_or_default(),
                     elapsed_ms: elapsed_ms__.unwrap_or_default(),
                     content: content__,
+                    assumed_seat: assumed_seat__.unwrap_or_default(),
                 })
             }
         }

@@ -1,7 +1,7 @@
 /// A point in time.
 pub static TIMESTAMP: Shape = Shape { name: "google.protobuf.Timestamp", size: size_of::<crate::Timestamp>(), fields: &[] };
 /// `chefshat.v1.AcceptedReport`.
-pub static ACCEPTED_REPORT: Shape = Shape { name: "chefshat.v1.AcceptedReport", size: size_of::<crate::v1::AcceptedReport>(), fields: &[Field { number: 1, list: false, kind: Kind::Number { size: 8, width: 0 } }, Field { number: 2, list: false, kind: Kind::Number { size: 4, width: 0 } }, Field { number: 3, list: false, kind: Kind::Text }, Field { number: 4, list: false, kind: Kind::Number { size: 8, width: 0 } }, Field { number: 5, list: false, kind: Kind::Message(&TABLE_REPORT) }, ] };
+pub static ACCEPTED_REPORT: Shape = Shape { name: "chefshat.v1.AcceptedReport", size: size_of::<crate::v1::AcceptedReport>(), fields: &[Field { number: 1, list: false, kind: Kind::Number { size: 8, width: 0 } }, Field { number: 2, list: false, kind: Kind::Number { size: 4, width: 0 } }, Field { number: 3, list: false, kind: Kind::Text }, Field { number: 4, list: false, kind: Kind::Number { size: 8, width: 0 } }, Field { number: 5, list: false, kind: Kind::Message(&TABLE_REPORT) }, Field { number: 6, list: false, kind: Kind::Number { size: 1, width: 0 } }, ] };
 /// `chefshat.v1.ActRequest`.
 pub static ACT_REQUEST: Shape = Shape { name: "chefshat.v1.ActRequest", size: size_of::<crate::v1::ActRequest>(), fields: &[Field { number: 1, list: false, kind: Kind::Text }, Field { number: 2, list: false, kind: Kind::Message(&ANSWER) }, Field { number: 3, list: false, kind: Kind::Message(&EXPRESSION) }, Field { number: 4, list: false, kind: Kind::Message(&RESUME_SEAT) }, Field { number: 5, list: false, kind: Kind::Message(&ASK_HINT) }, ] };
 /// `chefshat.v1.ActResponse`.

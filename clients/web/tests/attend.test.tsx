@@ -280,11 +280,25 @@ describe("a question", () => {
     ["Did Ada and Inés pass?", "es", "¿Han pasado Ada e Inés?"],
     ["Did Ada and Bo pass?", "es", "¿Han pasado Ada y Bo?"],
     ["Who opened the Shift?", "it", "Chi ha aperto lo Shift?"],
+    ["Is that a new play by Bo?", "it", "Bo: è una nuova giocata?"],
+    ["Is that a new play by Bo?", "de", "Ist das ein neuer Zug von Bo?"],
     ["7 or 9 at place 4?", "it", "7 or 9 at place 4?"],
   ] as const)("of the referee, %s, has words in %s", async (text, language, words) => {
     await setLanguage(language);
     await show(stateOf({ questions: [{ ...question, text }] }));
     expect(part("question-card")?.querySelector("h2")?.textContent).toBe(words);
+    await setLanguage("en");
+  });
+
+  test.each([
+    ["Yes", "Ja"],
+    ["No", "Nein"],
+    ["No, Bo passed before 9 9 J", "Nein, Bo hatte davor gepasst (9 9 J)"],
+    ["7", "7"],
+  ])("of the referee has the option %s in German", async (option, words) => {
+    await setLanguage("de");
+    await show(stateOf({ questions: [{ ...question, options: [option] }] }));
+    expect(part("question-card")?.querySelector("button")?.textContent).toBe(words);
     await setLanguage("en");
   });
 
@@ -375,6 +389,21 @@ describe("the reports of the Shift", () => {
         },
       },
       { case: "correction", value: { report: 2n, instead: { kind: { case: "pass", value: { seat: 1 } } } } },
+    ]);
+  });
+
+  test("a play of whom is only assumed can be moved to another seat", async () => {
+    const moved = reports.map((one) => ({ ...one, assumedSeat: one.report === 2n }));
+    await show(stateOf({ reports: moved }));
+    expect(item(1).textContent).toContain("(who it was is assumed)");
+    expect(item(0).textContent).not.toContain("assumed");
+    await press("Change: Bo laid 2 × 9 + joker", item(1));
+    const dialog = part("change");
+    if (!dialog) throw new Error("no dialog");
+    await press("1 Ada", dialog);
+    await press("Ada lays 2 × 9 + joker", dialog);
+    expect(sent).toMatchObject([
+      { case: "correction", value: { report: 2n, instead: { kind: { case: "laid", value: { seat: 0 } } } } },
     ]);
   });
 

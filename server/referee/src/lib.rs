@@ -22,7 +22,7 @@ mod words;
 
 pub use facts::{Fact, ShiftFacts};
 pub use game::PhysicalGame;
-pub use referee::{Answer, MAX_HELD, MAX_QUESTIONS, Referee, Refusal, ShiftStory};
+pub use referee::{Accepted, Answer, MAX_HELD, MAX_QUESTIONS, Referee, Refusal, ShiftStory};
 pub use report::{
     Corrected, Question, Report, Ruling, SeenCards, Stage, ToLay, Verdict, ViolatedRule, Violation,
 };

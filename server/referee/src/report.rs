@@ -94,6 +94,18 @@ impl Report {
             Self::Cleared | Self::Correction { .. } | Self::Answer { .. } | Self::Pause(_) => None,
         }
     }
+
+    /// A report about a turn, with the seat it is about.
+    pub(crate) fn with_seat(&self, seat: Seat) -> Self {
+        match self {
+            Self::Laid { cards, .. } => Self::Laid {
+                seat: Some(seat),
+                cards: *cards,
+            },
+            Self::Pass { .. } => Self::Pass { seat: Some(seat) },
+            other => other.clone(),
+        }
+    }
 }
 
 /// A question about the table.

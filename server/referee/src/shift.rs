@@ -15,13 +15,31 @@ use crate::{Fact, PhysicalGame, Report, ShiftFacts, StartState};
 pub(crate) struct Entry {
     /// Number of the report or decision.
     pub(crate) number: u64,
-    /// The report, if it can be corrected.
+    /// The report, if it can be corrected. One without a seat is about the seat whose turn it was,
+    /// which is only assumed.
     pub(crate) report: Option<Report>,
     pub(crate) act: Act,
     /// Number of the pizza, if it is a turn.
     pub(crate) pizza: u32,
     /// Whether the cards of a remote seat's decision were seen on the table.
     pub(crate) confirmed: bool,
+}
+
+impl Entry {
+    /// The report, with the seat it is about also where it names none.
+    pub(crate) fn named(&self) -> Option<Report> {
+        let report = self.report.as_ref()?;
+        Some(match self.act {
+            Act::Turn(seat, _) => report.with_seat(seat),
+            _ => report.clone(),
+        })
+    }
+
+    /// Whether it is only assumed which seat the report is about.
+    pub(crate) fn is_assumed(&self) -> bool {
+        let report = self.report.as_ref();
+        matches!(self.act, Act::Turn(..)) && report.is_some_and(|it| it.seat().is_none())
+    }
 }
 
 /// What happened.

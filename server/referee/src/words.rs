@@ -81,6 +81,19 @@ pub(crate) fn turn_text(action: Action) -> String {
     }
 }
 
+/// What a turn puts on the board as it is typed in every language: "9 9 J".
+pub(crate) fn typed_turn(action: Action) -> String {
+    let counts = counts_of_action(action);
+    let cards = (0..=JOKER).flat_map(|kind| {
+        let card = match kind {
+            JOKER => "J".to_owned(),
+            face => (face + 1).to_string(),
+        };
+        std::iter::repeat_n(card, counts[kind].into())
+    });
+    cards.collect::<Vec<_>>().join(" ")
+}
+
 /// "5s", "jokers".
 pub(crate) fn kind_text(kind: usize) -> String {
     match kind {

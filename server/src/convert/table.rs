@@ -460,7 +460,8 @@ fn put_table(
         .collect();
     let accepted = referee.accepted();
     state.reports = accepted
-        .map(|(number, report)| {
+        .map(|accepted| {
+            let (number, report) = (accepted.number, &accepted.report);
             let made = table.made(number);
             let (source, age) = made.map_or((ReportSource::Camera, Duration::ZERO), |made| {
                 (made.source, made.age)
@@ -472,6 +473,7 @@ fn put_table(
                 text: referee.describe(report),
                 elapsed_ms: u64::try_from(elapsed).unwrap_or(u64::MAX),
                 content: Some(without_hand(table_report(report, source, age, deck))),
+                assumed_seat: accepted.is_assumed,
             }
         })
         .collect();

@@ -283,6 +283,9 @@ class Rehearsal:
         if question.text.startswith("Did ") and question.text.endswith(" pass?"):
             asked = [seat for seat, taken in enumerate(state.room.seats) if taken.name in question.text]
             return 0 if self._shown.issuperset(asked) else 1
+        if question.text.startswith("Is that a new play"):
+            faces = [sorted(card.face for card in act.cards) for act in self._lying[-2:]]
+            return 0 if len(faces) == 2 and faces[0] == faces[1] else 1
         return 0
 
     async def _report(self, **kind: object) -> None:

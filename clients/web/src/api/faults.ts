@@ -70,6 +70,7 @@ export function needsToken(fault: Fault): boolean {
 /** A fault in words: the translated sentence for its reason if there is one, else the server's. */
 export function wordsOf(fault: Fault): string {
   const words = t().faults;
+  if (fault.reason === PAGE_BROKEN) return words.pageBroken;
   const known: Record<string, string> = words.byReason;
   const own = known[fault.reason];
   if (fault.retryMs !== undefined) {

@@ -153,7 +153,10 @@ function playerOf(table: Table, seat: number | undefined): number | undefined {
   return seat !== undefined && table.seats[seat]?.atTable ? seat : undefined;
 }
 
-/** A play or a pass. `fixed`: of this seat, in place of an earlier report. */
+/**
+ * A play or a pass. `fixed`: of this seat, in place of an earlier report; `movable`: or of another seat, if that one was only
+ * assumed.
+ */
 export function TurnFields({
   state,
   table,
@@ -162,9 +165,10 @@ export function TurnFields({
   change,
   send,
   fixed = false,
-}: FieldsProps & { fixed?: boolean }) {
+  movable = !fixed,
+}: FieldsProps & { fixed?: boolean; movable?: boolean }) {
   const words = t().attend.enter;
-  const seat = fixed ? named : playerOf(table, named);
+  const seat = movable ? playerOf(table, named) : named;
   const deck = deckOf(table.rules);
   const cards = cardsOfDraft(draft.play, deck);
   const name = seat === undefined ? undefined : distinctName(table, seat);
@@ -175,7 +179,7 @@ export function TurnFields({
   const before = isBeforePlay(state);
   return (
     <>
-      {!fixed && (
+      {movable && (
         <SeatPick table={table} seats={players(table)} value={seat} onPick={(picked) => change({ seat: picked })} />
       )}
       <PlayPick

@@ -24,7 +24,7 @@ interface ReportsProps {
   onOutcome: (outcome: Outcome) => void;
 }
 
-/** Reports shown at first: older ones can rarely be corrected. */
+/** Reports shown at first: older ones are rarely corrected. */
 const SHOWN = 8;
 
 /** The list. */
@@ -63,6 +63,7 @@ export function Reports({ state, table, report, onOutcome }: ReportsProps) {
             <li key={`${one.report} ${reports.length - index}`} class={css.report} data-part="report">
               <p>
                 {one.seat !== undefined && <SeatNumber seat={one.seat} />} {text}
+                {one.assumedSeat && <span class="soft"> {words.assumed}</span>}
               </p>
               <div class={css.reportActions}>
                 {isChangeable(one) && (
@@ -128,7 +129,7 @@ function Change({ state, table, one, onSend, onClose }: ChangeProps) {
     state,
     table,
     draft,
-    seat: one.seat,
+    seat: draft.seat ?? one.seat,
     change: (changed: Partial<Draft>) => setDraft((before) => ({ ...before, ...changed })),
     send: (what: ReportKind) => void send(what),
     fixed: true,
@@ -138,7 +139,7 @@ function Change({ state, table, one, onSend, onClose }: ChangeProps) {
     <Dialog title={words.reports.changeTitle(wordsOf(table, one))} onClose={onClose}>
       <div class={css.dialog} data-part="change">
         <p>{words.reports.changeText}</p>
-        {(kind === "laid" || kind === "pass") && <TurnFields {...fields} />}
+        {(kind === "laid" || kind === "pass") && <TurnFields {...fields} movable={one.assumedSeat} />}
         {kind === "hand" && <HandFields {...fields} />}
         {kind === "gift" && <GiftFields {...fields} />}
         {kind === "special" && <SpecialFields {...fields} />}

@@ -8,7 +8,13 @@ import { type Server, until } from "./stage";
 const MOST_TABS = 60;
 
 /** Opens an invitation, with the token of a guest if the server requires tokens, and takes a seat. */
-export async function sitDown(page: Page, server: Pick<Server, "url">, code: string, name: string, token = ""): Promise<void> {
+export async function sitDown(
+  page: Page,
+  server: Pick<Server, "url">,
+  code: string,
+  name: string,
+  token = "",
+): Promise<void> {
   await page.goto(`${server.url}/join/${code}${token && `#token=${token}`}`);
   await page.getByLabel("Your name").fill(name);
   await page.getByRole("button", { name: "Sit down" }).click();

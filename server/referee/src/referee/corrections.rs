@@ -2,7 +2,7 @@
 
 use chefshat_engine::{Action, Seat, Viewer};
 
-use super::turns::{seat_of, with_seat};
+use super::turns::seat_of;
 use super::{Judged, Referee};
 use crate::shift::{Act, Entry, Misfit};
 use crate::{Corrected, Report, Ruling, Verdict, ViolatedRule};
@@ -30,10 +30,8 @@ impl Referee {
                     format!("{} has decided to pass.", self.names.of(seat)),
                 ),
             )),
-            Some((number, true)) if self.is_correctable(number) => {
-                self.correct(number, Some(seat), None, ruling)
-            }
-            _ => Ok(Verdict::Known),
+            Some((number, true)) => self.correct(number, Some(seat), None, ruling),
+            None => Ok(Verdict::Known),
         }
     }
 
@@ -83,20 +81,21 @@ impl Referee {
                 "This report cannot be corrected: it is no report of this Shift that counts.",
             );
         }
-        if !self.is_correctable(number) {
-            return refuse("This report cannot be corrected any more: its pizza is over.");
-        }
         let entries = self.shift().entries.clone();
         // Passes that were confirmed with one answer have one number: the seat tells them apart.
         let seat = seat.or_else(|| instead.and_then(seat_of));
         let matches = |entry: &Entry| {
             let report = (entry.report.as_ref()).filter(|_| entry.number == number);
-            report.is_some_and(|report| seat.is_none_or(|seat| seat_of(report) == Some(seat)))
+            report.is_some_and(|report| {
+                let of = seat_of(report);
+                seat.is_none_or(|seat| of.is_none_or(|of| of == seat))
+            })
         };
         let Some(index) = entries.iter().position(matches) else {
             return refuse(NOT_ALIKE);
         };
         let old = entries[index].report.clone().expect("it is a report");
+        let assumed = entries[index].named().expect("it is a report");
         // Passes that were inferred from the report fall with it.
         let inferred = |entry: &&Entry| entry.number == number && entry.report.is_none();
         let first = index - entries[..index].iter().rev().take_while(inferred).count();
@@ -123,17 +122,14 @@ impl Referee {
         let void_reports = self.replay(&entries[index + 1..]);
         let text = match instead {
             Some(instead) => {
-                let instead = match seat_of(&old) {
-                    Some(seat) => with_seat(instead, seat),
-                    None => instead.clone(),
-                };
+                let instead = as_seat_of(&assumed, instead);
                 format!(
                     "Corrected: {}. (Before: {}.)",
                     self.describe(&instead),
-                    self.describe(&old)
+                    self.describe(&assumed)
                 )
             }
-            None => format!("Removed: {}.", self.describe(&old)),
+            None => format!("Removed: {}.", self.describe(&assumed)),
         };
         ruling.corrected = Some(Corrected {
             number,
@@ -150,7 +146,7 @@ impl Referee {
     }
 
     /// Judges again what came after a corrected report; what no longer fits is void.
-    fn replay(&mut self, later: &[Entry]) -> Vec<u64> {
+    pub(super) fn replay(&mut self, later: &[Entry]) -> Vec<u64> {
         let mut void = Vec::new();
         let shift = self.shifts.len();
         for entry in later {
@@ -190,40 +186,28 @@ impl Referee {
         std::mem::take(&mut self.held)
     }
 
-    fn has(&self, number: u64) -> bool {
+    /// Whether a report of this Shift counts.
+    pub(super) fn has(&self, number: u64) -> bool {
         let counts = |entry: &Entry| entry.number == number && entry.report.is_some();
         self.shift().entries.iter().any(counts)
-    }
-
-    /// Whether a report of this Shift can still be corrected: of turns, those of the pizza in progress
-    /// and of the one before.
-    pub(super) fn is_correctable(&self, number: u64) -> bool {
-        let entries = &self.shift().entries;
-        let last = entries
-            .iter()
-            .rfind(|entry| matches!(entry.act, Act::Turn(..)));
-        entries.iter().any(|entry| {
-            entry.number == number
-                && entry.report.is_some()
-                && (!matches!(entry.act, Act::Turn(..))
-                    || last.is_some_and(|last| last.pizza <= entry.pizza + 1))
-        })
     }
 }
 
 /// A report about the seat of another.
 fn as_seat_of(old: &Report, new: &Report) -> Report {
     match (seat_of(old), seat_of(new)) {
-        (Some(seat), None) => with_seat(new, seat),
+        (Some(seat), None) => new.with_seat(seat),
         _ => new.clone(),
     }
 }
 
-/// Whether a report can replace another: of the same seat and kind. A play can replace a pass.
+/// Whether a report can replace another: of the same seat, if both name one, and kind. A play can
+/// replace a pass.
 fn is_alike(old: &Report, new: &Report) -> bool {
     match (old, new) {
         (Report::Laid { .. } | Report::Pass { .. }, Report::Laid { .. } | Report::Pass { .. }) => {
-            seat_of(new).is_none() || seat_of(old) == seat_of(new)
+            let (old, new) = (seat_of(old), seat_of(new));
+            old.is_none() || new.is_none() || old == new
         }
         (Report::Hand { seat: old, .. }, Report::Hand { seat: new, .. })
         | (Report::Gift { seat: old, .. }, Report::Gift { seat: new, .. }) => old == new,

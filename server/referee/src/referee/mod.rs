@@ -15,7 +15,7 @@ use chefshat_engine::{
 };
 
 pub use refusal::Refusal;
-pub use state::ShiftStory;
+pub use state::{Accepted, ShiftStory};
 
 use crate::judge::Broken;
 use crate::shift::{Act, Entry, Misfit, Played, Shift, play};
@@ -48,6 +48,8 @@ pub struct Referee {
     published: Vec<Vec<Event>>,
     /// The question of the referee, if one is open.
     asked: Option<Asked>,
+    /// Number of turns of the Shift when the board was last seen to be cleared.
+    cleared: usize,
     /// Reports that wait for its answer.
     held: Vec<(u64, Report)>,
     /// Open questions, those of bridges and of the referee.
@@ -80,8 +82,11 @@ struct Asked {
 /// What the referee is not certain of.
 #[derive(Debug, Clone)]
 enum Doubt {
-    /// Whether these seats passed, in order.
-    Passed(Vec<Seat>),
+    /// Whether these seats passed, in order; or whether instead the play at one of these places of
+    /// the Shift, which named no seat, was laid only after the assumed seat had passed.
+    Passed(Vec<Seat>, Vec<usize>),
+    /// Whether the cards of the play that ended a pizza, which lie there, are a play of this seat.
+    Again(Seat),
     /// Which of these seats opened the Shift.
     Opener(Vec<Seat>),
 }
@@ -126,6 +131,7 @@ impl Referee {
             played: Vec::new(),
             published: Vec::new(),
             asked: None,
+            cleared: 0,
             held: Vec::new(),
             questions: Vec::new(),
             questions_asked: 0,
@@ -261,6 +267,7 @@ impl Referee {
             .expect("a Shift of which nothing is known can be played");
         self.shifts.push(shift);
         self.played.push(played);
+        self.cleared = 0;
     }
 
     /// Replaces what counts in the Shift in progress.

@@ -66,7 +66,7 @@ impl Referee {
 
     fn can_correct(&self, number: u64) -> bool {
         let waits = self.held.iter().any(|(held, _)| *held == number);
-        if waits || self.is_correctable(number) {
+        if waits || self.has(number) {
             return true;
         }
         // Until something of a Shift is reported, the one before can be corrected.
@@ -76,6 +76,6 @@ impl Referee {
         let mut before = self.clone();
         before.shifts.pop();
         before.played.pop();
-        before.is_correctable(number)
+        before.has(number)
     }
 }

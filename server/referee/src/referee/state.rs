@@ -24,6 +24,17 @@ pub struct ShiftStory {
     pub decisions: Vec<(u64, Seat, Action)>,
 }
 
+/// A report that counts.
+#[derive(Debug, Clone)]
+pub struct Accepted {
+    /// Its number.
+    pub number: u64,
+    /// The report. One about a turn has its seat.
+    pub report: Report,
+    /// Whether it named no seat: that it was the turn of this one is only assumed.
+    pub is_assumed: bool,
+}
+
 impl Referee {
     /// What the table waits for.
     pub fn stage(&self) -> Stage {
@@ -114,10 +125,15 @@ impl Referee {
         }
     }
 
-    /// The reports of this Shift that count and can be corrected, with their numbers.
-    pub fn accepted(&self) -> impl Iterator<Item = (u64, &Report)> {
-        (self.shift().entries.iter())
-            .filter_map(|entry| Some((entry.number, entry.report.as_ref()?)))
+    /// The reports of this Shift that count and can be corrected, oldest first.
+    pub fn accepted(&self) -> impl Iterator<Item = Accepted> {
+        (self.shift().entries.iter()).filter_map(|entry| {
+            Some(Accepted {
+                number: entry.number,
+                report: entry.named()?,
+                is_assumed: entry.is_assumed(),
+            })
+        })
     }
 
     /// For people: what a report says, "Bo laid two 9s". Names no cards of hands and gifts.

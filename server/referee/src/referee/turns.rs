@@ -8,11 +8,13 @@ use super::{Answer, Asked, Doubt, Judged, MAX_ANSWERS, MAX_HELD, QUESTION_PREFIX
 use crate::counts::counts_of_action;
 use crate::judge::{as_play, check_play};
 use crate::shift::{Act, Entry, Misfit, Shift, play};
-use crate::words::turn_text;
-use crate::{Question, Report, Ruling, ToLay, Verdict, ViolatedRule, Violation};
+use crate::words::{turn_text, typed_turn};
+use crate::{Corrected, Question, Report, Ruling, ToLay, Verdict, ViolatedRule, Violation};
 
 /// The most turns that may have been missed before a report.
 const MAX_MISSED: usize = 24;
+/// The most other explanations that a question about missed passes offers.
+const MAX_INSTEAD: usize = 3;
 
 /// A report about a turn.
 #[derive(Debug, Clone, Copy)]
@@ -98,6 +100,9 @@ impl Referee {
                 if self.is_repeated(seat, action) {
                     return Ok(Verdict::Known);
                 }
+                if let Some(leader) = self.may_be_repeated(seat, action) {
+                    return Ok(self.ask_if_again(number, report, leader));
+                }
                 self.act(number, report, seat, action, golden)
             }
             TurnReport::Cleared => self.clear(number, report),
@@ -169,23 +174,35 @@ impl Referee {
             return last
                 .is_some_and(|(of, done)| done == action && seat.is_none_or(|seat| seat == of));
         }
+        let last = shift.turns().next_back();
         let last_play = shift.turns().rfind(|(_, done)| *done != Action::Pass);
         let now = self.game().observe(Viewer::Spectator);
         match (action, seat) {
             (Action::Pass, Some(seat)) => {
                 let pass = Some((seat, Action::Pass));
                 let is_out = now.passed[seat] && shift.turns().rfind(|(of, _)| *of == seat) == pass;
-                let was_last = shift.turns().next_back() == pass;
-                (is_out || was_last) && self.to_act() != Some(seat)
+                (is_out || last == pass) && self.to_act() != Some(seat)
             }
             (Action::Pass, None) => false,
             (action, seat) => {
-                now.board.size > 0
-                    && last_play.is_some_and(|(of, done)| {
-                        done == action && seat.is_none_or(|seat| seat == of)
-                    })
+                let is_same = last_play
+                    .is_some_and(|(of, done)| done == action && seat.is_none_or(|seat| seat == of));
+                let ended_pizza = last == last_play && self.cleared < shift.turns().count();
+                let leads_again = || self.may_be_repeated(seat, action).is_some();
+                is_same && (now.board.size > 0 || ended_pizza && !leads_again())
             }
         }
+    }
+
+    /// The seat that leads the next pizza, if a report may be another of the play that ended the last
+    /// one: its cards lie there until the board is cleared.
+    fn may_be_repeated(&self, seat: Option<Seat>, action: Action) -> Option<Seat> {
+        let (of, last) = self.shift().turns().next_back()?;
+        let lies_there = self.game().observe(Viewer::Spectator).board.size == 0
+            && self.cleared < self.shift().turns().count();
+        let leader = self.to_act().filter(|leader| !self.remote[*leader])?;
+        let may_be = last == action && action != Action::Pass && lies_there;
+        (may_be && seat.is_none_or(|seat| seat == leader && seat == of)).then_some(leader)
     }
 
     /// Judges what a seat at the table did.
@@ -232,15 +249,23 @@ impl Referee {
             );
             return refuse(seat, (ViolatedRule::Decision, text));
         }
-        if opening {
+        if opening || self.to_act() == Some(seat) {
             let required = self.requirement(self.game());
             check_play(&self.rules, &required, action, golden).map_err(|it| (Some(seat), it))?;
-            return self.accept_turn(number, report, seat, action);
-        }
-        if self.to_act() == Some(seat) {
-            let required = self.requirement(self.game());
-            check_play(&self.rules, &required, action, golden).map_err(|it| (Some(seat), it))?;
-            return self.accept_turn(number, report, seat, action);
+            // Whoever opened is known by the Golden card.
+            let report = if opening {
+                report.with_seat(seat)
+            } else {
+                report.clone()
+            };
+            let accepted = self.accept_turn(number, &report, seat, action);
+            if accepted.is_err()
+                && !is_named
+                && let Some(missed) = self.missed_before_one_who_can(number, action)
+            {
+                return Ok(self.ask_if_passed(number, &report, missed, Vec::new()));
+            }
+            return accepted;
         }
         let to_act = self.to_act().expect("a Shift in progress has a turn");
         let out_of_turn = || {
@@ -270,13 +295,12 @@ impl Referee {
     fn accept_turn(&mut self, number: u64, report: &Report, seat: Seat, action: Action) -> Judged {
         let refuse = |text| Err((Some(seat), (ViolatedRule::Cards, text)));
         let name = self.names.of(seat).to_owned();
-        let report = with_seat(report, seat);
         let left = self.game().observe(Viewer::Spectator).cards_left[seat];
         let count: u8 = counts_of_action(action).iter().sum();
         if count > left {
             return refuse(format!("{name} has only {left} cards left."));
         }
-        match self.try_act(number, Some(&report), Act::Turn(seat, action)) {
+        match self.try_act(number, Some(report), Act::Turn(seat, action)) {
             Ok(()) => Ok(Verdict::Accepted),
             Err(problem) => refuse(format!(
                 "{name} cannot have {}: {}.",
@@ -331,6 +355,7 @@ impl Referee {
             _ => false,
         };
         if now.board.size == 0 || !self.shift().entries.iter().any(on_table) {
+            self.cleared = self.shift().turns().count();
             return Ok(Verdict::Known);
         }
         let is_done = |game: &Game| game.observe(Viewer::Spectator).pizza != pizza;
@@ -376,8 +401,10 @@ impl Referee {
         then: Option<(Seat, Action)>,
         ends_pizza: bool,
     ) -> Judged {
+        let instead = self.passes_before_plays(number, report);
         // After a violation or at the end of a pizza, an earlier report may be wrong: ask.
-        let certain = self.violation.is_none() && !ends_pizza && then.is_some();
+        let certain =
+            self.violation.is_none() && !ends_pizza && then.is_some() && instead.is_empty();
         if certain && self.only_passes_fit(number, &missed, then) {
             for seat in &missed {
                 self.try_act(number, None, Act::Turn(*seat, Action::Pass))
@@ -385,11 +412,92 @@ impl Referee {
             }
             return self.take_turn(number, report);
         }
+        Ok(self.ask_if_passed(number, report, missed, instead))
+    }
+
+    fn ask_if_passed(
+        &mut self,
+        number: u64,
+        report: &Report,
+        missed: Vec<Seat>,
+        instead: Vec<usize>,
+    ) -> Verdict {
         let names = self.names.list(&missed);
         let text = format!("Did {names} pass?");
-        let options = vec!["Yes".to_owned(), "No".to_owned()];
+        let mut options = yes_or_no();
+        options.extend(instead.iter().filter_map(|place| {
+            let Act::Turn(seat, action) = self.shift().entries.get(*place)?.act else {
+                return None;
+            };
+            let (name, play) = (self.names.of(seat), typed_turn(action));
+            Some(format!("No, {name} passed before {play}"))
+        }));
         let first = missed.first().copied();
-        Ok(self.ask_and_hold(number, report, Doubt::Passed(missed), text, options, first))
+        let doubt = Doubt::Passed(missed, instead);
+        self.ask_and_hold(number, report, doubt, text, options, first)
+    }
+
+    fn ask_if_again(&mut self, number: u64, report: &Report, leader: Seat) -> Verdict {
+        let text = format!("Is that a new play by {}?", self.names.of(leader));
+        let doubt = Doubt::Again(leader);
+        self.ask_and_hold(number, report, doubt, text, yes_or_no(), Some(leader))
+    }
+
+    /// The last plays that named no seat, by their places in the Shift, of which one may have been
+    /// laid by the next player, after the assumed one had passed: then the report fits without a
+    /// pass that was not seen. The newest first.
+    fn passes_before_plays(&self, number: u64, report: &Report) -> Vec<usize> {
+        let entries = &self.shift().entries;
+        let assumed = entries
+            .iter()
+            .rev()
+            .take_while(|it| it.is_assumed())
+            .count();
+        let places = (entries.len() - assumed..entries.len()).rev();
+        let fits = |place: &usize| {
+            let mut trial = self.clone();
+            trial.violation = None;
+            let fits = trial
+                .pass_before(number, *place)
+                .is_some_and(|void| void.is_empty());
+            fits && trial.asked.is_none()
+                && matches!(trial.take_turn(number, report), Ok(Verdict::Accepted))
+                && trial.asked.is_none()
+        };
+        places.filter(fits).take(MAX_INSTEAD).collect()
+    }
+
+    /// Lets the assumed seat of the play at this place pass before it, and the next one lay it. Returns
+    /// the reports that no longer fit; `None` if that seat cannot have passed.
+    fn pass_before(&mut self, number: u64, place: usize) -> Option<Vec<u64>> {
+        let entries = self.shift().entries.clone();
+        let Act::Turn(seat, _) = entries.get(place)?.act else {
+            return None;
+        };
+        self.set_entries(entries[..place].to_vec()).ok()?;
+        self.insert_passes(number, &[seat]).ok()?;
+        Some(self.replay(&entries[place..]))
+    }
+
+    /// The seats that must have passed before a play that named no seat, since they cannot have its
+    /// cards, and another has.
+    fn missed_before_one_who_can(&self, number: u64, action: Action) -> Option<Vec<Seat>> {
+        let pizza = |referee: &Self| referee.game().observe(Viewer::Spectator).pizza;
+        let mut trial = self.clone();
+        let mut missed: Vec<Seat> = Vec::new();
+        loop {
+            let seat = trial.to_act().filter(|seat| !self.remote[*seat])?;
+            if missed.contains(&seat) || pizza(&trial) != pizza(self) {
+                return None;
+            }
+            let required = trial.requirement(trial.game());
+            let fits = required.allows(action) && trial.can_be_played(number, &[(seat, action)]);
+            if fits && !missed.is_empty() {
+                return Some(missed);
+            }
+            trial.insert_passes(number, &[seat]).ok()?;
+            missed.push(seat);
+        }
     }
 
     fn ask_who_opened(&mut self, number: u64, report: &Report) -> Verdict {
@@ -512,21 +620,53 @@ impl Referee {
             return Ok(Verdict::Accepted);
         };
         match (asked.doubt, option) {
-            (Doubt::Passed(missed), Some(0)) => {
+            (Doubt::Passed(missed, _), Some(0)) => {
                 let before = self.clone();
                 if self.insert_passes(number, &missed).is_err() {
                     *self = before;
                 }
                 self.judge_held(ruling);
             }
+            (Doubt::Passed(_, instead), Some(option @ 2..)) => {
+                if let Some(place) = instead.get(option - 2) {
+                    let waiting = std::mem::take(&mut self.held);
+                    let before = self.clone();
+                    match self.pass_before(number, *place) {
+                        Some(void_reports) => {
+                            let text = question.options[option].clone();
+                            ruling.corrected = Some(Corrected {
+                                number,
+                                void_events: 0,
+                                void_reports,
+                                text,
+                            });
+                        }
+                        None => *self = before,
+                    }
+                    self.held.extend(waiting);
+                }
+                self.judge_held(ruling);
+            }
+            (Doubt::Again(seat), option) => {
+                if !self.held.is_empty() {
+                    let (held, report) = self.held.remove(0);
+                    if option == Some(0) {
+                        // Not a second report of the first: what is seen now is the new one.
+                        self.cleared = self.shift().turns().count();
+                        let judged = self.take_turn(held, &report.with_seat(seat));
+                        note(held, judged, ruling);
+                    }
+                }
+                self.judge_held(ruling);
+            }
             (Doubt::Opener(seats), Some(index)) => {
                 if let (Some(seat), Some((_, first))) = (seats.get(index), self.held.first_mut()) {
-                    *first = with_seat(first, *seat);
+                    *first = first.with_seat(*seat);
                 }
                 self.judge_held(ruling);
             }
             // They did not pass: the first report was out of turn.
-            (Doubt::Passed(_) | Doubt::Opener(_), _) => {
+            (Doubt::Passed(..) | Doubt::Opener(_), _) => {
                 if !self.held.is_empty() {
                     let (held, report) = self.held.remove(0);
                     let seat = seat_of(&report);
@@ -564,15 +704,10 @@ impl Referee {
                     Err((seat_of(&report), (ViolatedRule::Turn, text)))
                 }
             };
-            match judged {
-                Ok(Verdict::Held { .. }) => break,
-                Ok(_) => {}
-                Err((seat, (rule, text))) => {
-                    ruling
-                        .violations
-                        .push((number, Violation { seat, rule, text }));
-                }
+            if let Ok(Verdict::Held { .. }) = judged {
+                break;
             }
+            note(number, judged, ruling);
         }
         self.held.extend(held);
     }
@@ -585,21 +720,21 @@ impl Referee {
     }
 }
 
+/// Notes that a report that waited is not allowed.
+fn note(number: u64, judged: Judged, ruling: &mut Ruling) {
+    if let Err((seat, (rule, text))) = judged {
+        let violation = Violation { seat, rule, text };
+        ruling.violations.push((number, violation));
+    }
+}
+
+fn yes_or_no() -> Vec<String> {
+    vec!["Yes".to_owned(), "No".to_owned()]
+}
+
 fn turn_of(game: &Game) -> Option<Seat> {
     let open = game.decision()?;
     (open.kind == DecisionKind::Turn).then_some(open.seat)
-}
-
-/// The report with the seat it is about.
-pub(super) fn with_seat(report: &Report, seat: Seat) -> Report {
-    match report {
-        Report::Laid { cards, .. } => Report::Laid {
-            seat: Some(seat),
-            cards: *cards,
-        },
-        Report::Pass { .. } => Report::Pass { seat: Some(seat) },
-        other => other.clone(),
-    }
 }
 
 /// The seat a report about a turn names.

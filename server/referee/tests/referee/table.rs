@@ -10,6 +10,9 @@ use chefshat_referee::{Referee, Report, Ruling, SeenCards, Stage, Verdict};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
+/// The players, by seat.
+pub(crate) const NAMES: [&str; 6] = ["Ada", "Bo", "Cy", "Di", "Ed", "Flo"];
+
 /// Rules with a fixed number of Shifts.
 pub(crate) fn rules(players: u8, faces: u8, shifts: u32) -> RuleSet {
     RuleSetSpec {
@@ -96,8 +99,7 @@ impl Table {
     pub(crate) fn new(rules: RuleSet, seed: u64, remote: u8) -> Self {
         let players = rules.players();
         let remote = BySeat::from_fn(players, |seat| remote >> seat.index() & 1 == 1);
-        let names = ["Ada", "Bo", "Cy", "Di", "Ed", "Flo"];
-        let names = names[..players].iter().map(ToString::to_string).collect();
+        let names = NAMES[..players].iter().map(ToString::to_string).collect();
         let mut bytes = [0; 32];
         bytes[..8].copy_from_slice(&seed.to_le_bytes());
         let mut true_events = Vec::new();

@@ -161,6 +161,182 @@ fn a_missed_pass_is_asked_for() {
     assert_eq!(evening.referee.waiting_for(), "It is Ada's turn.");
 }
 
+/// Cards that somebody laid.
+fn somebody(faces: &[usize]) -> Report {
+    Report::Laid {
+        seat: None,
+        cards: cards(faces, None),
+    }
+}
+
+#[test]
+fn a_play_without_a_seat_may_be_of_the_one_after_who_passed_unseen() {
+    let mut evening = Evening::new();
+    // Bo passes, which nobody sees; Cy lays a 9, Di an 8, and then Ada passes.
+    evening.check(&[
+        (laid(0, &[11]), "accepted"),
+        (somebody(&[9]), "accepted"),
+        (somebody(&[8]), "accepted"),
+    ]);
+    let counted: Vec<_> = evening.referee.accepted().collect();
+    assert_eq!(counted[1].report.seat(), Some(Seat::new(1)));
+    assert_eq!(
+        counted.iter().map(|it| it.is_assumed).collect::<Vec<_>>(),
+        [false, true, true]
+    );
+    evening.check(&[(pass(0), "Did Di pass?")]);
+    let question = evening.referee.questions()[0].clone();
+    assert_eq!(
+        question.options,
+        [
+            "Yes",
+            "No",
+            "No, Cy passed before 8",
+            "No, Bo passed before 9"
+        ]
+    );
+    evening.number += 1;
+    let answer = Report::Answer {
+        id: question.id,
+        option: Some(3),
+    };
+    let ruling = evening.referee.report(evening.number, &answer);
+    let corrected = ruling.corrected.unwrap();
+    assert_eq!(corrected.text, "No, Bo passed before 9");
+    assert!(corrected.void_reports.is_empty());
+    let counted = evening
+        .referee
+        .accepted()
+        .map(|it| it.report.seat().unwrap());
+    assert_eq!(counted.collect::<Vec<_>>(), [0, 1, 2, 3, 0].map(Seat::new));
+    assert_eq!(evening.referee.waiting_for(), "It is Cy's turn.");
+}
+
+#[test]
+fn a_play_without_a_seat_is_moved_by_a_correction_and_those_after_it_follow() {
+    let mut evening = Evening::new();
+    evening.check(&[
+        (laid(0, &[11]), "accepted"),
+        (somebody(&[9]), "accepted"),
+        (somebody(&[8]), "accepted"),
+        (
+            Report::Correction {
+                number: 2,
+                instead: Some(Box::new(laid(2, &[9]))),
+            },
+            "Did Bo pass?",
+        ),
+    ]);
+    let id = evening.referee.questions()[0].id.clone();
+    evening.check(&[(
+        Report::Answer {
+            id,
+            option: Some(0),
+        },
+        "accepted",
+    )]);
+    let counted = evening
+        .referee
+        .accepted()
+        .map(|it| it.report.seat().unwrap());
+    assert_eq!(counted.collect::<Vec<_>>(), [0, 1, 2, 3].map(Seat::new));
+}
+
+#[test]
+fn a_play_that_the_awaited_seat_cannot_have_is_asked_about() {
+    let mut evening = Evening::new();
+    let hand = cards(
+        &[5, 6, 6, 7, 7, 7, 8, 8, 8, 8, 9, 9, 9, 9, 10, 10, 10],
+        None,
+    );
+    let hand = Report::Hand {
+        seat: Seat::new(1),
+        cards: hand,
+    };
+    evening.check(&[
+        (hand, "accepted"),
+        (laid(0, &[11, 11]), "accepted"),
+        // Bo has none.
+        (somebody(&[4, 4]), "Did Bo pass?"),
+    ]);
+    let id = evening.referee.questions()[0].id.clone();
+    evening.check(&[(
+        Report::Answer {
+            id,
+            option: Some(0),
+        },
+        "accepted",
+    )]);
+    assert_eq!(evening.referee.waiting_for(), "It is Di's turn.");
+}
+
+#[test]
+fn the_play_that_ended_a_pizza_counts_twice_only_if_it_was_laid_twice() {
+    let names = ["Ada", "Bo", "Cy"].map(str::to_owned).to_vec();
+    let options = [
+        (Some(0), "It is Cy's turn."),
+        (Some(1), "It is Ada's turn."),
+    ];
+    for (option, next) in options {
+        let referee = Referee::new(rules(3, 4, 1), BySeat::filled(3, false), names.clone());
+        let mut evening = Evening { referee, number: 0 };
+        evening.referee.start();
+        let golden = Report::Laid {
+            seat: Some(Seat::new(0)),
+            cards: cards(&[4], Some(true)),
+        };
+        evening.check(&[
+            (golden, "accepted"),
+            (laid(1, &[3]), "accepted"),
+            (pass(2), "accepted"),
+            (pass(0), "accepted"),
+        ]);
+        for face in [3, 3] {
+            evening.check(&[
+                (laid(1, &[face]), "accepted"),
+                (pass(2), "accepted"),
+                (pass(0), "accepted"),
+            ]);
+        }
+        // Bo has finished and Cy has passed: nobody can follow Ada.
+        evening.check(&[
+            (laid(1, &[4]), "accepted"),
+            (pass(2), "accepted"),
+            (laid(0, &[2]), "accepted"),
+        ]);
+        assert_eq!(evening.referee.waiting_for(), "It is Ada's turn.");
+        evening.check(&[(laid(0, &[2]), "Is that a new play by Ada?")]);
+        let id = evening.referee.questions()[0].id.clone();
+        evening.check(&[(Report::Answer { id, option }, "accepted")]);
+        assert_eq!(evening.referee.waiting_for(), next);
+    }
+}
+
+#[test]
+fn a_play_of_an_earlier_pizza_can_be_corrected() {
+    let mut evening = Evening::new();
+    let mut reports = vec![
+        (laid(0, &[11]), "accepted"),
+        (laid(1, &[9]), "accepted"),
+        (pass(2), "accepted"),
+        (pass(3), "accepted"),
+        (pass(0), "accepted"),
+    ];
+    for face in [8, 7, 6] {
+        reports.push((laid(1, &[face]), "accepted"));
+        reports.extend([2, 3, 0].map(|seat| (pass(seat), "accepted")));
+    }
+    evening.check(&reports);
+    let instead = Some(Box::new(laid(1, &[10])));
+    let ruling = (evening.referee).report(99, &Report::Correction { number: 2, instead });
+    let corrected = ruling.corrected.unwrap();
+    assert_eq!(
+        corrected.text,
+        "Corrected: Bo laid a 10. (Before: Bo laid a 9.)"
+    );
+    assert!(corrected.void_reports.is_empty());
+}
+
 #[test]
 fn a_remote_seat_decides_before_the_board_is_cleared() {
     let mut evening = Evening::with_remote(BySeat::from_fn(4, |seat| seat == Seat::new(3)));
@@ -281,10 +457,6 @@ fn what_came_after_a_corrected_end_of_the_game_is_void() {
 fn reports_without_a_seat_are_never_those_of_a_remote_seat() {
     let mut evening = Evening::with_remote(BySeat::from_fn(4, |seat| seat == Seat::new(1)));
     let hand = cards(&[4, 4, 5, 6, 6, 7, 7, 7, 8, 8, 8, 9, 9, 9, 9, 10, 10], None);
-    let somebody = |faces: &[usize]| Report::Laid {
-        seat: None,
-        cards: cards(faces, None),
-    };
     evening.check(&[
         (
             Report::Hand {
@@ -312,14 +484,10 @@ fn reports_without_a_seat_are_never_those_of_a_remote_seat() {
 #[test]
 fn reports_without_a_seat_wait_for_the_answer_to_a_question() {
     let mut evening = Evening::new();
-    let somebody = Report::Laid {
-        seat: None,
-        cards: cards(&[8], None),
-    };
     evening.check(&[
         (laid(0, &[11]), "accepted"),
         (laid(2, &[9]), "Did Bo pass?"),
-        (somebody, "Did Bo pass?"),
+        (somebody(&[8]), "Did Bo pass?"),
     ]);
     let held = evening.number;
     let hand = Report::Hand {

@@ -54,9 +54,15 @@ export const attend: Texts["attend"] = {
     words: (text) => {
       const [, passed] = /^Did (.+) pass\?$/.exec(text) ?? [];
       if (passed) return `${passed.includes(" and ") ? "Haben" : "Hat"} ${names(passed)} gepasst?`;
+      const [, leads] = /^Is that a new play by (.+)\?$/.exec(text) ?? [];
+      if (leads) return `Ist das ein neuer Zug von ${leads}?`;
       return text === "Who opened the Shift?" ? "Wer hat den Shift eröffnet?" : text;
     },
-    option: (text) => (text === "Yes" ? "Ja" : text),
+    option: (text) => {
+      const [, name, play] = /^No, (.+) passed before (.+)$/.exec(text) ?? [];
+      if (name) return `Nein, ${name} hatte davor gepasst (${play})`;
+      return text === "Yes" ? "Ja" : text === "No" ? "Nein" : text;
+    },
   },
   toLay: {
     title: "Am Tisch zu tun",
@@ -125,6 +131,7 @@ export const attend: Texts["attend"] = {
   reports: {
     title: "Meldungen in diesem Shift",
     none: "Es wurde noch nichts gemeldet.",
+    assumed: "(wer es war, ist angenommen)",
     change: "Ändern",
     remove: "Entfernen",
     removeSure: "Es ist dann, als wäre es nie geschehen. Was danach nicht mehr passt, wird auch entfernt.",

@@ -8,9 +8,9 @@ export const faults: Texts["faults"] = {
   unknown: "Etwas ist schiefgegangen.",
   tooMuch: "Das war zu viel auf einmal.",
   again: (ms: number) => `Versuche es in ${time(ms)} noch einmal.`,
+  pageBroken:
+    "Auf dieser Seite ist ein Fehler aufgetreten. Lade sie neu: Dein Platz und alles am Tisch bleiben erhalten.",
   byReason: {
-    PAGE_BROKEN:
-      "Auf dieser Seite ist ein Fehler aufgetreten. Lade sie neu: Dein Platz und alles am Tisch bleiben erhalten.",
     TOKEN_MISSING:
       "Dieser Server ist nur für Eingeladene offen. Bitte die Person, die ihn betreibt, um einen Link mit Token und öffne ihn hier.",
     TOKEN_UNKNOWN:

@@ -118,6 +118,7 @@ export const attend = {
   reports: {
     title: "Reports of this Shift",
     none: "Nothing has been reported yet.",
+    assumed: "(who it was is assumed)",
     change: "Change",
     remove: "Remove",
     removeSure: "It is as if it had never happened. What no longer fits after it is removed as well.",

@@ -8,8 +8,8 @@ export const faults = {
   unknown: "Something went wrong.",
   tooMuch: "This was too much at once.",
   again: (ms: number) => `Try again in ${time(ms)}.`,
+  pageBroken: "This page has met an error of its own. Reload it: your seat and everything at the table are kept.",
   byReason: {
-    PAGE_BROKEN: "This page has met an error of its own. Reload it: your seat and everything at the table are kept.",
     TOKEN_MISSING:
       "This server is open to invited people only. Ask its host for a link with a token, and open it here.",
     TOKEN_UNKNOWN:

@@ -53,9 +53,15 @@ export const attend: Texts["attend"] = {
     words: (text) => {
       const [, passed] = /^Did (.+) pass\?$/.exec(text) ?? [];
       if (passed) return `¿${passed.includes(" and ") ? "Han" : "Ha"} pasado ${names(passed)}?`;
+      const [, leads] = /^Is that a new play by (.+)\?$/.exec(text) ?? [];
+      if (leads) return `¿Es una jugada nueva de ${leads}?`;
       return text === "Who opened the Shift?" ? "¿Quién ha abierto el Shift?" : text;
     },
-    option: (text) => (text === "Yes" ? "Sí" : text),
+    option: (text) => {
+      const [, name, play] = /^No, (.+) passed before (.+)$/.exec(text) ?? [];
+      if (name) return `No, ${name} había pasado antes (${play})`;
+      return text === "Yes" ? "Sí" : text === "No" ? "No" : text;
+    },
   },
   toLay: {
     title: "Por hacer en la mesa",
@@ -125,6 +131,7 @@ export const attend: Texts["attend"] = {
   reports: {
     title: "Anotaciones de este Shift",
     none: "Todavía no se ha anotado nada.",
+    assumed: "(se supone quién fue)",
     change: "Cambiar",
     remove: "Eliminar",
     removeSure: "Es como si nunca hubiera pasado. También se elimina lo que después ya no encaja.",

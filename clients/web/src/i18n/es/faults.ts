@@ -8,9 +8,9 @@ export const faults: Texts["faults"] = {
   unknown: "Algo ha salido mal.",
   tooMuch: "Demasiadas peticiones a la vez.",
   again: (ms: number) => `Inténtalo de nuevo dentro de ${time(ms)}.`,
+  pageBroken:
+    "Se ha producido un error en esta página. Vuelve a cargarla: tu sitio y todo lo que hay en la mesa se conservan.",
   byReason: {
-    PAGE_BROKEN:
-      "Se ha producido un error en esta página. Vuelve a cargarla: tu sitio y todo lo que hay en la mesa se conservan.",
     TOKEN_MISSING:
       "Este servidor está abierto solo a personas invitadas. Pide un enlace con token a quien lo administra y ábrelo aquí.",
     TOKEN_UNKNOWN:

@@ -54,9 +54,15 @@ export const attend: Texts["attend"] = {
     words: (text) => {
       const [, passed] = /^Did (.+) pass\?$/.exec(text) ?? [];
       if (passed) return `${names(passed)}: ${passed.includes(" and ") ? "hanno" : "ha"} passato?`;
+      const [, leads] = /^Is that a new play by (.+)\?$/.exec(text) ?? [];
+      if (leads) return `${leads}: è una nuova giocata?`;
       return text === "Who opened the Shift?" ? "Chi ha aperto lo Shift?" : text;
     },
-    option: (text) => (text === "Yes" ? "Sì" : text),
+    option: (text) => {
+      const [, name, play] = /^No, (.+) passed before (.+)$/.exec(text) ?? [];
+      if (name) return `No, ${name} aveva passato prima (${play})`;
+      return text === "Yes" ? "Sì" : text === "No" ? "No" : text;
+    },
   },
   toLay: {
     title: "Da fare al tavolo",
@@ -125,6 +131,7 @@ export const attend: Texts["attend"] = {
   reports: {
     title: "Segnalazioni di questo Shift",
     none: "Non è ancora stato segnalato nulla.",
+    assumed: "(chi è stato è presunto)",
     change: "Cambia",
     remove: "Elimina",
     removeSure: "È come se non fosse mai successo. Viene eliminato anche ciò che dopo non è più valido.",

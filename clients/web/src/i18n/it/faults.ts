@@ -8,9 +8,9 @@ export const faults: Texts["faults"] = {
   unknown: "Qualcosa è andato storto.",
   tooMuch: "Troppe richieste in una volta.",
   again: (ms: number) => `Riprova tra ${time(ms)}.`,
+  pageBroken:
+    "In questa pagina si è verificato un errore. Ricaricala: il tuo posto e tutto ciò che è sul tavolo restano.",
   byReason: {
-    PAGE_BROKEN:
-      "In questa pagina si è verificato un errore. Ricaricala: il tuo posto e tutto ciò che è sul tavolo restano.",
     TOKEN_MISSING:
       "Questo server è aperto solo agli invitati. Chiedi a chi lo gestisce un link con un token e aprilo qui.",
     TOKEN_UNKNOWN:
