@@ -275,7 +275,7 @@ function Withdraw({ view, part }: { view: StudyView; part: Participating }) {
         </ConfirmButton>
       ) : (
         <ConfirmButton key="delete" label={words.deleteButton} confirm={words.deleteConfirm} act={() => withdraw(true)}>
-          {words.deleteText}
+          {words.deleteHint}
         </ConfirmButton>
       )}
     </footer>

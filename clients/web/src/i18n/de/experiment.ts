@@ -75,7 +75,7 @@ export const experiment: Texts["experiment"] = {
     browserLanguage: "die des Browsers",
     hide: "Am Tisch ausblenden",
     hidden: {
-      log: "was geschehen ist",
+      log: "Verlauf",
       lookup: "mögliche Züge",
       expressions: "Reaktionen",
       played: "im Shift gespielte Karten",

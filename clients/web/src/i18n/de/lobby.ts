@@ -10,7 +10,7 @@ export const lobby: Texts["lobby"] = {
   title: "Lobby",
   quick: {
     title: "Setz dich und spiele",
-    text: "Du und drei Agenten backen Pizzas. Wer zuerst keine Karten mehr hat, wird Chef.",
+    text: "Du und drei Agenten backt Pizzas. Wer zuerst keine Karten mehr hat, wird Chef.",
     name: "Dein Name",
     guest: "Gast",
     roomOf: (name) => `Tisch von ${name}`,

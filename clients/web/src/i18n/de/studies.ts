@@ -11,16 +11,16 @@ export const studies: Texts["studies"] = {
   lost: "Verbindung verloren. Wird wiederhergestellt…",
   progress: (step, steps) => `Schritt ${step} von ${steps}`,
   elsewhere: {
-    title: "Du machst auf einem anderen Gerät oder einer anderen Seite weiter",
-    text: "Diese Studie wurde in einem anderen Fenster oder auf einem anderen Gerät geöffnet. Sie geht dort weiter. Nichts von dem, was du getan hast, ist verloren.",
+    title: "Sie machen auf einem anderen Gerät oder einer anderen Seite weiter",
+    text: "Diese Studie wurde in einem anderen Fenster oder auf einem anderen Gerät geöffnet. Sie geht dort weiter. Nichts von dem, was Sie getan haben, ist verloren.",
     here: "Stattdessen hier weitermachen",
   },
   consent: {
-    title: "Bevor du beginnst",
+    title: "Bevor Sie beginnen",
     textLabel: "Einwilligungstext",
     version: (version) => `Version ${version} dieses Textes.`,
     agree: "Ich habe diesen Text gelesen und bin einverstanden, teilzunehmen",
-    must: "Kreuze das Kästchen an, wenn du einverstanden bist. Wenn nicht, schließe diese Seite oder zieh unten deine Teilnahme zurück.",
+    must: "Kreuzen Sie das Kästchen an, wenn Sie einverstanden sind. Wenn nicht, schließen Sie diese Seite oder ziehen Sie unten Ihre Teilnahme zurück.",
     submit: "Zustimmen und weiter",
   },
   questionnaire: {
@@ -29,7 +29,7 @@ export const studies: Texts["studies"] = {
     submit: "Antworten senden",
     missing: (count) =>
       plural(count, { one: "# Frage hat noch keine Antwort.", other: "# Fragen haben noch keine Antwort." }),
-    answerThis: "Bitte beantworte diese Frage.",
+    answerThis: "Bitte beantworten Sie diese Frage.",
     point: (point, points, label) => `${point} von ${points}${label && `: ${label}`}`,
     unset: "noch keine Antwort",
     onScale: (value, min, max) => `${value}, von ${min} bis ${max}`,
@@ -37,7 +37,8 @@ export const studies: Texts["studies"] = {
   },
   external: {
     title: "Ein Fragebogen",
-    text: (host) => `Er öffnet sich in einem neuen Fenster, auf ${host}. Komm hierher zurück, wenn du fertig bist.`,
+    text: (host) =>
+      `Er öffnet sich in einem neuen Fenster, auf ${host}. Kommen Sie hierher zurück, wenn Sie fertig sind.`,
     open: "Fragebogen öffnen",
     done: "Ich habe ihn ausgefüllt",
   },
@@ -51,36 +52,34 @@ export const studies: Texts["studies"] = {
     practice: "Übungspartie",
     game: "Partie",
     gameOf: (game, games) => `Partie ${game} von ${games}`,
-    preparing: "Deine Partie wird vorbereitet. Sie beginnt hier automatisch.",
+    preparing: "Ihre Partie wird vorbereitet. Sie beginnt hier automatisch.",
     ending: "Die Partie ist zu Ende. Gleich kommt der nächste Schritt.",
     over: "Die Partie ist zu Ende.",
   },
   end: {
-    title: "Die Studie ist für dich zu Ende",
-    thanks: "Danke für deine Teilnahme",
+    title: "Die Studie ist für Sie zu Ende",
+    thanks: "Danke für Ihre Teilnahme",
     texts: {
-      completed: "Du hast die Studie abgeschlossen. Alles wurde aufgezeichnet.",
-      withdrawn: "Du hast deine Teilnahme zurückgezogen. Deine bisher aufgezeichneten Daten bleiben gespeichert.",
-      deleted: "Du hast deine Teilnahme zurückgezogen, und deine Daten wurden gelöscht.",
+      completed: "Sie haben die Studie abgeschlossen. Alles wurde aufgezeichnet.",
+      withdrawn: "Sie haben Ihre Teilnahme zurückgezogen. Ihre bisher aufgezeichneten Daten bleiben gespeichert.",
+      deleted: "Sie haben Ihre Teilnahme zurückgezogen, und Ihre Daten wurden gelöscht.",
       droppedOut:
-        "Du warst zu lange weg, daher wurde dein Platz an jemand anderen vergeben. Wenn du weitermachen möchtest, frage die Studienleitung.",
-      removed: "Die Studienleitung hat deine Teilnahme beendet. Wenn du Fragen hast, wende dich an sie.",
+        "Sie waren zu lange weg, daher wurde Ihr Platz an jemand anderen vergeben. Wenn Sie weitermachen möchten, fragen Sie die Studienleitung.",
+      removed: "Die Studienleitung hat Ihre Teilnahme beendet. Wenn Sie Fragen haben, wenden Sie sich an sie.",
     },
     pseudonym: (pseudonym) =>
-      `Dein Code in der Studie ist ${pseudonym}. Nenne ihn, wenn du Fragen zu deinen Daten hast.`,
-    close: "Du kannst diese Seite schließen.",
+      `Ihr Code in der Studie ist ${pseudonym}. Nennen Sie ihn, wenn Sie Fragen zu Ihren Daten haben.`,
+    close: "Sie können diese Seite schließen.",
   },
   withdraw: {
     button: "Teilnahme zurückziehen…",
     confirm: "Jetzt zurückziehen",
-    text: "Deine Teilnahme endet sofort, und du kannst nicht zurückkommen. Du musst keinen Grund nennen.",
+    text: "Ihre Teilnahme endet sofort, und Sie können nicht zurückkommen. Sie müssen keinen Grund nennen.",
     deleteToo: "Auch die bisher aufgezeichneten Daten löschen",
     deleteHint:
-      "Deine Antworten, Partien und deine Einwilligung werden gelöscht und können nicht wiederhergestellt werden.",
+      "Ihre Antworten und Partien werden gelöscht und können nicht wiederhergestellt werden. Gespeichert bleibt, dass und wann Sie eingewilligt und sich zurückgezogen haben.",
     deleteButton: "Meine Daten löschen…",
     deleteConfirm: "Jetzt löschen",
-    deleteText:
-      "Deine Antworten, Partien und deine Einwilligung werden gelöscht und können nicht wiederhergestellt werden.",
   },
   own: {
     title: "Studien",
@@ -192,7 +191,7 @@ export const studies: Texts["studies"] = {
     conditionId: "Name der Bedingung",
     opponents: "Wer auf den anderen Plätzen spielt",
     labels: "Was die Teilnehmer darüber erfahren",
-    label: { asTheyAre: "Namen und Arten", kinds: "„Agent 1“ und so weiter", players: "„Player 1“ und so weiter" },
+    label: { asTheyAre: "Namen und Arten", kinds: "„Agent 1“ und so weiter", players: "„Spieler 1“ und so weiter" },
     addCondition: "Bedingung hinzufügen",
     removeCondition: "Diese Bedingung entfernen",
     consent: "Einwilligungstext",

@@ -43,7 +43,7 @@ export const table: Texts["table"] = {
     keysHelp: "Auch die Zahl einer Karte wählt sie, p passt, und das Fragezeichen zeigt alle Tasten.",
   },
   log: {
-    title: "Was geschehen ist",
+    title: "Verlauf",
     dealt: (shift) => `Die Karten für Shift ${shift} werden ausgeteilt`,
     plays: (cards) => `spielt ${cards}`,
     passes: "passt",

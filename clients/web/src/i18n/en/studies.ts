@@ -74,10 +74,10 @@ export const studies = {
     confirm: "Withdraw now",
     text: "Your participation ends at once, and you cannot come back. You need not give a reason.",
     deleteToo: "Also delete the data recorded so far",
-    deleteHint: "Your answers, games and consent are deleted and cannot be restored.",
+    deleteHint:
+      "Your answers and games are deleted and cannot be restored. What stays is that you agreed to take part and withdrew, and when.",
     deleteButton: "Delete my data…",
     deleteConfirm: "Delete now",
-    deleteText: "Your answers, games and consent are deleted and cannot be restored.",
   },
   own: {
     title: "Studies",

@@ -10,7 +10,7 @@ export const lobby: Texts["lobby"] = {
   title: "Vestíbulo",
   quick: {
     title: "Siéntate y juega",
-    text: "Prepara pizzas con tres agentes. Quien se queda sin cartas antes que los demás es Chef.",
+    text: "Prepara pizzas con tres agentes. Quien se quede sin cartas antes que los demás será el Chef.",
     name: "Tu nombre",
     guest: "Invitado",
     roomOf: (name) => `Mesa de ${name}`,
