@@ -5,6 +5,7 @@ import { useEffect, useMemo, useRef } from "preact/hooks";
 import { hidden } from "../experiment/hiding";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
+import { mustPass } from "./auto-pass";
 import type { OpenDecision } from "./model/live";
 import { isPresence, MOST_AT_ONCE, visibleLines } from "./model/log";
 import { isOpening } from "./model/requirement";
@@ -12,7 +13,7 @@ import type { TableState } from "./model/state";
 import { createPresenceAnnouncer } from "./presence";
 import { play, soundOf } from "./sounds";
 import { nowHeading } from "./view/Now";
-import { spokenLine } from "./words";
+import { outcomeWords, rolesWords, spokenLine } from "./words";
 
 /** Announces events, with sounds, while the table is rendered. */
 export function useAnnounced(table: TableState, own: number | undefined, decision: OpenDecision | undefined): void {
@@ -33,7 +34,7 @@ export function useAnnounced(table: TableState, own: number | undefined, decisio
       if (isPresence(line)) presence.apply(line);
       // The notice of a violation is read out by itself.
       else if (line.entry.kind === "violated") continue;
-      else announce(spokenLine(table, line));
+      else announce([spokenLine(table, line), outcomeWords(table, line)].join(" ").trim());
     }
     const sounds = lines.flatMap((line) => soundOf(line) ?? []);
     // All at once would be noise: only the last one is played, which says the most.
@@ -43,8 +44,16 @@ export function useAnnounced(table: TableState, own: number | undefined, decisio
   useEffect(() => {
     if (!decision) return;
     play("yourTurn");
-    announce(`${nowHeading({ table, own, decision, next: own })}. ${requirementWords(decision)}`);
+    const passes = mustPass(decision, table.faces) ? t().table.actions.onlyPass : "";
+    announce(`${nowHeading({ table, own, decision, next: own })}. ${requirementWords(decision)} ${passes}`.trim());
   }, [decision?.id]);
+  const roles = rolesWords(table);
+  const lastRoles = useRef(roles);
+  useEffect(() => {
+    if (roles === lastRoles.current) return;
+    lastRoles.current = roles;
+    if (roles) announce(roles);
+  }, [roles]);
 }
 
 /** The requirement of the open turn, as read out. */

@@ -132,6 +132,25 @@ export function spokenLine(table: TableState, { entry }: LogLine): string {
   return sentence.endsWith(".") ? sentence : `${sentence}.`;
 }
 
+/** How a Shift or the game ended, as it is read out; empty for any other line. */
+export function outcomeWords(table: TableState, { entry }: LogLine): string {
+  const line = (seat: number, place: number, points: number) =>
+    `${t().common.place(place)} ${distinctName(table, seat)}, ${t().common.points(points)}.`;
+  const { result, standings } = table;
+  if (entry.kind === "shiftOver" && result?.shift === entry.shift)
+    return result.order.map((seat, index) => line(seat, index + 1, result.points[seat] ?? 0)).join(" ");
+  const [winner] = standings;
+  if (entry.kind !== "gameOver" || winner === undefined) return "";
+  const lines = standings.map(({ seat, place, points }) => line(seat, place, points));
+  return [`${t().table.result.wins(distinctName(table, winner.seat))}.`, ...lines].join(" ");
+}
+
+/** The roles of all seats, as they are read out; empty before there are any. */
+export function rolesWords(table: TableState): string {
+  const of = ({ seat, role }: TableState["seats"][number]) => `${distinctName(table, seat)}: ${roleWord(role)}.`;
+  return table.seats.every(({ role }) => roleWord(role) !== "") ? table.seats.map(of).join(" ") : "";
+}
+
 /** What the rules or the cards do not allow: the page's own sentence, or the server's. */
 export function violationWords(table: TableState, { rule, text }: Breach, demand: Demand): string {
   return t().table.violation({

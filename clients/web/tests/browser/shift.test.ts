@@ -63,7 +63,7 @@ test("a person plays a complete Shift with the keyboard alone, and hears every t
   });
   await expectEnd(page, roomId, taken);
   await expect.poll(() => heard.join(" ").match(/Your turn\./g)?.length).toBe(taken);
-  await expect.poll(() => heard.join(" ")).toContain("The game is over.");
+  await expect.poll(() => heard.join(" ")).toMatch(/The game is over\. .+ won\. 1st .+, \d+ points?\. 2nd /);
   await tabTo(page, (on) => on.label === "Watch the replay");
   await page.keyboard.press("Enter");
   await page.waitForURL(/\/replay\//);

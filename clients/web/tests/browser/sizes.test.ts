@@ -11,6 +11,8 @@ import { browser, person, server, useStage } from "./stage";
 /** Width and height. */
 const SIZES = [
   [360, 740],
+  [375, 667],
+  [390, 664],
   [390, 844],
   [412, 915],
   [844, 390],
@@ -22,6 +24,12 @@ const SIZES = [
   [1366, 768],
   [1920, 1080],
   [2560, 1440],
+] as const;
+
+/** Old phones, where kinds and reactions give way. */
+const SMALLEST = [
+  [320, 568],
+  [360, 640],
 ] as const;
 
 /** The longest name, without a place to break it. */
@@ -41,6 +49,8 @@ const CHOICE = [
   "[data-action=play]",
   "[data-action=pass]",
 ];
+/** What a play must be, which a turn shows that does not open the Shift. */
+const REQUIREMENT = '[data-part~="requirement"]';
 
 /** Id of the game that was played to its end. */
 let gameId: string;
@@ -59,6 +69,10 @@ test("a turn, and the end of the game, at every size", async () => {
   const address = page.url();
   let looked = 0;
   await playOn(page, byClicks, async (taken) => {
+    if (taken === 1) {
+      expect(await page.locator(REQUIREMENT).count()).toBe(1);
+      await expectSeen(page, [...CHOICE, REQUIREMENT], [...SIZES, ...SMALLEST]);
+    }
     if (taken > 0) return;
     for (const { value: language } of languages) {
       await page.goto(`${address}?lang=${language}`);
@@ -124,8 +138,12 @@ test.each(languages)("the tutorial in $label, with its text, at every size", asy
 });
 
 /** At every size, none of these parts is outside the window or covered. */
-async function expectSeen(page: Page, parts: readonly string[]): Promise<void> {
-  for (const [width, height] of SIZES) {
+async function expectSeen(
+  page: Page,
+  parts: readonly string[],
+  sizes: readonly (readonly [number, number])[] = SIZES,
+): Promise<void> {
+  for (const [width, height] of sizes) {
     await page.setViewportSize({ width, height });
     await expectSeenNow(page, parts);
   }

@@ -113,7 +113,7 @@ export function Demands({ requirement, mayPass }: { requirement: Requirement; ma
   if (isOpening(requirement)) {
     return (
       <>
-        <div class={css.tiles}>
+        <div class={css.tiles} data-part="requirement">
           <Tile number={lowestFace} text={goldenCard ? words.openingGolden : words.openingFace} />
         </div>
         <p>{mayPass ? words.opensMayPass : words.opens}</p>
@@ -124,7 +124,7 @@ export function Demands({ requirement, mayPass }: { requirement: Requirement; ma
   if (highestFace === 0) return <p>{words.nothing}</p>;
   return (
     <>
-      <div class={css.tiles}>
+      <div class={css.tiles} data-part="requirement">
         <Tile sign="≤" number={highestFace} text={words.face} />
         <Tile sign="≥" number={fewestCards} text={words.cards(fewestCards)} />
       </div>
