@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import threading
 from dataclasses import replace
 from typing import Any
 
@@ -330,9 +332,51 @@ def test_a_decision_is_answered_after_its_acts_or_at_its_deadline_whatever_the_r
     run(test())
 
 
+class Waits(chefshat.Agent):
+    """An agent that computes until somebody lets it, and notes what it hears."""
+
+    def __init__(self) -> None:
+        self.may_end = threading.Event()
+        self.heard: list[str] = []
+
+    def decide(self, request: Decision) -> int:
+        assert self.may_end.wait(60)
+        self.heard.append("decision")
+        return 199
+
+    def on_event(self, event: pb.GameEvent) -> None:
+        self.heard.append(f"event {event.sequence}")
+        if event.sequence == 9:
+            raise ValueError("a ninth event")
+
+
+def test_an_agent_that_computes_stops_nobody_hears_everything_in_order_and_its_exceptions_are_raised() -> None:
+    async def test() -> None:
+        robot, agent = ScriptedRobot(), Waits()
+        async with Body(robot, Words("en"), seat=1, finish_s=0) as body:
+            player = RobotPlayer(agent, body)
+            player.on_attached(SeatInfo("room", "game", 1))
+            player.on_event(pb.GameEvent(sequence=1))
+            deciding = asyncio.create_task(player.decide(request([0, 199])))
+            # The body and the loop go on meanwhile.
+            body.say("One moment.", "en")
+            await until(lambda: said(robot) == ["One moment."])
+            player.on_event(pb.GameEvent(sequence=2))
+            assert not deciding.done()
+            agent.may_end.set()
+            assert await deciding == 199
+            player.on_game_over(chefshat.SeatResult(room_id="room", game_id="game", seat=1))
+            assert agent.heard == ["event 1", "decision", "event 2"]
+            player.on_event(pb.GameEvent(sequence=9))
+            with pytest.raises(ValueError, match="a ninth event"):
+                await player.decide(request([0, 199]))
+
+    run(test())
+
+
 def test_at_a_physical_table_the_decision_comes_before_the_cards() -> None:
     async def test() -> None:
-        robot = ScriptedRobot(lambda act: None)
+        robot = ScriptedRobot()
         async with Body(robot, Words("en"), seat=1, finish_s=0) as body:
             hand = pb.SeatCards(seat=1, cards=[9, 9, 11, 12], golden=True)
             dealt: dict[str, object] = {"shift_started": pb.ShiftStarted(shift=1)}
@@ -340,6 +384,7 @@ def test_at_a_physical_table_the_decision_comes_before_the_cards() -> None:
                 body.on_event(event)
             assert body.state.real_cards
             assert (body.state.hand[8], body.state.golden) == (2, True)
+            await body.idle()
             robot.acts.clear()
             player = RobotPlayer(Takes(199), body)
             assert await player.decide(request([199])) == 199

@@ -2,15 +2,19 @@
 
 What the robot does is in `body`. A decision is answered when the robot has finished its turn, or when the time of the decision is
 nearly used up, whichever comes first: a robot that is slow, fails or is gone never costs its seat a decision. At a physical table
-it is answered at once, and then laid.
+it is answered at once, and then laid. An agent that computes for a while stops neither the body nor the connection: it has a
+thread of its own.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import inspect
 import time
+from collections import deque
 from collections.abc import Awaitable, Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 
 import chefshat
 from chefshat import ChefsHatError, Decision, SeatInfo, SeatResult, pb
@@ -38,13 +42,13 @@ class RobotPlayer(chefshat.Agent):
         """Creates the player.
 
         Args:
-            agent: decides.
+            agent: decides. Unless its `decide` is a coroutine, all its methods are called in one thread of its own, in order.
             body: acts.
             hold_s: most seconds by which the robot's acts may delay an answer; None: as long as the decision's time allows.
             on_robot_event: called with what the robot hears, reads in faces, and with its buttons.
             says_violations: whether it says what is wrong when a physical table's referee finds a violation.
         """
-        self._agent = agent
+        self._agent = _Aside(agent)
         self._body = body
         self._hold_s = hold_s
         self._on_robot_event = on_robot_event
@@ -56,8 +60,7 @@ class RobotPlayer(chefshat.Agent):
     async def decide(self, request: Decision) -> int:
         """Lets the agent decide, and the robot act. Illegal actions of the agent are answered at once, without an act."""
         asked = time.monotonic()
-        answer = self._agent.decide(request)
-        action = int(await answer if isinstance(answer, Awaitable) else answer)
+        action = await self._agent.decide(request)
         if action in request.legal_actions:
             self._body.observe(request.request.observation)
             await self._act(request, action, asked)
@@ -89,43 +92,43 @@ class RobotPlayer(chefshat.Agent):
         self._body.seat_at(seat.seat, seat.live_from)
         if self._listener is None:
             self._listener = asyncio.get_running_loop().create_task(self._listen(), name="robot perceives")
-        self._agent.on_attached(seat)
+        self._agent.tell(lambda agent: agent.on_attached(seat))
 
     def on_event(self, event: pb.GameEvent) -> None:
         """Lets the agent and the robot follow the game."""
-        self._agent.on_event(event)
+        self._agent.tell(lambda agent: agent.on_event(event))
         self._body.on_event(event)
         if self._says_violations and event.HasField("violation") and event.sequence >= self._body.live_from:
             self._body.say(event.violation.text, "en")
 
     def on_snapshot(self, snapshot: pb.Snapshot) -> None:
         """Passes it to the agent."""
-        self._agent.on_snapshot(snapshot)
+        self._agent.tell(lambda agent: agent.on_snapshot(snapshot))
 
     def on_awaited(self, awaited: pb.Awaited) -> None:
         """Passes it to the agent."""
-        self._agent.on_awaited(awaited)
+        self._agent.tell(lambda agent: agent.on_awaited(awaited))
 
     def on_result(self, result: pb.AnswerResult) -> None:
         """Passes it to the agent. Lets the robot carry a gift at a physical table."""
         if self._gift is not None and self._gift[0] == result.decision_id and result.status == pb.ANSWER_STATUS_ACCEPTED:
             _, face, receiver = self._gift
             self._body.give(face, receiver)
-        self._agent.on_result(result)
+        self._agent.tell(lambda agent: agent.on_result(result))
 
     def on_refused(self, refused: pb.Refused) -> None:
         """Passes it to the agent."""
-        self._agent.on_refused(refused)
+        self._agent.tell(lambda agent: agent.on_refused(refused))
 
     def on_game_over(self, result: SeatResult) -> None:
         """Passes it to the agent."""
         self._end()
-        self._agent.on_game_over(result)
+        self._agent.tell_last(lambda agent: agent.on_game_over(result))
 
     def on_seat_lost(self, error: ChefsHatError) -> None:
         """Passes it to the agent."""
         self._end()
-        self._agent.on_seat_lost(error)
+        self._agent.tell_last(lambda agent: agent.on_seat_lost(error))
 
     async def _listen(self) -> None:
         async for event in self._body.driver.events():
@@ -134,6 +137,51 @@ class RobotPlayer(chefshat.Agent):
     def _end(self) -> None:
         if self._listener is not None:
             self._listener.cancel()
+
+
+class _Aside:
+    """An agent in a thread of its own, which hears everything in order. One whose `decide` is a coroutine stays in the loop."""
+
+    def __init__(self, agent: chefshat.Agent) -> None:
+        self._agent = agent
+        is_coroutine = inspect.iscoroutinefunction(agent.decide)
+        self._thread = None if is_coroutine else ThreadPoolExecutor(1, thread_name_prefix="agent")
+        # What it is still to hear, and the decision that it computes.
+        self._told: deque[Future[None]] = deque()
+        self._deciding: Future[int | Awaitable[int]] | None = None
+
+    async def decide(self, request: Decision) -> int:
+        """Lets it decide, after it has heard everything.
+
+        Raises:
+            Exception: what the agent raises, also when it heard something.
+        """
+        if self._thread is None:
+            answer = self._agent.decide(request)
+        else:
+            self._deciding = self._thread.submit(self._agent.decide, request)
+            answer = await asyncio.wrap_future(self._deciding)
+        self._raise()
+        return int(await answer if isinstance(answer, Awaitable) else answer)
+
+    def tell(self, what: Callable[[chefshat.Agent], None]) -> None:
+        """Tells it something. What it raised before is raised here."""
+        if self._thread is None:
+            what(self._agent)
+        else:
+            self._raise()
+            self._told.append(self._thread.submit(what, self._agent))
+
+    def tell_last(self, what: Callable[[chefshat.Agent], None]) -> None:
+        """Tells it the last thing of a game, and waits until it has heard it, unless it still computes a decision."""
+        self.tell(what)
+        if self._deciding is None or self._deciding.done():
+            while self._told:
+                self._told.popleft().result()
+
+    def _raise(self) -> None:
+        while self._told and self._told[0].done():
+            self._told.popleft().result()
 
 
 def limit_s(time_left_ms: int, used_s: float) -> float:

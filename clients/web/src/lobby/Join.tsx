@@ -13,10 +13,10 @@ import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_p
 import { t } from "../i18n";
 import { NO_KEY } from "../name-key";
 import { useAttempt } from "../parts/attempt";
-import { Button } from "../parts/Button";
+import { Button, ButtonLink } from "../parts/Button";
 import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
-import { navigate, type Route } from "../router";
+import { navigate, pathOf, type Route } from "../router";
 import { heldPlace, takePlace } from "../tournaments/place";
 import { paceOf, storePace } from "../wizard/pace";
 import { lookUp } from "./code";
@@ -24,7 +24,7 @@ import css from "./Join.module.css";
 import { JoinForm } from "./JoinForm";
 import { rulesInShort } from "./RoomCard";
 import { MAX_NAME } from "./room-form";
-import { nameOf } from "./rooms";
+import { isOpen, nameOf } from "./rooms";
 import { Seats } from "./Seats";
 import { canonical, giveBackSeat, heldSeat, lastName, roomOfCode, takeSeat } from "./seat";
 
@@ -185,7 +185,25 @@ function WayIn({ code }: { code: string }) {
           <Seats room={room} />
         </section>
       )}
-      <NameForm code={code} room={room} />
+      {room && !isOpen(room) ? <NoSeat room={room} /> : <NameForm code={code} room={room} />}
+    </>
+  );
+}
+
+/** Why nobody can sit down any more, and the way to watch. */
+function NoSeat({ room }: { room: Room }) {
+  const reasons = t().faults.byReason;
+  const begun = room.state === RoomState.PLAYING ? reasons.GAME_STARTED : reasons.GAME_OVER;
+  return (
+    <>
+      <Notice kind="hint">{room.state === RoomState.WAITING ? reasons.ROOM_FULL : begun}</Notice>
+      {room.policy?.spectators && (
+        <p>
+          <ButtonLink look="main" href={pathOf({ page: "watch", roomId: room.roomId })}>
+            {t().lobby.rooms.watch}
+          </ButtonLink>
+        </p>
+      )}
     </>
   );
 }

@@ -91,25 +91,41 @@ function Notifications() {
   );
 }
 
-/** The key of this device's names, to copy to another device or from there. */
+/**
+ * The key of this device's names, to copy to another device or from there. One that would replace
+ * another is confirmed: with the former, a person would be lost.
+ */
 function OwnNames() {
   const words = t().common.settings.names;
-  const [text, setText] = useState(nameKeyText() ?? "");
+  const [stored, setStored] = useState(nameKeyText());
+  const [text, setText] = useState(stored ?? "");
+  const store = (key: string) => {
+    setNameKey(key);
+    setStored(nameKeyText());
+  };
   const change = (typed: string) => {
     const key = typed.trim();
     setText(key);
-    if (isNameKey(key)) setNameKey(key);
+    if (isNameKey(key) && stored === null) store(key);
   };
+  const isKey = isNameKey(text);
   return (
-    <TextField
-      label={words.key}
-      hint={words.hint}
-      fault={isNameKey(text) || (text === "" && nameKeyText() === null) ? undefined : words.notAKey}
-      value={text}
-      onText={change}
-      autoCapitalize="none"
-      autoComplete="off"
-    />
+    <>
+      <TextField
+        label={words.key}
+        hint={words.hint}
+        fault={isKey || (text === "" && stored === null) ? undefined : words.notAKey}
+        value={text}
+        onText={change}
+        autoCapitalize="none"
+        autoComplete="off"
+      />
+      {isKey && stored !== null && text.toLowerCase() !== stored && (
+        <ConfirmButton label={words.use} look="plain" act={async () => store(text)}>
+          {words.replaces}
+        </ConfirmButton>
+      )}
+    </>
   );
 }
 

@@ -116,7 +116,14 @@ test("an invitation shows its room and the names taken there", async () => {
   await other.page.getByLabel("Your name").fill("Ben");
   await other.page.getByRole("button", { name: "Sit down" }).click();
   await other.page.waitForURL(/\/rooms\//);
-  expect([...ada.faults, ...other.faults]).toEqual([]);
+  // Who comes too late learns it before entering a name, and can watch.
+  const late = await person(browser);
+  await late.page.goto(`${server.url}/join/${code}`);
+  await late.page.getByText("The game has already started.").waitFor();
+  expect(await late.page.getByLabel("Your name").count()).toBe(0);
+  await late.page.getByRole("link", { name: "Watch" }).click();
+  await late.page.waitForURL(/\/watch\//);
+  expect([...ada.faults, ...other.faults, ...late.faults]).toEqual([]);
 });
 
 test("leaving frees the seat before the game, explains what happens during it, and lets the room's creator end it", async () => {
@@ -292,5 +299,15 @@ test("the key of a person's names is taken to another device", async () => {
   const other = await sit(third);
   expect(other).toMatch(/^[0-9a-f]{16}$/);
   expect(other).not.toBe(own);
+  // A key that would replace another is confirmed.
+  await (await keyField(third)).fill(key);
+  await third.getByText("Use this key").waitFor();
+  expect(await sit(third)).toBe(other);
+  await (await keyField(third)).fill(key);
+  await third.getByRole("button", { name: "Use this key" }).click();
+  await third.getByText("Copy the former key first").waitFor();
+  await third.getByRole("button", { name: "Use this key" }).click();
+  await third.getByRole("button", { name: "Use this key" }).waitFor({ state: "detached" });
+  expect(await sit(third)).toBe(own);
   for (const { faults } of devices) expect(faults).toEqual([]);
 });

@@ -51,6 +51,9 @@ export const common: Texts["common"] = {
       key: "Schlüssel deiner Namen",
       hint: "Andere können deinen Namen wählen, aber nicht seinen Schlüssel: Bestenlisten führen euch getrennt. Der Schlüssel entsteht, wenn du zum ersten Mal an einer Partie teilnimmst. Gib ihn auf einem anderen Gerät ein, um dort dieselbe Person zu sein; verrate ihn sonst niemandem.",
       notAKey: "Ein Schlüssel hat 64 Ziffern von 0 bis 9 und a bis f.",
+      use: "Diesen Schlüssel verwenden",
+      replaces:
+        "Dieses Gerät spielt dann als die Person des neuen Schlüssels. Kopiere zuerst den bisherigen, wenn du wieder diese Person sein willst.",
     },
     fullScreen: "Vollbild",
     fullScreenOff: "Vollbild beenden",

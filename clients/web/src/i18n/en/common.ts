@@ -49,6 +49,9 @@ export const common = {
       key: "Key of your names",
       hint: "Others can choose your name, but they do not have its key, so leaderboards list you separately. The key is created when you first join a game. Enter it on another device to be the same person there, and show it to nobody else.",
       notAKey: "A key has 64 digits from 0 to 9 and a to f.",
+      use: "Use this key",
+      replaces:
+        "This device then plays as the person of the new key. Copy the former key first if you want to be that person again.",
     },
     fullScreen: "Full screen",
     fullScreenOff: "Leave full screen",

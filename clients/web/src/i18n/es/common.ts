@@ -52,6 +52,9 @@ export const common: Texts["common"] = {
       key: "Clave de tus nombres",
       hint: "Otras personas pueden elegir tu nombre, pero no su clave: las clasificaciones os muestran por separado. La clave se crea cuando entras por primera vez en una partida. Para ser la misma persona en otro dispositivo, escríbela allí; no se la digas a nadie más.",
       notAKey: "Una clave tiene 64 cifras de 0 a 9 y de a a f.",
+      use: "Usar esta clave",
+      replaces:
+        "Este dispositivo jugará entonces como la persona de la clave nueva. Copia antes la anterior si quieres volver a ser esa persona.",
     },
     fullScreen: "Pantalla completa",
     fullScreenOff: "Salir de la pantalla completa",

@@ -49,6 +49,9 @@ export const common: Texts["common"] = {
       key: "Chiave dei tuoi nomi",
       hint: "Altri possono scegliere il tuo nome, ma non la sua chiave: le classifiche vi elencano separati. La chiave si crea quando entri per la prima volta in una partita. Per essere la stessa persona su un altro dispositivo, inseriscila lì; non dirla a nessun altro.",
       notAKey: "Una chiave ha 64 cifre da 0 a 9 e da a a f.",
+      use: "Usa questa chiave",
+      replaces:
+        "Questo dispositivo giocherà allora come la persona della nuova chiave. Copia prima quella di adesso se vuoi tornare a essere quella persona.",
     },
     fullScreen: "Schermo intero",
     fullScreenOff: "Esci da schermo intero",
