@@ -343,7 +343,9 @@ class CardsLaid(_message.Message):
     SEAT_FIELD_NUMBER: _builtins.int
     CARDS_FIELD_NUMBER: _builtins.int
     seat: _builtins.int
-    """The seat; unset: the one whose turn it is."""
+    """The seat; name it if it is known. Unset: it counts for the seat whose turn it is, until other
+    reports show that this seat had passed unseen (`AcceptedReport.assumed_seat`).
+    """
     @_builtins.property
     def cards(self) -> Global___SeenCards:
         """The cards laid, without those that lay there before."""
@@ -372,7 +374,7 @@ class PassShown(_message.Message):
 
     SEAT_FIELD_NUMBER: _builtins.int
     seat: _builtins.int
-    """The seat; unset: the one whose turn it is."""
+    """The seat; unset: the one whose turn it is, as in `CardsLaid`."""
     def __init__(
         self,
         *,
@@ -917,6 +919,7 @@ class AcceptedReport(_message.Message):
     TEXT_FIELD_NUMBER: _builtins.int
     ELAPSED_MS_FIELD_NUMBER: _builtins.int
     CONTENT_FIELD_NUMBER: _builtins.int
+    ASSUMED_SEAT_FIELD_NUMBER: _builtins.int
     report: _builtins.int
     """Number of the report."""
     seat: _builtins.int
@@ -925,6 +928,10 @@ class AcceptedReport(_message.Message):
     """For people: "Bo laid two 9s"."""
     elapsed_ms: _builtins.int
     """Milliseconds since the room was created."""
+    assumed_seat: _builtins.bool
+    """Whether the report named no seat: that it was this seat's turn is only assumed. A correction may
+    name another; later reports that named none then count for the seats after it.
+    """
     @_builtins.property
     def content(self) -> Global___TableReport:
         """The report as it counts; the cards of a hand are left out."""
@@ -937,10 +944,11 @@ class AcceptedReport(_message.Message):
         text: _builtins.str = ...,
         elapsed_ms: _builtins.int = ...,
         content: Global___TableReport | None = ...,
+        assumed_seat: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "content", b"content", "seat", b"seat"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "content", b"content", "elapsed_ms", b"elapsed_ms", "report", b"report", "seat", b"seat", "text", b"text"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_seat", b"_seat", "assumed_seat", b"assumed_seat", "content", b"content", "elapsed_ms", b"elapsed_ms", "report", b"report", "seat", b"seat", "text", b"text"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__seat: _TypeAlias = _typing.Literal["seat"]  # noqa: Y015
     _WhichOneofArgType__seat: _TypeAlias = _typing.Literal["_seat", b"_seat"]  # noqa: Y015
