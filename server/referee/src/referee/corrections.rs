@@ -95,7 +95,7 @@ impl Referee {
             return refuse(NOT_ALIKE);
         };
         let old = entries[index].report.clone().expect("it is a report");
-        let assumed = entries[index].named().expect("it is a report");
+        let named = entries[index].named().expect("it is a report");
         // Passes that were inferred from the report fall with it.
         let inferred = |entry: &&Entry| entry.number == number && entry.report.is_none();
         let first = index - entries[..index].iter().rev().take_while(inferred).count();
@@ -122,14 +122,14 @@ impl Referee {
         let void_reports = self.replay(&entries[index + 1..]);
         let text = match instead {
             Some(instead) => {
-                let instead = as_seat_of(&assumed, instead);
+                let instead = as_seat_of(&named, instead);
                 format!(
                     "Corrected: {}. (Before: {}.)",
                     self.describe(&instead),
-                    self.describe(&assumed)
+                    self.describe(&named)
                 )
             }
-            None => format!("Removed: {}.", self.describe(&assumed)),
+            None => format!("Removed: {}.", self.describe(&named)),
         };
         ruling.corrected = Some(Corrected {
             number,

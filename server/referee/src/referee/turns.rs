@@ -187,7 +187,7 @@ impl Referee {
             (action, seat) => {
                 let is_same = last_play
                     .is_some_and(|(of, done)| done == action && seat.is_none_or(|seat| seat == of));
-                let ended_pizza = last == last_play && self.cleared < shift.turns().count();
+                let ended_pizza = last == last_play && !self.is_cleared();
                 let leads_again = || self.may_be_repeated(seat, action).is_some();
                 is_same && (now.board.size > 0 || ended_pizza && !leads_again())
             }
@@ -198,11 +198,16 @@ impl Referee {
     /// one: its cards lie there until the board is cleared.
     fn may_be_repeated(&self, seat: Option<Seat>, action: Action) -> Option<Seat> {
         let (of, last) = self.shift().turns().next_back()?;
-        let lies_there = self.game().observe(Viewer::Spectator).board.size == 0
-            && self.cleared < self.shift().turns().count();
+        let lies_there =
+            self.game().observe(Viewer::Spectator).board.size == 0 && !self.is_cleared();
         let leader = self.to_act().filter(|leader| !self.remote[*leader])?;
         let may_be = last == action && action != Action::Pass && lies_there;
         (may_be && seat.is_none_or(|seat| seat == leader && seat == of)).then_some(leader)
+    }
+
+    /// Whether the board was seen to be cleared after the last turn.
+    fn is_cleared(&self) -> bool {
+        self.cleared >= self.shift().turns().count()
     }
 
     /// Judges what a seat at the table did.
@@ -252,7 +257,7 @@ impl Referee {
         if opening || self.to_act() == Some(seat) {
             let required = self.requirement(self.game());
             check_play(&self.rules, &required, action, golden).map_err(|it| (Some(seat), it))?;
-            // Whoever opened is known by the Golden card.
+            // The Golden card shows who opened.
             let report = if opening {
                 report.with_seat(seat)
             } else {
