@@ -136,8 +136,8 @@ impl Steps {
         });
     }
 
-    /// The last lines of the failed programs, then a line for each step that was reached: where a log
-    /// is cut, its end tells what failed.
+    /// The last lines of the failed programs, then a line for each step that was reached, and last
+    /// the lines that name failures: where a log is cut, its end tells what failed.
     pub(crate) fn summary(&self) -> String {
         let mut text = String::new();
         for step in &self.done {
@@ -179,29 +179,42 @@ impl Steps {
             };
             writeln!(text, "{line}").expect("a String grows as needed");
         }
+        for step in &self.done {
+            if let Outcome::Failed { output } = &step.outcome {
+                for line in naming(output.lines(), MOST_NAMED) {
+                    writeln!(text, "{}: {line}", step.name).expect("a String grows as needed");
+                }
+            }
+        }
         text
     }
 }
 
+/// The last lines, `most` of them, that name a failure.
+fn naming<'a>(lines: impl DoubleEndedIterator<Item = &'a str>, most: usize) -> Vec<&'a str> {
+    const NAMING: [&str; 5] = ["FAIL", "failed", "panicked", "Error", "error:"];
+    let passed = |line: &str| line.contains(" 0 failed") || line.ends_with("... ok");
+    let names = |line: &&str| NAMING.iter().any(|word| line.contains(word)) && !passed(line);
+    let mut naming: Vec<&str> = lines.rev().filter(names).take(most).collect();
+    naming.reverse();
+    naming
+}
+
 /// The lines of a log that tell most about a failure: those that name it, then the last ones.
 fn last_lines(output: &str) -> String {
-    const NAMING: [&str; 5] = ["FAIL", "failed", "panicked", "Error", "error:"];
     let lines: Vec<&str> = output.lines().collect();
     let (earlier, last) = lines.split_at(lines.len().saturating_sub(LAST_LINES));
-    let passed = |line: &str| line.contains(" 0 failed") || line.ends_with("... ok");
-    let mut naming: Vec<&str> = (earlier.iter().rev())
-        .filter(|line| NAMING.iter().any(|word| line.contains(word)) && !passed(line))
-        .take(LAST_LINES)
-        .copied()
-        .collect();
-    naming.reverse();
-    naming.extend(last);
-    naming.join("\n")
+    let mut kept = naming(earlier.iter().copied(), LAST_LINES);
+    kept.extend(last);
+    kept.join("\n")
 }
 
 /// The most lines of a failed program that are shown again at the end, besides as many that name
 /// failures.
 const LAST_LINES: usize = 60;
+
+/// The most lines of a failed program that name failures and are shown once more as the last ones.
+const MOST_NAMED: usize = 12;
 
 #[cfg(test)]
 mod tests {
@@ -245,7 +258,7 @@ mod tests {
         let mut steps = Steps::default();
         let lanes: Vec<Lane<'_>> = vec![
             Box::new(move |steps| {
-                program(steps, "first", "echo words; exit 1")?;
+                program(steps, "first", "echo a test FAILED; echo words; exit 1")?;
                 program(steps, "never", "exit 0")
             }),
             Box::new(move |steps| program(steps, "second", "exit 0")),
@@ -258,5 +271,6 @@ mod tests {
         assert!(summary.contains("ok       second "), "{summary}");
         assert!(!summary.contains("never"), "{summary}");
         assert!(summary.contains("words\n"), "{summary}");
+        assert!(summary.ends_with("first: a test FAILED\n"), "{summary}");
     }
 }
