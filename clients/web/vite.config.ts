@@ -65,7 +65,7 @@ export default defineConfig({
       output: {
         codeSplitting: {
           groups: [
-            { name: "libraries", test: /node_modules[\\/](?!uqr|@?pdf-lib|pako|tslib|smol-toml)/ },
+            { name: "libraries", test: /node_modules[\\/](?!uqr|smol-toml)/ },
             { name: "protocol", test: /src[\\/]gen[\\/]/ },
             { name: "parts", test: /src[\\/](parts|api|lobby)[\\/]|symbols[\\/]/ },
           ],

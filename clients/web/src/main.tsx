@@ -14,6 +14,7 @@ if (root) {
   startToken();
   startTheme();
   await startLanguage();
+  root.replaceChildren();
   render(<App />, root);
   // A browser has none in a private window, or without a secure origin.
   void navigator.serviceWorker?.register("/sw.js").catch(() => undefined);

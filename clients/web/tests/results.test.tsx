@@ -1,7 +1,6 @@
-// The results of a tournament to print, and certificates as PDF.
+// The results of a tournament and its certificates, to print.
 
 import { create } from "@bufbuild/protobuf";
-import { PDFDocument } from "pdf-lib";
 import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
@@ -18,7 +17,6 @@ import { setLanguage } from "../src/i18n";
 import { fileName } from "../src/parts/download";
 import { forgetAll } from "../src/store";
 import { certificatesOf } from "../src/tournaments/certificate";
-import { certificatesPdf } from "../src/tournaments/certificate-pdf";
 import { Results } from "../src/tournaments/ResultsPage";
 import { root } from "./mounted";
 
@@ -108,23 +106,28 @@ test("there are none before the end, or if it was closed early", () => {
   expect(certificatesOf(tournament(TournamentState.CLOSED), standings)).toEqual([]);
 });
 
-test("the PDF has a page for each, and a picture for what its fonts cannot write", async () => {
-  const drawn: string[] = [];
-  // One white pixel.
-  const png = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8/5+hHgAHggJ/PchI7wAAAABJRU5ErkJggg==";
-  const bytes = await certificatesPdf(certificatesOf(tournament(), standings), async (text) => {
-    drawn.push(text);
-    return Uint8Array.from(atob(png), (character) => character.charCodeAt(0));
-  });
-  const pdf = await PDFDocument.load(bytes);
-  expect(pdf.getPageCount()).toBe(4);
-  expect(pdf.getTitle()).toBe("Certificate · Spring cup");
-  expect(drawn).toEqual(["Łucja 你好"]);
-});
+test("certificates are on the page while the browser prints them", async () => {
+  const sheets = () => [...root.querySelectorAll('[data-part="certificate"]')].map(({ textContent }) => textContent);
+  const printed: (string | null)[][] = [];
+  vi.stubGlobal("print", () => printed.push(sheets()));
+  await act(async () => render(<Results live={{ tournament: tournament(), standings, games: [] }} />, root));
+  const press = (label: string) =>
+    act(async () => {
+      const buttons = [...root.querySelectorAll("button")].filter(({ textContent }) => textContent === label);
+      expect(buttons).toHaveLength(1);
+      buttons[0]?.click();
+    });
 
-test("without a canvas, other scripts become question marks", async () => {
-  const bytes = await certificatesPdf(certificatesOf(tournament(), standings), async () => null);
-  expect((await PDFDocument.load(bytes)).getPageCount()).toBe(4);
+  await press("Print all 4 certificates");
+  expect(printed).toHaveLength(1);
+  expect(printed[0]?.map((text) => text?.includes("Spring cup"))).toEqual([true, true, true, true]);
+  await act(async () => void window.dispatchEvent(new Event("afterprint")));
+  expect(sheets()).toEqual([]);
+
+  await press("Print the certificate of Łucja 你好");
+  expect(printed[1]?.length).toBe(1);
+  expect(printed[1]?.[0]).toContain("Łucja 你好");
+  vi.unstubAllGlobals();
 });
 
 test.each([

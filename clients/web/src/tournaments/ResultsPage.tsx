@@ -1,17 +1,13 @@
-// The results of a tournament, to print or to store as PDF, and certificates for the participants.
+// The results of a tournament and certificates for the participants, to print or, from the dialog of
+// the browser, to store as PDF.
 
+import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
 import type { PageProps } from "../app";
-import {
-  type Tournament,
-  type TournamentGame,
-  TournamentGameState,
-  type TournamentStanding,
-} from "../gen/chefshat/v1/tournament_pb";
+import { type Tournament, type TournamentGame, TournamentGameState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
-import { useAttempt } from "../parts/attempt";
 import { Button, ButtonLink } from "../parts/Button";
-import { download, fileName } from "../parts/download";
+import { Drawing } from "../parts/Drawing";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
 import { type Certificate, certificatesOf } from "./certificate";
@@ -36,8 +32,10 @@ export function Results({ live }: { live: LiveTournament }) {
   const words = t().tournaments;
   const games = useGames(live);
   const deals = dealsWords(tournament);
+  const certificates = certificatesOf(tournament, standings);
+  const [printing, print] = usePrinting();
   return (
-    <article class={css.results} data-part="results">
+    <article class={css.results} data-part="results" data-printing={printing && ""}>
       <nav class={css.controls} aria-label={words.results.controls}>
         <Button look="main" onClick={() => window.print()}>
           {words.print}
@@ -68,8 +66,11 @@ export function Results({ live }: { live: LiveTournament }) {
         </ul>
       </section>
       <Games tournament={tournament} games={games} />
-      <Certificates tournament={tournament} standings={standings} />
+      {certificates.length > 0 && <Certificates certificates={certificates} onPrint={print} />}
       <footer class={css.foot}>{words.results.foot(tournament.tournamentId)}</footer>
+      {printing?.map((certificate) => (
+        <Sheet key={certificate.participant} certificate={certificate} />
+      ))}
     </article>
   );
 }
@@ -120,42 +121,61 @@ function resultWords(tournament: Tournament, { seats }: TournamentGame): string 
     .join(" · ");
 }
 
-interface CertificatesProps {
-  tournament: Tournament;
-  standings: readonly TournamentStanding[];
+/** The certificates that are printed in place of the results, until the dialog is closed; and what opens it. */
+function usePrinting(): [readonly Certificate[] | undefined, (certificates: readonly Certificate[]) => void] {
+  const [printing, setPrinting] = useState<readonly Certificate[]>();
+  useEffect(() => {
+    if (!printing) return;
+    const end = () => setPrinting(undefined);
+    window.addEventListener("afterprint", end);
+    window.print();
+    return () => window.removeEventListener("afterprint", end);
+  }, [printing]);
+  return [printing, setPrinting];
 }
 
-/** Buttons that save certificates; null before the end. */
-function Certificates({ tournament, standings }: CertificatesProps) {
+interface CertificatesProps {
+  certificates: readonly Certificate[];
+  onPrint(certificates: readonly Certificate[]): void;
+}
+
+/** Buttons that print certificates. */
+function Certificates({ certificates, onPrint }: CertificatesProps) {
   const words = t().tournaments.certificate;
-  const { busy, fault, run } = useAttempt();
-  const all = certificatesOf(tournament, standings);
-  if (all.length === 0) return null;
-  const save = (certificates: readonly Certificate[], name: string) =>
-    run(async () => {
-      const { certificatesPdf } = await import("./certificate-pdf");
-      const pdf = await certificatesPdf(certificates);
-      download(pdf.slice().buffer, `${fileName(`${tournament.settings?.name} ${name}`)}.pdf`, "application/pdf");
-      return false;
-    });
   return (
     <section class={css.certificates} data-part="certificates">
       <h2>{words.heading}</h2>
       <p class="soft">{words.text}</p>
-      {fault && <Notice kind="fault">{fault}</Notice>}
-      <Button busy={busy} onClick={() => save(all, words.heading)}>
-        {words.all(all.length)}
-      </Button>
+      <Button onClick={() => onPrint(certificates)}>{words.all(certificates.length)}</Button>
       <ul>
-        {all.map((certificate) => (
+        {certificates.map((certificate) => (
           <li key={certificate.participant}>
-            <Button look="quiet" busy={busy} onClick={() => save([certificate], certificate.name)}>
+            <Button look="quiet" onClick={() => onPrint([certificate])}>
               <span class="visually-hidden">{words.of} </span>
               {certificate.name}
             </Button>
           </li>
         ))}
       </ul>
+    </section>
+  );
+}
+
+/** A certificate on a sheet of its own, seen only on paper. */
+function Sheet({ certificate }: { certificate: Certificate }) {
+  return (
+    <section class={css.sheet} data-part="certificate">
+      <Drawing name="role-chef" class={css.hat} />
+      <p class={css.title}>{certificate.title}</p>
+      <p class={css.name}>{certificate.name}</p>
+      <p>{certificate.achieved}</p>
+      <p class={css.tournament}>{certificate.tournament}</p>
+      {certificate.lines.map((line) => (
+        <p key={line} class={css.line}>
+          {line}
+        </p>
+      ))}
+      <p class={css.signature}>{certificate.signature}</p>
     </section>
   );
 }

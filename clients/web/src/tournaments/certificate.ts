@@ -1,4 +1,4 @@
-// What the certificates of a tournament say. Drawn by certificate-pdf.ts.
+// What the certificates of a tournament say. Printed by ResultsPage.tsx.
 
 import { type Tournament, type TournamentStanding, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { decimal, t } from "../i18n";

@@ -53,9 +53,9 @@ export const tournaments: Texts["tournaments"] = {
   },
   certificate: {
     heading: "Urkunden",
-    text: "Auf diesem Gerät erstellt, als PDF. Unterschreibe sie von Hand.",
-    all: (count) => plural(count, { one: "# Urkunde speichern", other: "Alle # Urkunden in einer Datei speichern" }),
-    of: "Urkunde speichern von",
+    text: "Auf Papier oder, im Dialog des Druckens, als PDF. Unterschreibe sie von Hand.",
+    all: (count) => plural(count, { one: "# Urkunde drucken", other: "Alle # Urkunden drucken" }),
+    of: "Urkunde drucken von",
     title: "Urkunde",
     placed: (place, of) => `hat im Turnier den ${place}. Platz von ${of} erreicht`,
     tookPart: "hat am Turnier teilgenommen",

@@ -53,9 +53,9 @@ export const tournaments = {
   },
   certificate: {
     heading: "Certificates",
-    text: "Made on this device, as PDF. Sign them by hand.",
-    all: (count: number) => plural(count, { one: "Save # certificate", other: "Save all # certificates in one file" }),
-    of: "Save the certificate of",
+    text: "On paper, or as PDF by the dialog that opens. Sign them by hand.",
+    all: (count: number) => plural(count, { one: "Print # certificate", other: "Print all # certificates" }),
+    of: "Print the certificate of",
     title: "Certificate",
     placed: (place: number, of: number) => `took ${th(place)} place of ${of} in the tournament`,
     tookPart: "took part in the tournament",

@@ -58,9 +58,9 @@ export const tournaments: Texts["tournaments"] = {
   },
   certificate: {
     heading: "Diplomas",
-    text: "Creados en este dispositivo, en PDF. Fírmalos a mano.",
-    all: (count) => plural(count, { one: "Guardar # diploma", other: "Guardar los # diplomas en un solo archivo" }),
-    of: "Guardar el diploma de",
+    text: "En papel o, desde el diálogo de impresión, en PDF. Fírmalos a mano.",
+    all: (count) => plural(count, { one: "Imprimir # diploma", other: "Imprimir los # diplomas" }),
+    of: "Imprimir el diploma de",
     title: "Diploma",
     placed: (place, of) => `obtuvo el ${place}.º puesto de ${of} en el torneo`,
     tookPart: "participó en el torneo",

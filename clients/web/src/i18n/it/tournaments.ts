@@ -53,9 +53,9 @@ export const tournaments: Texts["tournaments"] = {
   },
   certificate: {
     heading: "Attestati",
-    text: "Creati su questo dispositivo, in PDF. Firmali a mano.",
-    all: (count) => plural(count, { one: "Salva # attestato", other: "Salva tutti i # attestati in un file" }),
-    of: "Salva l’attestato di",
+    text: "Su carta o, dalla finestra di stampa, in PDF. Firmali a mano.",
+    all: (count) => plural(count, { one: "Stampa # attestato", other: "Stampa tutti i # attestati" }),
+    of: "Stampa l’attestato di",
     title: "Attestato",
     placed: (place, of) => `ha ottenuto il ${place}º posto su ${of} nel torneo`,
     tookPart: "ha partecipato al torneo",
