@@ -21,7 +21,7 @@ impl Client {
     ///
     /// # Errors
     /// `TICKET_UNKNOWN`, `REPORT_REFUSED` with the malformed field in the metadata,
-    /// `GAME_NOT_STARTED`, `GAME_OVER`, `NOT_CORRECTABLE`, `NO_SUCH_OPTION`,
+    /// `GAME_NOT_STARTED`, `GAME_OVER`, `GAME_NOT_OVER`, `NOT_CORRECTABLE`, `NO_SUCH_OPTION`,
     /// `TOO_MANY_HELD_REPORTS`, `TOO_MANY_QUESTIONS`.
     ///
     /// # Panics

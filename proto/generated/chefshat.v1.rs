@@ -11926,7 +11926,7 @@ pub struct TableReport {
     /// What happened.
     #[prost(
         oneof = "table_report::Kind",
-        tags = "3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14"
+        tags = "3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15"
     )]
     pub kind: ::core::option::Option<table_report::Kind>,
 }
@@ -11971,6 +11971,9 @@ pub mod table_report {
         /// The game is paused or resumed.
         #[prost(message, tag = "14")]
         Pause(super::TablePause),
+        /// The play that ended the game was read correctly.
+        #[prost(message, tag = "15")]
+        EndConfirmed(super::EndConfirmed),
     }
 }
 /// Cards seen at a physical table.
@@ -12051,10 +12054,9 @@ pub struct RoleTaken {
     #[prost(enumeration = "Role", tag = "2")]
     pub role: i32,
 }
-/// An earlier report was wrong: misread, or something that was not a play. Possible for hands and
-/// gifts of the Shift in progress, and for plays and passes of the pizza in progress and of the one
-/// before; after the end of a Shift, until something of the next is reported; never after the end of
-/// the game. Everything after it is judged again; what then no longer fits is void.
+/// An earlier report was wrong: misread, or something that was not a play. Possible for what was
+/// reported of the Shift in progress; after the end of a Shift, until something of the next is
+/// reported; after the play that ends the game, until its end is confirmed. Everything after it is judged again; what then no longer fits is void.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct ReportCorrection {
     /// Number of the report to correct.
@@ -12103,6 +12105,10 @@ pub struct TablePause {
     #[prost(bool, tag = "1")]
     pub paused: bool,
 }
+/// The play that ended the game was read correctly: the result is final, and nothing can be corrected
+/// any more. Only at TABLE_STAGE_CONFIRMATION, else FAILED_PRECONDITION (GAME_NOT_OVER).
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct EndConfirmed {}
 /// The referee's verdict on a report.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct ReportResponse {
@@ -12348,6 +12354,10 @@ pub enum TableStage {
     Question = 7,
     /// The game is over.
     Over = 8,
+    /// For the confirmation of the play that ended the game, since a misread one could not be corrected
+    /// later: report EndConfirmed, or correct it. Without another report the end counts as confirmed
+    /// after 20 s, in which the game is not paused.
+    Confirmation = 9,
 }
 impl TableStage {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -12365,6 +12375,7 @@ impl TableStage {
             Self::Turn => "TABLE_STAGE_TURN",
             Self::Question => "TABLE_STAGE_QUESTION",
             Self::Over => "TABLE_STAGE_OVER",
+            Self::Confirmation => "TABLE_STAGE_CONFIRMATION",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -12379,6 +12390,7 @@ impl TableStage {
             "TABLE_STAGE_TURN" => Some(Self::Turn),
             "TABLE_STAGE_QUESTION" => Some(Self::Question),
             "TABLE_STAGE_OVER" => Some(Self::Over),
+            "TABLE_STAGE_CONFIRMATION" => Some(Self::Confirmation),
             _ => None,
         }
     }
@@ -12479,8 +12491,9 @@ pub mod table_service_client {
         }
         /// Reports something that happened at the table. UNAUTHENTICATED (TICKET_UNKNOWN);
         /// INVALID_ARGUMENT (REPORT_REFUSED) names the field of a malformed report; ALREADY_EXISTS
-        /// (REPORT_ID_USED); FAILED_PRECONDITION (GAME_OVER; GAME_NOT_STARTED; NOT_CORRECTABLE: the report
-        /// to correct does not count or is too old; NO_SUCH_OPTION: the question has no such answer;
+        /// (REPORT_ID_USED); FAILED_PRECONDITION (GAME_OVER; GAME_NOT_STARTED; GAME_NOT_OVER: there is no
+        /// end to confirm; NOT_CORRECTABLE: the report to correct does not count or is too old;
+        /// NO_SUCH_OPTION: the question has no such answer;
         /// TOO_MANY_HELD_REPORTS: 32 plays and passes wait, so have the referee's question answered);
         /// RESOURCE_EXHAUSTED (TOO_MANY_QUESTIONS: 16 are open); UNAVAILABLE (ROOM_GONE). Nothing follows
         /// from a refused report. A report that the rules or the cards do not allow is not an error: see
@@ -12552,8 +12565,9 @@ pub mod table_service_server {
     pub trait TableService: std::marker::Send + std::marker::Sync + 'static {
         /// Reports something that happened at the table. UNAUTHENTICATED (TICKET_UNKNOWN);
         /// INVALID_ARGUMENT (REPORT_REFUSED) names the field of a malformed report; ALREADY_EXISTS
-        /// (REPORT_ID_USED); FAILED_PRECONDITION (GAME_OVER; GAME_NOT_STARTED; NOT_CORRECTABLE: the report
-        /// to correct does not count or is too old; NO_SUCH_OPTION: the question has no such answer;
+        /// (REPORT_ID_USED); FAILED_PRECONDITION (GAME_OVER; GAME_NOT_STARTED; GAME_NOT_OVER: there is no
+        /// end to confirm; NOT_CORRECTABLE: the report to correct does not count or is too old;
+        /// NO_SUCH_OPTION: the question has no such answer;
         /// TOO_MANY_HELD_REPORTS: 32 plays and passes wait, so have the referee's question answered);
         /// RESOURCE_EXHAUSTED (TOO_MANY_QUESTIONS: 16 are open); UNAVAILABLE (ROOM_GONE). Nothing follows
         /// from a refused report. A report that the rules or the cards do not allow is not an error: see

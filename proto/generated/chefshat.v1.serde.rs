@@ -8891,6 +8891,77 @@ impl<'de> serde::Deserialize<'de> for Durability {
         deserializer.deserialize_any(GeneratedVisitor)
     }
 }
+impl serde::Serialize for EndConfirmed {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let len = 0;
+        let struct_ser = serializer.serialize_struct("chefshat.v1.EndConfirmed", len)?;
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for EndConfirmed {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                            Err(serde::de::Error::unknown_field(value, FIELDS))
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = EndConfirmed;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.EndConfirmed")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<EndConfirmed, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                while map_.next_key::<GeneratedField>()?.is_some() {
+                    let _ = map_.next_value::<serde::de::IgnoredAny>()?;
+                }
+                Ok(EndConfirmed {
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.EndConfirmed", FIELDS, GeneratedVisitor)
+    }
+}
 impl serde::Serialize for Entered {
     #[allow(deprecated)]
     fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
@@ -41407,6 +41478,9 @@ impl serde::Serialize for TableReport {
                 table_report::Kind::Pause(v) => {
                     struct_ser.serialize_field("pause", v)?;
                 }
+                table_report::Kind::EndConfirmed(v) => {
+                    struct_ser.serialize_field("endConfirmed", v)?;
+                }
             }
         }
         struct_ser.end()
@@ -41435,6 +41509,8 @@ impl<'de> serde::Deserialize<'de> for TableReport {
             "question",
             "answer",
             "pause",
+            "end_confirmed",
+            "endConfirmed",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -41453,6 +41529,7 @@ impl<'de> serde::Deserialize<'de> for TableReport {
             Question,
             Answer,
             Pause,
+            EndConfirmed,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -41488,6 +41565,7 @@ impl<'de> serde::Deserialize<'de> for TableReport {
                             "question" => Ok(GeneratedField::Question),
                             "answer" => Ok(GeneratedField::Answer),
                             "pause" => Ok(GeneratedField::Pause),
+                            "endConfirmed" | "end_confirmed" => Ok(GeneratedField::EndConfirmed),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -41608,6 +41686,13 @@ impl<'de> serde::Deserialize<'de> for TableReport {
                                 return Err(serde::de::Error::duplicate_field("pause"));
                             }
                             kind__ = map_.next_value::<::std::option::Option<_>>()?.map(table_report::Kind::Pause)
+;
+                        }
+                        GeneratedField::EndConfirmed => {
+                            if kind__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("endConfirmed"));
+                            }
+                            kind__ = map_.next_value::<::std::option::Option<_>>()?.map(table_report::Kind::EndConfirmed)
 ;
                         }
                     }
@@ -41931,6 +42016,7 @@ impl serde::Serialize for TableStage {
             Self::Turn => "TABLE_STAGE_TURN",
             Self::Question => "TABLE_STAGE_QUESTION",
             Self::Over => "TABLE_STAGE_OVER",
+            Self::Confirmation => "TABLE_STAGE_CONFIRMATION",
         };
         serializer.serialize_str(variant)
     }
@@ -41951,6 +42037,7 @@ impl<'de> serde::Deserialize<'de> for TableStage {
             "TABLE_STAGE_TURN",
             "TABLE_STAGE_QUESTION",
             "TABLE_STAGE_OVER",
+            "TABLE_STAGE_CONFIRMATION",
         ];
 
         struct GeneratedVisitor;
@@ -42000,6 +42087,7 @@ impl<'de> serde::Deserialize<'de> for TableStage {
                     "TABLE_STAGE_TURN" => Ok(TableStage::Turn),
                     "TABLE_STAGE_QUESTION" => Ok(TableStage::Question),
                     "TABLE_STAGE_OVER" => Ok(TableStage::Over),
+                    "TABLE_STAGE_CONFIRMATION" => Ok(TableStage::Confirmation),
                     _ => Err(serde::de::Error::unknown_variant(value, FIELDS)),
                 }
             }

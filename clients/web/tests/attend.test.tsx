@@ -71,6 +71,7 @@ describe("what the table waits for", () => {
     [{}, "Ada to play"],
     [{ seat: 2 }, "Cleo is deciding"],
     [{ stage: TableStage.QUESTION, seat: undefined }, "A question to you"],
+    [{ stage: TableStage.CONFIRMATION, seat: undefined }, "Was the last play read correctly?"],
     [{ stage: TableStage.OVER, seat: undefined }, "The game is over"],
   ])("%o", async (changed, words) => {
     await show(stateOf(changed));
@@ -99,6 +100,14 @@ describe("what the table waits for", () => {
       { case: "pause", value: { paused: false } },
     ]);
   });
+});
+
+test("the play that ended the game is confirmed, or corrected; nothing else is entered", async () => {
+  await show(stateOf({ stage: TableStage.CONFIRMATION, seat: undefined }));
+  expect(part("entry")).toBeNull();
+  expect(part("reports")).not.toBeNull();
+  await press("Yes, the game is over");
+  expect(sent).toEqual([{ case: "endConfirmed", value: {} }]);
 });
 
 describe("entering by hand", () => {

@@ -79,6 +79,8 @@ pub enum Report {
     },
     /// The game is paused (`true`) or resumed.
     Pause(bool),
+    /// The play that ended the game was read correctly.
+    EndConfirmed,
 }
 
 impl Report {
@@ -91,7 +93,11 @@ impl Report {
             | Self::Role { seat, .. } => Some(*seat),
             Self::Laid { seat, .. } | Self::Pass { seat } | Self::Special { seat } => *seat,
             Self::Question(question) => question.seat,
-            Self::Cleared | Self::Correction { .. } | Self::Answer { .. } | Self::Pause(_) => None,
+            Self::Cleared
+            | Self::Correction { .. }
+            | Self::Answer { .. }
+            | Self::Pause(_)
+            | Self::EndConfirmed => None,
         }
     }
 
@@ -249,6 +255,8 @@ pub enum Stage {
     Turn(Seat),
     /// The answer to a question of the referee.
     Question,
+    /// The confirmation of the play that ended the game.
+    Confirmation,
     /// Nothing: the game is over.
     Over,
 }

@@ -8,8 +8,8 @@ use chefshat_agents::BuiltInAgent;
 use chefshat_engine::{ActionId, Seat, Viewer};
 
 use super::{
-    BUILT_IN_BUDGET, Core, JOIN_HOLD, MAX_ANNOTATION_BYTES_PER_GAME, MAX_HANDOVER, MAX_IDLE,
-    OpenDecision, RECALL_TIME, RECHECK_INTERVAL, REPLAY_COST, State,
+    BUILT_IN_BUDGET, CONFIRMATION_TIME, Core, JOIN_HOLD, MAX_ANNOTATION_BYTES_PER_GAME,
+    MAX_HANDOVER, MAX_IDLE, OpenDecision, RECALL_TIME, RECHECK_INTERVAL, REPLAY_COST, State,
 };
 use crate::journal::{AbortReason, Change, Fill, ParticipantKind, Source, StudyGame};
 use crate::policy::AbortPolicy;
@@ -25,7 +25,8 @@ impl Core {
             }
             State::Playing => {
                 let decision = self.decision_deadline();
-                decision.into_iter().chain(self.idle_until()).min()
+                let ends = decision.into_iter().chain(self.confirmed_at());
+                ends.chain(self.idle_until()).min()
             }
             State::Finished | State::Aborted(_) => None,
         }
@@ -55,6 +56,15 @@ impl Core {
     fn idle_until(&self) -> Option<Duration> {
         let last = self.table()?.last_report();
         Some(last.max(self.restarted.unwrap_or_default()) + MAX_IDLE)
+    }
+
+    /// When the end of the game of a physical table counts as confirmed, unless something is
+    /// reported. A restart leaves its bridge time to return.
+    fn confirmed_at(&self) -> Option<Duration> {
+        let waits = self.awaits_confirmation() && !self.is_paused();
+        let table = self.table().filter(|_| waits)?;
+        let last = table.last_report().max(table.awaited_since());
+        Some(last.max(self.restarted.unwrap_or_default()) + CONFIRMATION_TIME)
     }
 
     /// Whether only answers of participants advance the game now: no built-in agent or substitute
@@ -101,9 +111,12 @@ impl Core {
         self.abort(now, AbortReason::Closed);
     }
 
-    /// Ends the game without a result, unless it is over.
+    /// Ends the game without a result, unless it is over. One that only waits for the confirmation of
+    /// its end has a result.
     pub fn abort(&mut self, now: Duration, reason: AbortReason) {
-        if !self.state.is_over() {
+        if self.awaits_confirmation() {
+            self.commit(now, Change::EndConfirmed);
+        } else if !self.state.is_over() {
             self.commit(now, Change::Aborted(reason));
         }
     }
@@ -335,6 +348,9 @@ impl Core {
         }
         if self.is_paused() {
             return;
+        }
+        if self.confirmed_at().is_some_and(|at| at <= now) {
+            return self.commit(now, Change::EndConfirmed);
         }
         if self.next_taken_over().is_some() {
             return self.advance(now);

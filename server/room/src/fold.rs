@@ -98,6 +98,7 @@ impl Core {
             Change::ServerRestarted if self.state.is_over() => {}
             Change::ServerRestarted => self.restart(at),
             Change::Reported(reported) => self.fold_report(at, reported),
+            Change::EndConfirmed => self.fold_confirmation(at),
             Change::Aborted(reason) => {
                 self.state = State::Aborted(*reason);
                 self.open = None;

@@ -302,6 +302,8 @@ pub enum Change {
     ServerRestarted,
     /// Something was reported from the physical table.
     Reported(Box<Reported>),
+    /// At a physical table, nobody corrected the play that ended the game in time.
+    EndConfirmed,
 }
 
 /// A moment that the owner of the room marked.

@@ -57,6 +57,8 @@ pub const MAX_REPORTS: usize = 20_000;
 /// The game of a physical table is aborted if nothing is reported for this long, also while it is
 /// paused.
 pub const MAX_IDLE: Duration = Duration::from_secs(12 * 60 * 60);
+/// How long the play that ended the game of a physical table can be corrected, after the last report.
+pub const CONFIRMATION_TIME: Duration = Duration::from_secs(20);
 /// Most changes of one game. A game that reaches this limit is aborted.
 pub const MAX_GAME_CHANGES: u64 = 2_000_000;
 /// Most decisions that built-in agents take before the room reads its mailbox again.

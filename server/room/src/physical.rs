@@ -3,13 +3,13 @@
 use std::time::Duration;
 
 use chefshat_engine::{BySeat, Event, Seat};
-use chefshat_referee::Ruling;
+use chefshat_referee::{Ruling, Stage};
 
-use crate::Core;
 use crate::answers::{ReportError, ReportOutcome};
 use crate::journal::{Change, Fill, Reported, Source};
 use crate::log::{Correction, HandReported, RoomEvent};
 use crate::table::{PhysicalTable, RoomGame, StandingEvent, Taken, stated};
+use crate::{Core, State};
 
 impl Core {
     /// The physical table, once its game has started.
@@ -18,6 +18,12 @@ impl Core {
             Some(RoomGame::Physical(table)) => Some(table),
             _ => None,
         }
+    }
+
+    /// Whether the game of a physical table is over unless the play that ended it is corrected.
+    pub(super) fn awaits_confirmation(&self) -> bool {
+        self.state == State::Playing
+            && (self.table()).is_some_and(|table| table.referee().stage() == Stage::Confirmation)
     }
 
     /// Whether the game of a physical table is paused.
@@ -136,6 +142,15 @@ impl Core {
         self.log_physical(at, ruling.events, void, by);
         for violation in ruling.violations {
             self.log.push(at, RoomEvent::Violation(Box::new(violation)));
+        }
+    }
+
+    /// Ends the game, since nobody corrected the play that ended it.
+    pub(super) fn fold_confirmation(&mut self, at: Duration) {
+        let number = self.changes;
+        if let Some(RoomGame::Physical(table)) = &mut self.game {
+            let ruling = table.confirm_end(number);
+            self.fold_ruling(at, number, ruling, |_| (Source::Table, 0));
         }
     }
 

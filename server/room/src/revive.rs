@@ -98,6 +98,7 @@ impl Core {
                     "a reported seat does not exist",
                 )
             }
+            Change::EndConfirmed => check(self.awaits_confirmation(), "the game is not over"),
             Change::Marked(_) => check(self.markers.len() < MAX_MARKERS, "it has too many markers"),
             Change::Aborted(_) | Change::ServerRestarted => Ok(()),
         }

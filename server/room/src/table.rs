@@ -139,6 +139,11 @@ impl PhysicalTable {
         self.last_report
     }
 
+    /// Since when the table waits for what it waits for.
+    pub(super) fn awaited_since(&self) -> Duration {
+        self.awaited_since
+    }
+
     /// Since when the table is paused.
     pub(super) fn paused_since(&self) -> Option<Duration> {
         self.paused_since
@@ -197,6 +202,11 @@ impl PhysicalTable {
         };
         (self.outcomes).insert(reported.id.clone(), (reported.clone(), outcome));
         ruling
+    }
+
+    /// Confirms the end of the game.
+    pub(super) fn confirm_end(&mut self, number: u64) -> Ruling {
+        self.referee.confirm_end(number)
     }
 
     /// Remembers since when the table waits for something else than before.

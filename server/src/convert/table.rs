@@ -153,6 +153,7 @@ fn report_from_proto(message: &v1::TableReport, deck: Deck) -> Result<Report, Fi
             }),
         },
         Kind::Pause(pause) => Report::Pause(pause.paused),
+        Kind::EndConfirmed(_) => Report::EndConfirmed,
     })
 }
 
@@ -310,6 +311,7 @@ fn kind_of_report(report: &Report, deck: Deck) -> Kind {
         Report::Question(question) => Kind::Question(question_to_proto(question, Vec::new())),
         Report::Answer { id, option } => Kind::Answer(answer_to_proto(id, *option)),
         Report::Pause(paused) => Kind::Pause(v1::TablePause { paused: *paused }),
+        Report::EndConfirmed => Kind::EndConfirmed(v1::EndConfirmed {}),
     }
 }
 
@@ -501,6 +503,7 @@ fn stage_to_proto(stage: Stage) -> (v1::TableStage, Option<Seat>) {
         Stage::Opening => (v1::TableStage::Opening, None),
         Stage::Turn(seat) => (v1::TableStage::Turn, Some(seat)),
         Stage::Question => (v1::TableStage::Question, None),
+        Stage::Confirmation => (v1::TableStage::Confirmation, None),
         Stage::Over => (v1::TableStage::Over, None),
     }
 }

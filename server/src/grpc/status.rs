@@ -457,6 +457,7 @@ impl From<ReportRefusal> for Refusal {
                 Unjudged::NoSuchOption => (Code::FailedPrecondition, "NO_SUCH_OPTION"),
                 Unjudged::TooManyHeld => (Code::FailedPrecondition, "TOO_MANY_HELD_REPORTS"),
                 Unjudged::NotCorrectable => (Code::FailedPrecondition, "NOT_CORRECTABLE"),
+                Unjudged::NotOver => (Code::FailedPrecondition, "GAME_NOT_OVER"),
             },
         };
         Self(status(code, reason, error.to_string(), []))

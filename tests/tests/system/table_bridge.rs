@@ -122,6 +122,7 @@ impl Bridge {
             v1::TableStage::Opening => Stage::Opening,
             v1::TableStage::Turn => Stage::Turn(seat()),
             v1::TableStage::Question => Stage::Question,
+            v1::TableStage::Confirmation => Stage::Confirmation,
             v1::TableStage::Over => Stage::Over,
             stage => panic!("{stage:?} in a game without special actions"),
         }
@@ -129,7 +130,7 @@ impl Bridge {
 
     fn awaits_the_table(&self) -> bool {
         match self.stage() {
-            Stage::Hand(_) | Stage::Opening => true,
+            Stage::Hand(_) | Stage::Opening | Stage::Confirmation => true,
             Stage::Turn(seat) | Stage::Gift(seat) => self.at_table[seat],
             _ => false,
         }
@@ -254,7 +255,8 @@ impl Bridge {
                 self.follow().await;
                 return;
             }
-            if self.lay().await {
+            let is_played = self.state.stage() == v1::TableStage::Confirmation;
+            if !is_played && self.lay().await {
                 continue;
             }
             if !self.awaits_the_table() {

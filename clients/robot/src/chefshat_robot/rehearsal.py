@@ -165,6 +165,8 @@ class Rehearsal:
                 seat = self._opener() if state.stage == pb.TABLE_STAGE_OPENING else state.seat
                 if state.seats[seat].at_table:
                     return self._take_turn(state, seat, start)
+            case pb.TABLE_STAGE_CONFIRMATION:
+                await self._report(end_confirmed=pb.EndConfirmed())
         return None
 
     def _opener(self) -> int:

@@ -96,6 +96,7 @@ export function AttendView({ state, report, trouble }: AttendViewProps) {
         table={table}
         heading={heading}
         onPause={(paused) => void send({ case: "pause", value: { paused } })}
+        onConfirm={() => void send({ case: "endConfirmed", value: {} })}
       />
       <div class={css.columns}>
         <div class={css.column}>
@@ -136,7 +137,7 @@ export function AttendView({ state, report, trouble }: AttendViewProps) {
               </ul>
             </section>
           )}
-          {begun && !over && (
+          {begun && !over && state.stage !== TableStage.CONFIRMATION && (
             <Entry
               state={state}
               table={table}
@@ -175,10 +176,12 @@ interface AwaitedProps {
   table: Table;
   heading: { current: HTMLHeadingElement | null };
   onPause: (paused: boolean) => void;
+  /** Confirms the play that ended the game. */
+  onConfirm: () => void;
 }
 
 /** What the table waits for, large enough to read from a chair away. */
-function Awaited({ state, table, heading, onPause }: AwaitedProps) {
+function Awaited({ state, table, heading, onPause, onConfirm }: AwaitedProps) {
   const words = t().attend.now;
   const { heading: what, text } = awaitedWords(state, table);
   const { stage, seat, paused, playRequirement } = state;
@@ -202,6 +205,13 @@ function Awaited({ state, table, heading, onPause }: AwaitedProps) {
           </p>
         ) : (
           text && <p class="soft">{text}</p>
+        )}
+        {stage === TableStage.CONFIRMATION && (
+          <p>
+            <Button look="main" onClick={onConfirm}>
+              {words.confirm}
+            </Button>
+          </p>
         )}
         {stage === TableStage.OVER && (
           <p>

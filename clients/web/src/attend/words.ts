@@ -54,6 +54,8 @@ export function awaitedWords(state: TableState, table: Table): Awaited {
       return remote ? { heading: words.turnOf(name), text: words.remoteText } : { heading: words.turn(name), text: "" };
     case TableStage.QUESTION:
       return { heading: words.question, text: words.questionText };
+    case TableStage.CONFIRMATION:
+      return { heading: words.confirmation, text: words.confirmationText };
     case TableStage.OVER:
       return { heading: words.over, text: "" };
     default:

@@ -161,7 +161,9 @@ mod tests {
 
     #[test]
     fn decisions_of_remote_seats_are_waited_for() {
-        use v1::TableStage::{Gift, Hand, Opening, Over, Question, SpecialAction, Turn, Waiting};
+        use v1::TableStage::{
+            Confirmation, Gift, Hand, Opening, Over, Question, SpecialAction, Turn, Waiting,
+        };
         let state = |stage: v1::TableStage, seat| v1::TableState {
             stage: stage.into(),
             seat,
@@ -184,6 +186,7 @@ mod tests {
             (Turn, Some(0), true),
             (Turn, Some(1), false),
             (Question, None, true),
+            (Confirmation, None, true),
             (Over, None, true),
         ] {
             assert_eq!(needs_a_report(&state(stage, seat)), expected, "{stage:?}");

@@ -22,6 +22,7 @@ answer 1              the first answer to the oldest question; answer none withd
 correct 12: 8 8       report 12 was wrong: it was 8 8; also correct 12: pass
 remove 12             what report 12 says did not happen
 pause, resume         the clocks of remote players stand still, or run again
+end                   the play that ended the game was read correctly
 state                 show the table again
 wait                  wait until the table needs a report; for scripts
 quit                  end this command; the game continues";
@@ -88,6 +89,7 @@ impl<'a> Grammar<'a> {
         match verb.to_lowercase().trim_end_matches(':') {
             "pause" if rest.is_empty() => Ok(pause(true)),
             "resume" if rest.is_empty() => Ok(pause(false)),
+            "end" if rest.is_empty() => Ok(Kind::EndConfirmed(v1::EndConfirmed {})),
             "clear" if rest.is_empty() => Ok(Kind::Cleared(v1::BoardCleared {})),
             "take" => self.taken_back(rest),
             "done" => self.done(rest),

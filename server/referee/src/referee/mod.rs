@@ -61,6 +61,8 @@ pub struct Referee {
     violation: Option<(u64, Violation)>,
     to_lay: Vec<ToLay>,
     paused: bool,
+    /// Whether the play that ended the game stands for good.
+    end_confirmed: bool,
 }
 
 /// The answer to a question.
@@ -139,6 +141,7 @@ impl Referee {
             violation: None,
             to_lay: Vec::new(),
             paused: false,
+            end_confirmed: false,
         };
         referee.push_shift(StartState {
             shift: 1,
@@ -181,6 +184,11 @@ impl Referee {
         ruling
     }
 
+    /// Confirms the end of a game that is over, as `Report::EndConfirmed` does.
+    pub fn confirm_end(&mut self, number: u64) -> Ruling {
+        self.report(number, &Report::EndConfirmed)
+    }
+
     fn finish(&mut self, number: u64, ruling: &mut Ruling) {
         if let Some(last) = ruling.violations.last() {
             self.violation = Some(last.clone());
@@ -198,7 +206,7 @@ impl Referee {
     }
 
     fn judge(&mut self, number: u64, report: &Report, ruling: &mut Ruling) -> Verdict {
-        if self.game().is_over() && !matches!(report, Report::Correction { .. }) {
+        if self.game().is_over() && !self.counts_after_the_end(report) {
             return Verdict::Known;
         }
         let judged = match report {
@@ -225,10 +233,28 @@ impl Referee {
                     Verdict::Accepted
                 })
             }
+            Report::EndConfirmed => {
+                self.end_confirmed = self.game().is_over();
+                Ok(Verdict::Accepted)
+            }
         };
         judged.unwrap_or_else(|(seat, (rule, text))| {
             Verdict::Violation(Violation { seat, rule, text })
         })
+    }
+
+    /// Whether a report can change something after the play that ended the game.
+    fn counts_after_the_end(&self, report: &Report) -> bool {
+        let may_be = !matches!(
+            report,
+            Report::Cleared
+                | Report::Pass { .. }
+                | Report::Hand { .. }
+                | Report::Special { .. }
+                | Report::Gift { .. }
+                | Report::Role { .. }
+        );
+        may_be && !self.end_confirmed
     }
 
     fn ask(&mut self, question: &Question) -> Judged {
@@ -307,7 +333,8 @@ impl Referee {
         Ok(())
     }
 
-    /// How many of the published events are void, and the events that follow.
+    /// How many of the published events are void, and the events that follow. The end of the game is
+    /// published once it is confirmed.
     fn publish(&mut self) -> (usize, Vec<Event>) {
         let public = |event: &Event| event.seen_by(Viewer::Spectator);
         let first = self
@@ -316,12 +343,17 @@ impl Referee {
             .min(self.published.len())
             .saturating_sub(2);
         let (mut void, mut new) = (0, Vec::new());
-        for index in first..self.shifts.len().max(self.published.len()) {
-            let old = self.published.get(index).map_or(&[][..], Vec::as_slice);
-            let events = self
-                .played
-                .get(index)
-                .map_or(&[][..], |it| it.events.as_slice());
+        let played = self.played[first..].iter().map(|it| self.publishable(it));
+        let current: Vec<Vec<Event>> = played.map(<[Event]>::to_vec).collect();
+        for index in 0..current
+            .len()
+            .max(self.published.len().saturating_sub(first))
+        {
+            let old = self
+                .published
+                .get(first + index)
+                .map_or(&[][..], Vec::as_slice);
+            let events = current.get(index).map_or(&[][..], Vec::as_slice);
             let common = match void {
                 0 => (old.iter().zip(events))
                     .take_while(|(old, new)| public(old) == public(new))
@@ -332,9 +364,15 @@ impl Referee {
             new.extend_from_slice(&events[common..]);
         }
         self.published.truncate(first);
-        let current = self.played[first..].iter().map(|it| it.events.clone());
         self.published.extend(current);
         (void, new)
+    }
+
+    /// The events of a Shift, without the end of the game until it is confirmed.
+    fn publishable<'a>(&self, shift: &'a Played) -> &'a [Event] {
+        let is_end = |event: &Event| matches!(event, Event::GameEnded { .. });
+        let end = (shift.events.iter().position(is_end)).filter(|_| !self.end_confirmed);
+        &shift.events[..end.unwrap_or(shift.events.len())]
     }
 
     /// The game, with unknown hands completed: of hands, only known ones are true.

@@ -24,6 +24,9 @@ pub enum Refusal {
         "this report cannot be corrected: it does not count in this Shift, or its pizza was over long ago"
     )]
     NotCorrectable,
+    /// There is no end to confirm.
+    #[error("the game is not over: there is no end to confirm")]
+    NotOver,
 }
 
 impl Referee {
@@ -55,6 +58,7 @@ impl Referee {
             Report::Correction { number, .. } => {
                 is_refused(!self.can_correct(*number), Refusal::NotCorrectable)
             }
+            Report::EndConfirmed => is_refused(!self.game().is_over(), Refusal::NotOver),
             Report::Hand { .. }
             | Report::PassWithdrawn { .. }
             | Report::Special { .. }

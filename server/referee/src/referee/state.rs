@@ -40,7 +40,10 @@ impl Referee {
     pub fn stage(&self) -> Stage {
         let (shift, rules) = (self.shift(), &self.rules);
         if self.game().is_over() {
-            return Stage::Over;
+            return match self.end_confirmed {
+                true => Stage::Over,
+                false => Stage::Confirmation,
+            };
         }
         if self.asked.is_some() {
             return Stage::Question;
@@ -121,6 +124,7 @@ impl Referee {
                 let question = (self.questions.iter()).find(|it| Some(it.id.as_str()) == asked);
                 question.map_or_else(String::new, |question| question.text.clone())
             }
+            Stage::Confirmation => "The game is over. Was the last play read correctly?".into(),
             Stage::Over => "The game is over.".into(),
         }
     }
@@ -161,6 +165,7 @@ impl Referee {
             Report::Answer { .. } => "A question was answered".into(),
             Report::Pause(true) => "The game was paused".into(),
             Report::Pause(false) => "The game was resumed".into(),
+            Report::EndConfirmed => "The end of the game was confirmed".into(),
         }
     }
 

@@ -71,10 +71,6 @@ impl Referee {
 
     /// Judges a report about a turn while no question is open.
     pub(super) fn take_turn(&mut self, number: u64, report: &Report) -> Judged {
-        if self.game().is_over() {
-            let text = "The game is over.".to_owned();
-            return Err((seat_of(report), (ViolatedRule::Turn, text)));
-        }
         let turn = match report {
             Report::Laid { seat, cards } => TurnReport::Acted {
                 seat: *seat,
@@ -99,6 +95,10 @@ impl Referee {
                 }
                 if self.is_repeated(seat, action) {
                     return Ok(Verdict::Known);
+                }
+                if self.game().is_over() {
+                    let text = "The game is over. Correct the last play if it was misread.";
+                    return Err((seat, (ViolatedRule::Turn, text.to_owned())));
                 }
                 if let Some(leader) = self.may_be_repeated(seat, action) {
                     return Ok(self.ask_if_again(number, report, leader));

@@ -259,6 +259,9 @@ fn play(table: &mut Table, mut report_turn: impl FnMut(&mut Table, &Report)) {
             attend(table);
             continue;
         }
+        if table.referee.stage() == Stage::Confirmation {
+            attend(table);
+        }
         if !table.prepare() {
             continue;
         }

@@ -246,6 +246,11 @@ impl Table {
                 let (_, verdict) = self.report(&Report::Gift { seat, cards });
                 assert_eq!(verdict, Verdict::Accepted);
             }
+            Stage::Confirmation => {
+                assert!(!self.events.iter().any(is_end), "it can still be corrected");
+                let (_, verdict) = self.report(&Report::EndConfirmed);
+                assert_eq!(verdict, Verdict::Accepted);
+            }
             Stage::Opening | Stage::Turn(_) => return true,
             Stage::Question | Stage::Over => unreachable!("handled by the caller"),
         }
@@ -313,6 +318,10 @@ impl Table {
             }
         }
     }
+}
+
+fn is_end(event: &Event) -> bool {
+    matches!(event, Event::GameEnded { .. })
 }
 
 /// The report of a turn.

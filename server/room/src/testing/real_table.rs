@@ -44,6 +44,9 @@ impl RealTable {
         if let Stage::Hand(seat) = stage {
             return Some(self.hand(seat));
         }
+        if stage == Stage::Confirmation {
+            return Some(Report::EndConfirmed);
+        }
         let open = self.truth.decision()?;
         let decides_at_table = self.at_table[open.seat];
         match (stage, open.kind) {

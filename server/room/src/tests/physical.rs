@@ -10,7 +10,7 @@ use super::{Core, OPEN, ParticipantKind, Source, State, Table, ms};
 use crate::journal::{AbortReason, Report, ReportSource, Reported};
 use crate::log::RoomEvent;
 use crate::testing::real_table::{MIXED, Mixed, PERSON, policy, shifts};
-use crate::{MAX_IDLE, MAX_REPORTS, ReportError, ReportVerdict};
+use crate::{CONFIRMATION_TIME, MAX_IDLE, MAX_REPORTS, ReportError, ReportVerdict};
 
 #[test]
 fn a_mixed_game_is_the_one_at_the_table() {
@@ -66,6 +66,69 @@ fn all_at_the_table_start_at_once_and_no_clock_runs() {
     mixed.until(|it| it.table.core.state().is_over());
     let standings = mixed.table.core.game().expect("a game").standings();
     assert_eq!(standings, mixed.real.truth.standings());
+}
+
+/// A game at the table whose last play has been reported.
+fn at_the_end() -> Mixed {
+    let mut mixed = Mixed::new([PERSON; 4], 1, 3);
+    mixed.until(|it| it.stage() == Stage::Confirmation);
+    assert_eq!(mixed.table.core.state(), State::Playing);
+    mixed
+}
+
+#[test]
+fn the_play_that_ends_a_game_can_be_corrected_until_its_end_is_confirmed() {
+    let mut mixed = at_the_end();
+    let table = mixed.table.core.table().expect("a physical room");
+    let last = table.referee().accepted().last().expect("a play");
+    let (number, instead) = (last.number, None);
+    mixed.table.report(Report::Correction { number, instead });
+    assert!(
+        matches!(mixed.stage(), Stage::Turn(_)),
+        "{:?}",
+        mixed.stage()
+    );
+    let refused = Err(ReportError::Refused(Refusal::NotOver));
+    let confirm = |id: &str| Reported {
+        id: id.into(),
+        source: ReportSource::Attendant,
+        age: Duration::ZERO,
+        report: Report::EndConfirmed,
+    };
+    let now = mixed.table.now;
+    assert_eq!(mixed.table.core.report(now, confirm("early")), refused);
+    mixed.table.report(last.report);
+    assert_eq!(mixed.stage(), Stage::Confirmation);
+    mixed.table.report(Report::EndConfirmed);
+    assert_eq!(mixed.table.core.state(), State::Finished);
+    let standings = mixed.table.core.game().expect("a game").standings();
+    assert_eq!(standings, mixed.real.truth.standings());
+    let late = mixed.table.core.report(now, confirm("late"));
+    assert_eq!(late, Err(ReportError::GameOver));
+    mixed.table.assert_replays();
+}
+
+#[test]
+fn an_end_that_nobody_corrects_is_confirmed_by_time_unless_the_game_is_paused() {
+    let mut mixed = at_the_end();
+    mixed.table.pass_time(CONFIRMATION_TIME - ms(1));
+    mixed.table.report(Report::Pause(true));
+    mixed.table.pass_time(CONFIRMATION_TIME * 10);
+    assert_eq!(mixed.table.core.state(), State::Playing);
+    mixed.table.report(Report::Pause(false));
+    mixed.table.pass_time(CONFIRMATION_TIME - ms(1));
+    assert_eq!(mixed.table.core.state(), State::Playing);
+    assert_eq!(mixed.table.core.deadline(), Some(mixed.table.now + ms(1)));
+    mixed.table.pass_time(ms(1));
+    assert_eq!(mixed.table.core.state(), State::Finished);
+    mixed.table.assert_replays();
+}
+
+#[test]
+fn a_room_that_is_closed_before_its_end_is_confirmed_has_a_result() {
+    let mut mixed = at_the_end();
+    mixed.table.core.close(mixed.table.now, []);
+    assert_eq!(mixed.table.core.state(), State::Finished);
 }
 
 #[test]

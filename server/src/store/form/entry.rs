@@ -24,7 +24,7 @@ struct EntryForm {
     at_us: u64,
     #[prost(
         oneof = "ChangeForm",
-        tags = "2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16"
+        tags = "2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17"
     )]
     change: Option<ChangeForm>,
 }
@@ -61,6 +61,8 @@ enum ChangeForm {
     Retired(u32),
     #[prost(message, tag = "16")]
     Marked(MarkedForm),
+    #[prost(bool, tag = "17")]
+    EndConfirmed(bool),
 }
 
 /// Whether these bytes are an entry of a kind that this version knows.
@@ -240,6 +242,7 @@ pub(in crate::store) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
         }),
         Change::Aborted(reason) => ChangeForm::Aborted(number_of(&REASONS, reason)),
         Change::ServerRestarted => ChangeForm::ServerRestarted(true),
+        Change::EndConfirmed => ChangeForm::EndConfirmed(true),
         Change::Reported(reported) => ChangeForm::Reported(ReportedForm {
             id: reported.id.clone(),
             report: Some(convert::report_to_proto(reported, Deck::LARGEST)),
@@ -319,6 +322,7 @@ fn change_from(form: ChangeForm) -> Result<Change, Unreadable> {
             Change::Aborted(value_of(&REASONS, number, "reason of an abort")?)
         }
         ChangeForm::ServerRestarted(_) => Change::ServerRestarted,
+        ChangeForm::EndConfirmed(_) => Change::EndConfirmed,
         ChangeForm::Reported(form) => {
             let report = form.report.unwrap_or_default();
             let reported = convert::reported_from_proto(&form.id, &report, Deck::LARGEST);

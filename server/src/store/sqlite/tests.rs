@@ -139,6 +139,7 @@ fn entries() -> Vec<Entry> {
             moment: Duration::from_micros(1_234_567),
         })),
         seated("0123456789abcdef"),
+        Change::EndConfirmed,
     ];
     (1..)
         .zip(changes)

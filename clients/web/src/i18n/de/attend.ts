@@ -33,6 +33,10 @@ export const attend: Texts["attend"] = {
     remoteText: "Hier wird online gespielt. Bis die Entscheidung da ist, gibt es nichts zu tun.",
     question: "Eine Frage an dich",
     questionText: "Die Partie geht weiter, wenn sie beantwortet ist.",
+    confirmation: "Wurde der letzte Zug richtig gelesen?",
+    confirmationText:
+      "Dann ist die Partie zu Ende. Sonst berichtige ihn; ohne Meldung gilt das Ergebnis nach 20 Sekunden.",
+    confirm: "Ja, die Partie ist zu Ende",
     over: "Die Partie ist zu Ende",
     paused: "Unterbrochen",
     pausedText: "Die Uhren stehen. Meldungen zählen trotzdem.",

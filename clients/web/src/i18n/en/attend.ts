@@ -28,6 +28,10 @@ export const attend = {
     remoteText: "This player is remote. Nothing to do until the decision is here.",
     question: "A question to you",
     questionText: "The game continues when it is answered.",
+    confirmation: "Was the last play read correctly?",
+    confirmationText:
+      "Then the game is over. Otherwise correct it; without a report the result stands after 20 seconds.",
+    confirm: "Yes, the game is over",
     over: "The game is over",
     paused: "Paused",
     pausedText: "Clocks stand still. Reports still count.",

@@ -32,6 +32,10 @@ export const attend: Texts["attend"] = {
     remoteText: "Juega a distancia. No hay nada que hacer hasta que llegue la decisión.",
     question: "Una pregunta para ti",
     questionText: "La partida continúa cuando se responda.",
+    confirmation: "¿Se leyó bien la última jugada?",
+    confirmationText:
+      "Entonces la partida ha terminado. Si no, corrígela; sin anotación, el resultado vale a los 20 segundos.",
+    confirm: "Sí, la partida ha terminado",
     over: "La partida ha terminado",
     paused: "En pausa",
     pausedText: "Los relojes están parados. Las anotaciones siguen contando.",

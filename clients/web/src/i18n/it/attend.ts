@@ -33,6 +33,10 @@ export const attend: Texts["attend"] = {
     remoteText: "Gioca a distanza. Non c’è niente da fare finché non arriva la decisione.",
     question: "Una domanda per te",
     questionText: "La partita continua dopo la risposta.",
+    confirmation: "L’ultima giocata è stata letta bene?",
+    confirmationText:
+      "Allora la partita è finita. Altrimenti correggila; senza segnalazioni il risultato vale dopo 20 secondi.",
+    confirm: "Sì, la partita è finita",
     over: "La partita è finita",
     paused: "In pausa",
     pausedText: "Gli orologi sono fermi. Le segnalazioni valgono lo stesso.",

@@ -114,6 +114,11 @@ class _TableStageEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_TableStage
     """For the answer to a question of the referee, the first of `questions`."""
     TABLE_STAGE_OVER: _TableStage.ValueType  # 8
     """The game is over."""
+    TABLE_STAGE_CONFIRMATION: _TableStage.ValueType  # 9
+    """For the confirmation of the play that ended the game, since a misread one could not be corrected
+    later: report EndConfirmed, or correct it. Without another report the end counts as confirmed
+    after 20 s, in which the game is not paused.
+    """
 
 class TableStage(_TableStage, metaclass=_TableStageEnumTypeWrapper):
     """What a physical table waits for."""
@@ -136,6 +141,11 @@ TABLE_STAGE_QUESTION: TableStage.ValueType  # 7
 """For the answer to a question of the referee, the first of `questions`."""
 TABLE_STAGE_OVER: TableStage.ValueType  # 8
 """The game is over."""
+TABLE_STAGE_CONFIRMATION: TableStage.ValueType  # 9
+"""For the confirmation of the play that ended the game, since a misread one could not be corrected
+later: report EndConfirmed, or correct it. Without another report the end counts as confirmed
+after 20 s, in which the game is not paused.
+"""
 Global___TableStage: _TypeAlias = TableStage  # noqa: Y015
 
 @_typing.final
@@ -193,6 +203,7 @@ class TableReport(_message.Message):
     QUESTION_FIELD_NUMBER: _builtins.int
     ANSWER_FIELD_NUMBER: _builtins.int
     PAUSE_FIELD_NUMBER: _builtins.int
+    END_CONFIRMED_FIELD_NUMBER: _builtins.int
     source: Global___ReportSource.ValueType
     """Who reports."""
     age_ms: _builtins.int
@@ -243,6 +254,10 @@ class TableReport(_message.Message):
     def pause(self) -> Global___TablePause:
         """The game is paused or resumed."""
 
+    @_builtins.property
+    def end_confirmed(self) -> Global___EndConfirmed:
+        """The play that ended the game was read correctly."""
+
     def __init__(
         self,
         *,
@@ -259,12 +274,13 @@ class TableReport(_message.Message):
         question: Global___TableQuestion | None = ...,
         answer: Global___QuestionAnswered | None = ...,
         pause: Global___TablePause | None = ...,
+        end_confirmed: Global___EndConfirmed | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["answer", b"answer", "cleared", b"cleared", "correction", b"correction", "gift", b"gift", "hand", b"hand", "kind", b"kind", "laid", b"laid", "pass", b"pass", "pass_withdrawn", b"pass_withdrawn", "pause", b"pause", "question", b"question", "role", b"role", "special", b"special"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["answer", b"answer", "cleared", b"cleared", "correction", b"correction", "end_confirmed", b"end_confirmed", "gift", b"gift", "hand", b"hand", "kind", b"kind", "laid", b"laid", "pass", b"pass", "pass_withdrawn", b"pass_withdrawn", "pause", b"pause", "question", b"question", "role", b"role", "special", b"special"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["age_ms", b"age_ms", "answer", b"answer", "cleared", b"cleared", "correction", b"correction", "gift", b"gift", "hand", b"hand", "kind", b"kind", "laid", b"laid", "pass", b"pass", "pass_withdrawn", b"pass_withdrawn", "pause", b"pause", "question", b"question", "role", b"role", "source", b"source", "special", b"special"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["age_ms", b"age_ms", "answer", b"answer", "cleared", b"cleared", "correction", b"correction", "end_confirmed", b"end_confirmed", "gift", b"gift", "hand", b"hand", "kind", b"kind", "laid", b"laid", "pass", b"pass", "pass_withdrawn", b"pass_withdrawn", "pause", b"pause", "question", b"question", "role", b"role", "source", b"source", "special", b"special"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_kind: _TypeAlias = _typing.Literal["hand", "laid", "pass", "pass_withdrawn", "cleared", "special", "gift", "role", "correction", "question", "answer", "pause"]  # noqa: Y015
+    _WhichOneofReturnType_kind: _TypeAlias = _typing.Literal["hand", "laid", "pass", "pass_withdrawn", "cleared", "special", "gift", "role", "correction", "question", "answer", "pause", "end_confirmed"]  # noqa: Y015
     _WhichOneofArgType_kind: _TypeAlias = _typing.Literal["kind", b"kind"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_kind) -> _WhichOneofReturnType_kind | None: ...
 
@@ -509,10 +525,9 @@ Global___RoleTaken: _TypeAlias = RoleTaken  # noqa: Y015
 
 @_typing.final
 class ReportCorrection(_message.Message):
-    """An earlier report was wrong: misread, or something that was not a play. Possible for hands and
-    gifts of the Shift in progress, and for plays and passes of the pizza in progress and of the one
-    before; after the end of a Shift, until something of the next is reported; never after the end of
-    the game. Everything after it is judged again; what then no longer fits is void.
+    """An earlier report was wrong: misread, or something that was not a play. Possible for what was
+    reported of the Shift in progress; after the end of a Shift, until something of the next is
+    reported; after the play that ends the game, until its end is confirmed. Everything after it is judged again; what then no longer fits is void.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -635,6 +650,25 @@ class TablePause(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___TablePause: _TypeAlias = TablePause  # noqa: Y015
+
+@_typing.final
+class EndConfirmed(_message.Message):
+    """The play that ended the game was read correctly: the result is final, and nothing can be corrected
+    any more. Only at TABLE_STAGE_CONFIRMATION, else FAILED_PRECONDITION (GAME_NOT_OVER).
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    def __init__(
+        self,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___EndConfirmed: _TypeAlias = EndConfirmed  # noqa: Y015
 
 @_typing.final
 class ReportResponse(_message.Message):

@@ -56,8 +56,9 @@ class TableServiceServicer(object):
     def Report(self, request, context):
         """Reports something that happened at the table. UNAUTHENTICATED (TICKET_UNKNOWN);
         INVALID_ARGUMENT (REPORT_REFUSED) names the field of a malformed report; ALREADY_EXISTS
-        (REPORT_ID_USED); FAILED_PRECONDITION (GAME_OVER; GAME_NOT_STARTED; NOT_CORRECTABLE: the report
-        to correct does not count or is too old; NO_SUCH_OPTION: the question has no such answer;
+        (REPORT_ID_USED); FAILED_PRECONDITION (GAME_OVER; GAME_NOT_STARTED; GAME_NOT_OVER: there is no
+        end to confirm; NOT_CORRECTABLE: the report to correct does not count or is too old;
+        NO_SUCH_OPTION: the question has no such answer;
         TOO_MANY_HELD_REPORTS: 32 plays and passes wait, so have the referee's question answered);
         RESOURCE_EXHAUSTED (TOO_MANY_QUESTIONS: 16 are open); UNAVAILABLE (ROOM_GONE). Nothing follows
         from a refused report. A report that the rules or the cards do not allow is not an error: see
