@@ -6,7 +6,9 @@ import { act } from "preact/test-utils";
 import { afterEach, expect, test, vi } from "vitest";
 import { GameEventSchema } from "../src/gen/chefshat/v1/event_pb";
 import { SpecialAction } from "../src/gen/chefshat/v1/rules_pb";
+import { Announcer } from "../src/parts/Announcer";
 import { setPreference } from "../src/preferences";
+import { useAnnounced } from "../src/table/following";
 import { momentSince } from "../src/table/model/moments";
 import { applyEvents } from "../src/table/model/reduce";
 import { emptyTable, seatFromParticipant, type TableState } from "../src/table/model/state";
@@ -75,6 +77,23 @@ test("a moment is shown for a while; the past of a table is not", async () => {
   expect(shown()).toContain("Cleo has one card left");
   await act(() => void vi.advanceTimersByTime(10_000));
   expect(shown()).toBeUndefined();
+});
+
+test("what a moment means is read out after who played", async () => {
+  const Heard = ({ table }: { table: TableState }) => {
+    useAnnounced(table, undefined, undefined);
+    return (
+      <>
+        <Moment table={table} />
+        <Announcer />
+      </>
+    );
+  };
+  const dealt = played(start(), deal);
+  await act(() => render(<Heard table={dealt} />, root));
+  await act(() => render(<Heard table={played(dealt, play(1, 11, 2, 15))} />, root));
+  const heard = () => root.querySelector('[role="status"]')?.textContent;
+  await vi.waitFor(() => expect(heard()).toMatch(/^Bo plays .*\. It opens the Shift\.$/));
 });
 
 test("a last card is no longer announced once it has been played", async () => {

@@ -12,6 +12,7 @@ import { isOpening } from "./model/requirement";
 import type { TableState } from "./model/state";
 import { createPresenceAnnouncer } from "./presence";
 import { play, soundOf } from "./sounds";
+import { momentWords } from "./view/Moment";
 import { nowHeading } from "./view/Now";
 import { outcomeWords, rolesWords, spokenLine } from "./words";
 
@@ -36,6 +37,8 @@ export function useAnnounced(table: TableState, own: number | undefined, decisio
       else if (line.entry.kind === "violated") continue;
       else announce([spokenLine(table, line), outcomeWords(table, line)].join(" ").trim());
     }
+    const moment = momentWords(table, before);
+    if (moment) announce(moment);
     const sounds = lines.flatMap((line) => soundOf(line) ?? []);
     // All at once would be noise: only the last one is played, which says the most.
     const sound = sounds.at(-1);

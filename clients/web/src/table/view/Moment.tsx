@@ -1,10 +1,9 @@
-// A special moment of the game, over the pizza for a few seconds, with what it means. The event
-// itself is read out with all others (following.ts), its explanation here.
+// A special moment of the game, over the pizza for a few seconds, with what it means. It is read out
+// after its event (following.ts).
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { hidden } from "../../experiment/hiding";
 import { t } from "../../i18n";
-import { announce } from "../../parts/Announcer";
 import { Drawing } from "../../parts/Drawing";
 import { isOn } from "../../preferences";
 import { MOST_AT_ONCE } from "../model/log";
@@ -30,12 +29,9 @@ export function Moment({ table }: { table: TableState }) {
   const seen = useRef(last);
   useEffect(() => {
     const fresh = last - seen.current;
-    const found = fresh > 0 && fresh <= MOST_AT_ONCE ? momentSince(table, seen.current) : undefined;
+    const found = fresh > 0 && fresh <= MOST_AT_ONCE ? shownMoment(table, seen.current) : undefined;
     seen.current = last;
-    if (!found || !isOn("moments") || hidden.peek().includes("log")) return;
-    setShown(found);
-    const words = t().table.moments[found.kind];
-    announce(found.kind === "lastCard" ? `${words.title(distinctName(table, found.seat))}.` : words.text);
+    if (found) setShown(found);
   }, [last]);
   useEffect(() => {
     if (!shown) return;
@@ -51,6 +47,19 @@ export function Moment({ table }: { table: TableState }) {
       <p>{words.text}</p>
     </div>
   );
+}
+
+/** The last moment after an event, if moments are shown. */
+function shownMoment(table: TableState, since: number): GameMoment | undefined {
+  return isOn("moments") && !hidden.peek().includes("log") ? momentSince(table, since) : undefined;
+}
+
+/** The last moment after an event as it is read out after its event; empty for none. */
+export function momentWords(table: TableState, since: number): string {
+  const moment = shownMoment(table, since);
+  if (!moment) return "";
+  const words = t().table.moments[moment.kind];
+  return moment.kind === "lastCard" ? `${words.title(distinctName(table, moment.seat))}.` : words.text;
 }
 
 /** Whether a moment no longer holds: the last card has been played. */
