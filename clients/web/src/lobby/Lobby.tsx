@@ -4,6 +4,7 @@
 import type { ComponentChildren } from "preact";
 import { wordsOf } from "../api/faults";
 import { countWords, type Shown, useShown } from "../api/pages";
+import { usePolled } from "../api/poll";
 import { type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { ButtonLink } from "../parts/Button";
@@ -13,7 +14,8 @@ import { JoinForm } from "./JoinForm";
 import css from "./Lobby.module.css";
 import { QuickGame } from "./QuickGame";
 import { RoomCard } from "./RoomCard";
-import { roomsIn } from "./rooms";
+import { openRooms, roomsIn } from "./rooms";
+import { roomsWithSeats } from "./seat";
 import { TournamentStrip } from "./TournamentStrip";
 
 /** Polling interval of the lists, milliseconds. */
@@ -30,9 +32,17 @@ export function Lobby() {
   const playing = useShown(roomsIn(RoomState.PLAYING), AT_A_TIME, EVERY_MS, "playing");
   const over = useShown(roomsIn(RoomState.FINISHED), AT_A_TIME, OVER_EVERY_MS, "over");
   const fault = waiting.fault ?? playing.fault;
+  const held = roomsWithSeats();
+  const own = usePolled((signal) => openRooms(held, signal), EVERY_MS, held.join()).value ?? [];
   return (
     <div class={css.lobby}>
       <h1 class="visually-hidden">{words.title}</h1>
+      {own.length > 0 && (
+        <section class={css.section} data-part="own-seats">
+          <h2>{words.rooms.own}</h2>
+          <Rooms rooms={own} />
+        </section>
+      )}
       <div class={css.start}>
         <QuickGame />
         <section class={`sheet ${css.tile}`}>
@@ -46,10 +56,10 @@ export function Lobby() {
         </section>
       </div>
       {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
-      <RoomSection title={words.rooms.waiting} shown={waiting}>
+      <RoomSection title={words.rooms.waiting} shown={waiting} own={own}>
         {words.rooms.noneWaiting}
       </RoomSection>
-      <RoomSection title={words.rooms.playing} shown={playing}>
+      <RoomSection title={words.rooms.playing} shown={playing} own={own}>
         {words.rooms.nonePlaying}
       </RoomSection>
       <TournamentStrip />
@@ -58,9 +68,14 @@ export function Lobby() {
   );
 }
 
-/** A list of rooms with its title; `children` if it is empty. */
-function RoomSection(props: { title: string; shown: Shown<Room>; children?: ComponentChildren }) {
-  const { title, shown, children } = props;
+/** A list of rooms with its title; `children` if it is empty. Those with own seats are listed above. */
+function RoomSection(props: {
+  title: string;
+  shown: Shown<Room>;
+  own?: readonly Room[];
+  children?: ComponentChildren;
+}) {
+  const { title, shown, own = [], children } = props;
   const { list } = shown;
   if (list === null) return null;
   return (
@@ -69,12 +84,18 @@ function RoomSection(props: { title: string; shown: Shown<Room>; children?: Comp
         {title} {list.items.length > 0 && <span class="soft number">{countWords(list.items.length, list.more)}</span>}
       </h2>
       {list.items.length === 0 && <p class="soft">{children}</p>}
-      <ul class={css.rooms} data-part="lobby-rooms">
-        {list.items.map((room) => (
-          <RoomCard key={room.roomId} room={room} />
-        ))}
-      </ul>
+      <Rooms rooms={list.items.filter(({ roomId }) => !own.some((room) => room.roomId === roomId))} />
       <MoreButton shown={shown} what={title} />
     </section>
+  );
+}
+
+function Rooms({ rooms }: { rooms: readonly Room[] }) {
+  return (
+    <ul class={css.rooms} data-part="lobby-rooms">
+      {rooms.map((room) => (
+        <RoomCard key={room.roomId} room={room} />
+      ))}
+    </ul>
   );
 }

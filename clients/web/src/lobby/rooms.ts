@@ -20,6 +20,14 @@ export function roomsIn(state: RoomState): AskPage<Room> {
   };
 }
 
+/** Those of the rooms that wait or play; the others are over, gone, or cannot be asked for now. */
+export async function openRooms(roomIds: readonly string[], signal: AbortSignal): Promise<Room[]> {
+  const ask = (roomId: string) => roomApi.getRoom({ roomId }, { signal, timeoutMs: CALL_LIMIT_MS });
+  const asked = await Promise.allSettled(roomIds.map(ask));
+  const rooms = asked.flatMap((one) => (one.status === "fulfilled" && one.value.room ? [one.value.room] : []));
+  return rooms.filter(({ state }) => state === RoomState.WAITING || state === RoomState.PLAYING);
+}
+
 /** Whether the seat is free. */
 export function isFree(participant: Participant): boolean {
   return participant.name === "" && participant.builtInAgent === "";

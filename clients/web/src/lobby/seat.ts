@@ -29,11 +29,16 @@ export interface HostedRoom {
 
 /** This device's seat in a room, if any. */
 export function heldSeat(roomId: string): HeldSeat | null {
-  return recallObject(`seat.${roomId}`, (value) =>
+  return recallObject(SEAT + roomId, (value) =>
     typeof value.ticket === "string" && typeof value.seat === "number" && typeof value.name === "string"
       ? { ticket: value.ticket, seat: value.seat, name: value.name }
       : null,
   );
+}
+
+/** The rooms in which this device has a seat. */
+export function roomsWithSeats(): string[] {
+  return [...remembered().keys()].flatMap((name) => (name.startsWith(SEAT) ? [name.slice(SEAT.length)] : []));
 }
 
 /** Deletes a seat and everything stored with it: the room is gone, or the seat was given up. */
@@ -98,7 +103,7 @@ export async function takeSeat(
   );
   const room = saidRoom(joined.room);
   const held: HeldSeat = { ticket: joined.ticket, seat: joined.seat, name: name.trim() };
-  remember(`seat.${room.roomId}`, JSON.stringify(held));
+  remember(SEAT + room.roomId, JSON.stringify(held));
   keepSecret(held.ticket, room.policy, room.gameId);
   remember(CODE + canonical(code), room.roomId);
   remember("name", name.trim());
@@ -130,6 +135,7 @@ export function lastName(): string {
   return recall("name") ?? "";
 }
 
+const SEAT = "seat.";
 const CODE = "code.";
 
 /** Storage keys of the codes that led to a room. */

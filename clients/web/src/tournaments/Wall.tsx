@@ -21,7 +21,7 @@ import css from "./Wall.module.css";
 import { inShort, playWords, TournamentStateChip } from "./words";
 
 /** Most lines of the standings at a time. */
-const LINES = 10;
+const LINES = 12;
 /** Most tables at a time. */
 const TABLES = 12;
 /** Most tables per round for a readable bracket: with more, the tables are shown side by side. */

@@ -3,6 +3,7 @@
 
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
+import { Visibility } from "../../src/gen/chefshat/v1/room_pb";
 import { sitDown } from "./play";
 import { clientsOf, newRoom } from "./rooms";
 import { browser, person, server, useStage } from "./stage";
@@ -66,6 +67,21 @@ test("the newest rooms are shown first, and more on request", async () => {
   await section.getByRole("button", { name: "Show more" }).click();
   await section.getByRole("heading", { name: "Table 1", exact: true }).waitFor();
   expect(await cards.count()).toBeGreaterThanOrEqual(MANY);
+});
+
+test("a room with a seat of this device stands first, a private one too", async () => {
+  const seats = ["person", "person", "random", "random"];
+  const { code } = await newRoom(server, { name: "Where I sit", seats, policy: { visibility: Visibility.PRIVATE } });
+  const { page, faults } = await person(browser);
+  await sitDown(page, server, code, "Nadia");
+  await page.goto(`${server.url}/`);
+  const own = page.locator('[data-part~="own-seats"]');
+  await own.getByRole("heading", { name: "Where I sit" }).waitFor();
+  await page.locator('[data-part~="lobby-section"]').first().waitFor();
+  expect(await page.getByRole("heading", { name: "Where I sit" }).count()).toBe(1);
+  await own.getByRole("link", { name: "Back to my seat" }).click();
+  await page.waitForURL(/\/rooms\//);
+  expect(faults).toEqual([]);
 });
 
 test("all invalid fields are marked at once", async () => {

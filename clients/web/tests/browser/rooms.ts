@@ -46,7 +46,9 @@ interface Wanted {
   hands?: readonly (readonly number[])[];
   /** Whether the game is rated and so dealt at random; otherwise its deals are fixed. */
   rated?: boolean;
-  policy?: Partial<Pick<RoomPolicy, "hints" | "paceMs" | "spectatorDelayDecisions" | "spectatorsSeeHands">>;
+  policy?: Partial<
+    Pick<RoomPolicy, "hints" | "paceMs" | "spectatorDelayDecisions" | "spectatorsSeeHands" | "visibility">
+  >;
 }
 
 /** Creates a room for a few Shifts with an hour per decision. */

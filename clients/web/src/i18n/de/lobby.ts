@@ -33,6 +33,7 @@ export const lobby: Texts["lobby"] = {
     sitDown: "Hinsetzen",
   },
   rooms: {
+    own: "Wo du einen Platz hast",
     waiting: "Räume mit freien Plätzen",
     noneWaiting: "Kein Raum wartet auf Spieler. Erstelle einen und lade andere ein.",
     playing: "Laufende Partien",

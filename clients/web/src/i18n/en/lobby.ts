@@ -32,6 +32,7 @@ export const lobby = {
     sitDown: "Sit down",
   },
   rooms: {
+    own: "Where you have a seat",
     waiting: "Rooms with free seats",
     noneWaiting: "No room is waiting for players. Create one and invite others.",
     playing: "Games in progress",

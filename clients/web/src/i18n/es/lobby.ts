@@ -33,6 +33,7 @@ export const lobby: Texts["lobby"] = {
     sitDown: "Sentarse",
   },
   rooms: {
+    own: "Donde tienes un asiento",
     waiting: "Salas con asientos libres",
     noneWaiting: "Ninguna sala espera jugadores. Crea una e invita a otros.",
     playing: "Partidas en curso",

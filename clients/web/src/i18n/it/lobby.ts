@@ -33,6 +33,7 @@ export const lobby: Texts["lobby"] = {
     sitDown: "Siediti",
   },
   rooms: {
+    own: "Dove hai un posto",
     waiting: "Stanze con posti liberi",
     noneWaiting: "Nessuna stanza aspetta giocatori. Creane una e invita gli altri.",
     playing: "Partite in corso",
