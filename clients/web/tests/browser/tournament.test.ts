@@ -46,6 +46,19 @@ test("a tournament's page follows it from the first participant to the final sta
   await expect.poll(shown).toEqual(standings.map(({ score, games }) => (Number(score) / games).toFixed(2)));
   expect(await rows.filter({ hasText: "Gustav" }).locator(".number").allInnerTexts()).toContain("3");
   expect(loads).toBe(1);
+
+  // A certificate is printed on a sheet of its own, and nothing else with it.
+  await page.getByRole("link", { name: "Results and certificates" }).click();
+  await page.evaluate(() => {
+    globalThis.print = () => {};
+  });
+  await page.getByRole("button", { name: "Print the certificate of Gustav" }).click();
+  await page.locator('[data-part~="certificate"]').waitFor({ state: "attached" });
+  const pdf = (await page.pdf({ preferCSSPageSize: true })).toString("latin1");
+  const sizes = [...pdf.matchAll(/\/MediaBox \[0 0 (\d+)\.?\d* (\d+)/g)].map(([, width, height]) => [width, height]);
+  expect(sizes).toEqual([["841", "594"]]);
+  await page.evaluate(() => dispatchEvent(new Event("afterprint")));
+  await page.locator('[data-part~="certificate"]').waitFor({ state: "detached" });
   expect(faults).toEqual([]);
 });
 
