@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import cv2
@@ -54,6 +57,7 @@ from chefshat_robot.vision import (
     replay,
     to_json,
 )
+from chefshat_robot.vision.frames import Wish
 
 ROUND: list[Act] = [
     LayCards(0.6, 0, (Card(0, 65), Card(0, 58)), (1, 2)),
@@ -323,6 +327,74 @@ def test_a_video_is_read(tmp_path: Path) -> None:
     assert [frame.index for frame in frames] == [0, 1, 2]
     assert [round(frame.time, 3) for frame in frames] == [0.0, 0.1, 0.2]
     assert abs(int(frames[2].image.mean()) - 200) < 8
+
+
+class _Webcam:
+    """Stands for a camera that sends 640x480, or compressed 1920x1080."""
+
+    def __init__(self, camera: int | str) -> None:
+        self.camera = camera
+        self.asked: list[int] = []
+
+    def isOpened(self) -> bool:
+        return self.camera != 9
+
+    def set(self, what: int, value: float) -> bool:
+        self.asked.append(what)
+        return value > 0
+
+    def get(self, what: int) -> float:
+        large = self.asked[0] == cv2.CAP_PROP_FOURCC
+        sizes = {cv2.CAP_PROP_FRAME_WIDTH: (640, 1920), cv2.CAP_PROP_FRAME_HEIGHT: (480, 1080)}
+        return sizes[what][large]
+
+    def read(self) -> tuple[bool, np.ndarray | None]:
+        return False, None
+
+    def release(self) -> None:
+        self.camera = 9
+
+
+def test_a_camera_is_asked_for_what_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cv2, "VideoCapture", _Webcam)
+    with pytest.raises(SourceError, match="camera 9 does not open"):
+        open_source("9")
+    with pytest.raises(SourceError, match="sends 640x480, not 1920x1080; give a size that it has, or try --mjpg"):
+        open_source("0", Wish(size=(1920, 1080)))
+    for source in ("0", os.devnull):  # A number, and a device.
+        frames = open_source(source, Wish(size=(1920, 1080), mjpg=True))
+        with pytest.raises(SourceError, match=f"camera {source} sends no more pictures"):
+            next(frames)
+
+
+def test_a_camera_in_the_network_is_read() -> None:
+    picture = cv2.imencode(".jpg", np.full((48, 64, 3), 200, np.uint8))[1].tobytes()
+
+    class Camera(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.send_header("Content-Type", "multipart/x-mixed-replace; boundary=frame")
+            self.end_headers()
+            for _ in range(12):
+                self.wfile.write(b"--frame\r\nContent-Type: image/jpeg\r\n\r\n" + picture + b"\r\n")
+
+        def log_message(self, format: str, *values: object) -> None:
+            """Prints nothing."""
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Camera) as server:
+        thread = Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        address = f"http://127.0.0.1:{server.server_port}/video.mjpg"
+        frames = open_source(address)
+        seen = [next(frames) for _ in range(5)]
+        with pytest.raises(SourceError, match="sends no more pictures"):
+            for _ in frames:
+                pass
+        server.shutdown()
+    assert [frame.index for frame in seen] == [0, 1, 2, 3, 4]
+    assert all(frame.image.shape == (48, 64, 3) and abs(int(frame.image.mean()) - 200) < 8 for frame in seen)
+    with pytest.raises(SourceError, match="no camera answers"):
+        open_source(address)
 
 
 def test_the_commands_show_record_and_repeat_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,6 +16,7 @@ from chefshat_robot.bridge import Bridge
 from chefshat_robot.cli import CommandError
 from chefshat_robot.running import SERVER, run_command
 from chefshat_robot.vision import Camera, Perception, Recorder, SourceError, open_source
+from chefshat_robot.vision.frames import SOURCE_HELP, add_source_options, wish_of
 from chefshat_robot.vision.hand import HandReader
 
 DESCRIPTION = """\
@@ -31,12 +32,12 @@ Examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of the subcommand."""
     parser.description = DESCRIPTION
-    parser.add_argument("source", help="number of a camera, video file, or folder of pictures")
+    parser.add_argument("source", help=SOURCE_HELP)
     parser.add_argument("--ticket", required=True, help="the ticket of the table, from creating the room")
     add_server_options(parser, default=SERVER)
     parser.add_argument("--camera", type=Path, metavar="FILE", help="the camera's calibration, from `chefshat-robot calibrate`")
     parser.add_argument("--deck", type=int, choices=range(7), metavar="0..6", help="ignore the cards of other decks")
-    parser.add_argument("--fps", type=float, help="frames per second of the camera, or of pictures")
+    add_source_options(parser)
     parser.add_argument("--record", type=Path, metavar="DIR", help="write what is seen to this folder, for `perceive --replay`")
     parser.add_argument("--record-frames", action="store_true", help="with --record: write the frames too")
     parser.add_argument(
@@ -67,8 +68,8 @@ def run(arguments: argparse.Namespace) -> int:
             recorder = None
             if arguments.record is not None:
                 recorder = stack.enter_context(Recorder(arguments.record, arguments.deck, arguments.record_frames))
-            frames = open_source(arguments.source, arguments.fps)
-            hands = [(seat, open_source(source, arguments.fps)) for seat, source in arguments.hand]
+            frames = open_source(arguments.source, wish_of(arguments))
+            hands = [(seat, open_source(source, wish_of(arguments))) for seat, source in arguments.hand]
 
             async def watch() -> int:
                 async with aio.Client(server_of(arguments)) as client:

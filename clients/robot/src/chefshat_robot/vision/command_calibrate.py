@@ -12,7 +12,7 @@ import cv2
 from chefshat_robot.cli import CommandError
 
 from .calibration import ENOUGH_VIEWS, CalibrationError, calibrate
-from .frames import SourceError, open_source
+from .frames import SOURCE_HELP, SourceError, add_source_options, open_source, wish_of
 
 _DESCRIPTION = """\
 Measure the lens of a camera. Print the calibration sheet in its real size (`chefshat-robot print`), glue it to
@@ -28,7 +28,8 @@ Examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `calibrate`."""
     parser.description = _DESCRIPTION
-    parser.add_argument("source", help="number of a camera, video file, or folder of pictures")
+    parser.add_argument("source", help=SOURCE_HELP)
+    add_source_options(parser)
     parser.add_argument("--output", type=Path, default=Path("camera.json"), metavar="FILE", help="default: camera.json")
     parser.add_argument("--picture", type=Path, metavar="FILE", help="default: the output's name with .png")
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
@@ -42,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"\r{views} of {ENOUGH_VIEWS} positions", end="", file=sys.stderr, flush=True)
 
     try:
-        calibration = calibrate(open_source(arguments.source), progress)
+        calibration = calibrate(open_source(arguments.source, wish_of(arguments)), progress)
         calibration.camera.save(arguments.output)
         if not cv2.imwrite(str(picture), calibration.picture):
             raise CommandError(f"cannot write {picture}")

@@ -26,7 +26,7 @@ from .events import (
     TakenBack,
     to_json,
 )
-from .frames import Frame, SourceError, open_source
+from .frames import SOURCE_HELP, Frame, SourceError, add_source_options, open_source, wish_of
 from .perception import Perception
 from .recording import Recorder, replay
 
@@ -47,11 +47,11 @@ Examples:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `perceive`."""
     parser.description = _DESCRIPTION
-    parser.add_argument("source", nargs="?", help="number of a camera, video file, or folder of pictures")
+    parser.add_argument("source", nargs="?", help=SOURCE_HELP)
     parser.add_argument("--replay", type=Path, metavar="DIR", help="decide again from the recording in this folder")
     parser.add_argument("--camera", type=Path, metavar="FILE", help="the camera's calibration, from `chefshat-robot calibrate`")
     parser.add_argument("--deck", type=int, choices=range(7), metavar="0..6", help="ignore the cards of other decks")
-    parser.add_argument("--fps", type=float, help="frames per second of the camera, or of pictures")
+    add_source_options(parser)
     parser.add_argument("--record", type=Path, metavar="DIR", help="write what is seen to this folder")
     parser.add_argument("--record-frames", action="store_true", help="with --record: write the frames too")
     parser.add_argument("--doubts", type=Path, metavar="DIR", help="write the picture of each doubt to this folder")
@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
             _print_all(replay(arguments.replay), arguments.json, None)
             return 0
         camera = Camera.load(arguments.camera) if arguments.camera is not None else None
-        frames = open_source(arguments.source, arguments.fps)
+        frames = open_source(arguments.source, wish_of(arguments))
         if arguments.doubts is not None:
             arguments.doubts.mkdir(parents=True, exist_ok=True)
         if arguments.record is None:
