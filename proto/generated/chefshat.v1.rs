@@ -1044,7 +1044,7 @@ pub struct TournamentParticipant {
     pub name_fingerprint: ::prost::alloc::string::String,
 }
 /// The result of a participant in one game.
-#[derive(Clone, Copy, PartialEq, ::prost::Message)]
+#[derive(Clone, PartialEq, ::prost::Message)]
 pub struct TournamentGameSeat {
     /// Number of the participant. The index in `seats` is the seat.
     #[prost(uint32, tag = "1")]
@@ -1087,6 +1087,10 @@ pub struct TournamentGameSeat {
     /// plays the game to its end.
     #[prost(bool, tag = "13")]
     pub left: bool,
+    /// Display name of who had the place when the game was called, if somebody else has it now; else
+    /// empty.
+    #[prost(string, tag = "14")]
+    pub former_name: ::prost::alloc::string::String,
 }
 /// One game of a tournament.
 #[derive(Clone, PartialEq, ::prost::Message)]

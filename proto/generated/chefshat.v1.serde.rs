@@ -43348,6 +43348,9 @@ impl serde::Serialize for TournamentGameSeat {
         if self.left {
             len += 1;
         }
+        if !self.former_name.is_empty() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.TournamentGameSeat", len)?;
         if self.participant != 0 {
             struct_ser.serialize_field("participant", &self.participant)?;
@@ -43400,6 +43403,9 @@ impl serde::Serialize for TournamentGameSeat {
         if self.left {
             struct_ser.serialize_field("left", &self.left)?;
         }
+        if !self.former_name.is_empty() {
+            struct_ser.serialize_field("formerName", &self.former_name)?;
+        }
         struct_ser.end()
     }
 }
@@ -43427,6 +43433,8 @@ impl<'de> serde::Deserialize<'de> for TournamentGameSeat {
             "performance_score",
             "performanceScore",
             "left",
+            "former_name",
+            "formerName",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -43444,6 +43452,7 @@ impl<'de> serde::Deserialize<'de> for TournamentGameSeat {
             TimedDecisions,
             PerformanceScore,
             Left,
+            FormerName,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -43478,6 +43487,7 @@ impl<'de> serde::Deserialize<'de> for TournamentGameSeat {
                             "timedDecisions" | "timed_decisions" => Ok(GeneratedField::TimedDecisions),
                             "performanceScore" | "performance_score" => Ok(GeneratedField::PerformanceScore),
                             "left" => Ok(GeneratedField::Left),
+                            "formerName" | "former_name" => Ok(GeneratedField::FormerName),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -43510,6 +43520,7 @@ impl<'de> serde::Deserialize<'de> for TournamentGameSeat {
                 let mut timed_decisions__ = None;
                 let mut performance_score__ = None;
                 let mut left__ = None;
+                let mut former_name__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Participant => {
@@ -43610,6 +43621,12 @@ impl<'de> serde::Deserialize<'de> for TournamentGameSeat {
                             }
                             left__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::FormerName => {
+                            if former_name__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("formerName"));
+                            }
+                            former_name__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(TournamentGameSeat {
@@ -43626,6 +43643,7 @@ impl<'de> serde::Deserialize<'de> for TournamentGameSeat {
                     timed_decisions: timed_decisions__.unwrap_or_default(),
                     performance_score: performance_score__.unwrap_or_default(),
                     left: left__.unwrap_or_default(),
+                    former_name: former_name__.unwrap_or_default(),
                 })
             }
         }

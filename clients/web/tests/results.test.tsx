@@ -57,7 +57,7 @@ const game = (number: number, state: TournamentGameState) => ({
   number: 1,
   state,
   seats: [
-    { participant: 1, place: 2, score: 1 },
+    { participant: 1, place: 2, score: 1, formerName: "Di" },
     { participant: 0, place: 1, score: 3 },
   ],
 });
@@ -75,7 +75,7 @@ afterEach(() => {
 
 test("the page has standings, date, settings and the games that count", async () => {
   await act(async () => render(<Results live={{ tournament: tournament(), standings, games: [] }} />, root));
-  await vi.waitFor(() => expect(root.textContent).toContain("1. Ada +3 · 2. Bo & Çem +1"));
+  await vi.waitFor(() => expect(root.textContent).toContain("1. Ada +3 · 2. Di +1"));
   expect(root.textContent).toContain("2026");
   expect(root.textContent).toContain("Swiss");
   expect(root.querySelectorAll('[data-part~="standings"] tbody tr')).toHaveLength(NAMES.length);

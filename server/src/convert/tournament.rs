@@ -290,11 +290,16 @@ pub fn tournament_participants(tournament: &Tournament) -> Vec<v1::TournamentPar
 /// A game of a tournament. `placed` is its room and game id.
 pub fn tournament_game(
     index: usize,
-    game: &Game,
+    tournament: &Tournament,
     placed: Option<(Id, Id)>,
     series: Option<Id>,
     plan: &TournamentPlan,
 ) -> v1::TournamentGame {
+    let game = &tournament.games()[index];
+    let former_name = |participant| {
+        let name = tournament.former_name(game, participant);
+        name.unwrap_or_default().to_owned()
+    };
     let seats = match &game.state {
         GameState::Counted(result) => (result.seats.iter())
             .map(|seat| v1::TournamentGameSeat {
@@ -311,6 +316,7 @@ pub fn tournament_game(
                 timed_decisions: seat.statistics.timed_decisions,
                 performance_score: seat.statistics.performance_score,
                 left: game.left.contains(&seat.participant),
+                former_name: former_name(seat.participant),
             })
             .collect(),
         _ => (game.seats.iter())
@@ -318,6 +324,7 @@ pub fn tournament_game(
                 participant: number(*participant),
                 forfeited: game.forfeited.contains(participant),
                 left: game.left.contains(participant),
+                former_name: former_name(*participant),
                 ..v1::TournamentGameSeat::default()
             })
             .collect(),

@@ -378,7 +378,7 @@ impl TournamentHandle {
         let game = &state.core.games()[number];
         let placed = state.placed.get(&number).copied();
         let series = game.deal.map(|deal| self.series(deal));
-        convert::tournament_game(number, game, placed, series, &self.plan)
+        convert::tournament_game(number, &state.core, placed, series, &self.plan)
     }
 
     /// Whether its games can count for ratings.

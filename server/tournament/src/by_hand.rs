@@ -5,7 +5,7 @@
 use thiserror::Error;
 
 use super::Tournament;
-use super::change::{Change, Entrant, Former, GameState};
+use super::change::{Change, Entrant, Former, Game, GameState};
 use super::entry::JoinProblem;
 use super::settings::{Deals, Format};
 use super::state::{State, TournamentState};
@@ -83,6 +83,13 @@ impl Tournament {
     pub fn former(&self, participant: usize) -> &[Former] {
         let former = self.state.former.get(participant);
         former.map_or(&[], Vec::as_slice)
+    }
+
+    /// The name under which a participant was called to a game, if somebody else has its place now.
+    pub fn former_name(&self, game: &Game, participant: usize) -> Option<&str> {
+        let (_, index) = game.former.iter().find(|(who, _)| *who == participant)?;
+        let former = self.former(participant).get(*index)?;
+        Some(&former.entrant.name)
     }
 
     /// Number of changes by hand so far.
@@ -261,7 +268,18 @@ impl TournamentState {
         self.postponements[participant] = 0;
         let games = self.sums[participant].games;
         let entrant = std::mem::replace(&mut self.participants[participant], by.clone());
+        let former = self.former[participant].len();
         self.former[participant].push(Former { entrant, games });
+        for game in self
+            .games
+            .iter_mut()
+            .filter(|game| game.state != GameState::Due)
+        {
+            let is_known = game.former.iter().any(|(who, _)| *who == participant);
+            if game.seats.contains(&participant) && !is_known {
+                game.former.push((participant, former));
+            }
+        }
         // What the former participant missed is not the new one's.
         for &(_, index) in &self.due {
             let game = &mut self.games[index];
@@ -332,6 +350,7 @@ impl TournamentState {
         game.forfeited.clear();
         game.missing.clear();
         game.left.clear();
+        game.former.clear();
         game.forgiven.clear();
         game.turn = self.front_turn;
         self.due.insert((self.front_turn, index));

@@ -201,6 +201,9 @@ pub struct Game {
     /// Participants who withdrew or were replaced while it is or was being played. A substitute
     /// plays for them, and built-in agents play on.
     pub left: Vec<usize>,
+    /// Participants who were replaced after its last call: of each, which of the former holders of its
+    /// place (`Tournament::former`) was called.
+    pub(super) former: Vec<(usize, usize)>,
     /// Participants who postponed it, as often as they did; `None`: the organiser.
     pub postponed: Vec<Option<usize>>,
     /// Participants who took the place of one that forfeited it while it is being played. If it is

@@ -136,7 +136,9 @@ impl Tournament {
     /// Gives some participants, never built-in agents, another name, as if they had joined under
     /// it. Returns whether there were any.
     pub fn rename(&mut self, who: impl Fn(&Entrant) -> bool, to: &str) -> bool {
-        let participants = self.state.participants.iter_mut();
+        let former = self.state.former.iter_mut().flatten();
+        let former = former.map(|former| &mut former.entrant);
+        let participants = self.state.participants.iter_mut().chain(former);
         let mut any = false;
         for entrant in participants.filter(|it| it.built_in.is_none() && who(it)) {
             to.clone_into(&mut entrant.name);

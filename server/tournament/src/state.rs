@@ -303,6 +303,7 @@ impl TournamentState {
             forfeited: Vec::new(),
             missing: Vec::new(),
             left: Vec::new(),
+            former: Vec::new(),
             postponed: Vec::new(),
             forgiven: Vec::new(),
             dealt: false,
@@ -363,6 +364,7 @@ impl TournamentState {
         self.leave(index);
         let game = &mut self.games[index];
         game.left.clear();
+        game.former.clear();
         let forgiven = std::mem::take(&mut game.forgiven);
         game.forfeited.retain(|who| !forgiven.contains(who));
         self.set_physical(index);

@@ -14,7 +14,7 @@ import { type Certificate, certificatesOf } from "./certificate";
 import { type LiveTournament, useGames, useTournament } from "./following";
 import css from "./Results.module.css";
 import { Standings } from "./Standings";
-import { isEnded, nameOf, playedRounds } from "./structure";
+import { isEnded, nameIn, playedRounds } from "./structure";
 import { dateOf, dealsWords, formatWord, inShort, settingsWords } from "./words";
 
 /** The page. */
@@ -114,8 +114,9 @@ function Games({ tournament, games }: { tournament: Tournament; games: readonly 
 function resultWords(tournament: Tournament, { seats }: TournamentGame): string {
   return [...seats]
     .sort((one, other) => one.place - other.place)
-    .map(({ participant, place, score, forfeited }) => {
-      const name = `${place}. ${nameOf(tournament, participant)}`;
+    .map((seat) => {
+      const { place, score, forfeited } = seat;
+      const name = `${place}. ${nameIn(tournament, seat)}`;
       return forfeited ? `${name} (${t().tournaments.games.forfeited})` : `${name} +${score}`;
     })
     .join(" · ");

@@ -10,7 +10,7 @@ import {
 import { t } from "../i18n";
 import { GameLink } from "./GameLink";
 import css from "./Rounds.module.css";
-import { nameOf, type PlayedTable, playedRounds } from "./structure";
+import { nameIn, type PlayedTable, playedRounds } from "./structure";
 import wallCss from "./Wall.module.css";
 
 interface RoundsProps {
@@ -125,7 +125,7 @@ function Seat({ tournament, game, seat, mine }: SeatProps) {
       data-part="rounds-seat"
     >
       {counted && <span class="number soft">{t().common.place(seat.place)}</span>}
-      <span class={css.name}>{nameOf(tournament, seat.participant)}</span>
+      <span class={css.name}>{nameIn(tournament, seat)}</span>
       {counted &&
         (seat.forfeited ? (
           <span class="soft small">{t().tournaments.games.forfeited}</span>

@@ -4,6 +4,7 @@
 import {
   type Tournament,
   type TournamentGame,
+  type TournamentGameSeat,
   TournamentGameState,
   type TournamentParticipant,
   type TournamentStanding,
@@ -158,6 +159,11 @@ export function joinedIn({ state, participants }: Tournament): TournamentPartici
 /** A participant by number. */
 export function participantOf(tournament: Tournament, number: number): TournamentParticipant | undefined {
   return tournament.participants[number];
+}
+
+/** The name under which a seat's participant was called to the game. */
+export function nameIn(tournament: Tournament, { participant, formerName }: TournamentGameSeat): string {
+  return formerName || nameOf(tournament, participant);
 }
 
 /** A participant's display name: its own, else that of the built-in agent. */

@@ -299,6 +299,7 @@ fn no_message_exceeds_the_default_limit_of_clients() {
         timed_decisions: u64::MAX,
         performance_score: 1.0,
         left: true,
+        former_name: "🍕".repeat(MAX_NAME_CHARS),
     };
     let game = v1::TournamentGame {
         game: u32::MAX,

@@ -314,6 +314,34 @@ fn whoever_takes_a_place_has_its_results_and_is_waited_for() {
 }
 
 #[test]
+fn games_keep_the_names_of_those_who_were_called_to_them() {
+    let mut tournament = two_tables(|settings| settings.max_calls = 1);
+    follow(&mut tournament, 0);
+    let place = tournament.games()[0].seats[0];
+    let first = tournament.participants()[place].name.clone();
+    let names = |tournament: &Tournament| {
+        let games = tournament.games().iter();
+        let games = games.filter(|game| game.seats.contains(&place));
+        let names = games.map(|game| tournament.former_name(game, place).map(str::to_owned));
+        names.collect::<Vec<_>>()
+    };
+    end(&mut tournament, 0, played(&[1, 2, 3, 4]));
+    for by in ["Bo", "Cy"] {
+        let change = tournament.replace(place, entrant(by)).unwrap();
+        fold(&mut tournament, change);
+        tournament.set_present(place, true);
+        follow(&mut tournament, 0);
+    }
+    // The second game was called after the first replacement, and again for whoever came last.
+    let second = names(&tournament)[1].clone();
+    assert_eq!(names(&tournament)[0].as_deref(), Some(&*first));
+    assert!(matches!(second.as_deref(), Some("Bo") | None), "{second:?}");
+    // Somebody whose data are deleted has no name there either.
+    assert!(tournament.rename(|it| it.name == first, "player 1"));
+    assert_eq!(names(&tournament)[0].as_deref(), Some("player 1"));
+}
+
+#[test]
 fn a_built_in_agent_plays_on_at_once_and_somebody_can_take_the_place_of_a_filler() {
     let mut tournament = begun(settings(Format::Knockout), 3);
     let filler = 3;

@@ -427,6 +427,7 @@ class TournamentGameSeat(_message.Message):
     TIMED_DECISIONS_FIELD_NUMBER: _builtins.int
     PERFORMANCE_SCORE_FIELD_NUMBER: _builtins.int
     LEFT_FIELD_NUMBER: _builtins.int
+    FORMER_NAME_FIELD_NUMBER: _builtins.int
     participant: _builtins.int
     """Number of the participant. The index in `seats` is the seat."""
     forfeited: _builtins.bool
@@ -457,6 +458,10 @@ class TournamentGameSeat(_message.Message):
     """Whether it left the tournament, or was replaced, while the game was being played. A substitute
     plays the game to its end.
     """
+    former_name: _builtins.str
+    """Display name of who had the place when the game was called, if somebody else has it now; else
+    empty.
+    """
     def __init__(
         self,
         *,
@@ -473,10 +478,11 @@ class TournamentGameSeat(_message.Message):
         timed_decisions: _builtins.int = ...,
         performance_score: _builtins.float = ...,
         left: _builtins.bool = ...,
+        former_name: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["decision_time_us", b"decision_time_us", "decisions", b"decisions", "forfeited", b"forfeited", "left", b"left", "participant", b"participant", "performance_score", b"performance_score", "place", b"place", "points", b"points", "score", b"score", "substituted", b"substituted", "timed_decisions", b"timed_decisions", "timeouts", b"timeouts", "wrong_actions", b"wrong_actions"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["decision_time_us", b"decision_time_us", "decisions", b"decisions", "forfeited", b"forfeited", "former_name", b"former_name", "left", b"left", "participant", b"participant", "performance_score", b"performance_score", "place", b"place", "points", b"points", "score", b"score", "substituted", b"substituted", "timed_decisions", b"timed_decisions", "timeouts", b"timeouts", "wrong_actions", b"wrong_actions"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
