@@ -8976,7 +8976,8 @@ pub struct StudyParticipant {
     /// Its state.
     #[prost(enumeration = "StudyParticipantState", tag = "3")]
     pub state: i32,
-    /// Its slot, from 0; after it has left, the one it had. Unset until it begins.
+    /// Its slot, from 0; after it has left, the one it had. Unset until it is assigned
+    /// (`StudyOrder`).
     #[prost(uint32, optional, tag = "4")]
     pub slot: ::core::option::Option<u32>,
     /// Ids of its conditions in their order; empty until it begins.
@@ -9057,7 +9058,7 @@ pub struct Study {
     /// Number of participants who have begun and are not over.
     #[prost(uint32, tag = "11")]
     pub active: u32,
-    /// Number of participants who have completed it.
+    /// Number of participants who have completed it, also if their data were deleted since.
     #[prost(uint32, tag = "12")]
     pub completed: u32,
     /// Number of participants who have withdrawn, dropped out or were removed.
@@ -9261,7 +9262,8 @@ pub struct StudyTrace {
     pub duration_ms: u32,
 }
 /// How conditions are assigned. Assignment is by permuted blocks of slots, whose order follows from
-/// the assignment seed. A participant gets the first free slot when its link is first opened.
+/// the assignment seed. A participant gets the first free slot by consenting; when its link is first
+/// opened, if it is not asked for consent before a game or a condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
 pub enum StudyOrder {
@@ -10051,7 +10053,7 @@ pub mod study_service_client {
             self.inner.unary(req, path, codec).await
         }
         /// Adds participants and returns their links. More than `participants` of the settings may be
-        /// added: a link opened when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
+        /// added: a link opened, or a consent given, when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
         /// FAILED_PRECONDITION (STUDY_CLOSED); ALREADY_EXISTS (NAME_TAKEN); INVALID_ARGUMENT (NAME_REFUSED,
         /// COUNT_REFUSED); RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN).
         pub async fn add_study_participants(
@@ -10320,7 +10322,7 @@ pub mod study_service_server {
             tonic::Status,
         >;
         /// Adds participants and returns their links. More than `participants` of the settings may be
-        /// added: a link opened when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
+        /// added: a link opened, or a consent given, when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
         /// FAILED_PRECONDITION (STUDY_CLOSED); ALREADY_EXISTS (NAME_TAKEN); INVALID_ARGUMENT (NAME_REFUSED,
         /// COUNT_REFUSED); RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN).
         async fn add_study_participants(
@@ -11201,7 +11203,7 @@ pub mod participation_service_client {
         }
         /// Agrees to the text of the step. UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED);
         /// FAILED_PRECONDITION (STEP_OVER, STEP_MISMATCH, PARTICIPATION_OVER): show the newest view;
-        /// UNAVAILABLE (SHUTTING_DOWN).
+        /// FAILED_PRECONDITION (STUDY_FULL) if it gives a slot and none is free; UNAVAILABLE (SHUTTING_DOWN).
         pub async fn give_consent(
             &mut self,
             request: impl tonic::IntoRequest<super::GiveConsentRequest>,
@@ -11399,7 +11401,7 @@ pub mod participation_service_server {
         >;
         /// Agrees to the text of the step. UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED);
         /// FAILED_PRECONDITION (STEP_OVER, STEP_MISMATCH, PARTICIPATION_OVER): show the newest view;
-        /// UNAVAILABLE (SHUTTING_DOWN).
+        /// FAILED_PRECONDITION (STUDY_FULL) if it gives a slot and none is free; UNAVAILABLE (SHUTTING_DOWN).
         async fn give_consent(
             &self,
             request: tonic::Request<super::GiveConsentRequest>,

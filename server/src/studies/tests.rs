@@ -108,8 +108,17 @@ impl Lab {
 async fn a_participant_who_is_away_for_long_gives_its_slot_to_the_next() {
     let lab = Lab::new().await;
     let open = async |number| lab.study.open(number).await.expect("it runs");
-    assert_eq!(open(1).await, Ok(1));
-    assert_eq!(open(2).await, Err(chefshat_study::Refusal::Full));
+    let consent = async |number, session| {
+        let at = At {
+            number,
+            session,
+            step: 0,
+        };
+        lab.study.consent(at).await.expect("it runs")
+    };
+    assert_eq!((open(1).await, open(2).await), (Ok(1), Ok(1)));
+    assert_eq!(consent(1, 1).await, Ok(0));
+    assert_eq!(consent(2, 1).await, Err(chefshat_study::Refusal::Full));
     let present = lab.study.present(1, 1).await;
     lab.settled().await;
     advance(LIMIT * 2).await;
@@ -137,7 +146,8 @@ async fn a_participant_who_is_away_for_long_gives_its_slot_to_the_next() {
     lab.settled().await;
     advance(LIMIT).await;
     lab.until(1, Status::DroppedOut).await;
-    assert_eq!(open(2).await, Ok(1));
+    assert_eq!(open(2).await, Ok(2), "without a slot it may always return");
+    assert_eq!(consent(2, 2).await, Ok(0));
     assert_eq!(open(1).await, Ok(0), "there is only the end to show");
     assert_eq!(lab.status(1), Status::DroppedOut);
 }

@@ -19,7 +19,7 @@ pub enum Change {
     Opened {
         /// The participant.
         number: u32,
-        /// The slot that it gets, if this is its first session.
+        /// The slot that it gets, if this is its first session and it gets none by its consent.
         slot: Option<u32>,
         /// When, in milliseconds since the Unix epoch.
         at_ms: u64,
@@ -28,6 +28,8 @@ pub enum Change {
     Consented {
         /// The participant.
         number: u32,
+        /// The slot that it gets, if it had none.
+        slot: Option<u32>,
         /// The consent.
         consent: ConsentGiven,
     },

@@ -107,7 +107,8 @@ impl Study {
     }
 
     /// The change that opens a session of a participant, which is the newest then; `None` if its
-    /// participation is over, and there is only its end to show. The first session takes a slot.
+    /// participation is over, and there is only its end to show. The first session takes a slot, unless
+    /// the participant is asked for consent before its condition matters.
     ///
     /// # Errors
     /// If the participant is unknown or cannot begin.
@@ -115,7 +116,10 @@ impl Study {
         let participant = self.known(number)?;
         let slot = match participant.status {
             Status::Invited if self.is_closed() => return Err(Refusal::Closed),
-            Status::Invited => Some(self.free_slot().ok_or(Refusal::Full)?),
+            Status::Invited => {
+                let slot = self.free_slot().ok_or(Refusal::Full)?;
+                (!self.settings().assigns_by_consent()).then_some(slot)
+            }
             Status::Active => None,
             Status::DroppedOut if self.holder_of(participant.slot).is_none() => None,
             _ => return Ok(None),
@@ -130,17 +134,23 @@ impl Study {
         }))
     }
 
-    /// The change by which a participant consents.
+    /// The change by which a participant consents, and gets a slot if it has none.
     ///
     /// # Errors
-    /// If the participant is not at this step in this session, or it is not consent.
+    /// If the participant is not at this step in this session, it is not consent, or all slots are
+    /// taken.
     pub fn consent(&self, at: At, now_ms: u64) -> Result<Change, Refusal> {
-        let (_, step) = self.at(at)?;
+        let (participant, step) = self.at(at)?;
         let Task::Consent(consent) = step.task else {
             return Err(Refusal::StepMismatch);
         };
+        let slot = match participant.slot {
+            Some(_) => None,
+            None => Some(self.free_slot().ok_or(Refusal::Full)?),
+        };
         Ok(Change::Consented {
             number: at.number,
+            slot,
             consent: ConsentGiven {
                 text_sha256: Sha256::digest(&consent.text).into(),
                 version: consent.version.clone(),
@@ -203,9 +213,11 @@ impl Study {
         now_ms: u64,
     ) -> Result<Option<Change>, Refusal> {
         let participant = self.known(number)?;
-        let deletes = delete_data && !participant.data_deleted;
-        let withdraws = participant.status != Status::Withdrawn;
-        Ok((withdraws || deletes).then_some(Change::Withdrew {
+        let changes = match delete_data {
+            true => !participant.data_deleted || !participant.is_final(),
+            false => participant.status != Status::Withdrawn,
+        };
+        Ok(changes.then_some(Change::Withdrew {
             number,
             delete_data,
             at_ms: now_ms,

@@ -148,22 +148,28 @@ impl Study {
     /// The order in which a participant meets the items of the questionnaire at a step, from 0;
     /// `None` if the step is not a questionnaire.
     pub fn item_order(&self, number: u32, step: usize) -> Option<Vec<usize>> {
-        let sequence = self.sequence_of(self.participant(number)?)?;
-        match self.settings.steps(sequence).get(step)?.task {
+        match self.steps_of(self.participant(number)?)?.get(step)?.task {
             Task::Questionnaire(it) => Some(it.order(self.settings.assignment_seed, number, step)),
             _ => None,
         }
     }
 
-    /// The sequence of conditions of a participant who has begun.
+    /// The sequence of conditions of a participant who has a slot.
     pub fn sequence_of(&self, participant: &Participant) -> Option<&[usize]> {
         participant.slot.map(|slot| self.sequence(slot))
     }
 
     /// The step of a participant; `None` before it begins and after the last.
     pub fn step_of(&self, participant: &Participant) -> Option<Step<'_>> {
-        let steps = self.settings.steps(self.sequence_of(participant)?);
-        steps.get(participant.step()).copied()
+        self.steps_of(participant)?.get(participant.step()).copied()
+    }
+
+    /// The steps of a participant; `None` before it begins. Those before the consent by which it gets
+    /// its slot are the same in every sequence.
+    fn steps_of(&self, participant: &Participant) -> Option<Vec<Step<'_>>> {
+        let has_begun = !participant.reached_at_ms.is_empty();
+        let sequence = (self.sequence_of(participant)).unwrap_or_else(|| self.sequence(0));
+        has_begun.then(|| self.settings.steps(sequence))
     }
 
     /// Sets whether a participant has a session open.
@@ -205,8 +211,9 @@ impl Study {
 
     /// The participant who keeps a slot.
     fn holder_of(&self, slot: Option<u32>) -> Option<u32> {
+        let slot = slot?;
         let mut participants = self.state.participants.iter();
-        let holder = participants.find(|(_, it)| it.holds_slot() && it.slot == slot);
+        let holder = participants.find(|(_, it)| it.holds_slot() && it.slot == Some(slot));
         holder.map(|(number, _)| *number)
     }
 

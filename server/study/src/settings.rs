@@ -130,6 +130,20 @@ impl Settings {
         steps(&self.stages, sequence)
     }
 
+    /// Whether participants get their slots by their consent, so that nobody who declines takes one:
+    /// they are asked for it before they play or meet a condition.
+    pub fn assigns_by_consent(&self) -> bool {
+        let before = self.stages.iter().map_while(|stage| match stage {
+            Stage::Once(Task::Practice { .. } | Task::Games { .. }) | Stage::PerCondition(_) => {
+                None
+            }
+            Stage::Once(task) => Some(task),
+        });
+        before
+            .into_iter()
+            .any(|task| matches!(task, Task::Consent(_)))
+    }
+
     /// SHA-256 of the seeds one after the other, for a preregistration.
     pub fn seeds_sha256(&self) -> [u8; 32] {
         Sha256::digest(self.seeds.concat()).into()

@@ -32,7 +32,7 @@ pub struct Participant {
     pub pseudonym: String,
     /// Its state.
     pub status: Status,
-    /// Its slot, or after it has left the one it had; `None` until it begins.
+    /// Its slot, or after it has left the one it had; `None` until it begins, or until its consent.
     pub slot: Option<u32>,
     /// Number of sessions it opened, which is the number of the newest.
     pub session: u32,
@@ -47,7 +47,7 @@ pub struct Participant {
     pub answers: BTreeMap<usize, Arc<[ItemAnswer]>>,
     /// Its games, in order.
     pub games: Vec<PlayedGame>,
-    /// Whether it withdrew and had its data deleted.
+    /// Whether it had its data deleted.
     pub data_deleted: bool,
 }
 
@@ -68,9 +68,18 @@ impl Participant {
         self.reached_at_ms.len().saturating_sub(1)
     }
 
-    /// Whether it keeps its slot.
+    /// Whether it keeps its slot. Without its data somebody else is needed there.
     pub fn holds_slot(&self) -> bool {
-        matches!(self.status, Status::Active | Status::Completed)
+        let stays = matches!(self.status, Status::Active | Status::Completed);
+        stays && !self.data_deleted && self.slot.is_some()
+    }
+
+    /// Whether its state stays as it is when its data are deleted: what it has done, it has done.
+    pub(crate) fn is_final(&self) -> bool {
+        matches!(
+            self.status,
+            Status::Completed | Status::Withdrawn | Status::Removed
+        )
     }
 
     /// The last game of its step, if there is one.
@@ -139,8 +148,13 @@ impl StudyState {
                 slot,
                 at_ms,
             } => self.open(*number, *slot, *at_ms),
-            Change::Consented { number, consent } => {
+            Change::Consented {
+                number,
+                slot,
+                consent,
+            } => {
                 if let Some(participant) = self.active(*number) {
+                    participant.slot = participant.slot.or(*slot);
                     participant.consent = Some(consent.clone());
                     participant.advance(steps, consent.at_ms);
                 }
@@ -214,7 +228,7 @@ impl StudyState {
             return;
         };
         match participant.status {
-            Status::Invited if slot.is_some() => {
+            Status::Invited => {
                 participant.slot = slot;
                 participant.reached_at_ms.push(at_ms);
             }
@@ -230,7 +244,11 @@ impl StudyState {
         let Some(participant) = self.participants.get_mut(&number) else {
             return;
         };
-        if participant.status != Status::Withdrawn {
+        let ends = match delete_data {
+            true => !participant.is_final(),
+            false => participant.status != Status::Withdrawn,
+        };
+        if ends {
             participant.end(Status::Withdrawn, at_ms);
         }
         if delete_data {

@@ -98,7 +98,7 @@ pub enum End {
     Completed,
     /// It has withdrawn; its data so far are kept.
     Withdrawn,
-    /// It has withdrawn, and its data were deleted.
+    /// Its data were deleted.
     DataDeleted,
     /// It was away for too long.
     DroppedOut,
@@ -113,8 +113,8 @@ impl Study {
         let content = match participant.status {
             Status::Invited => return None,
             Status::Active => self.content(number, participant)?,
+            _ if participant.data_deleted => Content::End(End::DataDeleted),
             Status::Completed => Content::End(End::Completed),
-            Status::Withdrawn if participant.data_deleted => Content::End(End::DataDeleted),
             Status::Withdrawn => Content::End(End::Withdrawn),
             Status::DroppedOut => Content::End(End::DroppedOut),
             Status::Removed => Content::End(End::Removed),

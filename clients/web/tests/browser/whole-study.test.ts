@@ -92,7 +92,7 @@ test(
       await page.getByRole("button", { name: "Withdraw from the study…" }).click();
       await page.getByLabel("Also delete the data recorded so far").check();
       await page.getByRole("button", { name: "Withdraw now" }).click();
-      await page.getByText("You have withdrawn, and your data were deleted.").waitFor();
+      await page.getByText("Your participation is over, and your data were deleted.").waitFor();
       await leave();
     };
     const changeDevice = async (index: number) => {

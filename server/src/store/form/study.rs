@@ -84,6 +84,8 @@ struct ConsentForm {
     language: String,
     #[prost(uint64, tag = "5")]
     at_ms: u64,
+    #[prost(uint32, optional, tag = "6")]
+    slot: Option<u32>,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -258,7 +260,12 @@ fn kind_of(change: &Change) -> KindForm {
             slot: *slot,
             at_ms: *at_ms,
         }),
-        Change::Consented { number, consent } => KindForm::Consented(ConsentForm {
+        Change::Consented {
+            number,
+            slot,
+            consent,
+        } => KindForm::Consented(ConsentForm {
+            slot: *slot,
             number: *number,
             text_sha256: consent.text_sha256.to_vec(),
             version: consent.version.clone(),
@@ -319,6 +326,7 @@ fn change_of(kind: KindForm) -> Result<Change, Unreadable> {
         },
         KindForm::Consented(form) => Change::Consented {
             number: form.number,
+            slot: form.slot,
             consent: ConsentGiven {
                 text_sha256: array(&form.text_sha256, "the hash of a consent")?,
                 version: form.version,

@@ -56,6 +56,7 @@ fn every_change() -> Vec<Change> {
         },
         Change::Consented {
             number,
+            slot: None,
             consent: ConsentGiven {
                 text_sha256: [7; 32],
                 version: "2".to_owned(),

@@ -103,8 +103,7 @@ fn check(lab: &Lab) {
     );
 
     for (number, participant) in participants {
-        let has_begun = !participant.reached_at_ms.is_empty();
-        assert_eq!(participant.slot.is_some(), has_begun);
+        assert_eq!(participant.slot.is_some(), participant.consent.is_some());
         let Some(view) = lab.study.view(*number) else {
             continue;
         };
@@ -145,7 +144,11 @@ proptest! {
         // Once everybody needed has begun, only the last block may be incomplete.
         if !lab.study.is_closed() {
             lab.add(40);
-            (1..=lab.study.participants().len() as u32).for_each(|number| drop(lab.open(number)));
+            for number in 1..=lab.study.participants().len() as u32 {
+                if lab.open(number).is_ok() && lab.at(number).step == 0 {
+                    lab.act(number);
+                }
+            }
             let holders = lab.study.participants().values().filter(|it| it.holds_slot());
             prop_assert_eq!(holders.count() as u32, lab.study.settings().participants);
             check(&lab);

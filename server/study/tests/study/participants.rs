@@ -1,7 +1,7 @@
 //! Participants: beginning, sessions, steps, dropping out, withdrawing, being removed.
 
 use chefshat_study::testing::{settings, within};
-use chefshat_study::{At, Content, End, Refusal, Status};
+use chefshat_study::{At, Content, End, Refusal, Settings, Status};
 
 use super::support::Lab;
 
@@ -43,10 +43,10 @@ fn the_newest_session_wins_and_repeated_commands_change_nothing() {
     lab.open(1).unwrap();
     let first = lab.at(1);
     lab.open(1).unwrap();
-    assert_eq!(slot(&lab, 1), Some(0));
     assert_eq!(lab.study.consent(first, 0), Err(Refusal::Superseded));
     let second = lab.at(1);
     lab.act(1);
+    assert_eq!(slot(&lab, 1), Some(0));
     assert_eq!(lab.study.consent(second, 0), Err(Refusal::StepOver));
     assert_eq!(lab.study.consent(lab.at(1), 0), Err(Refusal::StepMismatch));
     assert_eq!(
@@ -106,7 +106,7 @@ fn who_is_away_too_long_drops_out_and_may_return_until_the_slot_is_given_again()
     lab.wait(0);
     lab.wait(60_000);
     assert_eq!(status(&lab, 1), Status::DroppedOut);
-    lab.open(2).unwrap();
+    lab.begin(2);
     assert_eq!(slot(&lab, 2), Some(0));
     lab.open(1).unwrap();
     assert_eq!(status(&lab, 1), Status::DroppedOut);
@@ -165,7 +165,7 @@ fn withdrawing_is_always_possible_and_does_what_it_says() {
 #[test]
 fn a_slot_is_given_again_first() {
     let mut lab = Lab::new(settings(), 6);
-    (1..=3).for_each(|number| lab.open(number).unwrap());
+    (1..=3).for_each(|number| lab.begin(number));
     let withdrew = lab.study.withdraw(2, false, 0).unwrap().unwrap();
     lab.fold(withdrew);
     let removed = lab.study.remove(1, 0).unwrap().unwrap();
@@ -178,9 +178,65 @@ fn a_slot_is_given_again_first() {
         Content::End(End::Removed)
     );
     assert!(lab.study.withdraw(1, true, 0).unwrap().is_some());
-    (4..=6).for_each(|number| lab.open(number).unwrap());
+    (4..=6).for_each(|number| lab.begin(number));
     let slots: Vec<_> = (3..=6).map(|number| slot(&lab, number)).collect();
     assert_eq!(slots, [Some(2), Some(0), Some(1), Some(3)]);
+}
+
+#[test]
+fn who_does_not_consent_takes_no_slot() {
+    let one = Settings {
+        participants: 1,
+        ..settings()
+    };
+    let mut lab = Lab::new(one.clone(), 2);
+    (1..=2).for_each(|number| lab.open(number).unwrap());
+    assert_eq!((slot(&lab, 1), slot(&lab, 2)), (None, None));
+    lab.act(2);
+    assert_eq!(slot(&lab, 2), Some(0));
+    let full = lab.study.consent(lab.at(1), lab.now_ms);
+    assert_eq!(full, Err(Refusal::Full));
+    let withdrew = lab.study.withdraw(2, false, 0).unwrap().unwrap();
+    lab.fold(withdrew);
+    lab.act(1);
+    assert_eq!(slot(&lab, 1), Some(0));
+    assert!(lab.folded_again() == lab.study);
+
+    // Who returns before consenting has still no slot.
+    let mut lab = Lab::new(one, 2);
+    lab.open(1).unwrap();
+    lab.study.set_connected(1, false, lab.now_ms);
+    lab.wait(60_000);
+    lab.open(2).unwrap();
+    lab.open(1).unwrap();
+    assert_eq!((status(&lab, 1), slot(&lab, 1)), (Status::Active, None));
+
+    // Without a question before the game, the link takes it.
+    let mut unasked = settings();
+    unasked.stages.remove(0);
+    let mut lab = Lab::new(unasked, 1);
+    lab.open(1).unwrap();
+    assert_eq!(slot(&lab, 1), Some(0));
+}
+
+#[test]
+fn who_completed_the_study_has_done_so_without_data_too_but_its_slot_is_free() {
+    let mut settings = settings();
+    settings.participants = 1;
+    let mut lab = Lab::new(settings, 2);
+    lab.open(1).unwrap();
+    lab.complete(1);
+    assert_eq!(lab.open(2), Err(Refusal::Full));
+    let deleted = lab.study.withdraw(1, true, lab.now_ms).unwrap().unwrap();
+    lab.fold(deleted);
+    assert_eq!(lab.study.withdraw(1, true, lab.now_ms), Ok(None));
+    assert_eq!(status(&lab, 1), Status::Completed);
+    assert!(lab.study.participant(1).unwrap().answers.is_empty());
+    let view = lab.study.view(1).unwrap();
+    assert_eq!(view.content, Content::End(End::DataDeleted));
+    lab.open(2).unwrap();
+    lab.complete(2);
+    assert_eq!(status(&lab, 2), Status::Completed);
 }
 
 #[test]
@@ -189,7 +245,7 @@ fn a_full_or_closed_study_accepts_nobody() {
     settings.participants = 1;
     settings.closes_at_ms = Some(2_000_000);
     let mut lab = Lab::new(settings, 3);
-    lab.open(1).unwrap();
+    lab.begin(1);
     assert_eq!(lab.open(2), Err(Refusal::Full));
     assert!(lab.study.view(2).is_none());
     lab.wait(0);

@@ -40,6 +40,12 @@ impl Lab {
         Ok(())
     }
 
+    /// A participant opens the study and consents.
+    pub(crate) fn begin(&mut self, number: u32) {
+        self.open(number).unwrap();
+        self.act(number);
+    }
+
     /// Folds what follows by itself.
     pub(crate) fn wait(&mut self, ms: u64) {
         self.now_ms += ms;
@@ -63,7 +69,10 @@ impl Lab {
         let due = self.study.due(number);
         let (at, now_ms) = (self.at(number), self.now_ms);
         let change = match self.study.view(number).unwrap().content {
-            Content::Consent(_) => self.study.consent(at, now_ms).unwrap(),
+            Content::Consent(_) => match self.study.consent(at, now_ms) {
+                Err(Refusal::Full) => return None,
+                consented => consented.unwrap(),
+            },
             Content::Questionnaire(shown) => {
                 let answers = shown.items.iter();
                 let answers = answers.map(|it| answer(it.item, valid(&it.kind))).collect();

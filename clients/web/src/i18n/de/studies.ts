@@ -62,7 +62,7 @@ export const studies: Texts["studies"] = {
     texts: {
       completed: "Sie haben die Studie abgeschlossen. Alles wurde aufgezeichnet.",
       withdrawn: "Sie haben Ihre Teilnahme zurückgezogen. Ihre bisher aufgezeichneten Daten bleiben gespeichert.",
-      deleted: "Sie haben Ihre Teilnahme zurückgezogen, und Ihre Daten wurden gelöscht.",
+      deleted: "Ihre Teilnahme ist beendet, und Ihre Daten wurden gelöscht.",
       droppedOut:
         "Sie waren zu lange weg, daher wurde Ihr Platz an jemand anderen vergeben. Wenn Sie weitermachen möchten, fragen Sie die Studienleitung.",
       removed: "Die Studienleitung hat Ihre Teilnahme beendet. Wenn Sie Fragen haben, wenden Sie sich an sie.",

@@ -60,7 +60,7 @@ export const studies = {
     texts: {
       completed: "You have completed the study. Everything has been recorded.",
       withdrawn: "You have withdrawn. Your data recorded so far are kept.",
-      deleted: "You have withdrawn, and your data were deleted.",
+      deleted: "Your participation is over, and your data were deleted.",
       droppedOut:
         "You were away for too long, so your place was given to someone else. If you want to continue, ask the researchers.",
       removed: "The researchers have ended your participation. If you have questions, ask them.",

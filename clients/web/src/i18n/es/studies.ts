@@ -61,7 +61,7 @@ export const studies: Texts["studies"] = {
     texts: {
       completed: "Ha completado el estudio. Todo se ha registrado.",
       withdrawn: "Se ha retirado. Sus datos registrados hasta ahora se conservan.",
-      deleted: "Se ha retirado, y sus datos se han borrado.",
+      deleted: "Su participación ha terminado, y sus datos se han borrado.",
       droppedOut:
         "Su ausencia fue demasiado larga y su plaza pasó a otra persona. Si quiere continuar, pregunte al equipo del estudio.",
       removed: "El equipo del estudio ha terminado su participación. Si tiene preguntas, diríjase a él.",

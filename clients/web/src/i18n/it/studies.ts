@@ -61,7 +61,7 @@ export const studies: Texts["studies"] = {
     texts: {
       completed: "Ha completato lo studio. Tutto è stato registrato.",
       withdrawn: "La Sua partecipazione è ritirata. I Suoi dati registrati finora restano.",
-      deleted: "La Sua partecipazione è ritirata, e i Suoi dati sono stati cancellati.",
+      deleted: "La Sua partecipazione è terminata, e i Suoi dati sono stati cancellati.",
       droppedOut:
         "La Sua assenza è stata troppo lunga e il Suo posto è passato a un’altra persona. Se vuole continuare, chieda a chi conduce lo studio.",
       removed: "Chi conduce lo studio ha concluso la Sua partecipazione. Se ha domande, chieda a chi lo conduce.",

@@ -39,7 +39,8 @@ class _StudyOrderEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_StudyOrder
 
 class StudyOrder(_StudyOrder, metaclass=_StudyOrderEnumTypeWrapper):
     """How conditions are assigned. Assignment is by permuted blocks of slots, whose order follows from
-    the assignment seed. A participant gets the first free slot when its link is first opened.
+    the assignment seed. A participant gets the first free slot by consenting; when its link is first
+    opened, if it is not asked for consent before a game or a condition.
     """
 
 STUDY_ORDER_UNSPECIFIED: StudyOrder.ValueType  # 0
@@ -1068,7 +1069,9 @@ class StudyParticipant(_message.Message):
     state: Global___StudyParticipantState.ValueType
     """Its state."""
     slot: _builtins.int
-    """Its slot, from 0; after it has left, the one it had. Unset until it begins."""
+    """Its slot, from 0; after it has left, the one it had. Unset until it is assigned
+    (`StudyOrder`).
+    """
     step: _builtins.int
     """The step it is at, from 0; the number of steps once it has completed the study."""
     connected: _builtins.bool
@@ -1192,7 +1195,7 @@ class Study(_message.Message):
     active: _builtins.int
     """Number of participants who have begun and are not over."""
     completed: _builtins.int
-    """Number of participants who have completed it."""
+    """Number of participants who have completed it, also if their data were deleted since."""
     left: _builtins.int
     """Number of participants who have withdrawn, dropped out or were removed."""
     @_builtins.property

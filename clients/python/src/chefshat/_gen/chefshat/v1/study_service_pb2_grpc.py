@@ -124,7 +124,7 @@ class StudyServiceServicer(object):
 
     def AddStudyParticipants(self, request, context):
         """Adds participants and returns their links. More than `participants` of the settings may be
-        added: a link opened when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
+        added: a link opened, or a consent given, when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
         FAILED_PRECONDITION (STUDY_CLOSED); ALREADY_EXISTS (NAME_TAKEN); INVALID_ARGUMENT (NAME_REFUSED,
         COUNT_REFUSED); RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN).
         """
@@ -647,7 +647,7 @@ class ParticipationServiceServicer(object):
     def GiveConsent(self, request, context):
         """Agrees to the text of the step. UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED);
         FAILED_PRECONDITION (STEP_OVER, STEP_MISMATCH, PARTICIPATION_OVER): show the newest view;
-        UNAVAILABLE (SHUTTING_DOWN).
+        FAILED_PRECONDITION (STUDY_FULL) if it gives a slot and none is free; UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

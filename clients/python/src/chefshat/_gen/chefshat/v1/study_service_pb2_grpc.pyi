@@ -47,7 +47,7 @@ class StudyServiceStub:
     """Lists the studies whose owner tokens the request has, and for the operator all, newest first."""
     AddStudyParticipants: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.AddStudyParticipantsRequest, _study_service_pb2.AddStudyParticipantsResponse]
     """Adds participants and returns their links. More than `participants` of the settings may be
-    added: a link opened when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
+    added: a link opened, or a consent given, when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
     FAILED_PRECONDITION (STUDY_CLOSED); ALREADY_EXISTS (NAME_TAKEN); INVALID_ARGUMENT (NAME_REFUSED,
     COUNT_REFUSED); RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN).
     """
@@ -109,7 +109,7 @@ class StudyServiceAsyncStub(StudyServiceStub):
     """Lists the studies whose owner tokens the request has, and for the operator all, newest first."""
     AddStudyParticipants: _aio.UnaryUnaryMultiCallable[_study_service_pb2.AddStudyParticipantsRequest, _study_service_pb2.AddStudyParticipantsResponse]  # type: ignore[assignment]
     """Adds participants and returns their links. More than `participants` of the settings may be
-    added: a link opened when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
+    added: a link opened, or a consent given, when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
     FAILED_PRECONDITION (STUDY_CLOSED); ALREADY_EXISTS (NAME_TAKEN); INVALID_ARGUMENT (NAME_REFUSED,
     COUNT_REFUSED); RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN).
     """
@@ -192,7 +192,7 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.AddStudyParticipantsResponse, _abc.Awaitable[_study_service_pb2.AddStudyParticipantsResponse]]:
         """Adds participants and returns their links. More than `participants` of the settings may be
-        added: a link opened when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
+        added: a link opened, or a consent given, when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
         FAILED_PRECONDITION (STUDY_CLOSED); ALREADY_EXISTS (NAME_TAKEN); INVALID_ARGUMENT (NAME_REFUSED,
         COUNT_REFUSED); RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN).
         """
@@ -305,7 +305,7 @@ class ParticipationServiceStub:
     GiveConsent: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.GiveConsentRequest, _study_service_pb2.GiveConsentResponse]
     """Agrees to the text of the step. UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED);
     FAILED_PRECONDITION (STEP_OVER, STEP_MISMATCH, PARTICIPATION_OVER): show the newest view;
-    UNAVAILABLE (SHUTTING_DOWN).
+    FAILED_PRECONDITION (STUDY_FULL) if it gives a slot and none is free; UNAVAILABLE (SHUTTING_DOWN).
     """
     AnswerQuestionnaire: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.AnswerQuestionnaireRequest, _study_service_pb2.AnswerQuestionnaireResponse]
     """Answers the questionnaire of the step. INVALID_ARGUMENT (ANSWER_REFUSED; metadata `item`);
@@ -352,7 +352,7 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
     GiveConsent: _aio.UnaryUnaryMultiCallable[_study_service_pb2.GiveConsentRequest, _study_service_pb2.GiveConsentResponse]  # type: ignore[assignment]
     """Agrees to the text of the step. UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED);
     FAILED_PRECONDITION (STEP_OVER, STEP_MISMATCH, PARTICIPATION_OVER): show the newest view;
-    UNAVAILABLE (SHUTTING_DOWN).
+    FAILED_PRECONDITION (STUDY_FULL) if it gives a slot and none is free; UNAVAILABLE (SHUTTING_DOWN).
     """
     AnswerQuestionnaire: _aio.UnaryUnaryMultiCallable[_study_service_pb2.AnswerQuestionnaireRequest, _study_service_pb2.AnswerQuestionnaireResponse]  # type: ignore[assignment]
     """Answers the questionnaire of the step. INVALID_ARGUMENT (ANSWER_REFUSED; metadata `item`);
@@ -414,7 +414,7 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_study_service_pb2.GiveConsentResponse, _abc.Awaitable[_study_service_pb2.GiveConsentResponse]]:
         """Agrees to the text of the step. UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED);
         FAILED_PRECONDITION (STEP_OVER, STEP_MISMATCH, PARTICIPATION_OVER): show the newest view;
-        UNAVAILABLE (SHUTTING_DOWN).
+        FAILED_PRECONDITION (STUDY_FULL) if it gives a slot and none is free; UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
