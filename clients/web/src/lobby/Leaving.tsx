@@ -7,10 +7,9 @@ import { t } from "../i18n";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Dialog } from "../parts/Dialog";
-import { Icon } from "../parts/Icon";
 import { Notice } from "../parts/Notice";
 import { navigate } from "../router";
-import toolsCss from "../table/view/Tools.module.css";
+import { Tool } from "../table/view/Tools";
 import css from "./Leaving.module.css";
 import { clockOfPeople } from "./rooms";
 import { closeRoom, giveBackSeat, hostedRoom } from "./seat";
@@ -26,16 +25,9 @@ interface LeaveButtonProps {
 export function LeaveButton({ roomId, look, onClick }: LeaveButtonProps) {
   const words = t().lobby.leaving;
   return look === "tool" ? (
-    <button
-      type="button"
-      class={toolsCss.tool}
-      data-part="tool tool-leave"
-      aria-label={words.leave}
-      title={words.leave}
-      onClick={onClick}
-    >
-      <DoorSign />
-    </button>
+    <Tool label={words.leave} part="tool-leave" onClick={onClick}>
+      <path d="M13 4H5v16h8M10 12h10M16.500 8.500l3.500 3.500l-3.500 3.500" />
+    </Tool>
   ) : (
     <p class={css.leaving} data-part="leaving">
       <Button look="quiet" onClick={onClick}>
@@ -113,13 +105,4 @@ function awayWords(policy: RoomPolicy | undefined, givenUp: boolean, others: boo
   const timeMs = others ? Math.min(clock.absenceTimeMs, clock.decisionTimeMs) : clock.decisionTimeMs + clock.bankMs;
   const seconds = Math.ceil(timeMs / 1000);
   return givenUp ? words.awayGivenUp(seconds) : words.awaySubstituted(seconds, substitute);
-}
-
-/** A door, and an arrow out of it. */
-function DoorSign() {
-  return (
-    <Icon>
-      <path d="M13 4H5v16h8M10 12h10M16.500 8.500l3.500 3.500l-3.500 3.500" />
-    </Icon>
-  );
 }

@@ -1,11 +1,11 @@
 // A participant's part of a tournament's page: status and next game; during a game, the table in
-// place of the page.
+// place of the page, unless the participant goes back to the page: to leave, or to organise.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
 import { AfterStudy } from "../experiment/AfterStudy";
-import { useHiding } from "../experiment/hiding";
+import { hidden, useHiding } from "../experiment/hiding";
 import { studyIn } from "../experiment/study";
 import { TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
@@ -13,7 +13,9 @@ import { announce } from "../parts/Announcer";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { type Acting, asksForTimes } from "../table/acting";
+import { useAttention } from "../table/attention";
 import { Seated } from "../table/Seated";
+import { Tool } from "../table/view/Tools";
 import type { LiveTournament } from "./following";
 import { OwnPlace } from "./OwnPlace";
 import { type Participation as Part, startParticipation } from "./participation";
@@ -66,6 +68,14 @@ export function Participation({ held, live, onLeft, children }: ParticipationPro
             <GameBanner game={game} />
           </>
         }
+        tools={
+          !isOverThere(game) &&
+          !hidden.value.includes("pages") && (
+            <Tool label={t().tournaments.results.back} part="tool-tournament" onClick={() => setLeft(game)}>
+              <path d="M7 4h10v5a5 5 0 0 1-10 0ZM7 5H4v2a3 3 0 0 0 3 3M17 5h3v2a3 3 0 0 1-3 3M12 14v4M8 20h8" />
+            </Tool>
+          )
+        }
         onward={
           <Button look="main" onClick={() => setLeft(game)}>
             {t().tournaments.part.back}
@@ -80,11 +90,7 @@ export function Participation({ held, live, onLeft, children }: ParticipationPro
       {after}
       {!after && (
         <OwnState held={held} live={live}>
-          {game && !gone && !isOverThere(game) && (
-            <Button look="main" onClick={() => setLeft(undefined)}>
-              {t().tournaments.part.toGame}
-            </Button>
-          )}
+          {game && !gone && !isOverThere(game) && <ToGame game={game} onClick={() => setLeft(undefined)} />}
           <OwnPlace {...{ held, live, onLeft }} />
         </OwnState>
       )}
@@ -109,6 +115,20 @@ function OwnState(props: { held: HeldPlace; live: LiveTournament; children: Comp
           : words.over}{" "}
       {props.children}
     </Notice>
+  );
+}
+
+/** The way to the own game, which calls as the table does. */
+function ToGame({ game, onClick }: { game: Acting; onClick: () => void }) {
+  const { table, decision } = game.live.value;
+  useAttention(table.roomId, decision, true);
+  return (
+    <>
+      {decision && <strong role="alert">{t().table.now.yourTurn}</strong>}{" "}
+      <Button look="main" onClick={onClick}>
+        {t().tournaments.part.toGame}
+      </Button>
+    </>
   );
 }
 

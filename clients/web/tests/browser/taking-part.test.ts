@@ -63,6 +63,11 @@ test("a person joins, plays every game of the tournament and sees the final stan
   // The second game replaces the first one's result, or is opened from the standings.
   const second = page.getByText("Friday league · round 2, table 1");
   await second.waitFor();
+  // The page of the tournament is a press away, and calls back.
+  await page.getByRole("button", { name: "Back to the tournament" }).click();
+  await page.getByRole("button", { name: "Leave the tournament…" }).waitFor();
+  await page.getByRole("alert").getByText("Your turn").waitFor();
+  await page.getByRole("button", { name: "Go to my game" }).click();
   await playOn(page, byClicks);
   await page.getByRole("button", { name: "Back to the standings" }).click();
   await page.getByText("The tournament is over. Thank you for playing.").waitFor();

@@ -33,6 +33,34 @@ export interface ShownTurn {
   readonly decision: Pick<OpenDecision, "hand" | "legal"> & { readonly requirement: Requirement };
 }
 
+interface ToolProps {
+  label: string;
+  /** An additional name of the part. */
+  part?: string;
+  /** Of a switch: whether it is on. */
+  pressed?: boolean;
+  onClick: () => void;
+  /** The drawing of the icon. */
+  children: ComponentChildren;
+}
+
+/** An icon that does something. */
+export function Tool({ label, part = "", pressed, onClick, children }: ToolProps) {
+  return (
+    <button
+      type="button"
+      class={css.tool}
+      data-part={`tool ${part}`.trim()}
+      aria-pressed={pressed}
+      aria-label={label}
+      title={label}
+      onClick={onClick}
+    >
+      <Icon>{children}</Icon>
+    </button>
+  );
+}
+
 interface ToolsProps {
   /** The reader's last turn. */
   turn: ShownTurn | undefined;
@@ -49,33 +77,14 @@ export function Tools({ turn, lookup, children }: ToolsProps) {
   return (
     <fieldset class={css.tools} aria-label={words.label}>
       {lookup && (
-        <button
-          type="button"
-          class={css.tool}
-          data-part="tool tool-lookup"
-          onClick={() => setOpen(turn ?? "none")}
-          aria-label={words.lookup}
-          title={words.lookup}
-        >
-          <Icon>
-            <path d="M4 4h16v16H4ZM4 9.3h16M4 14.6h16M9.3 4v16M14.6 4v16" />
-          </Icon>
-        </button>
+        <Tool label={words.lookup} part="tool-lookup" onClick={() => setOpen(turn ?? "none")}>
+          <path d="M4 4h16v16H4ZM4 9.3h16M4 14.6h16M9.3 4v16M14.6 4v16" />
+        </Tool>
       )}
-      <button
-        type="button"
-        class={css.tool}
-        data-part="tool"
-        aria-pressed={on}
-        aria-label={on ? words.soundOn : words.soundOff}
-        title={on ? words.soundOn : words.soundOff}
-        onClick={() => setSound(!on)}
-      >
-        <Icon>
-          <path fill="currentColor" d="M4 9.5v5h3.5L12 19V5L7.500 9.500Z" />
-          <path d={on ? "M15.500 9a4 4 0 0 1 0 6M18 6.500a8 8 0 0 1 0 11" : "M16 9.500l5 5M21 9.500l-5 5"} />
-        </Icon>
-      </button>
+      <Tool label={on ? words.soundOn : words.soundOff} pressed={on} onClick={() => setSound(!on)}>
+        <path fill="currentColor" d="M4 9.5v5h3.5L12 19V5L7.500 9.500Z" />
+        <path d={on ? "M15.500 9a4 4 0 0 1 0 6M18 6.500a8 8 0 0 1 0 11" : "M16 9.500l5 5M21 9.500l-5 5"} />
+      </Tool>
       {children}
       {open && (
         <Dialog title={words.lookup} onClose={() => setOpen(undefined)}>
@@ -123,18 +132,9 @@ export function Expressions({ onExpress, phrases, chat }: ExpressionsProps) {
         </button>
       ))}
       {(phrases || chat) && (
-        <button
-          type="button"
-          class={css.tool}
-          data-part="tool"
-          aria-label={words.say}
-          title={words.say}
-          onClick={() => setTalking(true)}
-        >
-          <Icon>
-            <path d="M4 5h16v11H11l-4.500 4v-4H4ZM8 9h8M8 12h5" />
-          </Icon>
-        </button>
+        <Tool label={words.say} onClick={() => setTalking(true)}>
+          <path d="M4 5h16v11H11l-4.500 4v-4H4ZM8 9h8M8 12h5" />
+        </Tool>
       )}
       {talking && (
         <Dialog title={words.say} onClose={() => setTalking(false)}>
