@@ -18,6 +18,7 @@ test("a person plays a complete Shift by clicking, and continues after a reload"
   await sitDown(page, server, code, "Rosa");
   let reloads = 0;
   const taken = await playOn(page, byClicks, async (already) => {
+    if (already === 0) await expectTimeInForcedColours(page);
     if (already !== 3) return;
     const before = await seen(page);
     await page.reload();
@@ -64,6 +65,8 @@ test("a person plays a complete Shift with the keyboard alone, and hears every t
   await expectEnd(page, roomId, taken);
   await expect.poll(() => heard.join(" ").match(/Your turn\./g)?.length).toBe(taken);
   await expect.poll(() => heard.join(" ")).toMatch(/The game is over\. .+ won\. 1st .+, \d+ points?\. 2nd /);
+  // The focus is on the result, from where the next step is a few keys away.
+  await expect.poll(async () => (await focus(page)).label).toMatch(/ won|You won/);
   await tabTo(page, (on) => on.label === "Watch the replay");
   await page.keyboard.press("Enter");
   await page.waitForURL(/\/replay\//);
@@ -191,4 +194,14 @@ async function expectEnd(page: Page, roomId: string, taken: number): Promise<voi
   expect(decisions).toHaveLength(taken);
   expect(taken).toBeGreaterThan(2);
   expect(decisions.every(({ source, invalidAttempts }) => source === 1 && invalidAttempts.length === 0)).toBe(true);
+}
+
+/** Expects that the bar of the time differs from its ground, also where the system chooses the colours. */
+async function expectTimeInForcedColours(page: Page): Promise<void> {
+  await page.emulateMedia({ forcedColors: "active" });
+  const colours = await page
+    .locator('[data-part~="clock"] [aria-hidden]')
+    .evaluate((bar) => [bar, bar.firstElementChild ?? bar].map((part) => getComputedStyle(part).backgroundColor));
+  expect(new Set(colours).size).toBe(2);
+  await page.emulateMedia({ forcedColors: "none" });
 }

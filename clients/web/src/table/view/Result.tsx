@@ -1,6 +1,7 @@
 // The result of a Shift or game, over the pizza: places, points, and next steps.
 
 import type { ComponentChildren } from "preact";
+import { useLayoutEffect, useRef } from "preact/hooks";
 import { t } from "../../i18n";
 import { ButtonLink } from "../../parts/Button";
 import { SeatNumber } from "../../parts/SeatNumber";
@@ -92,9 +93,16 @@ interface EndProps {
 function GameResult({ table, own, profiles, ways }: EndProps & { own: number | undefined; profiles: boolean }) {
   const words = t().table.result;
   const winner = table.standings[0]?.seat;
+  const heading = useRef<HTMLHeadingElement>(null);
+  // Who played with the keyboard goes on from the result: the hand is empty.
+  useLayoutEffect(() => {
+    if (document.activeElement?.closest('[data-part~="own"]')) heading.current?.focus();
+  }, []);
   return (
     <section class={`${css.result} sheet`} data-part="result" aria-label={words.game}>
-      <h2>{winner !== undefined && (winner === own ? words.youWon : words.wins(distinctName(table, winner)))}</h2>
+      <h2 ref={heading} tabIndex={-1}>
+        {winner !== undefined && (winner === own ? words.youWon : words.wins(distinctName(table, winner)))}
+      </h2>
       <table>
         <thead>
           <tr>
