@@ -204,6 +204,17 @@ def test_a_play_that_counts_is_taken_back_if_somebody_says_so(table: Table, brid
     assert not table.reports[-1].correction.HasField("instead")
 
 
+def test_what_was_taken_from_a_board_that_is_then_cleared_was_swept_away(table: Table, bridge: Bridge) -> None:
+    async def test() -> None:
+        await bridge.observed(laid(CARDS[9][:2]))
+        await bridge.observed(TakenBack(0, 0.0, (CARDS[9][0],), (1,)))
+        await bridge.observed(Cleared(0, 0.0))
+
+    run(test())
+    assert table.kinds() == ["laid", "question", "answer", "cleared"]
+    assert not table.reports[2].answer.HasField("option"), "the question is withdrawn"
+
+
 def test_a_doubt_is_a_question_whose_answer_perception_gets(table: Table, eyes: Eyes, bridge: Bridge) -> None:
     picture = np.full((80, 60, 3), 200, dtype=np.uint8)
     run(bridge.observed(Doubt(0, 0.0, 4, "1", 0.0, (CARDS[7][0], CARDS[9][0]), picture)))

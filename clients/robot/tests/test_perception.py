@@ -191,6 +191,16 @@ def test_a_card_taken_back() -> None:
     assert_true(table, watch(table))
 
 
+def test_a_sweep_in_three_strokes_clears_the_field() -> None:
+    cards = (Card(0, 50), Card(0, 51), Card(0, 52))
+    # Between the strokes the hand leaves the field.
+    strokes = [TakeBack(2.4 + 1.3 * number, 1, (number + 1,)) for number in range(3)]
+    table = SyntheticTable([LayCards(0.6, 0, cards, (1, 2, 3)), *strokes], EASY, seed=8)
+    _, laid, cleared = watch(table)
+    assert isinstance(laid, Laid)
+    assert isinstance(cleared, Cleared)
+
+
 def test_a_card_that_cannot_be_read_is_asked_about() -> None:
     unreadable = replace(EASY, smudged=1.0)
     table = SyntheticTable([LayCards(0.6, 0, (Card(0, 30),), (4,))], unreadable, seed=7)

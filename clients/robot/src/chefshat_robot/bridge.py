@@ -213,6 +213,7 @@ class Bridge:
                 await self._taken_back(list(event.cards))
             case Cleared():
                 self._play = None
+                await self._withdraw("taken-back")
                 await self._report(pb.TableReport(cleared=pb.BoardCleared()))
             case PassSeen():
                 report = pb.TableReport()

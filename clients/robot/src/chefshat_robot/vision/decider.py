@@ -9,8 +9,9 @@ The decider sees no pictures, so that a recording of sightings gives the same ev
   one that is covered again before it could be read.
   Later events wait until the doubt is answered or resolved: an event is never reported on top of one that may be missing.
 - A card or pass card is gone when its place looks empty for `GONE_FRAMES`. The field is cleared when all its cards are gone, or if
-  only some are, when none of the others can be read as new cards come. If others can still be read after `TAKEN_SECONDS`, cards
-  were taken back. Cards on others were taken back when a tag is read that they covered.
+  only some are, when none of the others can be read as new cards come. If others can still be read after `TAKEN_SECONDS` in which
+  nothing moved, cards were taken back: before that, more strokes may sweep the rest away. Cards on others were taken back when a
+  tag is read that they covered.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ GONE_FRAMES = 3
 DOUBT_SECONDS = 1.2
 """A place that cannot be explained for this long becomes a doubt, in s."""
 TAKEN_SECONDS = 1.2
-"""Cards that are gone for this long while others stay were taken back, in s."""
+"""Cards that are gone while others stay were taken back when nothing has moved for this long, in s."""
 TOGETHER_SECONDS = 0.8
 """What begins no more than this before the first card of a play, or before clearing, is of the same movement of a hand, in s."""
 REACH = 45.0
@@ -199,6 +200,7 @@ class Decider:
         self._next_doubt = 1
         self._frame = 0
         self._time = 0.0
+        self._moved = 0.0
         self._reaching = False
         self._places: tuple[SeenPlace, ...] = ()
 
@@ -246,6 +248,8 @@ class Decider:
         self._places = sighting.places
         self._reaching = sighting.reaching
         if sighting.places:
+            if any(sighting.places[spot].still == 0 for spot in CARD_SPOTS):
+                self._moved = self._time
             self._forget_moved()
             self._follow_tags(sighting.tags)
             self._settle(events)
@@ -538,20 +542,15 @@ class Decider:
         for spot in occupied:
             if self._spots[spot].gone_since is None and self._is_empty(spot):
                 self._spots[spot].gone_since = self._time
-        quiet = all(self._places[spot].still >= QUIET_FRAMES for spot in CARD_SPOTS)
-        gone = self._gone_for(0.0)
+        gone = self._gone()
         if gone and len(gone) == len(occupied):
             self._clear(events)
-        elif quiet and (gone := self._gone_for(TAKEN_SECONDS)) and self._some_stayed(gone):
+        elif gone and self._time - self._moved >= TAKEN_SECONDS and self._some_stayed(gone):
             self._queue.append(_Gone(self._time, self._remove(gone, events)))
 
-    def _gone_for(self, seconds: float) -> list[int]:
-        """The places whose cards have been gone for some time, in s."""
-        return [
-            number
-            for number in CARD_SPOTS
-            if (since := self._spots[number].gone_since) is not None and self._time - since >= seconds
-        ]
+    def _gone(self) -> list[int]:
+        """The places whose cards are gone."""
+        return [number for number in CARD_SPOTS if self._spots[number].gone_since is not None]
 
     def _some_stayed(self, gone: Iterable[int]) -> bool:
         """Whether cards at other places can still be read, so that light or shadow does not only hide that these are empty too."""
@@ -560,7 +559,7 @@ class Decider:
 
     def _settle_gone(self, events: list[Observed]) -> None:
         """As new cards lie there, decides whether all cards are gone, or those that stayed can still be read."""
-        gone = self._gone_for(0.0)
+        gone = self._gone()
         if not gone:
             return
         if self._some_stayed(gone):
