@@ -8,12 +8,7 @@ import { Button } from "./parts/Button";
 import { ErrorPage } from "./parts/ErrorPage";
 import { Layout } from "./parts/Layout";
 import { Notice } from "./parts/Notice";
-import { type Route, restoreScroll, route, startRouter } from "./router";
-
-/** The props of every page. */
-export interface PageProps<Name extends Route["page"]> {
-  route: Extract<Route, { page: Name }>;
-}
+import { type PageProps, type Route, restoreScroll, route, startRouter } from "./router";
 
 type Pages = { [Name in Route["page"]]: () => Promise<ComponentType<PageProps<Name>>> };
 

@@ -27,6 +27,11 @@ export type Route =
   | { page: "rules" }
   | { page: "unknown" };
 
+/** The props of every page. */
+export interface PageProps<Name extends Route["page"]> {
+  route: Extract<Route, { page: Name }>;
+}
+
 /** Parses a path such as "/rooms/0123". */
 export function routeOf(path: string): Route {
   const parts = path.split("/").filter((part) => part !== "");

@@ -3,12 +3,13 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
-import type { PageProps } from "../app";
 import { TableStage } from "../gen/chefshat/v1/table_service_pb";
 import { t } from "../i18n";
-import { CopyLine, HostInvite, QrCode, ThisMachine } from "../lobby/Invite";
+import { HostInvite } from "../lobby/HostInvite";
+import { CopyLine, QrCode, ThisMachine } from "../lobby/Invite";
 import { isForAgents, isOpen } from "../lobby/rooms";
 import { ErrorPage } from "../parts/ErrorPage";
+import type { PageProps } from "../router";
 import css from "./Attend.module.css";
 import { AttendView } from "./AttendView";
 import { type Attending, startAttending } from "./attending";

@@ -15,7 +15,7 @@ import { ConfirmButton } from "../parts/ConfirmButton";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
 import css from "./Doorway.module.css";
-import { HostInvite } from "./Invite";
+import { HostInvite } from "./HostInvite";
 import { NameForm } from "./Join";
 import { JoinForm } from "./JoinForm";
 import { RoomStateChip, rulesInShort } from "./RoomCard";

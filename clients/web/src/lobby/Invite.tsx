@@ -2,13 +2,11 @@
 
 import { useMemo, useState } from "preact/hooks";
 import { encode } from "uqr";
-import { StudyLinks } from "../experiment/StudyLinks";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import css from "./Invite.module.css";
-import { hostedRoom, invitation } from "./seat";
 
 /** Quiet zone around the QR code, in modules: scanners need four. */
 const QR_MARGIN = 4;
@@ -59,26 +57,6 @@ export function ThisMachine() {
 /** Whether this host name leads only to the machine that opens it. */
 export function isThisMachine(host: string): boolean {
   return host === "localhost" || host.endsWith(".localhost") || host === "[::1]" || /^127(\.\d+){3}$/.test(host);
-}
-
-/** The invitation, for the creator of the room; null for everyone else. */
-export function HostInvite({ roomId, forAgents }: { roomId: string; forAgents: boolean }) {
-  const hosted = hostedRoom(roomId);
-  if (!hosted) return null;
-  const { joinCode: code } = hosted;
-  const words = t().lobby.invite;
-  const command = `chefshat agent greedy --server ${location.origin} --code ${code}`;
-  return (
-    <section class={`sheet ${css.hostInvite}`}>
-      <Invite
-        title={words.title}
-        code={code}
-        address={invitation(code)}
-        agent={forAgents ? { label: words.agent, command } : undefined}
-      />
-      <StudyLinks roomId={roomId} address={invitation(code)} />
-    </section>
-  );
 }
 
 /** A text to copy, with its label. */

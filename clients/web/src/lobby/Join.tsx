@@ -4,7 +4,6 @@
 import { useEffect, useState } from "preact/hooks";
 import { faultOf, wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
-import type { PageProps } from "../app";
 import { AfterStudy } from "../experiment/AfterStudy";
 import { useHiding } from "../experiment/hiding";
 import { StudyJoin } from "../experiment/StudyJoin";
@@ -16,7 +15,7 @@ import { useAttempt } from "../parts/attempt";
 import { Button, ButtonLink } from "../parts/Button";
 import { TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
-import { navigate, pathOf, type Route } from "../router";
+import { navigate, type PageProps, pathOf, type Route } from "../router";
 import { heldPlace, takePlace } from "../tournaments/place";
 import { paceOf, storePace } from "../wizard/pace";
 import { lookUp } from "./code";

@@ -13,13 +13,6 @@ import { type FieldName, newForm, physicalProblems, ROOM_FIELDS, type RoomForm, 
 import { SeatFields } from "./SeatFields";
 import { createRoom } from "./seat";
 
-/** The props of each part of the form. */
-export interface FormProps {
-  form: RoomForm;
-  faults: FieldFaults<FieldName>;
-  change: (changed: Partial<RoomForm>) => void;
-}
-
 /** The page. */
 export function NewRoom() {
   return <FormPage title={t().lobby.make.title}>{(offered) => <RoomFormView offered={offered} />}</FormPage>;

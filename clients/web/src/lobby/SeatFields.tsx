@@ -5,14 +5,31 @@ import { t } from "../i18n";
 import { SelectField, TextField } from "../parts/Field";
 import { SeatNumber } from "../parts/SeatNumber";
 import css from "./FormPage.module.css";
-import type { FormProps } from "./NewRoom";
-import { isAtTable, MAX_NAME, SEARCHING, type SeatChoice, withCards, withPlayers } from "./room-form";
+import type { FieldFaults } from "./form-state";
+import {
+  type FieldName,
+  isAtTable,
+  MAX_NAME,
+  type RoomForm,
+  SEARCHING,
+  type SeatChoice,
+  withCards,
+  withPlayers,
+} from "./room-form";
 
 /** Possible numbers of players. */
 const PLAYERS = ["2", "3", "4", "5", "6"] as const;
 
+interface SeatFieldsProps {
+  form: RoomForm;
+  faults: FieldFaults<FieldName>;
+  change: (changed: Partial<RoomForm>) => void;
+  /** The built-in agents that the server offers. */
+  agents: string[];
+}
+
 /** The part of the form. */
-export function SeatFields({ form, faults, change, agents }: FormProps & { agents: string[] }) {
+export function SeatFields({ form, faults, change, agents }: SeatFieldsProps) {
   const words = t().lobby.make;
   const real = form.cards === "real";
   const choices: SeatChoice[] = [

@@ -3,11 +3,11 @@
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { recordApi } from "../api/client";
 import { inWords } from "../api/faults";
-import type { PageProps } from "../app";
 import { DecisionKind, type DecisionRequest } from "../gen/chefshat/v1/decision_pb";
 import type { DecisionRecord, RecordLine } from "../gen/chefshat/v1/record_pb";
 import { t } from "../i18n";
 import { ErrorPage } from "../parts/ErrorPage";
+import type { PageProps } from "../router";
 import { useAnnounced } from "../table/following";
 import { legalActions, moveOf } from "../table/model/actions";
 import { lookupOf } from "../table/model/lookup";

@@ -4,7 +4,6 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
-import type { PageProps } from "../app";
 import { leaveOut } from "../experiment/hiding";
 import { hostOf, questionnaire as safeAddress } from "../experiment/study";
 import {
@@ -22,6 +21,7 @@ import buttonCss from "../parts/Button.module.css";
 import { ConfirmButton } from "../parts/ConfirmButton";
 import { CheckField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
+import type { PageProps } from "../router";
 import { dropDraft } from "./answers";
 import { type Participating, startParticipating } from "./participating";
 import { Questionnaire } from "./Questionnaire";

@@ -2,10 +2,10 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
-import type { PageProps } from "../app";
 import { t } from "../i18n";
 import { ErrorPage } from "../parts/ErrorPage";
 import { Notice } from "../parts/Notice";
+import type { PageProps } from "../router";
 import { useAnnounced } from "./following";
 import { type Spectating, startSpectating } from "./spectating";
 import { Caption } from "./view/Caption";

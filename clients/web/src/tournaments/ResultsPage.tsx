@@ -3,13 +3,12 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
-import type { PageProps } from "../app";
 import { type Tournament, type TournamentGame, TournamentGameState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { Button, ButtonLink } from "../parts/Button";
 import { Drawing } from "../parts/Drawing";
 import { Notice } from "../parts/Notice";
-import { pathOf } from "../router";
+import { type PageProps, pathOf } from "../router";
 import { type Certificate, certificatesOf } from "./certificate";
 import { type LiveTournament, useGames, useTournament } from "./following";
 import css from "./Results.module.css";

@@ -4,7 +4,6 @@
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
-import type { PageProps } from "../app";
 import { hidden, useHiding } from "../experiment/hiding";
 import { StudyJoin } from "../experiment/StudyJoin";
 import { holderOf, languageOf, type Study, studyOf } from "../experiment/study";
@@ -14,7 +13,7 @@ import joinCss from "../lobby/Join.module.css";
 import { NO_KEY } from "../name-key";
 import { Button, ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import { pathOf, readdress } from "../router";
+import { type PageProps, pathOf, readdress } from "../router";
 import { Bracket } from "./Bracket";
 import { Countdown } from "./Countdown";
 import { Entrants } from "./Entrants";

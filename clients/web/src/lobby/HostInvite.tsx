@@ -1,0 +1,27 @@
+// The invitation to a room on the device that created it, with links for the participants of a study.
+
+import { StudyLinks } from "../experiment/StudyLinks";
+import { t } from "../i18n";
+import { Invite } from "./Invite";
+import css from "./Invite.module.css";
+import { hostedRoom, invitation } from "./seat";
+
+/** The invitation, for the creator of the room; null for everyone else. */
+export function HostInvite({ roomId, forAgents }: { roomId: string; forAgents: boolean }) {
+  const hosted = hostedRoom(roomId);
+  if (!hosted) return null;
+  const { joinCode: code } = hosted;
+  const words = t().lobby.invite;
+  const command = `chefshat agent greedy --server ${location.origin} --code ${code}`;
+  return (
+    <section class={`sheet ${css.hostInvite}`}>
+      <Invite
+        title={words.title}
+        code={code}
+        address={invitation(code)}
+        agent={forAgents ? { label: words.agent, command } : undefined}
+      />
+      <StudyLinks roomId={roomId} address={invitation(code)} />
+    </section>
+  );
+}
