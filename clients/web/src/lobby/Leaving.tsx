@@ -25,7 +25,7 @@ interface LeaveButtonProps {
 export function LeaveButton({ roomId, look, onClick }: LeaveButtonProps) {
   const words = t().lobby.leaving;
   return look === "tool" ? (
-    <Tool label={words.leave} part="tool-leave" onClick={onClick}>
+    <Tool label={words.leave} data-part="tool tool-leave" onClick={onClick}>
       <path d="M13 4H5v16h8M10 12h10M16.500 8.500l3.500 3.500l-3.500 3.500" />
     </Tool>
   ) : (

@@ -71,7 +71,7 @@ export function Participation({ held, live, onLeft, children }: ParticipationPro
         tools={
           !isOverThere(game) &&
           !hidden.value.includes("pages") && (
-            <Tool label={t().tournaments.results.back} part="tool-tournament" onClick={() => setLeft(game)}>
+            <Tool label={t().tournaments.results.back} onClick={() => setLeft(game)}>
               <path d="M7 4h10v5a5 5 0 0 1-10 0ZM7 5H4v2a3 3 0 0 0 3 3M17 5h3v2a3 3 0 0 1-3 3M12 14v4M8 20h8" />
             </Tool>
           )

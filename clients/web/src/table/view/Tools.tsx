@@ -35,8 +35,7 @@ export interface ShownTurn {
 
 interface ToolProps {
   label: string;
-  /** An additional name of the part. */
-  part?: string;
+  "data-part"?: string;
   /** Of a switch: whether it is on. */
   pressed?: boolean;
   onClick: () => void;
@@ -45,12 +44,12 @@ interface ToolProps {
 }
 
 /** An icon that does something. */
-export function Tool({ label, part = "", pressed, onClick, children }: ToolProps) {
+export function Tool({ label, "data-part": part = "tool", pressed, onClick, children }: ToolProps) {
   return (
     <button
       type="button"
       class={css.tool}
-      data-part={`tool ${part}`.trim()}
+      data-part={part}
       aria-pressed={pressed}
       aria-label={label}
       title={label}
@@ -77,7 +76,7 @@ export function Tools({ turn, lookup, children }: ToolsProps) {
   return (
     <fieldset class={css.tools} aria-label={words.label}>
       {lookup && (
-        <Tool label={words.lookup} part="tool-lookup" onClick={() => setOpen(turn ?? "none")}>
+        <Tool label={words.lookup} data-part="tool tool-lookup" onClick={() => setOpen(turn ?? "none")}>
           <path d="M4 4h16v16H4ZM4 9.3h16M4 14.6h16M9.3 4v16M14.6 4v16" />
         </Tool>
       )}
