@@ -111,15 +111,12 @@ impl Steps {
                 |lane: thread::ScopedJoinHandle<'_, _>| lane.join().expect("lanes do not panic");
             started.into_iter().map(join).collect::<Vec<_>>()
         });
-        let mut failures = Vec::new();
+        let mut results = Vec::new();
         for (steps, result) in ended {
             self.done.extend(steps.done);
-            failures.extend(result.err().map(|failure| failure.to_string()));
+            results.push(result);
         }
-        match failures.as_slice() {
-            [] => Ok(()),
-            failures => Err(Failure::new(failures.join("; "))),
-        }
+        Failure::of_any(results)
     }
 
     /// Reports a step that cannot be run.
@@ -190,12 +187,17 @@ impl Steps {
     }
 }
 
-/// The last lines, `most` of them, that name a failure.
+/// The last lines, `most` of them, that name a failure; what is said often, once.
 fn naming<'a>(lines: impl DoubleEndedIterator<Item = &'a str>, most: usize) -> Vec<&'a str> {
     const NAMING: [&str; 5] = ["FAIL", "failed", "panicked", "Error", "error:"];
     let passed = |line: &str| line.contains(" 0 failed") || line.ends_with("... ok");
     let names = |line: &&str| NAMING.iter().any(|word| line.contains(word)) && !passed(line);
-    let mut naming: Vec<&str> = lines.rev().filter(names).take(most).collect();
+    let mut naming = Vec::new();
+    for line in lines.rev().filter(names) {
+        if naming.len() < most && !naming.contains(&line) {
+            naming.push(line);
+        }
+    }
     naming.reverse();
     naming
 }

@@ -240,7 +240,7 @@ pub(crate) fn run(
                 outcomes.push(steps.program(&name, &mut pytest));
                 outcomes.push(wheels::run(places, steps, "release", true));
             }
-            all_of(outcomes)
+            Failure::of_any(outcomes)
         }));
     }
     let mut others = Vec::<Lane<'_>>::new();
@@ -263,22 +263,10 @@ pub(crate) fn run(
         others.push(Box::new(|steps| test_deployment(places, steps, slow)));
     }
     lanes.push(Box::new(|steps| {
-        all_of(others.into_iter().map(|tests| tests(steps)).collect())
+        Failure::of_any(others.into_iter().map(|tests| tests(steps)))
     }));
     // A failure stops only what depends on it, so that one run shows all of them.
     steps.beside(lanes)
-}
-
-/// The failures of steps that ran whatever became of the others.
-fn all_of(outcomes: Vec<Result<(), Failure>>) -> Result<(), Failure> {
-    let failures: Vec<String> = outcomes
-        .into_iter()
-        .filter_map(|outcome| outcome.err().map(|failure| failure.to_string()))
-        .collect();
-    match failures.as_slice() {
-        [] => Ok(()),
-        failures => Err(Failure::new(failures.join("; "))),
-    }
 }
 
 /// The tests of docker/ and of what the documents tell to type.

@@ -31,14 +31,15 @@ pub(crate) fn check(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
 
 /// The page's tests without a browser, then the browser tests, which start the server.
 pub(crate) fn test(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
-    steps.program("vitest", npm(places).args(["run", "test"]))?;
-    match setup::chromium() {
+    let vitest = steps.program("vitest", npm(places).args(["run", "test"]));
+    let browser = match setup::chromium() {
         Ok(()) => steps.program("browser tests", npm(places).args(["run", "test:browser"])),
         Err(failure) => {
             steps.skip("browser tests", &failure.to_string());
             Ok(())
         }
-    }
+    };
+    Failure::of_any([vitest, browser])
 }
 
 fn npm(places: &Places) -> Command {
