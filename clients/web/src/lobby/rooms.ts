@@ -1,6 +1,7 @@
 // The rooms of the server, for the lobby.
 
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { faultOf } from "../api/faults";
 import type { AskPage } from "../api/pages";
 import {
   type Participant,
@@ -20,12 +21,22 @@ export function roomsIn(state: RoomState): AskPage<Room> {
   };
 }
 
+/** Rooms that were found to be over or gone, which they stay. */
+const over = new Set<string>();
+
 /** Those of the rooms that wait or play; the others are over, gone, or cannot be asked for now. */
 export async function openRooms(roomIds: readonly string[], signal: AbortSignal): Promise<Room[]> {
-  const ask = (roomId: string) => roomApi.getRoom({ roomId }, { signal, timeoutMs: CALL_LIMIT_MS });
-  const asked = await Promise.allSettled(roomIds.map(ask));
-  const rooms = asked.flatMap((one) => (one.status === "fulfilled" && one.value.room ? [one.value.room] : []));
-  return rooms.filter(({ state }) => state === RoomState.WAITING || state === RoomState.PLAYING);
+  const ask = async (roomId: string): Promise<Room[]> => {
+    try {
+      const { room } = await roomApi.getRoom({ roomId }, { signal, timeoutMs: CALL_LIMIT_MS });
+      if (room?.state === RoomState.WAITING || room?.state === RoomState.PLAYING) return [room];
+      over.add(roomId);
+    } catch (error) {
+      if (faultOf(error).reason === "ROOM_UNKNOWN") over.add(roomId);
+    }
+    return [];
+  };
+  return (await Promise.all(roomIds.filter((roomId) => !over.has(roomId)).map(ask))).flat();
 }
 
 /** Whether the seat is free. */
