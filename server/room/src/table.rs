@@ -10,7 +10,7 @@ use chefshat_engine::{
 use chefshat_referee::{Corrected, Referee, Ruling, Stage};
 
 use crate::answers::ReportOutcome;
-use crate::journal::{Decided, ReportSource, Reported, Source};
+use crate::journal::{Decided, Report, ReportSource, Reported, Source};
 
 /// The game of a room.
 #[derive(Debug)]
@@ -206,7 +206,7 @@ impl PhysicalTable {
 
     /// Confirms the end of the game.
     pub(super) fn confirm_end(&mut self, number: u64) -> Ruling {
-        self.referee.confirm_end(number)
+        self.referee.report(number, &Report::EndConfirmed)
     }
 
     /// Remembers since when the table waits for something else than before.

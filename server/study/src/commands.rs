@@ -213,11 +213,9 @@ impl Study {
         now_ms: u64,
     ) -> Result<Option<Change>, Refusal> {
         let participant = self.known(number)?;
-        let changes = match delete_data {
-            true => !participant.data_deleted || !participant.is_final(),
-            false => participant.status != Status::Withdrawn,
-        };
-        Ok(changes.then_some(Change::Withdrew {
+        let deletes = delete_data && !participant.data_deleted;
+        let ends = participant.ends_by_withdrawing(delete_data);
+        Ok((ends || deletes).then_some(Change::Withdrew {
             number,
             delete_data,
             at_ms: now_ms,

@@ -133,15 +133,14 @@ impl Settings {
     /// Whether participants get their slots by their consent, so that nobody who declines takes one:
     /// they are asked for it before they play or meet a condition.
     pub fn assigns_by_consent(&self) -> bool {
-        let before = self.stages.iter().map_while(|stage| match stage {
-            Stage::Once(Task::Practice { .. } | Task::Games { .. }) | Stage::PerCondition(_) => {
-                None
-            }
-            Stage::Once(task) => Some(task),
-        });
-        before
-            .into_iter()
-            .any(|task| matches!(task, Task::Consent(_)))
+        let plays = |stage: &&Stage| {
+            matches!(
+                stage,
+                Stage::Once(Task::Practice { .. } | Task::Games { .. }) | Stage::PerCondition(_)
+            )
+        };
+        let mut before = self.stages.iter().take_while(|stage| !plays(stage));
+        before.any(|stage| matches!(stage, Stage::Once(Task::Consent(_))))
     }
 
     /// SHA-256 of the seeds one after the other, for a preregistration.

@@ -74,12 +74,13 @@ impl Participant {
         stays && !self.data_deleted && self.slot.is_some()
     }
 
-    /// Whether its state stays as it is when its data are deleted: what it has done, it has done.
-    pub(crate) fn is_final(&self) -> bool {
-        matches!(
-            self.status,
-            Status::Completed | Status::Withdrawn | Status::Removed
-        )
+    /// Whether withdrawing changes its state. A deletion of its data does not undo what it has done.
+    pub(crate) fn ends_by_withdrawing(&self, delete_data: bool) -> bool {
+        match self.status {
+            Status::Withdrawn => false,
+            Status::Completed | Status::Removed => !delete_data,
+            Status::Invited | Status::Active | Status::DroppedOut => true,
+        }
     }
 
     /// The last game of its step, if there is one.
@@ -244,11 +245,7 @@ impl StudyState {
         let Some(participant) = self.participants.get_mut(&number) else {
             return;
         };
-        let ends = match delete_data {
-            true => !participant.is_final(),
-            false => participant.status != Status::Withdrawn,
-        };
-        if ends {
+        if participant.ends_by_withdrawing(delete_data) {
             participant.end(Status::Withdrawn, at_ms);
         }
         if delete_data {

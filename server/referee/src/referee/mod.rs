@@ -184,11 +184,6 @@ impl Referee {
         ruling
     }
 
-    /// Confirms the end of a game that is over, as `Report::EndConfirmed` does.
-    pub fn confirm_end(&mut self, number: u64) -> Ruling {
-        self.report(number, &Report::EndConfirmed)
-    }
-
     fn finish(&mut self, number: u64, ruling: &mut Ruling) {
         if let Some(last) = ruling.violations.last() {
             self.violation = Some(last.clone());
@@ -345,14 +340,9 @@ impl Referee {
         let (mut void, mut new) = (0, Vec::new());
         let played = self.played[first..].iter().map(|it| self.publishable(it));
         let current: Vec<Vec<Event>> = played.map(<[Event]>::to_vec).collect();
-        for index in 0..current
-            .len()
-            .max(self.published.len().saturating_sub(first))
-        {
-            let old = self
-                .published
-                .get(first + index)
-                .map_or(&[][..], Vec::as_slice);
+        let former = self.published.split_off(first);
+        for index in 0..current.len().max(former.len()) {
+            let old = former.get(index).map_or(&[][..], Vec::as_slice);
             let events = current.get(index).map_or(&[][..], Vec::as_slice);
             let common = match void {
                 0 => (old.iter().zip(events))
@@ -363,7 +353,6 @@ impl Referee {
             void += old.len() - common;
             new.extend_from_slice(&events[common..]);
         }
-        self.published.truncate(first);
         self.published.extend(current);
         (void, new)
     }

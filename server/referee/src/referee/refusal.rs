@@ -24,7 +24,7 @@ pub enum Refusal {
         "this report cannot be corrected: it does not count in this Shift, or its pizza was over long ago"
     )]
     NotCorrectable,
-    /// There is no end to confirm.
+    /// The game goes on.
     #[error("the game is not over: there is no end to confirm")]
     NotOver,
 }

@@ -332,7 +332,7 @@ fn games_keep_the_names_of_those_who_were_called_to_them() {
         tournament.set_present(place, true);
         follow(&mut tournament, 0);
     }
-    // The second game was called after the first replacement, and again for whoever came last.
+    // The second game was called after the first replacement.
     let second = names(&tournament)[1].clone();
     assert_eq!(names(&tournament)[0].as_deref(), Some(&*first));
     assert!(matches!(second.as_deref(), Some("Bo") | None), "{second:?}");
