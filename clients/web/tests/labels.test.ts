@@ -1,8 +1,8 @@
 // The names that a study gives the other seats, in the language of the page.
 
 import { afterEach, expect, test } from "vitest";
-import { labelled, shownName } from "../src/experiment/labels";
 import { setLanguage } from "../src/i18n";
+import { labelled, shownName } from "../src/table/labels";
 
 afterEach(async () => {
   labelled.value = false;

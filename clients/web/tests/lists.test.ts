@@ -1,12 +1,12 @@
-// Paginated lists and their bounds, and the seats for a study.
+// Paginated lists and their bounds, and the seats for people.
 
 import { create } from "@bufbuild/protobuf";
 import { beforeAll, expect, test } from "vitest";
 import { type AskPage, allPages, countWords, firstOf } from "../src/api/pages";
-import { freeForPeople, placed } from "../src/experiment/places";
 import { AnswerResultSchema, AnswerStatus } from "../src/gen/chefshat/v1/decision_pb";
 import { ParticipantKind, ParticipantSchema } from "../src/gen/chefshat/v1/room_pb";
 import { setLanguage } from "../src/i18n";
+import { freeForPeople } from "../src/lobby/rooms";
 import { answerWords } from "../src/table/words";
 
 beforeAll(() => setLanguage("en"));
@@ -53,7 +53,7 @@ test("an incomplete count says so", () => {
   expect([countWords(12, true), countWords(12, false)]).toEqual(["12+", "12"]);
 });
 
-test("links are for seats that people can take, and stay with participants who have joined", () => {
+test("people can take the free seats that are not reserved for others", () => {
   const seats = [
     create(ParticipantSchema, { name: "P02" }),
     create(ParticipantSchema, { builtInAgent: "greedy" }),
@@ -62,12 +62,6 @@ test("links are for seats that people can take, and stay with participants who h
     create(ParticipantSchema, {}),
   ];
   expect(freeForPeople(seats)).toEqual([2, 4]);
-  expect(placed(seats, ["P01", "P02", "P03", "P04"], 0)).toEqual([
-    { name: "P01", seat: 2 },
-    { name: "P02", seat: 0 },
-    { name: "P03", seat: 4 },
-  ]);
-  expect(placed(seats, [""], 3)).toEqual([{ name: "", seat: 4 }]);
 });
 
 test.each([

@@ -53,7 +53,7 @@ test("the request of a room is repeated until it succeeds, on one stream", async
   const room = create(GetRoomResponseSchema, { room: { roomId: "room1" } });
   const ask = vi.spyOn(roomApi, "getRoom").mockRejectedValueOnce(away).mockRejectedValueOnce(away);
   ask.mockResolvedValue(room);
-  const part = startParticipation("ticket", false);
+  const part = startParticipation("ticket");
   await vi.advanceTimersByTimeAsync(10_000);
   expect(ask).toHaveBeenCalledTimes(3);
   expect(watch).toHaveBeenCalledTimes(1);
@@ -68,7 +68,7 @@ test("a superseded page stops its requests and does not take the place back", as
     [5_000, superseded],
   ]);
   const ask = vi.spyOn(roomApi, "getRoom").mockRejectedValue(away);
-  const part = startParticipation("ticket", false);
+  const part = startParticipation("ticket");
   await vi.advanceTimersByTimeAsync(5_000);
   expect(part.presence.value).toBe("superseded");
   const asked = ask.mock.calls.length;
@@ -86,7 +86,7 @@ test("the request of a room that is gone is not repeated", async () => {
     [0, seated],
   ]);
   const ask = vi.spyOn(roomApi, "getRoom").mockRejectedValue(new ConnectError("gone", Code.NotFound));
-  const part = startParticipation("ticket", false);
+  const part = startParticipation("ticket");
   await vi.advanceTimersByTimeAsync(10_000);
   expect(ask).toHaveBeenCalledTimes(1);
   expect(part.game.value).toBeUndefined();

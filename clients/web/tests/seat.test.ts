@@ -16,7 +16,6 @@ test("a seat is stored until it is given up", () => {
   expect(heldSeat("room1")).toEqual(HELD);
   expect(heldSeat("room2")).toBeNull();
   expect(roomOfCode("bcdf-2345")).toBe("room1");
-  remember("study.room1", "?name=Rosa");
   remember("code.OTHER234", "room2");
   giveUpSeat("room1");
   expect([...remembered().keys()]).toEqual(["code.OTHER234"]);
@@ -35,11 +34,7 @@ test.each([
   ["bcdf2345", "BCDF2345", ""],
   [" bcdf 2345 ", "BCDF2345", ""],
   ["http://127.0.0.1:50051/join/bcdf2345", "BCDF2345", ""],
-  [
-    "http://127.0.0.1:50051/join/bcdf2345?name=P07&hide=log,pages&lang=it ",
-    "BCDF2345",
-    "?name=P07&hide=log,pages&lang=it",
-  ],
+  ["http://127.0.0.1:50051/join/bcdf2345?as=robot&lang=it ", "BCDF2345", "?as=robot&lang=it"],
   ["", "", ""],
 ])("%j is the code %s, and besides %j", (typed, code, search) => {
   expect(codeIn(typed)).toEqual({ code, search });

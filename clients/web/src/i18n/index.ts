@@ -61,6 +61,15 @@ export async function startLanguage(): Promise<void> {
   await load(firstKnown([asked, recall("language"), ...navigator.languages]));
 }
 
+/**
+ * The language parameter of an address, to be kept when navigating, so that a reload keeps the
+ * link's language.
+ */
+export function languageOf(search: string): string {
+  const language = new URLSearchParams(search).get("lang");
+  return language === null ? "" : `?lang=${encodeURIComponent(language)}`;
+}
+
 /** Shows the page in a language without storing it; nothing happens if it has no texts. */
 export async function showLanguage(asked: string): Promise<void> {
   if (isKnown(asked) && asked !== language.peek()) await load(asked);

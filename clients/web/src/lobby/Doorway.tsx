@@ -5,9 +5,6 @@ import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
 import { tableTicket } from "../attend/ticket";
-import { hidden } from "../experiment/hiding";
-import { freeForPeople } from "../experiment/places";
-import { KeptLinks } from "../experiment/StudyLinks";
 import { type Room, RoomState } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { ButtonLink } from "../parts/Button";
@@ -19,7 +16,7 @@ import { HostInvite } from "./HostInvite";
 import { NameForm } from "./Join";
 import { JoinForm } from "./JoinForm";
 import { RoomStateChip, rulesInShort } from "./RoomCard";
-import { isForAgents, isOpen } from "./rooms";
+import { freeForPeople, isForAgents, isOpen } from "./rooms";
 import { Seats } from "./Seats";
 import { closeRoom, hostedRoom } from "./seat";
 
@@ -38,13 +35,10 @@ export function Doorway({ roomId }: { roomId: string }) {
       <div class={css.doorway}>
         <section class="sheet">
           <Notice kind="fault">{wordsOf(fault)}</Notice>
-          {!hidden.value.includes("pages") && (
-            <p>
-              <ButtonLink href="/">{words.toLobby}</ButtonLink>
-            </p>
-          )}
+          <p>
+            <ButtonLink href="/">{words.toLobby}</ButtonLink>
+          </p>
         </section>
-        <KeptLinks roomId={roomId} />
       </div>
     );
   }
@@ -62,7 +56,6 @@ export function Doorway({ roomId }: { roomId: string }) {
         {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}
       </section>
       {waiting && <WayIn room={room} />}
-      {!(waiting && isOpen(room)) && <KeptLinks roomId={roomId} />}
       {[RoomState.WAITING, RoomState.PLAYING].includes(room.state) && hostedRoom(roomId) && (
         <ConfirmButton label={words.close} act={() => closeRoom(roomId)}>
           {room.state === RoomState.WAITING ? words.closeSure : words.closePlaying}

@@ -1,6 +1,5 @@
-// The invitation to a room on the device that created it, with links for the participants of a study.
+// The invitation to a room on the device that created it.
 
-import { StudyLinks } from "../experiment/StudyLinks";
 import { t } from "../i18n";
 import { Invite } from "./Invite";
 import css from "./Invite.module.css";
@@ -21,7 +20,6 @@ export function HostInvite({ roomId, forAgents }: { roomId: string; forAgents: b
         address={invitation(code)}
         agent={forAgents ? { label: words.agent, command } : undefined}
       />
-      <StudyLinks roomId={roomId} address={invitation(code)} />
     </section>
   );
 }

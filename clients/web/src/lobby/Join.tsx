@@ -4,12 +4,8 @@
 import { useEffect, useState } from "preact/hooks";
 import { faultOf, wordsOf } from "../api/faults";
 import { usePolled } from "../api/poll";
-import { AfterStudy } from "../experiment/AfterStudy";
-import { useHiding } from "../experiment/hiding";
-import { StudyJoin } from "../experiment/StudyJoin";
-import { finishedBy, holderOf, languageOf, type Study, studyOf } from "../experiment/study";
 import { ParticipantKind, type Room, RoomState } from "../gen/chefshat/v1/room_pb";
-import { t } from "../i18n";
+import { languageOf, t } from "../i18n";
 import { NO_KEY } from "../name-key";
 import { useAttempt } from "../parts/attempt";
 import { Button, ButtonLink } from "../parts/Button";
@@ -25,7 +21,7 @@ import { rulesInShort } from "./RoomCard";
 import { MAX_NAME } from "./room-form";
 import { isOpen, nameOf } from "./rooms";
 import { Seats } from "./Seats";
-import { canonical, giveBackSeat, heldSeat, lastName, roomOfCode, takeSeat } from "./seat";
+import { canonical, lastName, roomOfCode, takeSeat } from "./seat";
 
 /** Polling interval of the code and its room, milliseconds. */
 const EVERY_MS = 4_000;
@@ -34,124 +30,15 @@ const EVERY_MS = 4_000;
 export function Join({ route }: PageProps<"join">) {
   const words = t().lobby.join;
   const code = canonical(route.code);
-  const study = studyOf(location.search);
-  useHiding(study);
-  const held = code === "" ? null : roomOfCode(code);
-  const before = held === null ? "" : (heldSeat(held)?.name ?? "");
-  const seated = holderOf(study, before) === "reader" ? held : null;
-  const goOn = (roomId: string) =>
-    navigate({ page: "room", roomId }, { replace: true, search: languageOf(location.search) });
+  const seated = code === "" ? null : roomOfCode(code);
   useEffect(() => {
-    if (seated) goOn(seated);
+    if (seated) navigate({ page: "room", roomId: seated }, { replace: true, search: languageOf(location.search) });
   }, [seated]);
   if (seated) return null;
-  const finished = study ? finishedBy(code, study.name) : [];
-  if ((held === null || study?.name !== "") && finished.length > 0) {
-    return (
-      <section class={`sheet ${css.page}`}>
-        <h1>{t().experiment.join.over}</h1>
-        {finished.map(({ name, roomId, after }) => (
-          <AfterStudy key={name} after={after} blanks={{ name, room: roomId }} named />
-        ))}
-      </section>
-    );
-  }
-  if (study && code !== "") return <StudyWay study={study} code={code} arrive={goOn} />;
   return (
     <section class={`sheet ${css.page}`}>
       <h1>{words.title}</h1>
       {code === "" ? <JoinForm /> : <WayIn code={code} />}
-    </section>
-  );
-}
-
-/**
- * The way into a study. Checks that the room still exists before the participant fills in a
- * questionnaire.
- */
-function StudyWay(props: { study: Study; code: string; arrive: (roomId: string) => void }) {
-  const { study, code, arrive } = props;
-  const { value: found } = usePolled((signal) => lookUp(code, signal), EVERY_MS, code);
-  // Ticket of the seat that the person agreed to give up.
-  const [givenUp, setGivenUp] = useState<string | null>(null);
-  const [, setAsked] = useState(0);
-  if (found === null) return <p class="soft">{t().common.loading}</p>;
-  if (found.kind === "tournament") return <ToTournament tournamentId={found.tournamentId} code={code} />;
-  if (found.kind === "refused") return <StudyNotice kind="fault">{wordsOf(found.fault)}</StudyNotice>;
-  const room = found.kind === "room" ? found.room : undefined;
-  const seats = room?.seats ?? [];
-  // Read on each render: another tab of this device may have taken a seat meanwhile.
-  const held = roomOfCode(code);
-  const holder = held === null ? null : heldSeat(held);
-  const gone = found.kind === "nothing";
-  const waiting = found.kind === "unknown" || room?.state === RoomState.WAITING;
-  if (gone && !(held && study.name === "")) {
-    return <StudyNotice kind="fault">{t().experiment.join.gone}</StudyNotice>;
-  }
-  if (held && holder && (!waiting || holder.ticket !== givenUp)) {
-    return (
-      <Holder
-        name={holder.name}
-        study={study}
-        onSame={() => arrive(held)}
-        onOther={waiting ? () => setGivenUp(holder.ticket) : undefined}
-      />
-    );
-  }
-  if (seats.some((seat) => study.name !== "" && seat.kind === ParticipantKind.HUMAN && seat.name === study.name)) {
-    return <StudyNotice kind="hint">{t().experiment.join.seated(study.name)}</StudyNotice>;
-  }
-  const take = async (name: string) => {
-    const roomId = roomOfCode(code);
-    const holder = roomId === null ? null : heldSeat(roomId);
-    if (roomId !== null && holder) {
-      if (holder.ticket !== givenUp) {
-        setAsked((times) => times + 1);
-        return null;
-      }
-      await giveBackSeat(roomId);
-    }
-    return (await takeSeat(code, name, study.seat, ParticipantKind.HUMAN, NO_KEY)).roomId;
-  };
-  const isTaken = (name: string) => seats.some((seat) => sameName(nameOf(seat), name));
-  return <StudyJoin study={study} what="room" take={take} isTaken={isTaken} arrive={arrive} />;
-}
-
-interface HolderProps {
-  /** Name on this device's seat. */
-  name: string;
-  /** The study of the opened link. */
-  study: Study;
-  onSame: () => void;
-  /** Undefined once the game has started: the seat cannot be given up then. */
-  onOther: (() => void) | undefined;
-}
-
-/** Asks who is using this device when it already has a seat in the room. */
-function Holder({ name, study, onSame, onOther }: HolderProps) {
-  const words = t().experiment.join;
-  // Another tab took a seat with the same link meanwhile.
-  const same = study.name === name;
-  return (
-    <section class={`sheet ${css.page}`}>
-      <h1>{words.title}</h1>
-      <p>{study.name === "" || same ? words.taken(name) : words.held(name)}</p>
-      {!same && <p class="soft">{onOther ? words.oneSeat(name) : words.begun(name)}</p>}
-      <Button look="main" onClick={onSame}>
-        {words.goOn(name)}
-      </Button>
-      {onOther && !same && (
-        <Button onClick={onOther}>{study.name === "" ? words.another : words.giveBack(name, study.name)}</Button>
-      )}
-    </section>
-  );
-}
-
-function StudyNotice({ kind, children }: { kind: "fault" | "hint"; children: string }) {
-  return (
-    <section class={`sheet ${css.page}`}>
-      <h1>{t().experiment.join.title}</h1>
-      <Notice kind={kind}>{children}</Notice>
     </section>
   );
 }

@@ -1,5 +1,4 @@
-// Creates a room with the rules, times and agents of another and its other seats free: for studies
-// in which each participant has a room of their own, and for playing again.
+// Playing again: a room with the rules, times and agents of another and its other seats free.
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
@@ -8,28 +7,16 @@ import { GameOrigin, type Participant, ParticipantKind, type Room, RoomPolicySch
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
 import { NO_KEY, nameKey } from "../name-key";
 import { navigate } from "../router";
-import { MAX_NAME } from "./room-form";
 import { createRoom, hostedRoom, takeSeat } from "./seat";
 
-/** Why a room cannot be repeated exactly; null if it can. */
-export function notToBeRepeated(room: Room): "seed" | "hands" | "real" | null {
-  if (room.origin === GameOrigin.SCRIPTED) return "hands";
-  if (room.origin === GameOrigin.PHYSICAL) return "real";
-  return room.seedFixed ? "seed" : null;
-}
-
 /** The request for a room with the rules, the policy and the agents of another that this device created. */
-export function requestLike(
-  room: Room,
-  name: string,
-  waitingTimeMs = room.policy?.waitingTimeMs,
-): MessageInitShape<typeof CreateRoomRequestSchema> {
+export function requestLike(room: Room): MessageInitShape<typeof CreateRoomRequestSchema> {
   const wizards = hostedRoom(room.roomId)?.wizards ?? [];
   return {
-    name: Array.from(name).slice(0, MAX_NAME).join(""),
+    name: room.name,
     seats: room.seats.map((seat) => seatLike(seat, wizards.includes(seat.seat))),
     physical: room.origin === GameOrigin.PHYSICAL,
-    policy: { ...(room.policy ?? create(RoomPolicySchema)), ...(waitingTimeMs === undefined ? {} : { waitingTimeMs }) },
+    policy: room.policy ?? create(RoomPolicySchema),
     // A branched game keeps the rules of the game it branches from.
     ...(room.branchedFrom
       ? { start: { case: "branch" as const, value: room.branchedFrom } }
@@ -51,7 +38,7 @@ function seatLike(seat: Participant, wizard: boolean) {
 export async function playAgain(roomId: string, name: string, seat: number): Promise<void> {
   const { room } = await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS });
   if (!room) throw new Error("the server did not say which room it is");
-  const { joinCode } = await createRoom(requestLike(room, room.name));
+  const { joinCode } = await createRoom(requestLike(room));
   const again = await sitAgain(room, joinCode, name, seat);
   const ownerToken = hostedRoom(roomId)?.ownerToken ?? "";
   // Without it the others need the invitation, which the new room shows.

@@ -44,6 +44,12 @@ export function isFree(participant: Participant): boolean {
   return participant.name === "" && participant.builtInAgent === "";
 }
 
+/** The seats that a person can take. */
+export function freeForPeople(seats: readonly Participant[]): number[] {
+  const kinds = [ParticipantKind.UNSPECIFIED, ParticipantKind.HUMAN];
+  return seats.flatMap((seat, index) => (isFree(seat) && kinds.includes(seat.reservedFor) ? index : []));
+}
+
 /**
  * Whether a person or agent can still join. The seats of a tournament's room belong to its
  * participants.

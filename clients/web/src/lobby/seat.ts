@@ -6,7 +6,6 @@ import type { MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { keepSecret } from "../api/secrets";
 import { keepTableTicket } from "../attend/ticket";
-import { rememberFinished } from "../experiment/study";
 import { ParticipantKind, type Room } from "../gen/chefshat/v1/room_pb";
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
 import { nameKey } from "../name-key";
@@ -43,7 +42,7 @@ export function roomsWithSeats(): string[] {
 
 /** Deletes a seat and everything stored with it: the room is gone, or the seat was given up. */
 export function giveUpSeat(roomId: string): void {
-  for (const name of ["seat", "study", "timed"]) remember(`${name}.${roomId}`, null);
+  remember(SEAT + roomId, null);
   for (const name of codesOf(roomId)) remember(name, null);
 }
 
@@ -51,12 +50,6 @@ export function giveUpSeat(roomId: string): void {
 export async function giveBackSeat(roomId: string): Promise<void> {
   const held = heldSeat(roomId);
   if (held) await roomApi.leaveRoom({ ticket: held.ticket }, { timeoutMs: CALL_LIMIT_MS });
-  giveUpSeat(roomId);
-}
-
-/** Deletes a seat whose game is over, but keeps a study's last questionnaire. */
-export function leaveSeat(roomId: string): void {
-  for (const name of codesOf(roomId)) rememberFinished(roomId, name.slice(CODE.length));
   giveUpSeat(roomId);
 }
 

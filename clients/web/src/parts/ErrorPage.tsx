@@ -2,7 +2,7 @@
 // unless a study hides links.
 
 import type { ComponentChildren } from "preact";
-import { hidden } from "../experiment/hiding";
+import { hidden } from "../hiding";
 import { t } from "../i18n";
 import { ButtonLink } from "./Button";
 import { Notice } from "./Notice";

@@ -2,7 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
-import { hidden } from "../experiment/hiding";
+import { hidden } from "../hiding";
 import { t } from "../i18n";
 import type { Route } from "../router";
 import { Announcer } from "./Announcer";

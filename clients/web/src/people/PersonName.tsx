@@ -1,6 +1,6 @@
 // A participant's name, linked to its page.
 
-import { hidden } from "../experiment/hiding";
+import { hidden } from "../hiding";
 import { t } from "../i18n";
 import { pathOf } from "../router";
 

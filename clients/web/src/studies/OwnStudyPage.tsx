@@ -5,8 +5,6 @@ import { type Signal, signal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
 import { faultOf, wordsOf } from "../api/faults";
 import { type Following, follow } from "../api/follow";
-import { LinkList } from "../experiment/LinkList";
-import { participantsIn } from "../experiment/participants";
 import { type Study, type StudyLink, type StudyParticipant, StudyParticipantState } from "../gen/chefshat/v1/study_pb";
 import { hex } from "../hex";
 import { dateLocale, t } from "../i18n";
@@ -22,6 +20,7 @@ import { zipped } from "../parts/zip";
 import { navigate, type PageProps } from "../router";
 import { byCondition, STATES, stateName } from "./board";
 import { studyApi } from "./client";
+import { LinkList } from "./LinkList";
 import css from "./Own.module.css";
 import {
   addParticipants,
@@ -36,6 +35,7 @@ import {
   ownerTokenOf,
   removeFromStudy,
 } from "./owning";
+import { MAX_ADDED, participantsIn } from "./participants";
 
 /** The page. */
 export function OwnStudyPage({ route: { studyId } }: PageProps<"ownStudy">) {
@@ -211,8 +211,6 @@ function Counts({ study, participants }: FollowedStudy) {
   );
 }
 
-const MAX_ADDED = 1000;
-
 function Add({ studyId }: { studyId: string }) {
   const words = t().studies.own.add;
   const [count, setCount] = useState("");
@@ -280,7 +278,7 @@ function Links({ studyId }: { studyId: string }) {
         </div>
       ) : (
         <>
-          <LinkList links={links.map((link) => ({ name: link.pseudonym, address: addressOf(link), roomId: "" }))} />
+          <LinkList links={links.map((link) => ({ name: link.pseudonym, address: addressOf(link) }))} />
           <div>
             <Button onClick={() => window.print()}>{words.print}</Button>
           </div>

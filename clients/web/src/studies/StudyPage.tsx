@@ -4,8 +4,6 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
-import { leaveOut } from "../experiment/hiding";
-import { hostOf, questionnaire as safeAddress } from "../experiment/study";
 import {
   type StudyConsent,
   StudyEndReason,
@@ -13,6 +11,7 @@ import {
   type StudyText,
   type StudyView,
 } from "../gen/chefshat/v1/study_pb";
+import { leaveOut } from "../hiding";
 import { showLanguage, t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { useAttempt } from "../parts/attempt";
@@ -189,6 +188,11 @@ function Text({ text, part }: { text: StudyText; part: Participating }) {
   );
 }
 
+/** A valid address of a questionnaire, or empty: a link must not run a script. */
+function safeAddress(address: string): string {
+  return ["https:", "http:"].includes(URL.parse(address)?.protocol ?? "") ? address : "";
+}
+
 function External({ external, part }: { external: StudyExternalQuestionnaire; part: Participating }) {
   const words = t().studies.external;
   const address = safeAddress(external.url);
@@ -199,7 +203,7 @@ function External({ external, part }: { external: StudyExternalQuestionnaire; pa
       {external.text && <Paragraphs text={external.text} />}
       {address && (
         <>
-          <p>{words.text(hostOf(address))}</p>
+          <p>{words.text(new URL(address).host)}</p>
           <p>
             <a
               class={buttonCss.button}

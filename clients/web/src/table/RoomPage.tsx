@@ -1,21 +1,16 @@
 // A room as one of its players sees it: the seats while it waits, then the table, as long as this
 // device holds a seat.
 
-import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { faultOf, wordsOf } from "../api/faults";
-import { AfterRoom } from "../experiment/AfterStudy";
-import { AtTable } from "../experiment/AtTable";
-import { useHiding } from "../experiment/hiding";
-import { KeptLinks } from "../experiment/StudyLinks";
-import { studyIn } from "../experiment/study";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { Again, JoinAgain } from "../lobby/Again";
 import { Doorway } from "../lobby/Doorway";
 import { HostInvite } from "../lobby/HostInvite";
 import { LeaveButton, LeaveDialog } from "../lobby/Leaving";
-import { giveUpSeat, heldSeat, hostedRoom, leaveSeat } from "../lobby/seat";
+import { giveUpSeat, heldSeat, hostedRoom } from "../lobby/seat";
 import { Button } from "../parts/Button";
 import { ErrorPage } from "../parts/ErrorPage";
 import { Notice } from "../parts/Notice";
@@ -32,9 +27,6 @@ export function RoomPage({ route }: PageProps<"room">) {
   const [ticket, setTicket] = useState("");
   const [fault, setFault] = useState("");
   const ended = useRef<TableState | undefined>(undefined);
-  // For the page as a whole: its parts change between waiting room and table. The study's hiding
-  // stays on even when the seat is deleted after an error.
-  useHiding(useMemo(() => studyIn(roomId), [roomId]));
 
   useEffect(() => {
     let left = false;
@@ -51,7 +43,7 @@ export function RoomPage({ route }: PageProps<"room">) {
         setTicket(held?.ticket ?? "");
       } catch (thrown) {
         const fault = faultOf(thrown);
-        if (fault.reason === "ROOM_UNKNOWN") leaveSeat(roomId);
+        if (fault.reason === "ROOM_UNKNOWN") giveUpSeat(roomId);
         if (!left) setFault(wordsOf(fault));
       }
     };
@@ -60,9 +52,7 @@ export function RoomPage({ route }: PageProps<"room">) {
     return () => {
       left = true;
       started?.stop();
-      // A reload shows the last page of a study again. A participant who leaves it is done, and
-      // finds the questionnaire through the link.
-      if (ended.current?.roomId === roomId) depart(ended.current);
+      if (ended.current?.roomId === roomId) giveUpSeat(roomId);
     };
   }, [roomId]);
 
@@ -78,35 +68,15 @@ export function RoomPage({ route }: PageProps<"room">) {
     // The seat was given up, here or in another tab, or went to others while this page was away:
     // show the room from outside. Delete the stored seat unless another tab has taken a new one
     // since.
-    if (session && heldSeat(roomId)?.ticket === ticket) depart(session.live.peek().table);
+    if (session && heldSeat(roomId)?.ticket === ticket) giveUpSeat(roomId);
     session?.stop();
     setSession(undefined);
   }, [vacated]);
 
-  const after = <AfterRoom roomId={roomId} />;
-  if (fault) {
-    return (
-      <>
-        {after}
-        <ErrorPage title={t().table.title} words={fault} />
-        <KeptLinks roomId={roomId} />
-      </>
-    );
-  }
+  if (fault) return <ErrorPage title={t().table.title} words={fault} />;
   if (!table) return <p class="soft">{t().common.loading}</p>;
   if (session) return <Held session={session} />;
-  return (
-    <>
-      {after}
-      <Doorway roomId={roomId} />
-    </>
-  );
-}
-
-/** Deletes a seat. If there was a game, a study's last questionnaire stays available. */
-function depart(table: TableState): void {
-  if (hasBegun(table)) leaveSeat(table.roomId);
-  else giveUpSeat(table.roomId);
+  return <Doorway roomId={roomId} />;
 }
 
 /** The table from this device's seat. */
@@ -117,8 +87,7 @@ function Held({ session }: { session: Session }) {
   const banner = (
     <>
       <Banner session={session} />
-      <AtTable roomId={roomId} over={isOver(table) && hasBegun(table)} />
-      {isOver(table) && !studyIn(roomId) && <JoinAgain roomId={roomId} />}
+      {isOver(table) && <JoinAgain roomId={roomId} />}
     </>
   );
   const waiting = table.phase === "waiting";
@@ -139,10 +108,9 @@ function Held({ session }: { session: Session }) {
       )}
       <Seated
         acting={session}
-        study={studyIn(roomId) !== null}
         banner={banner}
         tools={!isOver(table) && leave}
-        onward={hostedRoom(roomId) && !studyIn(roomId) && <Again roomId={roomId} others={others} />}
+        onward={hostedRoom(roomId) && <Again roomId={roomId} others={others} />}
         below={
           <>
             <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />
@@ -150,7 +118,6 @@ function Held({ session }: { session: Session }) {
           </>
         }
       />
-      {!waiting && <KeptLinks roomId={roomId} />}
     </>
   );
 }
@@ -158,11 +125,6 @@ function Held({ session }: { session: Session }) {
 /** Whether an agent can still take the seat. */
 function isForAgent(seat: SeatState): boolean {
   return !isTaken(seat) && [ParticipantKind.UNSPECIFIED, ParticipantKind.AGENT].includes(seat.reservedFor);
-}
-
-/** Whether there was a game: a room may be closed before. */
-function hasBegun({ shift, standings }: TableState): boolean {
-  return shift > 0 || standings.length > 0;
 }
 
 function isOver({ phase }: TableState): boolean {

@@ -16,7 +16,7 @@ import { WaitingRoom } from "./view/WaitingRoom";
 interface SeatedProps {
   acting: Acting;
   /** Whether the person takes part in a study: then every decision is made at its turn, by hand. */
-  study: boolean;
+  study?: boolean;
   banner?: ComponentChildren;
   /** Additional tools of the table. */
   tools?: ComponentChildren;
@@ -29,7 +29,7 @@ interface SeatedProps {
 }
 
 /** The table from a seat. */
-export function Seated({ acting, study, banner, tools, onward, below, onPick }: SeatedProps) {
+export function Seated({ acting, study = false, banner, tools, onward, below, onPick }: SeatedProps) {
   const { table, own, decision, awaited } = acting.live.value;
   const wizard = own !== undefined && isWizard(table.seats[own]);
   useAnnounced(table, own, decision);

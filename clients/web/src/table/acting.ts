@@ -7,7 +7,6 @@ import { CALL_LIMIT_MS, playApi } from "../api/client";
 import { faultOf, inWords, isPassing } from "../api/faults";
 import { type AnswerResult, AnswerStatus } from "../gen/chefshat/v1/decision_pb";
 import type { Hint, SeatUpdate } from "../gen/chefshat/v1/play_service_pb";
-import { recall } from "../store";
 import type { Gesture } from "./expressions";
 import { applyUpdate, type LiveState, startLive } from "./model/live";
 import type { TableState } from "./model/state";
@@ -23,14 +22,6 @@ export const PERSON_TIME_KEY = "person_decision_time_ms";
 export const AUTOMATIC_KEY = "person_automatic";
 /** Passed because nothing else was legal, or chosen before the turn. */
 export type Automatic = "auto_pass" | "planned";
-
-/**
- * Whether decisions in a room or tournament are sent with the time measured here: only if the host
- * of a study asked for it.
- */
-export function asksForTimes(id: string): boolean {
-  return recall(`timed.${id}`) !== null;
-}
 
 /**
  * Deadline of a call with an answer: on a connection that has died it is called again. The server
@@ -76,7 +67,7 @@ export interface Acting {
 }
 
 /** Starts acting with a seat's ticket; `timed` sends the decision time with each answer. */
-export function startActing(ticket: string, table: TableState, seat: number | undefined, timed: boolean): Acting {
+export function startActing(ticket: string, table: TableState, seat: number | undefined, timed = false): Acting {
   const live = signal(startLive(table, seat));
   /** The decision to which an answer is being sent. */
   const answering = signal<bigint | undefined>(undefined);

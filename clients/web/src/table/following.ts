@@ -2,7 +2,7 @@
 // not hear every past event.
 
 import { useEffect, useMemo, useRef } from "preact/hooks";
-import { hidden } from "../experiment/hiding";
+import { hidden } from "../hiding";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { mustPass } from "./auto-pass";

@@ -5,7 +5,7 @@ import { type Signal, signal } from "@preact/signals";
 import { playApi } from "../api/client";
 import { type Following, follow } from "../api/follow";
 import type { HeldSeat } from "../lobby/seat";
-import { type Acting, asksForTimes, startActing } from "./acting";
+import { type Acting, startActing } from "./acting";
 import type { TableState } from "./model/state";
 
 export interface Session extends Acting {
@@ -22,7 +22,7 @@ export interface Session extends Acting {
 export function startSession(
   held: Pick<HeldSeat, "ticket"> & Partial<HeldSeat>,
   table: TableState,
-  timed = asksForTimes(table.roomId),
+  timed = false,
 ): Session {
   const { ticket } = held;
   const acting = startActing(ticket, table, held.seat, timed);

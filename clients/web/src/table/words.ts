@@ -1,11 +1,11 @@
 // The table in words: cards, events, decisions. Combines the texts with the model's values.
 
-import { shownName } from "../experiment/labels";
 import { type AnswerResult, AnswerStatus } from "../gen/chefshat/v1/decision_pb";
 import { Role, SpecialAction } from "../gen/chefshat/v1/rules_pb";
 import { t } from "../i18n";
 import { seatNumber } from "../parts/SeatNumber";
 import { isLabel, phraseOf } from "./expressions";
+import { shownName } from "./labels";
 import type { Move } from "./model/actions";
 import { type Card, faceOf } from "./model/cards";
 import type { Reason } from "./model/picking";

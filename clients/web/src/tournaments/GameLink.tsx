@@ -1,6 +1,5 @@
 // A link to a game of a tournament: live while it runs, as a replay once it counts.
 
-import { hidden } from "../experiment/hiding";
 import { type Tournament, type TournamentGame, TournamentGameState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { pathOf } from "../router";
@@ -18,16 +17,9 @@ export function GameLink({ tournament, game, several }: GameLinkProps) {
   const number = several ? ` ${game.number}` : "";
   const which = words.games.of(`${words.round(game.round)}, ${words.table(game.table)}`, game.number);
   const label = <span class="visually-hidden"> {which}</span>;
-  // A study may hide links to other pages.
-  const linked = !hidden.value.includes("pages");
   switch (game.state) {
     case TournamentGameState.COUNTED:
-      return !linked ? (
-        <span class="soft">
-          {words.games.over}
-          {number}
-        </span>
-      ) : (
+      return (
         <a href={pathOf({ page: "replay", gameId: game.gameId })}>
           {words.games.replay}
           {number}
@@ -35,7 +27,7 @@ export function GameLink({ tournament, game, several }: GameLinkProps) {
         </a>
       );
     case TournamentGameState.PLAYING:
-      return linked && tournament.settings?.policy?.spectators && game.roomId !== "" ? (
+      return tournament.settings?.policy?.spectators && game.roomId !== "" ? (
         <a href={pathOf({ page: "watch", roomId: game.roomId })}>
           <span aria-hidden="true">▶ </span>
           {words.games.watch}

@@ -2,7 +2,6 @@
 // attending to physical games, changing it by hand, closing.
 
 import { agentsFor, useOffered } from "../api/server";
-import { StudyLinks } from "../experiment/StudyLinks";
 import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { Invite } from "../lobby/Invite";
@@ -17,7 +16,7 @@ import { closeTournament, hostedTournament, invitationTo, startTournament } from
 import { PhysicalGames } from "./PhysicalGames";
 import { isEnded, joinedIn } from "./structure";
 import css from "./Tournaments.module.css";
-import { isForAgents, isForPeople } from "./words";
+import { isForAgents } from "./words";
 
 /** The organiser's part; null on other devices, and after the end. */
 export function Organiser({ live }: { live: LiveTournament }) {
@@ -48,7 +47,6 @@ export function Organiser({ live }: { live: LiveTournament }) {
             address={address}
             agent={isForAgents(tournament) ? { label: words.agent, command } : undefined}
           />
-          {isForPeople(tournament) && <StudyLinks address={address} />}
         </>
       )}
       {state === TournamentState.PLAYING && <Pause tournament={tournament} />}

@@ -4,15 +4,12 @@
 import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
-import { AfterStudy } from "../experiment/AfterStudy";
-import { hidden, useHiding } from "../experiment/hiding";
-import { studyIn } from "../experiment/study";
 import { TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import { type Acting, asksForTimes } from "../table/acting";
+import type { Acting } from "../table/acting";
 import { useAttention } from "../table/attention";
 import { Seated } from "../table/Seated";
 import { Tool } from "../table/view/Tools";
@@ -33,21 +30,15 @@ interface ParticipationProps {
 
 /** The page for a participant. */
 export function Participation({ held, live, onLeft, children }: ParticipationProps) {
-  const { tournamentId } = live.tournament;
   const ended = isEnded(live.tournament);
   const [part, setPart] = useState<Part | undefined>(undefined);
   useEffect(() => {
     // The stream reports games of others that end only after the participant's own game.
     if (ended) return;
-    const started = startParticipation(held.ticket, asksForTimes(tournamentId));
+    const started = startParticipation(held.ticket);
     setPart(started);
     return () => started.stop();
   }, [held.ticket]);
-  const study = studyIn(tournamentId);
-  useHiding(study);
-  const after = study && ended && (
-    <AfterStudy after={study.after} blanks={{ name: held.name, tournament: tournamentId }} named />
-  );
   const game = part?.game.value;
   const [left, setLeft] = useState<Acting | undefined>(undefined);
   useEffect(() => {
@@ -60,17 +51,14 @@ export function Participation({ held, live, onLeft, children }: ParticipationPro
     return (
       <Seated
         acting={game}
-        study={study !== null}
         banner={
           <>
             {banner}
-            {after}
             <GameBanner game={game} />
           </>
         }
         tools={
-          !isOverThere(game) &&
-          !hidden.value.includes("pages") && (
+          !isOverThere(game) && (
             <Tool label={t().tournaments.results.back} onClick={() => setLeft(game)}>
               <path d="M7 4h10v5a5 5 0 0 1-10 0ZM7 5H4v2a3 3 0 0 0 3 3M17 5h3v2a3 3 0 0 1-3 3M12 14v4M8 20h8" />
             </Tool>
@@ -87,13 +75,10 @@ export function Participation({ held, live, onLeft, children }: ParticipationPro
   return (
     <>
       {banner}
-      {after}
-      {!after && (
-        <OwnState held={held} live={live}>
-          {game && !gone && !isOverThere(game) && <ToGame game={game} onClick={() => setLeft(undefined)} />}
-          <OwnPlace {...{ held, live, onLeft }} />
-        </OwnState>
-      )}
+      <OwnState held={held} live={live}>
+        {game && !gone && !isOverThere(game) && <ToGame game={game} onClick={() => setLeft(undefined)} />}
+        <OwnPlace {...{ held, live, onLeft }} />
+      </OwnState>
       {children}
     </>
   );

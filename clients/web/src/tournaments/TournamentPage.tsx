@@ -4,14 +4,9 @@
 import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
-import { hidden, useHiding } from "../experiment/hiding";
-import { StudyJoin } from "../experiment/StudyJoin";
-import { holderOf, languageOf, type Study, studyOf } from "../experiment/study";
 import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
-import { t } from "../i18n";
-import joinCss from "../lobby/Join.module.css";
-import { NO_KEY } from "../name-key";
-import { Button, ButtonLink } from "../parts/Button";
+import { languageOf, t } from "../i18n";
+import { ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { type PageProps, pathOf, readdress } from "../router";
 import { Bracket } from "./Bracket";
@@ -30,7 +25,7 @@ import { JoinTournament } from "./JoinTournament";
 import { Organiser } from "./Organiser";
 import { WhichPlace } from "./OwnPlace";
 import { Participation } from "./Participation";
-import { decidePlace, type HeldPlace, heldPlace, placeFromLink, takePlace } from "./place";
+import { decidePlace, type HeldPlace, heldPlace, placeFromLink } from "./place";
 import { Rounds } from "./Rounds";
 import { Confidence, Standings, standingsTitle } from "./Standings";
 import { isEnded, participantOf } from "./structure";
@@ -82,16 +77,12 @@ function Visited({ live }: { live: LiveTournament }) {
   const { tournament } = live;
   const { tournamentId } = tournament;
   const [held, setHeld] = useState<HeldPlace | null>(() => heldPlace(tournamentId));
-  const [another, setAnother] = useState(false);
-  const invited = inviteIn(location.search);
-  useHiding(invited?.study ?? null);
-  const holder = another ? "another" : holderOf(invited?.study ?? null, held?.name ?? "");
   const open = tournament.state === TournamentState.OPEN;
+  const isInvited = new URLSearchParams(location.search).get("code");
   const arrive = () => {
     // The link has been used: a reload shows the place that was taken.
     readdress(languageOf(location.search));
     setHeld(heldPlace(tournamentId));
-    setAnother(false);
   };
   const lost = held && lostPlace(tournament, held);
   if (held && lost) {
@@ -103,7 +94,7 @@ function Visited({ live }: { live: LiveTournament }) {
       </Overview>
     );
   }
-  if (held && holder === "reader") {
+  if (held) {
     return (
       <Participation held={held} live={live} onLeft={() => setHeld(heldPlace(tournamentId))}>
         <Overview live={live} mine={held.participant}>
@@ -112,54 +103,14 @@ function Visited({ live }: { live: LiveTournament }) {
       </Participation>
     );
   }
-  if (held && !another && (holder === "unclear" || !isEnded(tournament))) {
-    const onOther = open || holder === "unclear" ? () => setAnother(true) : undefined;
-    return <Whose name={held.name} as={invited?.study?.name ?? ""} onSame={arrive} onOther={onOther} />;
-  }
-  if (open && invited?.study) {
-    const take = (name: string) => takePlace(tournamentId, invited.code, name, NO_KEY);
-    return <StudyJoin study={invited.study} what="tournament" take={take} arrive={arrive} />;
-  }
   return (
     <Overview live={live} mine={undefined}>
       <Organiser live={live} />
       {open && <JoinTournament tournament={tournament} onJoined={arrive} />}
-      {!open && invited && !isEnded(tournament) && (
+      {!open && isInvited && !isEnded(tournament) && (
         <Notice kind="hint">{t().faults.byReason.TOURNAMENT_STARTED}</Notice>
       )}
     </Overview>
-  );
-}
-
-/** The join code in the address, and its study; null without a code. */
-function inviteIn(search: string): { code: string; study: Study | null } | null {
-  const code = new URLSearchParams(search).get("code");
-  return code ? { code, study: studyOf(search) } : null;
-}
-
-interface WhoseProps {
-  /** Name on this device's place. */
-  name: string;
-  /** Name in the link; empty for none. */
-  as: string;
-  onSame: () => void;
-  /** Undefined once nobody can join any more. */
-  onOther: (() => void) | undefined;
-}
-
-/** Asks who is using this device when it already has a place in the tournament. */
-function Whose({ name, as, onSame, onOther }: WhoseProps) {
-  const words = t().experiment.join;
-  return (
-    <section class={`sheet ${joinCss.page}`}>
-      <h1>{words.title}</h1>
-      <p>{as === "" ? words.takenPlace(name) : words.heldPlace(name)}</p>
-      {onOther && <p class="soft">{words.onePlace(name)}</p>}
-      <Button look="main" onClick={onSame}>
-        {words.goOn(name)}
-      </Button>
-      {onOther && <Button onClick={onOther}>{as === "" ? words.anotherPlace : words.joinAs(as)}</Button>}
-    </section>
   );
 }
 
@@ -196,16 +147,14 @@ function Overview({ live, mine, children }: OverviewProps) {
           {deals && <p class="soft small">{deals}</p>}
           <Countdown tournament={tournament} />
         </div>
-        {!hidden.value.includes("pages") && (
-          <div class={tournamentsCss.links}>
-            {tournament.round > 0 && (
-              <ButtonLink href={pathOf({ page: "results", tournamentId: tournament.tournamentId })}>
-                {words.results.open}
-              </ButtonLink>
-            )}
-            <ButtonLink href={wallOf(tournament)}>{words.wall.open}</ButtonLink>
-          </div>
-        )}
+        <div class={tournamentsCss.links}>
+          {tournament.round > 0 && (
+            <ButtonLink href={pathOf({ page: "results", tournamentId: tournament.tournamentId })}>
+              {words.results.open}
+            </ButtonLink>
+          )}
+          <ButtonLink href={wallOf(tournament)}>{words.wall.open}</ButtonLink>
+        </div>
       </header>
       {children}
       <section class={`sheet ${tournamentsCss.part}`}>

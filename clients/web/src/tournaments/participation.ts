@@ -39,8 +39,8 @@ interface Seated {
   waiting: SeatUpdate[];
 }
 
-/** Takes part with a participant's ticket; `timed` sends the decision time with each answer. */
-export function startParticipation(ticket: string, timed: boolean): Participation {
+/** Takes part with a participant's ticket. */
+export function startParticipation(ticket: string): Participation {
   const presence = signal<Presence>("coming");
   const game = signal<Acting | undefined>(undefined);
   let stopped = false;
@@ -77,7 +77,7 @@ export function startParticipation(ticket: string, timed: boolean): Participatio
         rooms.delete(attached.roomId);
         return;
       }
-      const acting = startActing(attached.ticket, tableFromRoom(room), attached.seat, timed);
+      const acting = startActing(attached.ticket, tableFromRoom(room), attached.seat);
       batch(() => {
         acting.apply(seated.waiting);
         game.value = acting;

@@ -137,7 +137,6 @@ const PAGES: Record<string, { path: () => string; ready: string; opened?: string
   "tournament of one's own": {
     path: () => `/tournaments/${ownId}`,
     ready: '[data-part~="organiser"]',
-    opened: '[data-part~="study-links"] summary',
   },
   tournament: { path: () => `/tournaments/${tournamentId}`, ready: '[data-part~="standings"] tbody tr' },
   wall: { path: () => `/tournaments/${tournamentId}?wall`, ready: '[data-part~="standings"] tbody tr' },

@@ -3,6 +3,7 @@
 
 import { readFileSync } from "node:fs";
 import { expect, test } from "vitest";
+import { StudyHide } from "../../src/gen/chefshat/v1/study_pb";
 import { inaccessible, PHONE, tooWide } from "./checks";
 import { consent, expectNoSecretOn, expectNoSecretSent, newStudy, playGame } from "./participants";
 import { clientsOf } from "./rooms";
@@ -82,6 +83,45 @@ test("a participant goes through all stages, on two devices, without meeting a c
     expect(archive).toContain(file);
   expect(archive).toContain("cond-");
   expect(researcher.faults).toEqual([]);
+});
+
+/** The parts of the table that a condition can hide. */
+const HIDDEN_BY: [StudyHide, string][] = [
+  [StudyHide.LOG, "log"],
+  [StudyHide.LOOKUP, "tool-lookup"],
+  [StudyHide.EXPRESSIONS, "expressions"],
+  [StudyHide.PLAYED, "played"],
+];
+
+test.each([
+  ["what a condition hides is hidden in the whole game, also after a reload", HIDDEN_BY.map(([hide]) => hide), []],
+  ["what no condition hides is seen", [], HIDDEN_BY.map(([, part]) => part)],
+])("%s", async (_, hide, expected) => {
+  const condition = {
+    id: "one",
+    rules: { preset: "paper", faces: 8, stop: { case: "targetShifts" as const, value: 1 } },
+    policy: { decisionTimeMs: 3_600_000, paceMs: 0 },
+    seats: Array.from({ length: 3 }, () => ({ filledBy: { case: "builtInAgent" as const, value: "random" } })),
+    hide,
+  };
+  const stages = [{ stage: { case: "games" as const, value: { count: 1 } } }];
+  const study = await newStudy(server, { participants: 1, factors: [], conditions: [condition], stages });
+  const { links } = await clientsOf(server).studies.addStudyParticipants({ ...study, count: 1 });
+  const { page, faults } = await person(browser);
+  const seen = new Set<string>();
+  const look = async () => {
+    for (const [, part] of HIDDEN_BY)
+      if (await page.locator(`[data-part~="${part}"]`).first().isVisible()) seen.add(part);
+  };
+  await page.goto(`${server.url}/study/${links[0]?.link}`);
+  await page.locator("[data-decision]").waitFor();
+  await look();
+  await page.reload();
+  await page.locator("[data-decision]").waitFor();
+  do await look();
+  while ((await playGame(page, 1)) === 1);
+  expect([...seen]).toEqual(expected);
+  expect(faults).toEqual([]);
 });
 
 test("a researcher deletes a study with a participant in the middle of it, and its link and key are gone", async () => {

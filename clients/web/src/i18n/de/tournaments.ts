@@ -115,7 +115,6 @@ export const tournaments: Texts["tournaments"] = {
     bracket: "Turnierbaum",
     due: "noch nicht aufgerufen",
     playing: "läuft",
-    over: "beendet",
     void: "ungültig",
     watch: "Zuschauen",
     replay: "Replay",

@@ -2,7 +2,6 @@
 
 import { attend } from "./attend";
 import { common } from "./common";
-import { experiment } from "./experiment";
 import { faults } from "./faults";
 import { lobby } from "./lobby";
 import { organise } from "./organise";
@@ -18,7 +17,6 @@ import { wizard } from "./wizard";
 export const en = {
   attend,
   common,
-  experiment,
   faults,
   lobby,
   organise,

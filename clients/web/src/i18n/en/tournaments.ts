@@ -114,7 +114,6 @@ export const tournaments = {
     bracket: "Bracket",
     due: "not yet called",
     playing: "in progress",
-    over: "over",
     void: "void",
     watch: "Watch",
     replay: "Replay",

@@ -119,7 +119,6 @@ export const tournaments: Texts["tournaments"] = {
     bracket: "Cuadro",
     due: "aún no llamada",
     playing: "en curso",
-    over: "terminada",
     void: "anulada",
     watch: "Ver",
     replay: "Repetición",

@@ -3,7 +3,6 @@
 import type { Texts } from "../en";
 import { attend } from "./attend";
 import { common } from "./common";
-import { experiment } from "./experiment";
 import { faults } from "./faults";
 import { lobby } from "./lobby";
 import { organise } from "./organise";
@@ -19,7 +18,6 @@ import { wizard } from "./wizard";
 export const it: Texts = {
   attend,
   common,
-  experiment,
   faults,
   lobby,
   organise,

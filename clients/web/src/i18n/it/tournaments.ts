@@ -114,7 +114,6 @@ export const tournaments: Texts["tournaments"] = {
     bracket: "Tabellone",
     due: "non ancora chiamata",
     playing: "in corso",
-    over: "conclusa",
     void: "annullata",
     watch: "Guarda",
     replay: "Rivedi",

@@ -1,6 +1,6 @@
 // "What can I do?": the rules of this moment, and the keys of the table.
 
-import { hidden } from "../../experiment/hiding";
+import { hidden } from "../../hiding";
 import { t } from "../../i18n";
 import { Dialog } from "../../parts/Dialog";
 import { isOn } from "../../preferences";

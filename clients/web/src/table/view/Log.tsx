@@ -1,7 +1,7 @@
 // The history of the table, newest last. The announcer reads it out line by line, not this list.
 
 import { useId } from "preact/hooks";
-import { hidden } from "../../experiment/hiding";
+import { hidden } from "../../hiding";
 import { t } from "../../i18n";
 import { SeatNumber } from "../../parts/SeatNumber";
 import { visibleLines } from "../model/log";

@@ -2,7 +2,7 @@
 // after its event (following.ts).
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { hidden } from "../../experiment/hiding";
+import { hidden } from "../../hiding";
 import { t } from "../../i18n";
 import { Drawing } from "../../parts/Drawing";
 import { isOn } from "../../preferences";

@@ -4,8 +4,8 @@
 
 import type { ComponentChildren } from "preact";
 import { useRef, useState } from "preact/hooks";
-import { hidden } from "../../experiment/hiding";
 import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
+import { hidden } from "../../hiding";
 import { t } from "../../i18n";
 import { clockOfPeople } from "../../lobby/rooms";
 import { Notice } from "../../parts/Notice";

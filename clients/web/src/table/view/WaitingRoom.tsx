@@ -5,7 +5,7 @@
 import type { ComponentChildren } from "preact";
 import { CALL_LIMIT_MS, roomApi } from "../../api/client";
 import { usePolled } from "../../api/poll";
-import { hidden } from "../../experiment/hiding";
+import { hidden } from "../../hiding";
 import { t } from "../../i18n";
 import { rulesInShort } from "../../lobby/RoomCard";
 import { hostedRoom } from "../../lobby/seat";

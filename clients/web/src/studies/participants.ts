@@ -1,21 +1,17 @@
 // Parses the names of a study's participants: one per line, or a range such as "P01-P20".
 
-import { MAX_NAME } from "../lobby/room-form";
+/** Most participants that are added at a time. */
+export const MAX_ADDED = 1_000;
 
 /**
- * Most participants at a time: each may get a separate room, and a server holds a limited number.
- */
-export const MAX_PARTICIPANTS = 100;
-
-/**
- * The distinct names in the order typed; at most one more than `MAX_PARTICIPANTS`, so that an
+ * The distinct names in the order typed; at most one more than `MAX_ADDED`, so that an
  * excess is noticed.
  */
 export function participantsIn(typed: string): string[] {
   const names = new Set<string>();
   for (const line of typed.split("\n"))
     for (const name of namesOf(line.trim())) {
-      if (names.size > MAX_PARTICIPANTS) return [...names];
+      if (names.size > MAX_ADDED) return [...names];
       names.add(name);
     }
   return [...names];
@@ -28,12 +24,7 @@ function namesOf(line: string): string[] {
   const [, stem = "", first = "", again = "", last = ""] = range ?? [];
   const count = Number(last) - Number(first) + 1;
   if (!range || (again !== "" && again !== stem) || count < 1) return [line];
-  return Array.from({ length: Math.min(count, MAX_PARTICIPANTS + 1) }, (_, index) => {
+  return Array.from({ length: Math.min(count, MAX_ADDED + 1) }, (_, index) => {
     return stem + String(Number(first) + index).padStart(first.length, "0");
   });
-}
-
-/** Whether a name is longer than the server accepts. */
-export function isTooLong(name: string): boolean {
-  return Array.from(name).length > MAX_NAME;
 }

@@ -4,20 +4,17 @@ import { t } from "../i18n";
 import { CopyLine, useCopying } from "../lobby/Invite";
 import { Button } from "../parts/Button";
 import { download } from "../parts/download";
-import css from "./Experiment.module.css";
+import css from "./Own.module.css";
 
 /** The link of a participant. */
-export interface StudyLink {
-  /** Empty for a link without a name. */
+interface NamedLink {
   readonly name: string;
   readonly address: string;
-  /** Empty in a tournament. */
-  readonly roomId: string;
 }
 
 /** The links. */
-export function LinkList({ links }: { links: readonly StudyLink[] }) {
-  const words = t().experiment.links;
+export function LinkList({ links }: { links: readonly NamedLink[] }) {
+  const words = t().studies.own.links;
   const all = links.map(({ name, address }) => `${name}\t${address}`).join("\n");
   const { copied, copy } = useCopying(all);
   return (
@@ -30,18 +27,18 @@ export function LinkList({ links }: { links: readonly StudyLink[] }) {
           </Button>
         </p>
       )}
-      <div class={css.list}>
+      <div class={css.linkList}>
         {links.map(({ name, address }) => (
-          <CopyLine key={name} label={name || words.everybody} text={address} />
+          <CopyLine key={name} label={name} text={address} />
         ))}
       </div>
     </>
   );
 }
 
-/** The links as CSV (RFC 4180): names, addresses and room ids. */
-export function tableOf(links: readonly StudyLink[]): string {
-  const rows = [["name", "link", "room_id"], ...links.map(({ name, address, roomId }) => [name, address, roomId])];
+/** The links as CSV (RFC 4180): names and addresses. */
+export function tableOf(links: readonly NamedLink[]): string {
+  const rows = [["name", "link"], ...links.map(({ name, address }) => [name, address])];
   return rows.map((row) => `${row.map(quoted).join(",")}\r\n`).join("");
 }
 

@@ -1,12 +1,11 @@
-// The parts of the page that a study hides. hiding.css hides most of them by `data-hide` of the
-// document; screen reader announcements and keyboard handling ask here.
+// The parts of the page that a study hides from its participants. hiding.css hides most of them by
+// `data-hide` of the document; screen reader announcements and keyboard handling ask here.
 
 import { signal } from "@preact/signals";
-import { useLayoutEffect } from "preact/hooks";
-import type { Hideable, Study } from "./study";
 import "./hiding.css";
 
-export type { Hideable } from "./study";
+/** A part that a study can hide. */
+export type Hideable = "log" | "lookup" | "expressions" | "played" | "pages";
 
 /** The hidden parts; empty outside a study. */
 export const hidden = signal<readonly Hideable[]>([]);
@@ -26,12 +25,6 @@ export function leaveOut(parts: readonly Hideable[]): () => void {
     wanted.delete(own);
     show();
   };
-}
-
-/** Hides the parts of a study while the calling component is rendered. */
-export function useHiding(study: Study | null): void {
-  const hide = study?.hide.join(" ") ?? "";
-  useLayoutEffect(() => leaveOut(study?.hide ?? []), [hide]);
 }
 
 function show(): void {
