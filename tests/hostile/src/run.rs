@@ -1,4 +1,5 @@
-//! One attack: a new server, the honest room in quiet, the attack beside it, and the time after.
+//! One attack: a new server, the honest room in quiet, the attack beside it, and the time after. For
+//! comparison, the honest room has a server of its own (`--beside`).
 
 use std::path::Path;
 use std::sync::Arc;
@@ -71,6 +72,11 @@ async fn attacked(
     options: &Options,
 ) -> Result<Row, HostileError> {
     let server = AttackedServer::start(binary, &attack.setup).await?;
+    let spared = match options.beside {
+        true => Some(AttackedServer::start(binary, &attack.setup).await?),
+        false => None,
+    };
+    let honest_access = &spared.as_ref().unwrap_or(&server).access;
     let watched = Watched::new(server.pid());
     let watched = watched.map_err(HostileError::io("reading the server's memory"))?;
     let tally = Arc::new(Tally::default());
@@ -100,7 +106,7 @@ async fn attacked(
             other => return Err(HostileError::Prepare(format!("{other:?}"))),
         }
     }
-    let honest = HonestRoom::start(server.access.clone(), SHORT);
+    let honest = HonestRoom::start(honest_access.clone(), SHORT);
     tokio::time::sleep(options.quiet).await;
     let quiet = honest.take();
     if quiet.latencies.is_empty() {
