@@ -27,6 +27,7 @@ class Table:
     def __init__(self) -> None:
         self.decider = Decider()
         self.events: list[Observed] = []
+        self.reaching = False
         self._frame = 0
         self._still = [9] * len(SPOTS)
         self._looks = [1] * len(SPOTS)
@@ -42,7 +43,7 @@ class Table:
                 for still, look, before, empty in zip(self._still, self._looks, self._before, self._empty, strict=True)
             )
             tags = tuple(tag for spot, piece in enumerate(self._tops) if piece for tag in tags_of(piece, spot))
-            self.events += self.decider.see(Sighting(self._frame, self._frame / FPS, None, tags, False, places))
+            self.events += self.decider.see(Sighting(self._frame, self._frame / FPS, None, tags, self.reaching, places))
             self._frame += 1
             self._still = [still + 1 for still in self._still]
 
@@ -108,6 +109,55 @@ def test_a_place_that_never_looks_empty_does_not_turn_clearing_into_taking_back(
     table.wait()
     assert kinds(table.said()) == [Cleared, Laid]
     assert table.decider.on_table == {card: place for place, card in enumerate(FOURS, start=1)}
+
+
+def test_cards_under_an_arm_that_rests_over_them_are_neither_cleared_nor_laid_again() -> None:
+    table = Table()
+    laid(table, *NINES)
+    table.reaching = True
+    # A sleeve without a pattern looks as an empty place does.
+    table.sweep(0, 1, 2)
+    table.wait(5 * FPS)
+    assert table.said() == []
+    table.put(0, 1, 2, cards=NINES)
+    table.wait()
+    table.reaching = False
+    table.wait(5 * FPS)
+    assert table.said() == []
+    # Without them, they were cleared when the arm leaves.
+    table.reaching = True
+    table.sweep(0, 1, 2)
+    table.wait(FPS)
+    table.reaching = False
+    table.wait(1)
+    assert kinds(table.said()) == [Cleared]
+
+
+def test_cards_that_a_hand_sweeps_before_it_lays_others_were_cleared() -> None:
+    table = Table()
+    laid(table, *NINES)
+    table.reaching = True
+    table.sweep(0, 1, 2)
+    table.wait()
+    table.put(0, 1, 2, cards=FOURS)
+    table.wait()
+    table.reaching = False
+    table.wait()
+    assert kinds(table.said()) == [Cleared, Laid]
+
+
+def test_a_play_that_a_hand_lays_card_by_card_is_reported_when_it_has_left() -> None:
+    table = Table()
+    table.reaching = True
+    for spot, card in enumerate(NINES):
+        table.put(spot, cards=(card,))
+        table.wait(2 * FPS)
+        assert table.said() == []
+    table.reaching = False
+    table.wait(1)
+    (event,) = table.said()
+    assert isinstance(event, Laid)
+    assert event.cards == NINES
 
 
 def test_a_place_that_looked_empty_for_a_moment_is_cleared_with_the_others() -> None:

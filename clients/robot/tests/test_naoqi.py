@@ -94,6 +94,49 @@ class Leds(Log):
         self.calls.append(("fadeRGB", group, colour))
 
 
+class Motion(Log):
+    """The joints."""
+
+    def wakeUp(self) -> None:
+        self.calls.append(("wakeUp",))
+
+
+class Awareness(Log):
+    """Turns to whoever moves or speaks."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.enabled = True
+
+    def isEnabled(self) -> bool:
+        return self.enabled
+
+    def setEnabled(self, enabled: bool) -> None:
+        self.enabled = enabled
+
+
+class Recognition(Log):
+    """Understands words. The vocabulary can be changed only while it is paused."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.paused = False
+
+    def pause(self, paused: bool) -> None:
+        self.paused = paused
+
+    def setVocabulary(self, words: list[str], spotting: bool) -> None:
+        if not self.paused:
+            raise RuntimeError("a grammar is in use")
+        self.calls.append(("setVocabulary", words, spotting))
+
+    def subscribe(self, name: str) -> None:
+        self.calls.append(("subscribe", name))
+
+    def unsubscribe(self, name: str) -> None:
+        self.calls.append(("unsubscribe", name))
+
+
 class Subscriber:
     """Values of one event, for those who subscribe."""
 
@@ -128,6 +171,10 @@ class Pepper:
         self.url = str(self.session.endpoints()[0])
         self.speech, self.tracker, self.animations, self.leds = TextToSpeech(), Tracker(), AnimationPlayer(), Leds()
         self.memory, self.arm, self.animated = Memory(), Arm(), TextToSpeech()
+        self.motion, self.awareness, self.recognition = Motion(), Awareness(), Recognition()
+        self.session.registerService("ALMotion", self.motion)
+        self.session.registerService("ALBasicAwareness", self.awareness)
+        self.session.registerService("ALSpeechRecognition", self.recognition)
         self.session.registerService("ALTextToSpeech", self.speech)
         self.session.registerService("ALTracker", self.tracker)
         self.session.registerService("ALAnimationPlayer", self.animations)
@@ -210,6 +257,29 @@ def test_the_robot_can_fail_hang_and_leave() -> None:
             outcome = await attempt(driver, Say("anyone?"), FAR_S)
             assert isinstance(outcome, Failed)
             assert f"no NAOqi at {pepper.url}" in outcome.reason
+
+    run(test())
+
+
+def test_the_robot_wakes_up_attends_to_the_game_and_listens_for_words_until_it_is_given_back() -> None:
+    async def test() -> None:
+        pepper = await asyncio.to_thread(Pepper)
+        try:
+            async with NaoqiDriver(url=pepper.url, words="passo; tocca a me;") as driver:
+                assert driver.connected
+                assert pepper.motion.calls == [("wakeUp",)]
+                assert not pepper.awareness.enabled
+                assert pepper.recognition.calls == [("setVocabulary", ["passo", "tocca a me"], True), ("subscribe", "ChefsHat")]
+                assert not pepper.recognition.paused
+            assert pepper.awareness.enabled
+            assert pepper.recognition.calls[-1] == ("unsubscribe", "ChefsHat")
+            # One that did not turn to people before does not afterwards.
+            pepper.awareness.enabled = False
+            async with NaoqiDriver(url=pepper.url):
+                pass
+            assert not pepper.awareness.enabled
+        finally:
+            await asyncio.to_thread(pepper.session.close)
 
     run(test())
 

@@ -181,6 +181,18 @@ def test_hands_that_pass_over_are_nothing() -> None:
     assert_true(table, watch(table))
 
 
+@pytest.mark.parametrize("seat", [1, 2, 3])
+def test_an_arm_that_rests_over_the_cards_is_nothing(seat: int) -> None:
+    acts: list[Act] = [
+        LayCards(0.6, 0, (Card(0, 50), Card(0, 51), Card(0, 52)), (1, 2, 3)),
+        Hover(2.6, seat, 2, 5.0),
+        LayCards(9.2, 1, (Card(0, 20), Card(0, 21), Card(0, 22)), (1, 2, 3)),
+        Clear(11.4, 1),
+    ]
+    table = SyntheticTable(acts, MEDIUM, seed=6)
+    assert_true(table, watch(table))
+
+
 def test_a_card_taken_back() -> None:
     acts: list[Act] = [
         LayCards(0.6, 0, (Card(0, 50), Card(0, 51)), (1, 2)),
@@ -229,6 +241,15 @@ def test_a_pass_card_that_cannot_be_read_is_asked_about() -> None:
     events = watch(table)
     assert [event.place for event in events if isinstance(event, Doubt)] == ["pass 2"]
     assert happened(events) == [("pass_shown", 2), ("pass_withdrawn", 2)]
+
+
+@pytest.mark.parametrize("seat", range(4))
+def test_a_pass_card_that_lies_face_down_is_asked_about_at_every_place(seat: int) -> None:
+    for difficulty in (EASY, MEDIUM):
+        table = SyntheticTable([ShowPass(0.6, seat, face_down=True), WithdrawPass(3.5, seat)], difficulty, seed=7)
+        events = watch(table)
+        assert [event.place for event in events if isinstance(event, Doubt)] == [f"pass {seat}"]
+        assert happened(events) == [("pass_shown", seat), ("pass_withdrawn", seat)]
 
 
 def test_answers_must_fit() -> None:
@@ -420,6 +441,18 @@ def test_the_commands_show_record_and_repeat_a_table(tmp_path: Path, capsys: pyt
     truth = [json.loads(line) for line in (evening / "events.jsonl").read_text().splitlines()]
     assert events
     assert [event[0] for event in events] == [true_event["kind"] for true_event in truth][: len(events)]
+
+
+def test_the_command_says_that_it_never_found_the_field(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    frames = tmp_path / "frames"
+    frames.mkdir()
+    for index in range(100):
+        cv2.imwrite(str(frames / f"{index:05}.jpg"), np.full((480, 640, 3), 90, np.uint8))
+    assert cli.main(["perceive", str(frames)]) != 0
+    seen = capsys.readouterr()
+    assert seen.out == ""
+    # While it watches, and at the end.
+    assert seen.err.count("the field is not found: show the camera all of it") == 2
 
 
 def test_the_command_leaves_out_what_nobody_can_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -132,6 +133,18 @@ def test_points_are_before_a_robot_forward_left_and_up() -> None:
     assert standpoint.before(280.0, 200.0) == (0.5, 0.0, 0.7)
     # Seat 2 sits at the top: its left is where x is larger.
     assert standpoint.before(380.0, 100.0, 50.0) == (0.4, 0.1, 0.75)
+
+
+@pytest.mark.parametrize("seat", range(4))
+def test_the_frame_of_the_field_leads_from_its_points_to_the_robot(seat: int) -> None:
+    standpoint = Standpoint.at(TableState(seat=seat, names=("Ada", "Bo", "Cleo", "Dan")), 300.0, 700.0)
+    x, y, z, yaw = standpoint.field_frame()
+    for point in ((0.0, 0.0), (560.0, 400.0), (97.5, 151.0)):
+        # As in ROS: metres, and y away from seat 0.
+        field_x, field_y = point[0] / 1000, -point[1] / 1000
+        forward = x + field_x * math.cos(yaw) - field_y * math.sin(yaw)
+        left = y + field_x * math.sin(yaw) + field_y * math.cos(yaw)
+        assert (forward, left, z) == pytest.approx(standpoint.before(*point), abs=2e-4)
 
 
 def test_expressions_have_the_nearest_mood() -> None:

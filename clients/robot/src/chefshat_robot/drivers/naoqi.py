@@ -9,13 +9,17 @@
 | pick | `pick(moves)` of a service of your own, by default `ChefsHatArm` |
 
 Its argument is a text, the moves as JSON (`chefshat_robot.wire`); it returns "", or why it failed. The hands of Pepper and NAO do
-not pick up cards: without such a service, the robot asks the people to lay its cards. Words that speech recognition understands
-(`WordRecognized`; start ALSpeechRecognition on the robot) and touches are reported.
+not pick up cards: without such a service, the robot asks the people to lay its cards. Touches are reported, and the words that
+speech recognition understands (`WordRecognized`): those of `words=`, such as "pass;my turn", or of a vocabulary of your own.
+
+When it connects, the robot wakes up (ALMotion.wakeUp), and no longer turns to whoever moves or speaks (ALBasicAwareness), which
+would fight with the gazes of the game; when it is closed, it does again if it did before.
 """
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 from collections.abc import Callable
 from functools import partial
@@ -58,6 +62,8 @@ MOODS = {
     "sadness": ("animations/Stand/Emotions/Negative/Sad_1", 0x2040FF),
 }
 FADE_S = 0.5
+#: The name under which speech recognition is subscribed to.
+SUBSCRIBER = "ChefsHat"
 
 
 class NaoqiDriver(Driver):
@@ -70,6 +76,7 @@ class NaoqiDriver(Driver):
         distance: float = 300.0,
         table: float = 700.0,
         arm: str = "ChefsHatArm",
+        words: str = "",
         url: str = "",
     ) -> None:
         """Sets the robot and where it stands.
@@ -80,6 +87,7 @@ class NaoqiDriver(Driver):
             distance: from the edge of the field to the robot's axis, mm.
             table: height of the table above the floor, mm.
             arm: name of the service that carries cards.
+            words: what speech recognition listens for, separated by semicolons; empty: its vocabulary is left as it is.
             url: NAOqi's address in full, instead of host and port.
         """
         super().__init__()
@@ -87,6 +95,9 @@ class NaoqiDriver(Driver):
         self._url = url or f"tcp://{host}:{port}"
         self._distance, self._table = distance, table
         self._arm = arm
+        self._words = [word for part in words.split(";") if (word := part.strip())]
+        # Whether the robot turned to whoever moves or speaks before it played.
+        self._was_aware = False
         self._session: Any = None
         self._language = ""
         self._state = TableState()
@@ -115,6 +126,25 @@ class NaoqiDriver(Driver):
             await self._subscribe(memory, "WordRecognized", self._recognized)
             for name in TOUCHES:
                 await self._subscribe(memory, name, partial(self._touched, name))
+        await self._prepare()
+
+    async def _prepare(self) -> None:
+        """Wakes the robot up, lets it attend to the game alone, and listens for words. What it cannot do is logged."""
+        await self._try("ALMotion", "wakeUp")
+        awareness = await self._service("ALBasicAwareness")
+        if awareness is not None:
+            self._was_aware = self._was_aware or bool(await self._result(awareness.isEnabled(_async=True)))
+            await self._try("ALBasicAwareness", "setEnabled", False)
+        if self._words:
+            await self._try("ALSpeechRecognition", "pause", True)
+            await self._try("ALSpeechRecognition", "setVocabulary", self._words, True)
+            await self._try("ALSpeechRecognition", "pause", False)
+            await self._try("ALSpeechRecognition", "subscribe", SUBSCRIBER)
+
+    async def _try(self, service: str, method: str, *arguments: object) -> None:
+        outcome = await self._call(service, method, *arguments)
+        if isinstance(outcome, Failed):
+            LOG.warning("%s", outcome.reason)
 
     async def perform(self, act: Act) -> Outcome:
         """Calls the service for the act, and waits until it returns."""
@@ -142,8 +172,14 @@ class NaoqiDriver(Driver):
         self._state = state
 
     async def close(self) -> None:
-        """Closes the session."""
+        """Gives the robot back as it was, and closes the session."""
+        with contextlib.suppress(RobotError):
+            if self._was_aware:
+                await self._try("ALBasicAwareness", "setEnabled", True)
+            if self._words:
+                await self._try("ALSpeechRecognition", "unsubscribe", SUBSCRIBER)
         session, self._session = self._session, None
+        self._was_aware = False
         self._subscribers.clear()
         if session is not None:
             await asyncio.to_thread(session.close)

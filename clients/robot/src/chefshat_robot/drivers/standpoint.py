@@ -66,6 +66,15 @@ class Standpoint:
         forward, left = dx * ahead_x + dy * ahead_y, dx * left_x + dy * left_y
         return round(forward / 1000, 4), round(left / 1000, 4), round((z + self.table_mm) / 1000, 4)
 
+    def field_frame(self) -> tuple[float, float, float, float]:
+        """Returns the frame `chefshat_field` of ROS as seen from the robot.
+
+        It is described in `CardMove.msg`. Returns x, y and z of its origin in metres, and its yaw in radians.
+        """
+        x, y, z = self.before(0.0, 0.0)
+        right_x, right_y, _ = self.before(field.WIDTH, 0.0)
+        return x, y, z, math.atan2(right_y - y, right_x - x)
+
 
 def mood_of(express: Express) -> str:
     """Returns the mood of an expression's label, or the nearest by valence and arousal."""

@@ -40,10 +40,17 @@ class LayCards:
 
 @dataclass(frozen=True)
 class ShowPass:
-    """A seat lays its pass card at its pass place."""
+    """A seat lays its pass card at its pass place.
+
+    Attributes:
+        start: Time at which the hand comes, in s.
+        seat: The seat, 0..3.
+        face_down: Whether it is laid with its back up.
+    """
 
     start: float
     seat: int
+    face_down: bool = False
 
 
 @dataclass(frozen=True)

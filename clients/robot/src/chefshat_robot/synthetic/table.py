@@ -246,7 +246,7 @@ class SyntheticTable:
             self._happened("laid", laid[-1].since, act.seat, act.cards, act.places)
         elif isinstance(act, ShowPass):
             pass_card = Piece(PieceKind.PASS, self._deck, act.seat)
-            laid = self._lay(act.start, act.seat, [(pass_card, act.seat, pass_places[act.seat])], False, rng)
+            laid = self._lay(act.start, act.seat, [(pass_card, act.seat, pass_places[act.seat])], act.face_down, rng)
             lying += laid
             self._happened("pass_shown", laid[-1].since, act.seat)
         elif isinstance(act, Hover):

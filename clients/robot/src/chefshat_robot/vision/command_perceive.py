@@ -32,6 +32,11 @@ from .recording import Recorder, replay
 
 PATIENCE_S = 5.0
 """A doubt is left out after so long, in s."""
+FIELD_PATIENCE_S = 5.0
+"""A field that is not found for so long is asked for, in s."""
+NO_FIELD = (
+    "the field is not found: show the camera all of it, with the marks of its four corners, in enough light and without glare"
+)
 
 _DESCRIPTION = """\
 Watch the table and print what happens, each event with the time at which it became certain. Start while the field is empty.
@@ -66,17 +71,19 @@ def run(arguments: argparse.Namespace) -> int:
         raise CommandError("--record-frames needs --record with a folder")
     try:
         if arguments.replay is not None:
-            _print_all(replay(arguments.replay), arguments.json, None)
-            return 0
+            is_found = _print_all(replay(arguments.replay), arguments.json, None)
+            return _end(is_found)
         camera = Camera.load(arguments.camera) if arguments.camera is not None else None
         frames = open_source(arguments.source, wish_of(arguments))
         if arguments.doubts is not None:
             arguments.doubts.mkdir(parents=True, exist_ok=True)
         if arguments.record is None:
-            _print_all(_watch(Perception(camera, arguments.deck), frames), arguments.json, arguments.doubts)
+            is_found = _print_all(_watch(Perception(camera, arguments.deck), frames), arguments.json, arguments.doubts)
         else:
             with Recorder(arguments.record, arguments.deck, arguments.record_frames) as recorder:
-                _print_all(_watch(Perception(camera, arguments.deck, recorder), frames), arguments.json, arguments.doubts)
+                is_found = _print_all(
+                    _watch(Perception(camera, arguments.deck, recorder), frames), arguments.json, arguments.doubts
+                )
     except FileNotFoundError as error:
         raise CommandError(f"{error.filename} does not exist; give a folder that --record has written") from error
     except FileExistsError as error:
@@ -85,14 +92,29 @@ def run(arguments: argparse.Namespace) -> int:
         raise CommandError(str(error)) from error
     except KeyboardInterrupt:
         print(file=sys.stderr)
+        return 0
+    return _end(is_found)
+
+
+def _end(is_found: bool) -> int:
+    """The end of what there was to see; the field was found, or never."""
+    if not is_found:
+        raise CommandError(NO_FIELD)
     return 0
 
 
 def _watch(perception: Perception, frames: Iterable[Frame]) -> Iterator[Observed]:
     """The events of the frames. Nobody answers here, so what cannot be read in time is left out."""
     asked: dict[int, float] = {}
+    began: float | None = None
+    missed = True
     for frame in frames:
         events = perception.see(frame)
+        began = frame.time if began is None else began
+        missed = missed and not any(isinstance(event, FieldChanged) for event in events)
+        if missed and frame.time - began >= FIELD_PATIENCE_S:
+            print(NO_FIELD, file=sys.stderr)
+            missed = False
         for number in [number for number, time in asked.items() if frame.time - time >= PATIENCE_S]:
             print(f"doubt {number} is left out: nobody answers here, as people do with `chefshat-robot bridge`", file=sys.stderr)
             events += perception.answer(number, False)
@@ -105,12 +127,15 @@ def _watch(perception: Perception, frames: Iterable[Frame]) -> Iterator[Observed
             yield event
 
 
-def _print_all(events: Iterable[Observed], as_json: bool, doubts: Path | None) -> None:
-    """Prints events as they come."""
+def _print_all(events: Iterable[Observed], as_json: bool, doubts: Path | None) -> bool:
+    """Prints events as they come. Returns whether the field was ever found."""
+    is_found = False
     for event in events:
+        is_found = is_found or isinstance(event, FieldChanged)
         print(json.dumps(to_json(event)) if as_json else f"{event.time:8.2f} s  {_text(event)}", flush=True)
         if doubts is not None and isinstance(event, Doubt) and event.picture is not None:
             cv2.imwrite(str(doubts / f"doubt-{event.number}.png"), event.picture)
+    return is_found
 
 
 def _text(event: Observed) -> str:

@@ -3,15 +3,17 @@
 The decider sees no pictures, so that a recording of sightings gives the same events as the camera did. Its rule:
 
 - A card **settles** when its tag was read in `SETTLE_READS` frames within `STILL_MM` while nothing moved around its place.
-- Cards that settled are reported together as soon as nothing moves at any place for cards (`QUIET_FRAMES`) and every place is
-  **explained**: its look is the one it had before, it is empty, or the card on top of it was read since then.
+- Cards that settled are reported together as soon as the hands have left the field, nothing moves at any place for cards
+  (`QUIET_FRAMES`) and every place is **explained**: its look is the one it had before, it is empty, or the card on top of it was
+  read since then. What happens next closes a play, too.
 - A place that stays unexplained for `DOUBT_SECONDS` while no arm reaches over the edge of the field becomes a doubt, and so does
   one that is covered again before it could be read.
   Later events wait until the doubt is answered or resolved: an event is never reported on top of one that may be missing.
-- A card or pass card is gone when its place looks empty for `GONE_FRAMES`. The field is cleared when all its cards are gone, or if
-  only some are, when none of the others can be read as new cards come. If others can still be read after `TAKEN_SECONDS` in which
-  nothing moved, cards were taken back: before that, more strokes may sweep the rest away. Cards on others were taken back when a
-  tag is read that they covered.
+- A card or pass card is gone when its place looks empty for `GONE_FRAMES`. While an arm reaches over the field, it may only hide
+  them: what is gone is decided when it has left, or when new cards lie there. The field is cleared when all its cards are gone, or
+  if only some are, when none of the others can be read as new cards come. If others can still be read after `TAKEN_SECONDS` in
+  which nothing moved, cards were taken back: before that, more strokes may sweep the rest away. Cards on others were taken back
+  when a tag is read that they covered.
 """
 
 from __future__ import annotations
@@ -534,7 +536,7 @@ class Decider:
     def _notice_gone(self, events: list[Observed]) -> None:
         """Notices pieces that are no longer where they lay."""
         for piece, known in list(self._known.items()):
-            if piece.kind is PieceKind.PASS and self._is_empty(known.spot):
+            if piece.kind is PieceKind.PASS and not self._reaching and self._is_empty(known.spot):
                 del self._known[piece]
                 self._queue.append(_PassMoved(self._time, piece.number, False))
                 self._explained(known.spot, events)
@@ -543,6 +545,8 @@ class Decider:
             if self._spots[spot].gone_since is None and self._is_empty(spot):
                 self._spots[spot].gone_since = self._time
         gone = self._gone()
+        if self._reaching:
+            return
         if gone and len(gone) == len(occupied):
             self._clear(events)
         elif gone and self._time - self._moved >= TAKEN_SECONDS and self._some_stayed(gone):
@@ -629,10 +633,15 @@ class Decider:
         return covered + [spot.since for spot in self._spots if spot.unexplained and spot.doubt is None]
 
     def _is_quiet(self) -> bool:
-        """Whether nothing moves at the places for cards, and all of them are explained."""
-        return bool(self._places) and all(
-            self._places[spot].still >= QUIET_FRAMES and (not self._spots[spot].unexplained or self._spots[spot].doubt is not None)
-            for spot in CARD_SPOTS
+        """Whether no arm reaches over the field, nothing moves at the places for cards, and all of them are explained."""
+        return (
+            bool(self._places)
+            and not self._reaching
+            and all(
+                self._places[spot].still >= QUIET_FRAMES
+                and (not self._spots[spot].unexplained or self._spots[spot].doubt is not None)
+                for spot in CARD_SPOTS
+            )
         )
 
 
