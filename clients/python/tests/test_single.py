@@ -1,4 +1,4 @@
-"""One game of Gymnasium, whose rows are looked up: every number is that of the columns."""
+"""One game of Gymnasium or PettingZoo, whose rows are looked up: every number is that of the columns."""
 
 from typing import Any
 
@@ -37,7 +37,7 @@ def test_rows_are_those_of_the_columns(rules: Any) -> None:
                     row = table.packed.columns
                     np.testing.assert_array_equal(reader.table(row), features.table_of(table)[0])
                     np.testing.assert_array_equal(reader.mask(row), table.masks[0])
-                    assert reader.reward(row) == table.rewards[0]
+                    assert (reader.reward(row), reader.seat(row)) == (table.rewards[0], table.seats[0])
                     kinds |= 1 << int(table.kinds[0])
                     if isinstance(table, Batch):
                         assert (reader.attempts(row), reader.kind(row)) == (table.attempts[0], table.kinds[0])
@@ -64,7 +64,7 @@ def test_a_number_that_is_too_large_is_not_looked_up() -> None:
 def test_steps_are_those_of_an_environment_without_rows(observation: str, monkeypatch: pytest.MonkeyPatch) -> None:
     options: Any = {"observation": observation, "rewards": "winning", "seed": 8}
     with monkeypatch.context() as patched:
-        patched.setattr("chefshat.envs.gymnasium_env.SingleRow", lambda *_: None)
+        patched.setattr("chefshat.envs.single.SingleRow", lambda *_: None)
         plain = ChefsHatEnv(**options)
     env = ChefsHatEnv(**options)
     chance = np.random.default_rng(1)
@@ -78,6 +78,37 @@ def test_steps_are_those_of_an_environment_without_rows(observation: str, monkey
             ended += 1
             same(env.reset(), plain.reset())
     assert ended > 5
+
+
+@pytest.mark.parametrize("observation", ["table", "columns", "classic"])
+def test_turns_of_all_seats_are_those_of_an_environment_without_rows(observation: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pettingzoo")
+    from chefshat.envs import chefshat_v1
+
+    options: Any = {"observation": observation, "rewards": "winning", "invalid_penalty": 0.5, "seed": 8}
+    with monkeypatch.context() as patched:
+        patched.setattr("chefshat.envs.single.SingleRow", lambda *_: None)
+        plain = chefshat_v1.raw_env(**options)
+    env = chefshat_v1.raw_env(**options)
+    chance = np.random.default_rng(1)
+    ended = 0
+    for _ in range(8):
+        env.reset()
+        plain.reset()
+        for agent in env.agent_iter():
+            assert agent == plain.agent_selection
+            seen, expected = env.last(), plain.last()
+            same(seen, expected)
+            for other in env.agents:
+                same(env.observe(other), plain.observe(other))
+            action = None
+            if not seen[2]:
+                legal = np.flatnonzero(seen[0]["action_mask"])
+                action = int(chance.choice(legal)) if chance.random() < 0.9 else int(chance.integers(214))
+            ended += seen[2]
+            env.step(action)
+            plain.step(action)
+    assert ended == 8 * 4
 
 
 def test_rewards_of_a_function_are_not_those_of_the_row() -> None:

@@ -19,10 +19,11 @@ except ImportError as error:
 
 from chefshat.columns import Situations
 from chefshat.envs.copying import NotCopied
-from chefshat.envs.gymnasium_env import check_open, wait_for_a_row
-from chefshat.envs.illegal import penalties, with_limit
+from chefshat.envs.gymnasium_env import check_open, take, wait_for_a_row
+from chefshat.envs.illegal import with_limit
 from chefshat.envs.observing import Form, ObservationFunction, mask_space
 from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
+from chefshat.envs.single import RowReader
 from chefshat.vector import Batch, VectorEnv
 
 __all__ = ["env", "raw_env"]
@@ -84,8 +85,11 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
         self._action_spaces: dict[str, spaces.Space[Any]] = {
             agent: spaces.Discrete(sizes.num_actions) for agent in self.possible_agents
         }
+        self._reader = RowReader(self._form, self.vector.batch, own_rewards="reward_function" in options)
         self._nothing = self._form.of(Situations(1, sizes))
+        self._no_mask = np.zeros(sizes.num_actions, np.int8)
         self._seen: dict[str, Any] = {}
+        self._mask = self._no_mask
         self._stepped = False
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
@@ -99,7 +103,7 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
     def observe(self, agent: str) -> dict[str, Any]:
         """Returns the observation at an agent's current or last decision; zeros before its first."""
         deciding = agent == self.agent_selection and not self.terminations.get(agent) and not self.truncations.get(agent)
-        mask = self.vector.batch.masks[0].astype(np.int8) if deciding else np.zeros(self.vector.num_actions, np.int8)
+        mask = (self._mask if deciding else self._no_mask).copy()
         seen = self._seen.get(agent)
         return {"observation": self._form.row(self._nothing, 0) if seen is None else seen, "action_mask": mask}
 
@@ -128,19 +132,15 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
         if self.terminations[agent] or self.truncations[agent]:
             self._was_dead_step(action)
             return
-        actions = np.asarray([action])
-        penalty = float(penalties(self.vector.batch, actions, self._invalid_penalty)[0])
-        self.vector.step(actions)
+        batch, penalty = take(self.vector, action, self._invalid_penalty)
         self._stepped = True
-        wait_for_a_row(self.vector, or_an_end=True)
-        batch = self.vector.batch
         self._cumulative_rewards[agent] = 0.0
         self._clear_rewards()
         if len(batch.endings):
             self._end(batch)
         else:
-            self._take_turn(batch)
-            self.rewards[self.agent_selection] = float(batch.rewards[0])
+            reward = self._take_turn(batch)
+            self.rewards[self.agent_selection] = reward
         self.rewards[agent] -= penalty
         self._accumulate_rewards()
         if self.render_mode == "human":
@@ -161,12 +161,14 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
         """Ends the game."""
         self.vector.close()
 
-    def _take_turn(self, batch: Batch) -> None:
-        """Selects the deciding agent."""
-        agent = self.possible_agents[int(batch.seats[0])]
+    def _take_turn(self, batch: Batch) -> float:
+        """Selects the deciding agent. Returns its rewards since its last decision."""
+        observation, self._mask, reward, seat, kind, attempts = self._reader.read(batch)
+        agent = self.possible_agents[seat]
         self.agent_selection = agent
-        self._seen[agent] = self._form.row(self._form.of(batch), 0)
-        self.infos[agent] = {"kind": int(batch.kinds[0]), "invalid_attempts": int(batch.attempts[0])}
+        self._seen[agent] = observation
+        self.infos[agent] = {"kind": kind, "invalid_attempts": attempts}
+        return reward
 
     def _end(self, batch: Batch) -> None:
         """Ends the episode for all agents."""

@@ -11,14 +11,28 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from chefshat.address import ServerAddress
-from chefshat.columns import Endings, Situations
+from chefshat.columns import Endings
 from chefshat.envs.copying import NotCopied
 from chefshat.envs.illegal import penalties, with_limit
 from chefshat.envs.observing import Form, ObservationFunction
 from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
-from chefshat.envs.single import SingleRow
+from chefshat.envs.single import RowReader
 from chefshat.errors import ChefsHatError
 from chefshat.vector import Batch, VectorEnv
+
+
+def take(vector: VectorEnv, action: Any, invalid_penalty: float) -> tuple[Batch, float]:  # noqa: ANN401 - As Gymnasium has it.
+    """Takes the decision of the only game.
+
+    Returns the batch with the next decision or an ending, and the penalty of an illegal action.
+    """
+    actions = np.asarray([action])
+    penalty = float(penalties(vector.batch, actions, invalid_penalty)[0]) if invalid_penalty else 0.0
+    batch = vector.step(actions)
+    if not len(batch) and not len(batch.endings):
+        wait_for_a_row(vector, or_an_end=True)
+        batch = vector.batch
+    return batch, penalty
 
 
 def wait_for_a_row(vector: VectorEnv, *, or_an_end: bool = False) -> None:
@@ -93,12 +107,7 @@ class ChefsHatEnv(NotCopied, gymnasium.Env[Any, Any]):
         self.observation_space = self._form.space_with_mask
         #: The seat's current situation, in row 0.
         self._now: Batch | Endings = self.vector.batch
-        # How rows are read, by their table.
-        self._singles: dict[type[Situations], SingleRow] = {}
-        for table in (self.vector.batch, self.vector.batch.endings):
-            # A reward function's rewards are not in the row.
-            if table.packed is not None and "reward_function" not in options:
-                self._singles[type(table)] = SingleRow(sizes, table.packed.before)
+        self._reader = RowReader(self._form, self.vector.batch, own_rewards="reward_function" in options)
         # Whether an episode has begun, and whether a step has been taken in it.
         self._running = False
         self._stepped = False
@@ -125,17 +134,9 @@ class ChefsHatEnv(NotCopied, gymnasium.Env[Any, Any]):
         check_open(self.vector)
         if not self._running:
             raise gymnasium.error.ResetNeeded("there is no running episode: call reset()")
-        actions = np.asarray([action])
-        penalty = 0.0
-        if self._invalid_penalty:
-            penalty = float(penalties(self.vector.batch, actions, self._invalid_penalty)[0])
-        batch = self.vector.step(actions)
+        batch, penalty = take(self.vector, action, self._invalid_penalty)
         self._stepped = True
         endings = batch.endings
-        if not len(batch) and not len(endings):
-            wait_for_a_row(self.vector, or_an_end=True)
-            batch = self.vector.batch
-            endings = batch.endings
         if not len(endings):
             self._now = batch
             observed, reward, info = self._read(batch)
@@ -173,28 +174,7 @@ class ChefsHatEnv(NotCopied, gymnasium.Env[Any, Any]):
 
     def _read(self, now: Batch | Endings) -> tuple[Any, float, dict[str, Any]]:
         """Returns the observation, the reward and the info of the first row."""
-        packed = now.packed
-        single = self._singles.get(type(now))
-        if single is None or packed is None or len(now) != 1:
-            mask = np.array(now.masks[0], np.int8)
-            attempts = int(now.attempts[0]) if isinstance(now, Batch) else 0
-            observed = self._form.row(self._form.of(now), 0)
-            if self._form.has_parts:
-                observed["action_mask"] = mask
-            return (
-                observed,
-                float(now.rewards[0]),
-                {"action_mask": mask.copy(), "kind": int(now.kinds[0]), "invalid_attempts": attempts},
-            )
-        row = packed.columns
-        observed = single.table(row) if self._form.is_table else None
-        if observed is not None:
-            # The mask is its last part.
-            mask = observed[-self.vector.num_actions :].astype(np.int8)
-        else:
-            mask = single.mask(row)
-            observed = self._form.row(self._form.of(now), 0)
-            if self._form.has_parts:
-                observed["action_mask"] = mask.copy()
-        kind, attempts = (single.kind(row), single.attempts(row)) if isinstance(now, Batch) else (0, 0)
-        return observed, single.reward(row), {"action_mask": mask, "kind": kind, "invalid_attempts": attempts}
+        observation, mask, reward, _, kind, attempts = self._reader.read(now)
+        if self._form.has_parts:
+            observation["action_mask"] = mask.copy()
+        return observation, reward, {"action_mask": mask, "kind": kind, "invalid_attempts": attempts}

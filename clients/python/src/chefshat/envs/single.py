@@ -1,4 +1,4 @@
-"""A single row of a native batch, read without an array for each column: what makes one game fast.
+"""A single row of a native batch, read without an array for each column: what makes one game fast, in Gymnasium and PettingZoo.
 
 Reading one number through a column costs as much as a step of the game. Larger batches are read by their columns, and by
 `chefshat.learn.features`, which computes the same numbers; those of a single row are looked up in tables of all values of a byte.
@@ -6,12 +6,14 @@ Reading one number through a column costs as much as a step of the game. Larger 
 
 from collections.abc import Mapping
 from struct import Struct
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chefshat.columns import Sizes
+from chefshat.batch import Batch
+from chefshat.columns import Endings, Situations, Sizes
+from chefshat.envs.observing import Form
 from chefshat.learn import features
 
 Values = NDArray[np.float32]
@@ -19,6 +21,65 @@ Values = NDArray[np.float32]
 _BYTE = np.arange(256, dtype=np.uint8)
 _REWARD = Struct("<f").unpack_from
 _COUNT = Struct("<I").unpack_from
+
+
+class Seen(NamedTuple):
+    """What an environment shows of a row.
+
+    Attributes:
+        observation: of its form, without the mask.
+        mask: (A,): 1 where an action is legal; zeros at an end.
+        reward: the reward.
+        seat: the seat.
+        kind: the kind of the decision; 0 at an end.
+        attempts: the invalid attempts at the decision; 0 at an end.
+    """
+
+    observation: Any
+    mask: NDArray[np.int8]
+    reward: float
+    seat: int
+    kind: int
+    attempts: int
+
+
+class RowReader:
+    """Reads the first row of the batches of one game, and of their endings: fast if it is alone in its table."""
+
+    def __init__(self, form: Form, batch: Batch, *, own_rewards: bool) -> None:
+        """Prepares.
+
+        Args:
+            form: the form of observations.
+            batch: the first one.
+            own_rewards: whether a reward function computes the rewards, which are not in the rows then.
+        """
+        self._form = form
+        self._actions = batch.sizes.num_actions
+        self._singles: dict[type[Situations], SingleRow] = {}
+        for table in (batch, batch.endings):
+            if table.packed is not None and not own_rewards:
+                self._singles[type(table)] = SingleRow(batch.sizes, table.packed.before)
+
+    def read(self, now: Batch | Endings) -> Seen:
+        """Reads the first row."""
+        packed = now.packed
+        single = self._singles.get(type(now))
+        if single is None or packed is None or len(now) != 1:
+            attempts = int(now.attempts[0]) if isinstance(now, Batch) else 0
+            observation = self._form.row(self._form.of(now), 0)
+            mask = np.array(now.masks[0], np.int8)
+            return Seen(observation, mask, float(now.rewards[0]), int(now.seats[0]), int(now.kinds[0]), attempts)
+        row = packed.columns
+        observed = single.table(row) if self._form.is_table else None
+        if observed is not None:
+            # The mask is its last part.
+            mask = observed[-self._actions :].astype(np.int8)
+        else:
+            mask = single.mask(row)
+            observed = self._form.row(self._form.of(now), 0)
+        kind, attempts = (single.kind(row), single.attempts(row)) if isinstance(now, Batch) else (0, 0)
+        return Seen(observed, mask, single.reward(row), single.seat(row), kind, attempts)
 
 
 class SingleRow:
@@ -34,7 +95,7 @@ class SingleRow:
         self._actions = sizes.num_actions
         first = before.get("mask_bits")
         self._mask = None if first is None else slice(first, first + sizes.mask_bytes)
-        self._reward = before["rewards"]
+        self._reward, self._seat = before["rewards"], before["seats"]
         # Not of endings.
         self._attempts, self._kind = before.get("attempts", 0), before.get("kinds", 0)
         self._lookup = _TableLookup(sizes, before)
@@ -42,6 +103,10 @@ class SingleRow:
     def reward(self, row: NDArray[np.uint8]) -> float:
         """Returns the reward."""
         return float(_REWARD(row.data, self._reward)[0])
+
+    def seat(self, row: NDArray[np.uint8]) -> int:
+        """Returns the seat."""
+        return int(row[self._seat])
 
     def attempts(self, row: NDArray[np.uint8]) -> int:
         """Returns the invalid attempts at the decision."""
