@@ -564,7 +564,7 @@ fn routes(
     use v1::tournament_service_server::TournamentServiceServer;
     use v1::vector_service_server::VectorServiceServer;
     let reach = grpc::Reach::new(Arc::clone(rooms), Arc::clone(tournaments));
-    let recorded = grpc::Recorded::new(reach.clone(), config.access.records);
+    let recorded = grpc::Recorded::new(reach.clone(), config.access.records)?;
     let retention = Retention::new(Arc::clone(rooms));
     let study_calls = grpc::StudyCalls::new(
         Arc::clone(studies),

@@ -1,10 +1,11 @@
-//! Reads recorded games for the services, a few at a time and for callers in turns, on blocking
-//! threads. The work itself holds its place, so a cancelled call does not make room for another
-//! before its work has ended.
+//! Reads recorded games for the services, a few at a time and for callers in turns, on threads that
+//! give way to those of rooms. The work itself holds its place, so a cancelled call does not make room
+//! for another before its work has ended.
 
 use std::sync::Arc;
 
 use chefshat_proto::v1::{self, record_service_client::RecordServiceClient};
+use rayon::ThreadPoolBuildError;
 use tonic::{Code, Status};
 
 use super::access::refused;
@@ -18,6 +19,7 @@ use crate::convert::lines_of;
 use crate::limits::{Held, Key, Places};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
+use crate::threads::{Priority, Threads};
 use chefshat_room::ids::Id;
 
 /// Reason of the error while games with the same deals are being played.
@@ -31,17 +33,23 @@ pub struct Recorded {
     required: Role,
     /// Limits how many records are assembled at a time, because they are large.
     places: Arc<Places>,
+    threads: Arc<Threads>,
 }
 
 impl Recorded {
     /// Creates a reader of the recorded games that callers with the role `required` reach.
-    pub fn new(reach: Reach, required: Role) -> Self {
+    ///
+    /// # Errors
+    /// The operating system cannot start its threads.
+    pub fn new(reach: Reach, required: Role) -> Result<Self, ThreadPoolBuildError> {
         let places = Places::new(MAX_CONCURRENT_RECORDS, reach.rooms().shares());
-        Self {
+        let threads = Threads::new("records", MAX_CONCURRENT_RECORDS, Priority::Batches)?;
+        Ok(Self {
             reach,
             required,
             places,
-        }
+            threads: Arc::new(threads),
+        })
     }
 
     /// The rooms.
@@ -123,7 +131,8 @@ impl Recorded {
         if (stored.tournament()).is_some_and(|game| self.rooms().is_withheld(game)) {
             return Err(series_open());
         }
-        in_background(place, move || work(lines_of(&stored).into_owned(), sight)).await
+        let working = move || work(lines_of(&stored).into_owned(), sight);
+        self.in_background(place, working).await
     }
 
     /// The record of a finished game as `seen` makes it, for a call that cannot be sent to another
@@ -158,7 +167,22 @@ impl Recorded {
         key: Key,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Status> {
-        in_background(self.places.take(key).await, work).await
+        self.in_background(self.places.take(key).await, work).await
+    }
+
+    /// Runs work that takes milliseconds on a thread. The place is free when it ends.
+    async fn in_background<T: Send + 'static>(
+        &self,
+        place: Held,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, Status> {
+        let working = self.threads.run(move || {
+            let _place = place;
+            work()
+        });
+        // It folds what is stored, so that a failure means that this cannot be read.
+        let failed = || StoreError::Unreadable("work on a record was given up".to_owned());
+        working.await.ok_or_else(|| status::read_failed(failed()))
     }
 }
 
@@ -190,20 +214,4 @@ fn series_open() -> Status {
         "other games with the same deals are being played; the record is available when they have ended",
         [("field", "game_id")],
     )
-}
-
-/// Runs work that takes milliseconds on a blocking thread. The place is free when it ends.
-async fn in_background<T: Send + 'static>(
-    place: Held,
-    work: impl FnOnce() -> T + Send + 'static,
-) -> Result<T, Status> {
-    let working = tokio::task::spawn_blocking(move || {
-        let _place = place;
-        work()
-    });
-    // It folds what is stored, so that a failure means that this cannot be read.
-    let failed = |error| StoreError::Unreadable(format!("work on a record failed: {error}"));
-    working
-        .await
-        .map_err(|error| status::read_failed(failed(error)))
 }

@@ -695,7 +695,7 @@ mod tests {
         let rooms = Rooms::new(&config, store.clone(), TaskTracker::new()).expect("threads");
         let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
         let reach = Reach::new(rooms, Arc::clone(&tournaments));
-        let recorded = Recorded::new(reach, Role::Spectator);
+        let recorded = Recorded::new(reach, Role::Spectator).expect("threads");
         let records = Records::new(recorded, tournaments, &config);
         let caller = Caller {
             role: Role::Admin,

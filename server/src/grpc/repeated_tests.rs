@@ -33,7 +33,7 @@ fn calls() -> (TournamentCalls, StudyCalls) {
     let studies = Studies::new(Arc::clone(&rooms), tracker);
     let limits = Arc::new(CallLimits::new(config.shares));
     let reach = Reach::new(rooms, Arc::clone(&tournaments));
-    let recorded = Recorded::new(reach.clone(), Role::Spectator);
+    let recorded = Recorded::new(reach.clone(), Role::Spectator).expect("threads");
     let closing = CancellationToken::new();
     (
         TournamentCalls::new(tournaments, recorded, Arc::clone(&limits), closing.clone()),
