@@ -1,8 +1,12 @@
-// The settings: full screen, where the browser can show it.
+// The settings: the connection, and full screen where the browser can show it.
 
+import { create } from "@bufbuild/protobuf";
+import { Code, ConnectError } from "@connectrpc/connect";
 import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { serverApi } from "../src/api/client";
+import { GetServerInfoResponseSchema } from "../src/gen/chefshat/v1/server_service_pb";
 import { Settings } from "../src/parts/Settings";
 import { root } from "./mounted";
 
@@ -18,6 +22,8 @@ afterEach(() => {
     Reflect.deleteProperty(document, name);
   Reflect.deleteProperty(document.documentElement, "requestFullscreen");
   vi.clearAllMocks();
+  vi.restoreAllMocks();
+  vi.useRealTimers();
 });
 
 async function show(fullscreenEnabled: boolean, fullscreenElement: Element | null) {
@@ -27,6 +33,10 @@ async function show(fullscreenEnabled: boolean, fullscreenElement: Element | nul
   await act(() => render(<Settings onClose={onClose} />, root));
   return onClose;
 }
+const later = (ms: number) =>
+  act(async () => {
+    await vi.advanceTimersByTimeAsync(ms);
+  });
 const button = (words: string) => [...root.querySelectorAll("button")].find(({ textContent }) => textContent === words);
 
 test("full screen is switched on, after the dialog has closed", async () => {
@@ -51,4 +61,23 @@ test("a browser without full screen is not offered it", async () => {
   await show(false, null);
   expect(button("Full screen")).toBeUndefined();
   expect(button("Leave full screen")).toBeUndefined();
+});
+
+test("the time until the server answers is measured while the settings are open", async () => {
+  vi.useFakeTimers();
+  const ask = vi.spyOn(serverApi, "getServerInfo").mockImplementation(async () => {
+    await new Promise((resolve) => setTimeout(resolve, 120));
+    return create(GetServerInfoResponseSchema, {});
+  });
+  await show(false, null);
+  const lag = () => root.querySelector('[data-part="lag"]')?.textContent;
+  expect(lag()).toBe("The connection is being measured…");
+  await later(120);
+  expect(lag()).toBe("The server answers after 120 ms.");
+  ask.mockRejectedValue(new ConnectError("", Code.Unavailable));
+  await later(3_000);
+  expect(lag()).toMatch(/server/i);
+  act(() => render(null, root));
+  await vi.advanceTimersByTimeAsync(60_000);
+  expect(ask).toHaveBeenCalledTimes(2);
 });

@@ -1,7 +1,10 @@
-// The settings of this device: language, theme, what happens at the table, full screen, and deleting
-// what is stored. Sound and replay speed are on their pages.
+// The settings of this device: language, theme, what happens at the table, the connection, full
+// screen, and deleting what is stored. Sound and replay speed are on their pages.
 
 import { useState } from "preact/hooks";
+import { CALL_LIMIT_MS, serverApi } from "../api/client";
+import { wordsOf } from "../api/faults";
+import { usePolled } from "../api/poll";
 import { language, languages, setLanguage, t } from "../i18n";
 import { isNameKey, nameKeyText, setNameKey } from "../name-key";
 import { isOn, type Preference, setPreference } from "../preferences";
@@ -35,6 +38,7 @@ export function Settings({ onClose }: { onClose: () => void }) {
         />
         <AtTheTable />
         <OwnNames />
+        <Lag />
         <FullScreen onClose={onClose} />
         <Forget />
       </div>
@@ -126,6 +130,25 @@ function OwnNames() {
         </ConfirmButton>
       )}
     </>
+  );
+}
+
+/** Time between two measurements of the connection, milliseconds. */
+const MEASURE_EVERY_MS = 3_000;
+
+/** How long the server takes to answer, measured while the settings are open. */
+function Lag() {
+  const words = t().common.settings;
+  const measure = async (signal: AbortSignal) => {
+    const begunMs = performance.now();
+    await serverApi.getServerInfo({}, { signal, timeoutMs: CALL_LIMIT_MS });
+    return Math.round(performance.now() - begunMs);
+  };
+  const { value: lagMs, fault } = usePolled(measure, MEASURE_EVERY_MS, "");
+  return (
+    <p class="soft" data-part="lag">
+      {fault ? wordsOf(fault) : lagMs === null ? words.measuring : words.lag(lagMs)}
+    </p>
   );
 }
 

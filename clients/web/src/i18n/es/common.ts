@@ -56,6 +56,8 @@ export const common: Texts["common"] = {
       replaces:
         "Este dispositivo jugará entonces como la persona de la clave nueva. Copia antes la anterior si quieres volver a ser esa persona.",
     },
+    measuring: "Midiendo la conexión…",
+    lag: (ms) => `El servidor responde en ${ms} ms.`,
     fullScreen: "Pantalla completa",
     fullScreenOff: "Salir de la pantalla completa",
     forget: "Olvidar todo en este dispositivo",

@@ -107,8 +107,10 @@ export function Hand(props: HandProps) {
   const half = fullerHalf(runs);
   const style = {
     "--stacks": runs.length,
+    "--strips": cards.length - runs.length,
     "--units": units,
     "--half-stacks": half.length,
+    "--half-strips": half.flat().length - half.length,
     "--half-units": widthOf(half),
   };
   let index = -1;
