@@ -6725,6 +6725,10 @@ pub struct SetNextRoomRequest {
     /// `join_code` of the next room: 8 letters and digits.
     #[prost(string, tag = "3")]
     pub join_code: ::prost::alloc::string::String,
+    /// In place of the owner token: a ticket of the room. A participant's offer does not replace one that
+    /// can still be joined.
+    #[prost(string, tag = "4")]
+    pub ticket: ::prost::alloc::string::String,
 }
 /// The next room is known.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
@@ -7113,8 +7117,10 @@ pub mod room_service_client {
             self.inner.unary(req, path, codec).await
         }
         /// Sets the join code of the room in which the participants of a room play again
-        /// (`Room.next_join_code`); it replaces an earlier one. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
-        /// NOT_FOUND (ROOM_UNKNOWN).
+        /// (`Room.next_join_code`). The owner's replaces an earlier one. A participant's does so only if
+        /// nobody can join the earlier one any more: the first offer counts. FAILED_PRECONDITION
+        /// (NEXT_ROOM_SET); PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+        /// UNAUTHENTICATED (TICKET_UNKNOWN); NOT_FOUND (ROOM_UNKNOWN).
         pub async fn set_next_room(
             &mut self,
             request: impl tonic::IntoRequest<super::SetNextRoomRequest>,
@@ -7219,8 +7225,10 @@ pub mod room_service_server {
             tonic::Status,
         >;
         /// Sets the join code of the room in which the participants of a room play again
-        /// (`Room.next_join_code`); it replaces an earlier one. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
-        /// NOT_FOUND (ROOM_UNKNOWN).
+        /// (`Room.next_join_code`). The owner's replaces an earlier one. A participant's does so only if
+        /// nobody can join the earlier one any more: the first offer counts. FAILED_PRECONDITION
+        /// (NEXT_ROOM_SET); PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+        /// UNAUTHENTICATED (TICKET_UNKNOWN); NOT_FOUND (ROOM_UNKNOWN).
         async fn set_next_room(
             &self,
             request: tonic::Request<super::SetNextRoomRequest>,
@@ -9211,8 +9219,8 @@ pub struct StudyItemAnswer {
     /// `item` of StudyShownItem.
     #[prost(uint32, tag = "1")]
     pub item: u32,
-    /// Milliseconds from showing the questionnaire to the last change of this answer, measured by the
-    /// participant's device.
+    /// Milliseconds from reaching the questionnaire to the last change of this answer, measured by the
+    /// participant's device, which counts on after a reload (`step_age_ms` of OpenStudyResponse).
     #[prost(uint32, optional, tag = "5")]
     pub answered_after_ms: ::core::option::Option<u32>,
     /// The answer.
@@ -9778,6 +9786,12 @@ pub struct OpenStudyResponse {
     /// What to show.
     #[prost(message, optional, tag = "2")]
     pub view: ::core::option::Option<StudyView>,
+    /// What the participant has entered at this step so far (SaveAnswers), if it is a questionnaire.
+    #[prost(message, repeated, tag = "3")]
+    pub saved_answers: ::prost::alloc::vec::Vec<StudyItemAnswer>,
+    /// Milliseconds since the participant reached this step: `answered_after_ms` counts on from there.
+    #[prost(uint64, tag = "4")]
+    pub step_age_ms: u64,
 }
 /// Requests to follow what to show.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -9830,6 +9844,22 @@ pub struct AnswerQuestionnaireResponse {
     #[prost(message, optional, tag = "1")]
     pub view: ::core::option::Option<StudyView>,
 }
+/// What was entered so far.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct SaveAnswersRequest {
+    /// `session` of OpenStudyResponse.
+    #[prost(string, tag = "1")]
+    pub session: ::prost::alloc::string::String,
+    /// `step` of the view that was shown.
+    #[prost(uint32, tag = "2")]
+    pub step: u32,
+    /// All that was entered so far, at most one answer for each item.
+    #[prost(message, repeated, tag = "3")]
+    pub answers: ::prost::alloc::vec::Vec<StudyItemAnswer>,
+}
+/// The answers are kept.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct SaveAnswersResponse {}
 /// Requests to continue.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct ContinueStudyRequest {
@@ -11262,6 +11292,35 @@ pub mod participation_service_client {
                 );
             self.inner.unary(req, path, codec).await
         }
+        /// Keeps what was entered in the questionnaire of the step so far, for a reload or another device: it
+        /// replaces what was kept before, and is forgotten when the questionnaire is answered. Not every item
+        /// needs an answer. RESOURCE_EXHAUSTED (TOO_MANY_SAVES after 1000); else as AnswerQuestionnaire.
+        pub async fn save_answers(
+            &mut self,
+            request: impl tonic::IntoRequest<super::SaveAnswersRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::SaveAnswersResponse>,
+            tonic::Status,
+        > {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = tonic_prost::ProstCodec::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/chefshat.v1.ParticipationService/SaveAnswers",
+            );
+            let mut req = request.into_request();
+            req.extensions_mut()
+                .insert(
+                    GrpcMethod::new("chefshat.v1.ParticipationService", "SaveAnswers"),
+                );
+            self.inner.unary(req, path, codec).await
+        }
         /// Continues from a text, a questionnaire on another site, or a game that has ended.
         /// FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
         pub async fn continue_study(
@@ -11417,6 +11476,16 @@ pub mod participation_service_server {
             request: tonic::Request<super::AnswerQuestionnaireRequest>,
         ) -> std::result::Result<
             tonic::Response<super::AnswerQuestionnaireResponse>,
+            tonic::Status,
+        >;
+        /// Keeps what was entered in the questionnaire of the step so far, for a reload or another device: it
+        /// replaces what was kept before, and is forgotten when the questionnaire is answered. Not every item
+        /// needs an answer. RESOURCE_EXHAUSTED (TOO_MANY_SAVES after 1000); else as AnswerQuestionnaire.
+        async fn save_answers(
+            &self,
+            request: tonic::Request<super::SaveAnswersRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::SaveAnswersResponse>,
             tonic::Status,
         >;
         /// Continues from a text, a questionnaire on another site, or a game that has ended.
@@ -11708,6 +11777,52 @@ pub mod participation_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = AnswerQuestionnaireSvc(inner);
+                        let codec = tonic_prost::ProstCodec::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.unary(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
+                "/chefshat.v1.ParticipationService/SaveAnswers" => {
+                    #[allow(non_camel_case_types)]
+                    struct SaveAnswersSvc<T: ParticipationService>(pub Arc<T>);
+                    impl<
+                        T: ParticipationService,
+                    > tonic::server::UnaryService<super::SaveAnswersRequest>
+                    for SaveAnswersSvc<T> {
+                        type Response = super::SaveAnswersResponse;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::Response>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<super::SaveAnswersRequest>,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as ParticipationService>::save_answers(&inner, request)
+                                    .await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = SaveAnswersSvc(inner);
                         let codec = tonic_prost::ProstCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(

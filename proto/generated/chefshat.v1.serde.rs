@@ -21417,12 +21417,26 @@ impl serde::Serialize for OpenStudyResponse {
         if self.view.is_some() {
             len += 1;
         }
+        if !self.saved_answers.is_empty() {
+            len += 1;
+        }
+        if self.step_age_ms != 0 {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.OpenStudyResponse", len)?;
         if !self.session.is_empty() {
             struct_ser.serialize_field("session", &self.session)?;
         }
         if let Some(v) = self.view.as_ref() {
             struct_ser.serialize_field("view", v)?;
+        }
+        if !self.saved_answers.is_empty() {
+            struct_ser.serialize_field("savedAnswers", &self.saved_answers)?;
+        }
+        if self.step_age_ms != 0 {
+            #[allow(clippy::needless_borrow)]
+            #[allow(clippy::needless_borrows_for_generic_args)]
+            struct_ser.serialize_field("stepAgeMs", ToString::to_string(&self.step_age_ms).as_str())?;
         }
         struct_ser.end()
     }
@@ -21436,12 +21450,18 @@ impl<'de> serde::Deserialize<'de> for OpenStudyResponse {
         const FIELDS: &[&str] = &[
             "session",
             "view",
+            "saved_answers",
+            "savedAnswers",
+            "step_age_ms",
+            "stepAgeMs",
         ];
 
         #[allow(clippy::enum_variant_names)]
         enum GeneratedField {
             Session,
             View,
+            SavedAnswers,
+            StepAgeMs,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -21465,6 +21485,8 @@ impl<'de> serde::Deserialize<'de> for OpenStudyResponse {
                         match value {
                             "session" => Ok(GeneratedField::Session),
                             "view" => Ok(GeneratedField::View),
+                            "savedAnswers" | "saved_answers" => Ok(GeneratedField::SavedAnswers),
+                            "stepAgeMs" | "step_age_ms" => Ok(GeneratedField::StepAgeMs),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -21486,6 +21508,8 @@ impl<'de> serde::Deserialize<'de> for OpenStudyResponse {
             {
                 let mut session__ = None;
                 let mut view__ = None;
+                let mut saved_answers__ = None;
+                let mut step_age_ms__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Session => {
@@ -21500,11 +21524,27 @@ impl<'de> serde::Deserialize<'de> for OpenStudyResponse {
                             }
                             view__ = map_.next_value()?;
                         }
+                        GeneratedField::SavedAnswers => {
+                            if saved_answers__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("savedAnswers"));
+                            }
+                            saved_answers__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::StepAgeMs => {
+                            if step_age_ms__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("stepAgeMs"));
+                            }
+                            step_age_ms__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
                     }
                 }
                 Ok(OpenStudyResponse {
                     session: session__.unwrap_or_default(),
                     view: view__,
+                    saved_answers: saved_answers__.unwrap_or_default(),
+                    step_age_ms: step_age_ms__.unwrap_or_default(),
                 })
             }
         }
@@ -30904,6 +30944,204 @@ impl<'de> serde::Deserialize<'de> for SampleChunk {
         deserializer.deserialize_struct("chefshat.v1.SampleChunk", FIELDS, GeneratedVisitor)
     }
 }
+impl serde::Serialize for SaveAnswersRequest {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if !self.session.is_empty() {
+            len += 1;
+        }
+        if self.step != 0 {
+            len += 1;
+        }
+        if !self.answers.is_empty() {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.SaveAnswersRequest", len)?;
+        if !self.session.is_empty() {
+            struct_ser.serialize_field("session", &self.session)?;
+        }
+        if self.step != 0 {
+            struct_ser.serialize_field("step", &self.step)?;
+        }
+        if !self.answers.is_empty() {
+            struct_ser.serialize_field("answers", &self.answers)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for SaveAnswersRequest {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "session",
+            "step",
+            "answers",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Session,
+            Step,
+            Answers,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "session" => Ok(GeneratedField::Session),
+                            "step" => Ok(GeneratedField::Step),
+                            "answers" => Ok(GeneratedField::Answers),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = SaveAnswersRequest;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.SaveAnswersRequest")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<SaveAnswersRequest, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut session__ = None;
+                let mut step__ = None;
+                let mut answers__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Session => {
+                            if session__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("session"));
+                            }
+                            session__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::Step => {
+                            if step__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("step"));
+                            }
+                            step__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::Answers => {
+                            if answers__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("answers"));
+                            }
+                            answers__ = Some(map_.next_value()?);
+                        }
+                    }
+                }
+                Ok(SaveAnswersRequest {
+                    session: session__.unwrap_or_default(),
+                    step: step__.unwrap_or_default(),
+                    answers: answers__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.SaveAnswersRequest", FIELDS, GeneratedVisitor)
+    }
+}
+impl serde::Serialize for SaveAnswersResponse {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let len = 0;
+        let struct_ser = serializer.serialize_struct("chefshat.v1.SaveAnswersResponse", len)?;
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for SaveAnswersResponse {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                            Err(serde::de::Error::unknown_field(value, FIELDS))
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = SaveAnswersResponse;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.SaveAnswersResponse")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<SaveAnswersResponse, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                while map_.next_key::<GeneratedField>()?.is_some() {
+                    let _ = map_.next_value::<serde::de::IgnoredAny>()?;
+                }
+                Ok(SaveAnswersResponse {
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.SaveAnswersResponse", FIELDS, GeneratedVisitor)
+    }
+}
 impl serde::Serialize for SavedStart {
     #[allow(deprecated)]
     fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
@@ -32585,6 +32823,9 @@ impl serde::Serialize for SetNextRoomRequest {
         if !self.join_code.is_empty() {
             len += 1;
         }
+        if !self.ticket.is_empty() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.SetNextRoomRequest", len)?;
         if !self.room_id.is_empty() {
             struct_ser.serialize_field("roomId", &self.room_id)?;
@@ -32594,6 +32835,9 @@ impl serde::Serialize for SetNextRoomRequest {
         }
         if !self.join_code.is_empty() {
             struct_ser.serialize_field("joinCode", &self.join_code)?;
+        }
+        if !self.ticket.is_empty() {
+            struct_ser.serialize_field("ticket", &self.ticket)?;
         }
         struct_ser.end()
     }
@@ -32611,6 +32855,7 @@ impl<'de> serde::Deserialize<'de> for SetNextRoomRequest {
             "ownerToken",
             "join_code",
             "joinCode",
+            "ticket",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -32618,6 +32863,7 @@ impl<'de> serde::Deserialize<'de> for SetNextRoomRequest {
             RoomId,
             OwnerToken,
             JoinCode,
+            Ticket,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -32642,6 +32888,7 @@ impl<'de> serde::Deserialize<'de> for SetNextRoomRequest {
                             "roomId" | "room_id" => Ok(GeneratedField::RoomId),
                             "ownerToken" | "owner_token" => Ok(GeneratedField::OwnerToken),
                             "joinCode" | "join_code" => Ok(GeneratedField::JoinCode),
+                            "ticket" => Ok(GeneratedField::Ticket),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -32664,6 +32911,7 @@ impl<'de> serde::Deserialize<'de> for SetNextRoomRequest {
                 let mut room_id__ = None;
                 let mut owner_token__ = None;
                 let mut join_code__ = None;
+                let mut ticket__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::RoomId => {
@@ -32684,12 +32932,19 @@ impl<'de> serde::Deserialize<'de> for SetNextRoomRequest {
                             }
                             join_code__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::Ticket => {
+                            if ticket__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("ticket"));
+                            }
+                            ticket__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(SetNextRoomRequest {
                     room_id: room_id__.unwrap_or_default(),
                     owner_token: owner_token__.unwrap_or_default(),
                     join_code: join_code__.unwrap_or_default(),
+                    ticket: ticket__.unwrap_or_default(),
                 })
             }
         }

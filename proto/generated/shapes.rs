@@ -311,7 +311,7 @@ pub static OBSERVATION_COLUMNS: Shape = Shape { name: "chefshat.v1.ObservationCo
 /// `chefshat.v1.OpenStudyRequest`.
 pub static OPEN_STUDY_REQUEST: Shape = Shape { name: "chefshat.v1.OpenStudyRequest", size: size_of::<crate::v1::OpenStudyRequest>(), fields: &[Field { number: 1, list: false, kind: Kind::Text }, ] };
 /// `chefshat.v1.OpenStudyResponse`.
-pub static OPEN_STUDY_RESPONSE: Shape = Shape { name: "chefshat.v1.OpenStudyResponse", size: size_of::<crate::v1::OpenStudyResponse>(), fields: &[Field { number: 1, list: false, kind: Kind::Text }, Field { number: 2, list: false, kind: Kind::Message(&STUDY_VIEW) }, ] };
+pub static OPEN_STUDY_RESPONSE: Shape = Shape { name: "chefshat.v1.OpenStudyResponse", size: size_of::<crate::v1::OpenStudyResponse>(), fields: &[Field { number: 1, list: false, kind: Kind::Text }, Field { number: 2, list: false, kind: Kind::Message(&STUDY_VIEW) }, Field { number: 3, list: true, kind: Kind::Message(&STUDY_ITEM_ANSWER) }, Field { number: 4, list: false, kind: Kind::Number { size: 8, width: 0 } }, ] };
 /// `chefshat.v1.OrderConfidence`.
 pub static ORDER_CONFIDENCE: Shape = Shape { name: "chefshat.v1.OrderConfidence", size: size_of::<crate::v1::OrderConfidence>(), fields: &[Field { number: 1, list: false, kind: Kind::Number { size: 4, width: 0 } }, Field { number: 2, list: false, kind: Kind::Number { size: 4, width: 0 } }, Field { number: 3, list: false, kind: Kind::Number { size: 8, width: 8 } }, Field { number: 4, list: false, kind: Kind::Number { size: 8, width: 8 } }, Field { number: 5, list: false, kind: Kind::Number { size: 8, width: 8 } }, Field { number: 6, list: false, kind: Kind::Number { size: 8, width: 0 } }, ] };
 /// `chefshat.v1.OwnedSeat`.
@@ -426,6 +426,10 @@ pub static RUN_REQUEST: Shape = Shape { name: "chefshat.v1.RunRequest", size: si
 pub static RUN_RESPONSE: Shape = Shape { name: "chefshat.v1.RunResponse", size: size_of::<crate::v1::RunResponse>(), fields: &[Field { number: 1, list: false, kind: Kind::Message(&VECTOR_STARTED) }, Field { number: 2, list: false, kind: Kind::Message(&VECTOR_BATCH) }, Field { number: 3, list: false, kind: Kind::Message(&VECTOR_RECORD) }, Field { number: 4, list: false, kind: Kind::Message(&VECTOR_STATES) }, ] };
 /// `chefshat.v1.SampleChunk`.
 pub static SAMPLE_CHUNK: Shape = Shape { name: "chefshat.v1.SampleChunk", size: size_of::<crate::v1::SampleChunk>(), fields: &[Field { number: 1, list: false, kind: Kind::Text }, Field { number: 2, list: true, kind: Kind::Text }, Field { number: 3, list: true, kind: Kind::Number { size: 8, width: 0 } }, Field { number: 4, list: true, kind: Kind::Number { size: 4, width: 4 } }, ] };
+/// `chefshat.v1.SaveAnswersRequest`.
+pub static SAVE_ANSWERS_REQUEST: Shape = Shape { name: "chefshat.v1.SaveAnswersRequest", size: size_of::<crate::v1::SaveAnswersRequest>(), fields: &[Field { number: 1, list: false, kind: Kind::Text }, Field { number: 2, list: false, kind: Kind::Number { size: 4, width: 0 } }, Field { number: 3, list: true, kind: Kind::Message(&STUDY_ITEM_ANSWER) }, ] };
+/// `chefshat.v1.SaveAnswersResponse`.
+pub static SAVE_ANSWERS_RESPONSE: Shape = Shape { name: "chefshat.v1.SaveAnswersResponse", size: size_of::<crate::v1::SaveAnswersResponse>(), fields: &[] };
 /// `chefshat.v1.SavedStart`.
 pub static SAVED_START: Shape = Shape { name: "chefshat.v1.SavedStart", size: size_of::<crate::v1::SavedStart>(), fields: &[Field { number: 1, list: true, kind: Kind::Text }, Field { number: 2, list: false, kind: Kind::Number { size: 1, width: 0 } }, ] };
 /// `chefshat.v1.ScriptedShift`.
@@ -451,7 +455,7 @@ pub static SEEN_CARDS: Shape = Shape { name: "chefshat.v1.SeenCards", size: size
 /// `chefshat.v1.ServerRestarted`.
 pub static SERVER_RESTARTED: Shape = Shape { name: "chefshat.v1.ServerRestarted", size: size_of::<crate::v1::ServerRestarted>(), fields: &[] };
 /// `chefshat.v1.SetNextRoomRequest`.
-pub static SET_NEXT_ROOM_REQUEST: Shape = Shape { name: "chefshat.v1.SetNextRoomRequest", size: size_of::<crate::v1::SetNextRoomRequest>(), fields: &[Field { number: 1, list: false, kind: Kind::Text }, Field { number: 2, list: false, kind: Kind::Text }, Field { number: 3, list: false, kind: Kind::Text }, ] };
+pub static SET_NEXT_ROOM_REQUEST: Shape = Shape { name: "chefshat.v1.SetNextRoomRequest", size: size_of::<crate::v1::SetNextRoomRequest>(), fields: &[Field { number: 1, list: false, kind: Kind::Text }, Field { number: 2, list: false, kind: Kind::Text }, Field { number: 3, list: false, kind: Kind::Text }, Field { number: 4, list: false, kind: Kind::Text }, ] };
 /// `chefshat.v1.SetNextRoomResponse`.
 pub static SET_NEXT_ROOM_RESPONSE: Shape = Shape { name: "chefshat.v1.SetNextRoomResponse", size: size_of::<crate::v1::SetNextRoomResponse>(), fields: &[] };
 /// `chefshat.v1.ShiftEnded`.
@@ -662,6 +666,7 @@ Method { path: "/chefshat.v1.ParticipationService/OpenStudy", request: &OPEN_STU
 Method { path: "/chefshat.v1.ParticipationService/FollowParticipation", request: &FOLLOW_PARTICIPATION_REQUEST, decode: |bytes| Ok(Box::new(<crate::v1::FollowParticipationRequest as prost::Message>::decode(bytes)?)) },
 Method { path: "/chefshat.v1.ParticipationService/GiveConsent", request: &GIVE_CONSENT_REQUEST, decode: |bytes| Ok(Box::new(<crate::v1::GiveConsentRequest as prost::Message>::decode(bytes)?)) },
 Method { path: "/chefshat.v1.ParticipationService/AnswerQuestionnaire", request: &ANSWER_QUESTIONNAIRE_REQUEST, decode: |bytes| Ok(Box::new(<crate::v1::AnswerQuestionnaireRequest as prost::Message>::decode(bytes)?)) },
+Method { path: "/chefshat.v1.ParticipationService/SaveAnswers", request: &SAVE_ANSWERS_REQUEST, decode: |bytes| Ok(Box::new(<crate::v1::SaveAnswersRequest as prost::Message>::decode(bytes)?)) },
 Method { path: "/chefshat.v1.ParticipationService/ContinueStudy", request: &CONTINUE_STUDY_REQUEST, decode: |bytes| Ok(Box::new(<crate::v1::ContinueStudyRequest as prost::Message>::decode(bytes)?)) },
 Method { path: "/chefshat.v1.ParticipationService/RecordTraces", request: &RECORD_TRACES_REQUEST, decode: |bytes| Ok(Box::new(<crate::v1::RecordTracesRequest as prost::Message>::decode(bytes)?)) },
 Method { path: "/chefshat.v1.ParticipationService/WithdrawFromStudy", request: &WITHDRAW_FROM_STUDY_REQUEST, decode: |bytes| Ok(Box::new(<crate::v1::WithdrawFromStudyRequest as prost::Message>::decode(bytes)?)) },

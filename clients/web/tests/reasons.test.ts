@@ -19,9 +19,11 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "SEATS_REFUSED",
     "SETTINGS_REFUSED",
   ],
-  "the page of a study shows the newest step, or drops the traces": [
+  "the page joins the room that somebody else was faster to offer": ["NEXT_ROOM_SET"],
+  "the page of a study shows the newest step, or drops the traces and what it could not save": [
     "STEP_MISMATCH",
     "STEP_OVER",
+    "TOO_MANY_SAVES",
     "TOO_MANY_TRACES",
     "TRACES_REFUSED",
   ],

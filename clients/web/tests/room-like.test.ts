@@ -1,15 +1,19 @@
 // Rooms like another, for playing again.
 
 import { create } from "@bufbuild/protobuf";
+import { Code, ConnectError } from "@connectrpc/connect";
 import { afterEach, expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
 import { GameOrigin, ParticipantKind, RoomSchema } from "../src/gen/chefshat/v1/room_pb";
 import {
+  CloseRoomResponseSchema,
   CreateRoomRequestSchema,
   CreateRoomResponseSchema,
   GetRoomResponseSchema,
   JoinRoomResponseSchema,
+  SetNextRoomResponseSchema,
 } from "../src/gen/chefshat/v1/room_service_pb";
+import { ErrorInfoSchema } from "../src/gen/google/rpc/error_details_pb";
 import { playAgain, requestLike } from "../src/lobby/room-like";
 import { createRoom } from "../src/lobby/seat";
 import { forgetAll, remember } from "../src/store";
@@ -94,12 +98,31 @@ test.each([
   const { making, seats } = await wizardRoom();
   const join = vi.spyOn(roomApi, "joinRoom");
   join.mockResolvedValue(create(JoinRoomResponseSchema, { room: { roomId: "next" }, ticket: "t", seat }));
-  await playAgain("wizard's", name, seat);
+  const offer = vi.spyOn(roomApi, "setNextRoom").mockResolvedValue(create(SetNextRoomResponseSchema));
+  await playAgain("wizard's", { ticket: "mine", name, seat });
+  expect(offer.mock.lastCall?.[0]).toEqual({ roomId: "wizard's", ticket: "mine", joinCode: "BCDF2345" });
   expect(making.mock.lastCall?.[0].seats).toEqual(seats);
   expect(join.mock.calls).toHaveLength(1);
   const asked = join.mock.calls[0]?.[0];
   expect(asked).toMatchObject({ joinCode: "BCDF2345", name, seat, kind });
   expect(asked?.nameKey).toHaveLength(keyBytes);
+});
+
+test("who is slower to offer a rematch closes the own room and joins the other's", async () => {
+  const { described } = await wizardRoom();
+  const refused = new ConnectError("", Code.FailedPrecondition, undefined, [
+    { desc: ErrorInfoSchema, value: { reason: "NEXT_ROOM_SET" } },
+  ]);
+  vi.spyOn(roomApi, "setNextRoom").mockRejectedValue(refused);
+  const close = vi.spyOn(roomApi, "closeRoom").mockResolvedValue(create(CloseRoomResponseSchema));
+  const offered = { ...described, nextJoinCode: "FIRST234" };
+  vi.spyOn(roomApi, "getRoom").mockResolvedValue(create(GetRoomResponseSchema, { room: offered }));
+  const join = vi.spyOn(roomApi, "joinRoom");
+  join.mockResolvedValue(create(JoinRoomResponseSchema, { room: { roomId: "theirs" }, ticket: "t", seat: 2 }));
+  await playAgain("wizard's", { ticket: "mine", name: "Mia", seat: 2 });
+  expect(close).toHaveBeenCalledTimes(1);
+  expect(join.mock.calls.map(([asked]) => asked.joinCode)).toEqual(["FIRST234"]);
+  expect(location.pathname).toBe("/rooms/theirs");
 });
 
 test("a branch continues from the same point", () => {

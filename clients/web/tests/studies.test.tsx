@@ -9,10 +9,10 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
 import { ParticipantSchema } from "../src/gen/chefshat/v1/room_pb";
 import { type StudyShownItem, StudyShownItemSchema, StudyTraceKind } from "../src/gen/chefshat/v1/study_pb";
-import { ContinueStudyResponseSchema } from "../src/gen/chefshat/v1/study_service_pb";
+import { ContinueStudyResponseSchema, type SaveAnswersRequest } from "../src/gen/chefshat/v1/study_service_pb";
 import { setLanguage } from "../src/i18n";
 import { remembered } from "../src/store";
-import { answersOf, dropDraft, keepDraft, keptDraft, missingItems } from "../src/studies/answers";
+import { answersOf, missingItems } from "../src/studies/answers";
 import { participationApi } from "../src/studies/client";
 import type { Trace } from "../src/studies/participating";
 import { StudyPage } from "../src/studies/StudyPage";
@@ -57,7 +57,6 @@ afterEach(async () => {
   await act(() => render(null, root));
   vi.useRealTimers();
   vi.restoreAllMocks();
-  dropDraft();
   await setLanguage("en");
   localStorage.clear();
 });
@@ -66,6 +65,10 @@ const show = () =>
   act(async () => {
     render(<StudyPage route={{ page: "study", link: LINK }} />, root);
   }).then(settled);
+const later = (ms: number) =>
+  act(async () => {
+    await vi.advanceTimersByTimeAsync(ms);
+  });
 const settled = () =>
   act(async () => {
     for (let turn = 0; turn < 5; turn += 1) await vi.advanceTimersByTimeAsync(0);
@@ -135,7 +138,7 @@ test("a participant goes through all stages, and nothing is stored on the device
     [3, { options: [0, 2] }],
   ]);
   expect(remembered()).toEqual(before);
-  expect(sessionStorage.getItem("chefshat.answers")).toBeNull();
+  expect(sessionStorage.length).toBe(0);
 });
 
 test("the study is shown in its own language, which is not stored", async () => {
@@ -255,7 +258,7 @@ test("a response that is older than what the stream has sent meanwhile is not sh
   expect(root.textContent).toContain("The game is over.");
 });
 
-test("answers are checked, sent in the order of the items, and survive a reload at the same step", () => {
+test("answers are checked, and sent in the order of the items", () => {
   const draft = {
     4: { value: 3, afterMs: 10.4 },
     3: { value: [2, 0], afterMs: 20 },
@@ -266,10 +269,61 @@ test("answers are checked, sent in the order of the items, and survive a reload 
     { item: 4, value: { case: "number", value: 3 }, answeredAfterMs: 10 },
     { item: 3, value: { case: "options", value: { options: [0, 2] } }, answeredAfterMs: 20 },
   ]);
-  keepDraft(LINK, 2, draft);
-  expect(keptDraft(LINK, 2)).toEqual(draft);
-  expect(keptDraft(LINK, 3)).toEqual({});
-  expect(keptDraft("another", 2)).toEqual({});
+});
+
+test("what is entered is kept by the server, shown on another device, and its times count on", async () => {
+  const { sent, state } = fakeStudy([QUESTIONS, QUESTIONS]);
+  const clock = vi.spyOn(performance, "now").mockReturnValue(5_000);
+  const saves = () => sent.filter(({ call }) => call === "save").map(({ request }) => request as SaveAnswersRequest);
+  const times = () =>
+    saves()
+      .at(-1)
+      ?.answers.map(({ item, answeredAfterMs }) => [item, answeredAfterMs]);
+  await show();
+  clock.mockReturnValue(6_200);
+  await act(() => input(4, 'input[value="2"]').click());
+  await act(() => root.querySelectorAll<HTMLInputElement>('[data-item="3"] input')[2]?.click());
+  expect(saves()).toEqual([]);
+  await later(500);
+  expect(saves()).toHaveLength(1);
+  expect(saves()[0]).toMatchObject({ session: "session 1", step: 0 });
+  expect(times()).toEqual([
+    [4, 1_200],
+    [3, 1_200],
+  ]);
+
+  // The page is loaded again 20 s later.
+  await act(() => render(null, root));
+  state.stepAgeMs = 20_000n;
+  clock.mockReturnValue(100);
+  await show();
+  expect(input(4, 'input[value="2"]').checked).toBe(true);
+  expect(root.querySelectorAll<HTMLInputElement>('[data-item="3"] input')[2]?.checked).toBe(true);
+  clock.mockReturnValue(400);
+  await act(() => input(1, 'input[value="5"]').click());
+  // At once, because the page is hidden before the pause is over.
+  vi.spyOn(document, "visibilityState", "get").mockReturnValue("hidden");
+  await act(async () => void document.dispatchEvent(new Event("visibilitychange")));
+  expect(times()).toEqual([
+    [4, 1_200],
+    [1, 20_300],
+    [3, 1_200],
+  ]);
+
+  // The next questionnaire begins empty, and its times at nothing.
+  await act(() => {
+    const slider = input(2, 'input[type="range"]');
+    slider.value = "35";
+    slider.dispatchEvent(new Event("input", { bubbles: true }));
+  });
+  clock.mockReturnValue(900);
+  await press("Send the answers");
+  expect(root.querySelectorAll("input:checked")).toHaveLength(0);
+  clock.mockReturnValue(1_000);
+  await act(() => input(4, 'input[value="1"]').click());
+  await later(500);
+  expect(saves().at(-1)).toMatchObject({ step: 1 });
+  expect(times()).toEqual([[4, 100]]);
 });
 
 test("traces name what was touched and how long, and wait for the server", async () => {

@@ -3,7 +3,7 @@
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { Code, ConnectError } from "@connectrpc/connect";
 import { vi } from "vitest";
-import { StudyEndReason, type StudyView, StudyViewSchema } from "../src/gen/chefshat/v1/study_pb";
+import { StudyEndReason, type StudyItemAnswer, type StudyView, StudyViewSchema } from "../src/gen/chefshat/v1/study_pb";
 import {
   AnswerQuestionnaireResponseSchema,
   ContinueStudyResponseSchema,
@@ -11,6 +11,8 @@ import {
   GiveConsentResponseSchema,
   OpenStudyResponseSchema,
   RecordTracesResponseSchema,
+  SaveAnswersRequestSchema,
+  SaveAnswersResponseSchema,
   WithdrawFromStudyResponseSchema,
 } from "../src/gen/chefshat/v1/study_service_pb";
 import { ErrorInfoSchema } from "../src/gen/google/rpc/error_details_pb";
@@ -39,7 +41,7 @@ export function viewOf(stages: readonly NonNullable<Content>[], step: number, tr
 
 /** Replaces the calls of participants; what the page sent is in `sent`. */
 export function fakeStudy(stages: readonly NonNullable<Content>[], options: { traces?: boolean } = {}) {
-  const state = { step: 0, session: 0 };
+  const state = { step: 0, session: 0, savedAnswers: [] as StudyItemAnswer[], stepAgeMs: 0n };
   const view = () => viewOf(stages, state.step, options.traces);
   const sent: { call: string; request: object }[] = [];
   const streams: { push: (next: StudyView) => void; fail: (why: ConnectError) => void }[] = [];
@@ -51,7 +53,13 @@ export function fakeStudy(stages: readonly NonNullable<Content>[], options: { tr
   vi.spyOn(participationApi, "openStudy").mockImplementation(async (request) => {
     sent.push({ call: "open", request });
     state.session += 1;
-    return create(OpenStudyResponseSchema, { session: `session ${state.session}`, view: view() });
+    const { savedAnswers, stepAgeMs } = state;
+    return create(OpenStudyResponseSchema, {
+      session: `session ${state.session}`,
+      view: view(),
+      savedAnswers,
+      stepAgeMs,
+    });
   });
   vi.spyOn(participationApi, "followParticipation").mockImplementation(async function* () {
     const waiting: (StudyView | ConnectError)[] = [];
@@ -79,6 +87,11 @@ export function fakeStudy(stages: readonly NonNullable<Content>[], options: { tr
   vi.spyOn(participationApi, "answerQuestionnaire").mockImplementation(async (request) =>
     create(AnswerQuestionnaireResponseSchema, await answer(request)),
   );
+  vi.spyOn(participationApi, "saveAnswers").mockImplementation(async (request) => {
+    sent.push({ call: "save", request });
+    state.savedAnswers = create(SaveAnswersRequestSchema, request).answers;
+    return create(SaveAnswersResponseSchema);
+  });
   const proceed = next("continue");
   vi.spyOn(participationApi, "continueStudy").mockImplementation(async (request) =>
     create(ContinueStudyResponseSchema, await proceed(request)),

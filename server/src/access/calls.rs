@@ -222,7 +222,7 @@ pub const CALLS: &[Call] = &[
         .forwarded()
         .takes(MAX_MESSAGE_BYTES, 512, 768 * KIB),
     call("/chefshat.v1.RoomService/CloseRoom", Host, Compared).forwarded(),
-    call("/chefshat.v1.RoomService/SetNextRoom", Host, Compared).forwarded(),
+    call("/chefshat.v1.RoomService/SetNextRoom", Player, Compared).forwarded(),
     call("/chefshat.v1.StudyService/CreateStudy", Host, Refused)
         .forwarded()
         .takes(MAX_STUDY_MESSAGE_BYTES, 20_000, 8 * MIB),
@@ -281,6 +281,13 @@ pub const CALLS: &[Call] = &[
     .forwarded(),
     call(
         "/chefshat.v1.ParticipationService/AnswerQuestionnaire",
+        Player,
+        Refused,
+    )
+    .forwarded()
+    .takes(MAX_STUDY_MESSAGE_BYTES, 512, 3 * MIB),
+    call(
+        "/chefshat.v1.ParticipationService/SaveAnswers",
         Player,
         Refused,
     )

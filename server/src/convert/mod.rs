@@ -49,7 +49,7 @@ pub use study::{
     ConditionPlan, PARTICIPANT_KIND, StudyPlan, complete_settings, participant_state,
     study_participant, study_plan, study_to_proto,
 };
-pub use study_view::{answers_from_proto, study_view};
+pub use study_view::{answers_from_proto, answers_to_proto, study_view};
 pub use summary::summary;
 pub use table::{Deck, report_response, report_to_proto, reported_from_proto, table_state};
 pub use tournament::{

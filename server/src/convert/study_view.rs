@@ -107,6 +107,23 @@ fn end_reason(end: End) -> v1::StudyEndReason {
     }
 }
 
+/// Converts answers to messages.
+pub fn answers_to_proto(answers: &[ItemAnswer]) -> Vec<v1::StudyItemAnswer> {
+    use study_item_answer::Value;
+    let answer = |answer: &ItemAnswer| v1::StudyItemAnswer {
+        item: number(answer.item),
+        value: Some(match &answer.value {
+            Answer::Number(number) => Value::Number(*number),
+            Answer::Options(chosen) => Value::Options(v1::StudyChosen {
+                options: chosen.iter().copied().map(number).collect(),
+            }),
+            Answer::Text(text) => Value::Text(text.clone()),
+        }),
+        answered_after_ms: answer.answered_after_ms,
+    };
+    answers.iter().map(answer).collect()
+}
+
 /// The answers of a request; `Err` is the item of one without a value.
 ///
 /// # Errors

@@ -96,6 +96,16 @@ impl RoomCalls {
         self.reach().check_joining(caller, handle.id())?;
         Ok(handle)
     }
+
+    /// Whether the room with a join code is on this server, and waits for players.
+    async fn is_open(&self, join_code: &str) -> bool {
+        match self.rooms.by_code(join_code) {
+            Some(handle) => {
+                (handle.describe().await).is_ok_and(|room| room.state() == v1::RoomState::Waiting)
+            }
+            None => false,
+        }
+    }
 }
 
 /// The rooms that a caller finds.
@@ -361,19 +371,36 @@ impl RoomService for RoomCalls {
     ) -> Result<Response<v1::SetNextRoomResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
-        let caller = caller.showing(&request.owner_token);
+        let caller = (caller.showing(&request.owner_token)).showing(&request.ticket);
         let handle = self.reach().room(&caller, &request.room_id).await?;
         let header = self.rooms.header(handle.id());
         let is_owner = |header| (self.reach()).is_owner_token(&request.owner_token, header);
-        if !header.as_deref().is_some_and(is_owner) {
+        let is_owner = header.as_deref().is_some_and(is_owner);
+        if !is_owner && request.ticket.is_empty() {
             return Err(status::owner_token_wrong());
+        }
+        let participant = Caller::default().showing(&request.ticket);
+        if !is_owner && !self.reach().takes_part(&participant, &handle).await {
+            return Err(ticket_unknown());
         }
         let join_code = normal_code(&request.join_code);
         if join_code.len() != CODE_LENGTH {
             return Err(join_code_wrong());
         }
-        handle.set_next_join_code(join_code);
-        Ok(Response::new(v1::SetNextRoomResponse {}))
+        loop {
+            let earlier = handle.next_join_code();
+            if !is_owner && earlier != join_code && self.is_open(&earlier).await {
+                return Err(status::status(
+                    Code::FailedPrecondition,
+                    "NEXT_ROOM_SET",
+                    "somebody else was faster: get the room, and join its next one",
+                    [],
+                ));
+            }
+            if handle.replace_next_join_code(&earlier, join_code.clone()) {
+                return Ok(Response::new(v1::SetNextRoomResponse {}));
+            }
+        }
     }
 }
 

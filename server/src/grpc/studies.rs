@@ -521,6 +521,7 @@ fn refused(refusal: StudyRefusal) -> Status {
         StudyRefusal::StepMismatch => (Code::FailedPrecondition, "STEP_MISMATCH"),
         StudyRefusal::GameNotOver => (Code::FailedPrecondition, "GAME_NOT_OVER"),
         StudyRefusal::TooManySessions => (Code::ResourceExhausted, "TOO_MANY_SESSIONS"),
+        StudyRefusal::TooManySaves => (Code::ResourceExhausted, "TOO_MANY_SAVES"),
         StudyRefusal::NameTaken(_) => (Code::AlreadyExists, "NAME_TAKEN"),
         StudyRefusal::TooManyParticipants => (Code::ResourceExhausted, "TOO_MANY_PARTICIPANTS"),
         StudyRefusal::Answers(problem) => {

@@ -276,10 +276,16 @@ impl Handle {
         code.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// Sets the join code of the room in which the participants play again.
-    pub fn set_next_join_code(&self, join_code: String) {
+    /// Sets the join code of the room in which the participants play again, if it is still this one.
+    /// Returns whether it was.
+    pub fn replace_next_join_code(&self, earlier: &str, join_code: String) -> bool {
         let code = self.next_join_code.lock();
-        *code.unwrap_or_else(PoisonError::into_inner) = join_code;
+        let mut code = code.unwrap_or_else(PoisonError::into_inner);
+        let is_earlier = *code == earlier;
+        if is_earlier {
+            *code = join_code;
+        }
+        is_earlier
     }
 
     /// Counts spectators who share one of its streams at another node.

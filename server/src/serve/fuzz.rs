@@ -171,6 +171,7 @@ fn calls(
                 room_id: room_id.clone(),
                 owner_token: room.owner_token.clone(),
                 join_code: "BCDF2345".into(),
+                ticket: String::new(),
             }],
         ),
         call(

@@ -23,7 +23,15 @@ pub(super) struct StudyData {
     budget: Arc<Places>,
     participants: Mutex<Vec<Held>>,
     /// By number of the participant.
-    answers: Mutex<BTreeMap<u32, Vec<Held>>>,
+    answers: Mutex<BTreeMap<u32, Answers>>,
+}
+
+/// The memory of the answers of a participant.
+#[derive(Debug, Default)]
+struct Answers {
+    given: Vec<Held>,
+    /// Of those that were saved while they are entered.
+    saved: Option<Held>,
 }
 
 impl StudyData {
@@ -35,11 +43,13 @@ impl StudyData {
         let bytes: usize = (participants.values())
             .map(|it| memory_of_participant(it.pseudonym.len()))
             .sum();
-        let answers = participants.iter().filter(|(_, it)| !it.answers.is_empty());
-        let answers = answers.map(|(number, participant)| {
-            let answers = participant.answers.values();
-            let bytes = answers.map(|answers| memory_of_answers(answers)).sum();
-            (*number, vec![take(bytes)])
+        let answers = participants.iter().map(|(number, participant)| {
+            let given = participant.answers.values();
+            let given = given.map(|answers| take(memory_of_answers(answers)));
+            let saved = &participant.saved_answers;
+            let saved = (!saved.is_empty()).then(|| take(memory_of_answers(saved)));
+            let given = given.collect();
+            (*number, Answers { given, saved })
         });
         Self {
             answers: Mutex::new(answers.collect()),
@@ -77,9 +87,17 @@ impl StudyData {
             .push(held);
     }
 
-    /// Keeps the memory of answers of a participant.
+    /// Keeps the memory of answers that a participant gave, and no longer that of those it had saved.
     pub(super) fn keep_answers(&self, number: u32, held: Held) {
-        self.lock_answers().entry(number).or_default().push(held);
+        let mut answers = self.lock_answers();
+        let answers = answers.entry(number).or_default();
+        answers.given.push(held);
+        answers.saved = None;
+    }
+
+    /// Keeps the memory of answers that a participant saved, in place of those it had saved before.
+    pub(super) fn keep_saved_answers(&self, number: u32, held: Held) {
+        self.lock_answers().entry(number).or_default().saved = Some(held);
     }
 
     /// Gives the memory of a participant's answers back.
@@ -101,7 +119,7 @@ impl StudyData {
         }
     }
 
-    fn lock_answers(&self) -> MutexGuard<'_, BTreeMap<u32, Vec<Held>>> {
+    fn lock_answers(&self) -> MutexGuard<'_, BTreeMap<u32, Answers>> {
         (self.answers.lock()).expect("no code that holds this lock can panic")
     }
 }

@@ -289,6 +289,45 @@ impl StudyHandle {
         Ok(answered.await?.map_err(NotAdded::from))
     }
 
+    /// Saves what a participant has entered so far, and charges a caller for its memory.
+    ///
+    /// # Errors
+    /// As [`StudyHandle::add`].
+    pub async fn save(
+        &self,
+        key: Key,
+        at: At,
+        answers: Vec<ItemAnswer>,
+    ) -> Result<Result<u32, NotAdded>, Stopped> {
+        let memory = match self.data.for_answers(key, &answers) {
+            Ok(memory) => memory,
+            Err(refused) => return Ok(Err(refused.into())),
+        };
+        let data = Arc::clone(&self.data);
+        let saved = self.command(move |study, _| {
+            let change = study.save(at, answers)?;
+            // Here, because the caller may go before it gets its answer.
+            data.keep_saved_answers(at.number, memory);
+            Ok((vec![change], 0))
+        });
+        Ok(saved.await?.map_err(NotAdded::from))
+    }
+
+    /// What a participant has entered at its step so far, and how long ago it reached the step, in
+    /// milliseconds.
+    pub fn progress(&self, number: u32, now_ms: u64) -> (Vec<v1::StudyItemAnswer>, u64) {
+        let study = self.committed();
+        let Some(participant) = study.participant(number) else {
+            return (Vec::new(), 0);
+        };
+        let reached_ms = participant.reached_at_ms.last().copied();
+        let age_ms = now_ms.saturating_sub(reached_ms.unwrap_or(now_ms));
+        (
+            convert::answers_to_proto(&participant.saved_answers),
+            age_ms,
+        )
+    }
+
     /// Continues with the next step of a participant.
     ///
     /// # Errors

@@ -420,6 +420,22 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
     );
     assert_eq!(studies.data.taken(), before);
 
+    // What is saved replaces what was saved before, and goes when it is answered.
+    let save = async |count: usize| {
+        let at = At {
+            number: 1,
+            session: 1,
+            step: 0,
+        };
+        let saved = study.save(address(1), at, answers[..count].to_vec()).await;
+        assert_eq!(saved.expect("it runs"), Ok(0));
+        studies.data.taken() - before
+    };
+    let few = save(1).await;
+    assert!((10_000..11_000).contains(&few), "{few}");
+    assert!(save(50).await > 500_000);
+    assert_eq!(save(1).await, few);
+
     // A caller stores its share; others store theirs.
     let share = MAX_STUDY_DATA / 10;
     while answer(address(1), &study).await.is_ok() {}

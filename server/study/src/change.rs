@@ -42,6 +42,13 @@ pub enum Change {
         /// When, in milliseconds since the Unix epoch.
         at_ms: u64,
     },
+    /// What a participant has entered in a questionnaire so far was saved.
+    Saved {
+        /// The participant.
+        number: u32,
+        /// All of it. Replaces what was saved before.
+        answers: Arc<[ItemAnswer]>,
+    },
     /// A game of a participant was assigned a room, before the room is created.
     Placed {
         /// The participant.
@@ -102,6 +109,7 @@ impl Change {
             | Self::Opened { number, .. }
             | Self::Consented { number, .. }
             | Self::Answered { number, .. }
+            | Self::Saved { number, .. }
             | Self::Placed { number, .. }
             | Self::GameEnded { number, .. }
             | Self::Continued { number, .. }
@@ -122,7 +130,12 @@ impl Change {
             }
             Self::Answered {
                 number, answers, ..
-            } if *number == forgotten => !std::mem::take(answers).is_empty(),
+            }
+            | Self::Saved { number, answers }
+                if *number == forgotten =>
+            {
+                !std::mem::take(answers).is_empty()
+            }
             _ => false,
         }
     }

@@ -16,6 +16,8 @@ use crate::state::{Participant, Status};
 
 /// Maximum number of sessions that a participant may open, which bounds the journal.
 pub const MAX_SESSIONS: u32 = 1000;
+/// Maximum number of times that a participant may save answers, which bounds the journal.
+pub const MAX_SAVES: u32 = 1000;
 
 /// Why a command is refused.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
@@ -47,6 +49,9 @@ pub enum Refusal {
     /// The participant has opened too many sessions.
     #[error("the study was opened more than {MAX_SESSIONS} times")]
     TooManySessions,
+    /// The participant has saved answers too often.
+    #[error("answers were saved more than {MAX_SAVES} times")]
+    TooManySaves,
     /// The answers are invalid.
     #[error(transparent)]
     Answers(#[from] AnswerProblem),
@@ -166,16 +171,41 @@ impl Study {
     /// If the participant is not at this step in this session, it is not a questionnaire, or the
     /// answers are invalid.
     pub fn answer(&self, at: At, answers: Vec<ItemAnswer>, now_ms: u64) -> Result<Change, Refusal> {
-        let (_, step) = self.at(at)?;
-        let Task::Questionnaire(questionnaire) = step.task else {
-            return Err(Refusal::StepMismatch);
-        };
-        questionnaire.check_answers(&answers)?;
+        self.check_answers(at, &answers, false)?;
         Ok(Change::Answered {
             number: at.number,
             answers: answers.into(),
             at_ms: now_ms,
         })
+    }
+
+    /// The change by which what a participant has entered so far is saved.
+    ///
+    /// # Errors
+    /// As [`Study::answer`], but answers may be missing; or it has saved too often.
+    pub fn save(&self, at: At, answers: Vec<ItemAnswer>) -> Result<Change, Refusal> {
+        let participant = self.check_answers(at, &answers, true)?;
+        if participant.saves >= MAX_SAVES {
+            return Err(Refusal::TooManySaves);
+        }
+        Ok(Change::Saved {
+            number: at.number,
+            answers: answers.into(),
+        })
+    }
+
+    fn check_answers(
+        &self,
+        at: At,
+        answers: &[ItemAnswer],
+        only_saved: bool,
+    ) -> Result<&Participant, Refusal> {
+        let (participant, step) = self.at(at)?;
+        let Task::Questionnaire(questionnaire) = step.task else {
+            return Err(Refusal::StepMismatch);
+        };
+        questionnaire.check_answers(answers, only_saved)?;
+        Ok(participant)
     }
 
     /// The change by which a participant continues from a text, an external questionnaire or a game

@@ -52,7 +52,7 @@ use std::sync::Arc;
 pub use assignment::Order;
 pub use change::{Change, ConsentGiven, Outcome, PlacedGame};
 pub use checks::SettingsProblem;
-pub use commands::{At, MAX_SESSIONS, Refusal};
+pub use commands::{At, MAX_SAVES, MAX_SESSIONS, Refusal};
 pub use games::{DueGame, MAX_ATTEMPTS};
 pub use link::{ParticipantLink, SessionSecret};
 pub use questionnaire::{

@@ -1,6 +1,6 @@
 //! Questionnaires: items, the order in which a participant meets them, and which answers are valid.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 
 use thiserror::Error;
@@ -171,23 +171,29 @@ impl Questionnaire {
         order
     }
 
-    /// Checks answers: at most one for each item, one for each required item, each valid.
-    pub(crate) fn check_answers(&self, answers: &[ItemAnswer]) -> Result<(), AnswerProblem> {
+    /// Checks answers: at most one for each item, each valid, and, unless they are only saved, one for
+    /// each required item.
+    pub(crate) fn check_answers(
+        &self,
+        answers: &[ItemAnswer],
+        only_saved: bool,
+    ) -> Result<(), AnswerProblem> {
         let problem = |item, problem: String| Err(AnswerProblem { item, problem });
-        let mut by_item = BTreeMap::new();
+        let is_required = |item: &Item| item.required && !only_saved;
+        let mut answered = BTreeSet::new();
         for answer in answers {
-            if by_item.insert(answer.item, &answer.value).is_some() {
+            if !answered.insert(answer.item) {
                 return problem(answer.item, "it has two answers".to_owned());
             }
             let Some(item) = self.items.get(answer.item) else {
                 return problem(answer.item, "the questionnaire has no such item".to_owned());
             };
-            if let Some(wrong) = item.kind.problem_of(&answer.value, item.required) {
+            if let Some(wrong) = item.kind.problem_of(&answer.value, is_required(item)) {
                 return problem(answer.item, wrong);
             }
         }
         for (index, item) in self.items.iter().enumerate() {
-            if item.required && !by_item.contains_key(&index) {
+            if is_required(item) && !answered.contains(&index) {
                 return problem(index, "it must be answered".to_owned());
             }
         }

@@ -45,6 +45,10 @@ pub struct Participant {
     pub consent: Option<ConsentGiven>,
     /// Its answers, by step. They may be long, so copies share them.
     pub answers: BTreeMap<usize, Arc<[ItemAnswer]>>,
+    /// What it has entered in the questionnaire of its step so far.
+    pub saved_answers: Arc<[ItemAnswer]>,
+    /// Number of times that it saved answers.
+    pub saves: u32,
     /// Its games, in order.
     pub games: Vec<PlayedGame>,
     /// Whether it had its data deleted.
@@ -91,6 +95,7 @@ impl Participant {
 
     fn advance(&mut self, steps: usize, at_ms: u64) {
         self.reached_at_ms.push(at_ms);
+        self.saved_answers = Arc::default();
         if self.step() >= steps {
             self.end(Status::Completed, at_ms);
         }
@@ -139,6 +144,8 @@ impl StudyState {
                     ended_at_ms: None,
                     consent: None,
                     answers: BTreeMap::new(),
+                    saved_answers: Arc::default(),
+                    saves: 0,
                     games: Vec::new(),
                     data_deleted: false,
                 };
@@ -169,6 +176,12 @@ impl StudyState {
                     let step = participant.step();
                     participant.answers.insert(step, Arc::clone(answers));
                     participant.advance(steps, *at_ms);
+                }
+            }
+            Change::Saved { number, answers } => {
+                if let Some(participant) = self.active(*number) {
+                    participant.saved_answers = Arc::clone(answers);
+                    participant.saves += 1;
                 }
             }
             Change::Placed { number, game } => {
@@ -252,6 +265,7 @@ impl StudyState {
             participant.data_deleted = true;
             participant.pseudonym.clear();
             participant.answers.clear();
+            participant.saved_answers = Arc::default();
         }
     }
 }

@@ -412,6 +412,12 @@ async fn only_the_participants_of_a_room_learn_where_they_play_again() {
         room_id: room_id.clone(),
         owner_token: owner_token.into(),
         join_code: join_code.into(),
+        ticket: String::new(),
+    };
+    let offer = |ticket: &str, join_code: &str| v1::SetNextRoomRequest {
+        owner_token: String::new(),
+        ticket: ticket.into(),
+        ..set("", join_code)
     };
     for (token, code, expected) in [
         (
@@ -440,4 +446,28 @@ async fn only_the_participants_of_a_room_learn_where_they_play_again() {
     let listed = client.list_rooms(v1::ListRoomsRequest::default()).await;
     let listed = listed.expect("a page").rooms;
     assert!(listed.iter().all(|room| room.next_join_code.is_empty()));
+
+    // A participant's offer counts if there is none that can be joined; the owner's always.
+    let refused = rooms.set_next_room(offer(&next.owner_token, "BCDF2345"));
+    assert_eq!(
+        reason(&refused.await.expect_err("no ticket")),
+        "TICKET_UNKNOWN"
+    );
+    let other = create().await;
+    let refused = rooms.set_next_room(offer(&ticket, &other.join_code)).await;
+    assert_eq!(reason(&refused.expect_err("there is one")), "NEXT_ROOM_SET");
+    let again = rooms.set_next_room(offer(&ticket, &next.join_code)).await;
+    again.expect("the same");
+    let closed = rooms.close_room(v1::CloseRoomRequest {
+        room_id: next.room.expect("a room").room_id,
+        owner_token: next.owner_token,
+    });
+    closed.await.expect("its owner");
+    let offered = rooms.set_next_room(offer(&ticket, &other.join_code)).await;
+    offered.expect("the first one is closed");
+    assert_eq!(shown(&ticket).await, other.join_code);
+    let third = create().await;
+    let told = rooms.set_next_room(set(&made.owner_token, &third.join_code));
+    told.await.expect("its owner");
+    assert_eq!(shown(&ticket).await, third.join_code);
 }

@@ -260,7 +260,8 @@ impl Person {
                 (given.into_inner().view.expect("a view"), None)
             }
             Content::Questionnaire(shown) => {
-                let answers = shown.items.iter().map(answer).collect();
+                let answers: Vec<_> = shown.items.iter().map(answer).collect();
+                let session = self.save_and_come_back(session, step, &answers[..1]).await;
                 let request = v1::AnswerQuestionnaireRequest {
                     session,
                     step,
@@ -288,6 +289,33 @@ impl Person {
             Content::Text(_) => (self.proceed(step).await, None),
             other => panic!("unexpected: {other:?}"),
         }
+    }
+
+    /// Saves answers, and opens the link again, where they are shown. Returns the new session.
+    async fn save_and_come_back(
+        &mut self,
+        session: String,
+        step: u32,
+        answers: &[v1::StudyItemAnswer],
+    ) -> String {
+        let request = v1::SaveAnswersRequest {
+            session,
+            step,
+            answers: answers.to_vec(),
+        };
+        let saved = self.service.save_answers(request.clone()).await;
+        saved.expect("the answer is valid");
+        let link = self.link.clone();
+        let opened = (self.service)
+            .open_study(v1::OpenStudyRequest { link })
+            .await;
+        let opened = opened.expect("the link is valid").into_inner();
+        assert_eq!(opened.saved_answers, answers);
+        let again = self.service.save_answers(request).await;
+        let superseded = again.expect_err("another session is open");
+        assert_eq!(reason(&superseded), "SESSION_SUPERSEDED");
+        self.session.clone_from(&opened.session);
+        opened.session
     }
 
     async fn proceed(&mut self, step: u32) -> v1::StudyView {

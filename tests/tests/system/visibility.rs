@@ -414,6 +414,7 @@ async fn asked_counting(
             room_id: room_id.clone(),
             owner_token: wrong(room_id),
             join_code: "BCDF2345".into(),
+            ticket: String::new(),
         })
     );
     let mut servers = ServerServiceClient::new(client.channel());
@@ -966,7 +967,7 @@ const ASKED_ELSEWHERE: [(&str, &str); 4] = [
 ];
 
 /// The calls about a study, whose ids and secrets nobody else may know.
-const OF_STUDIES: [&str; 17] = [
+const OF_STUDIES: [&str; 18] = [
     "AddStudyParticipants",
     "AnswerQuestionnaire",
     "CloseStudy",
@@ -983,6 +984,7 @@ const OF_STUDIES: [&str; 17] = [
     "OpenStudy",
     "RecordTraces",
     "RemoveStudyParticipant",
+    "SaveAnswers",
     "WithdrawFromStudy",
 ];
 
@@ -1183,6 +1185,10 @@ async fn asked_of_study(
     ask!(
         "RecordTraces",
         participant.record_traces(RecordTracesRequest { session: session })
+    );
+    ask!(
+        "SaveAnswers",
+        participant.save_answers(SaveAnswersRequest { session: session })
     );
     let request = v1::ListStudiesRequest {
         owner_tokens: vec![Token::random(Id::parse(study_id).expect("an id")).to_text()],

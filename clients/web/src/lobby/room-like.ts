@@ -2,14 +2,15 @@
 
 import { create, type MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
+import { faultOf } from "../api/faults";
 import { SECRET_HEADER } from "../api/secrets";
 import { GameOrigin, type Participant, ParticipantKind, type Room, RoomPolicySchema } from "../gen/chefshat/v1/room_pb";
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
 import { NO_KEY, nameKey } from "../name-key";
 import { navigate } from "../router";
-import { createRoom, hostedRoom, takeSeat } from "./seat";
+import { closeRoom, createRoom, type HeldSeat, hostedRoom, takeSeat } from "./seat";
 
-/** The request for a room with the rules, the policy and the agents of another that this device created. */
+/** The request for a room with the rules, the policy and the agents of another. */
 export function requestLike(room: Room): MessageInitShape<typeof CreateRoomRequestSchema> {
   const wizards = hostedRoom(room.roomId)?.wizards ?? [];
   return {
@@ -34,35 +35,44 @@ function seatLike(seat: Participant, wizard: boolean) {
   return { filledBy: { case: "reservedFor" as const, value: reservedFor } };
 }
 
-/** Creates a room like one of this device's, takes the same seat, tells the others and navigates to it. */
-export async function playAgain(roomId: string, name: string, seat: number): Promise<void> {
-  const { room } = await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS });
-  if (!room) throw new Error("the server did not say which room it is");
-  const { joinCode } = await createRoom(requestLike(room));
-  const again = await sitAgain(room, joinCode, name, seat);
-  const ownerToken = hostedRoom(roomId)?.ownerToken ?? "";
-  // Without it the others need the invitation, which the new room shows.
-  await roomApi.setNextRoom({ roomId, ownerToken, joinCode }, { timeoutMs: CALL_LIMIT_MS }).catch(() => undefined);
-  navigate({ page: "room", roomId: again });
+/**
+ * Creates a room like one in which this device has a seat, offers it to the others, takes the same seat
+ * and navigates to it. If somebody else was faster, it takes the seat in that room.
+ */
+export async function playAgain(roomId: string, { ticket, name, seat }: HeldSeat): Promise<void> {
+  const room = await roomOfTicket(roomId, ticket);
+  const made = await createRoom(requestLike(room));
+  try {
+    await roomApi.setNextRoom({ roomId, ticket, joinCode: made.joinCode }, { timeoutMs: CALL_LIMIT_MS });
+  } catch (thrown) {
+    if (faultOf(thrown).reason === "NEXT_ROOM_SET") {
+      await closeRoom(made.room.roomId);
+      return joinAgain(await roomOfTicket(roomId, ticket), { name, seat });
+    }
+    // Without the offer the others need the invitation, which the new room shows.
+  }
+  await sitAgain(room, made.joinCode, { name, seat });
 }
 
 /** A room as its participants see it, with the join code of the room in which they play again. */
-export async function roomOfTicket(roomId: string, ticket: string, signal: AbortSignal): Promise<Room | undefined> {
+export async function roomOfTicket(roomId: string, ticket: string, signal?: AbortSignal): Promise<Room> {
   const headers = { [SECRET_HEADER]: ticket };
-  const { room } = await roomApi.getRoom({ roomId }, { signal, headers, timeoutMs: CALL_LIMIT_MS });
+  const call = { headers, timeoutMs: CALL_LIMIT_MS, ...(signal && { signal }) };
+  const { room } = await roomApi.getRoom({ roomId }, call);
+  if (!room) throw new Error("the server did not say which room it is");
   return room;
 }
 
 /** Takes the same seat in the room in which the participants of a room play again, and navigates to it. */
-export async function joinAgain(room: Room, name: string, seat: number): Promise<void> {
-  navigate({ page: "room", roomId: await sitAgain(room, room.nextJoinCode, name, seat) });
+export async function joinAgain(room: Room, { name, seat }: Pick<HeldSeat, "name" | "seat">): Promise<void> {
+  await sitAgain(room, room.nextJoinCode, { name, seat });
 }
 
-/** Takes a seat as in a room before. Returns the id of its room. */
-async function sitAgain(before: Room, code: string, name: string, seat: number): Promise<string> {
+/** Takes a seat as in a room before, and navigates to its room. */
+async function sitAgain(before: Room, code: string, { name, seat }: Pick<HeldSeat, "name" | "seat">): Promise<void> {
   const kind = before.seats[seat]?.kind || ParticipantKind.HUMAN;
   // A robot's name is not the person's own.
   const key = kind === ParticipantKind.HUMAN ? nameKey() : NO_KEY;
   const { roomId } = await takeSeat(code, name, seat, kind, key);
-  return roomId;
+  navigate({ page: "room", roomId });
 }

@@ -9,34 +9,35 @@ import { announce } from "../parts/Announcer";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import { answersOf, type Draft, dropDraft, keepDraft, keptDraft, missingItems, type Value } from "./answers";
-import type { ItemAnswer } from "./participating";
+import { answersOf, type Draft, draftOf, missingItems, type Value } from "./answers";
+import type { ItemAnswer, Participating } from "./participating";
 import css from "./Questionnaire.module.css";
 import { Paragraphs, StageTitle } from "./Stage";
 
 interface QuestionnaireProps {
-  /** The secret of the link, and the step: whose answers these are. */
-  link: string;
-  step: number;
   questionnaire: StudyShownQuestionnaire;
-  onAnswer: (answers: ItemAnswer[]) => Promise<void>;
+  part: Pick<Participating, "progress" | "answer" | "save">;
 }
 
+/** Pause after the last change before it is saved, milliseconds: a text changes with every key. */
+const SAVE_AFTER_MS = 500;
+
 /** The form. */
-export function Questionnaire({ link, step, questionnaire, onAnswer }: QuestionnaireProps) {
+export function Questionnaire({ questionnaire, part }: QuestionnaireProps) {
   const { title, instructions, items } = questionnaire;
   const words = t().studies.questionnaire;
-  const [draft, setDraft] = useState<Draft>(() => keptDraft(link, step));
+  const [{ reachedAtMs, saved }] = useState(part.progress);
+  const [draft, setDraft] = useState<Draft>(() => draftOf(saved));
   const [tried, setTried] = useState(false);
   const { busy, fault, run } = useAttempt();
-  const sinceMs = useRef(performance.now());
+  const save = useSaving(part.save);
   const form = useRef<HTMLFormElement>(null);
   const missing = tried ? missingItems(items, draft) : [];
 
   const enter = (item: number, value: Value) => {
-    const next = { ...draft, [item]: { value, afterMs: performance.now() - sinceMs.current } };
+    const next = { ...draft, [item]: { value, afterMs: performance.now() - reachedAtMs } };
     setDraft(next);
-    keepDraft(link, step, next);
+    save(answersOf(items, next));
   };
   const submit = (event: Event) => {
     event.preventDefault();
@@ -48,8 +49,7 @@ export function Questionnaire({ link, step, questionnaire, onAnswer }: Questionn
       return;
     }
     run(async () => {
-      await onAnswer(answersOf(items, draft));
-      dropDraft();
+      await part.answer(answersOf(items, draft));
       return false;
     });
   };
@@ -75,6 +75,38 @@ export function Questionnaire({ link, step, questionnaire, onAnswer }: Questionn
       </div>
     </form>
   );
+}
+
+/**
+ * Saves the answers a moment after they last changed, and at once when the page is hidden; one call at
+ * a time. What cannot be saved stays on the page, and is saved with the next change.
+ */
+function useSaving(send: (answers: ItemAnswer[]) => Promise<void>): (answers: ItemAnswer[]) => void {
+  const unsaved = useRef<ItemAnswer[] | undefined>(undefined);
+  const timer = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
+  const busy = useRef(false);
+  const flush = async () => {
+    clearTimeout(timer.current);
+    for (let next = unsaved.current; next && !busy.current; next = unsaved.current) {
+      unsaved.current = undefined;
+      busy.current = true;
+      await send(next).catch(() => undefined);
+      busy.current = false;
+    }
+  };
+  useEffect(() => {
+    const hide = () => document.visibilityState === "hidden" && void flush();
+    document.addEventListener("visibilitychange", hide);
+    return () => {
+      clearTimeout(timer.current);
+      document.removeEventListener("visibilitychange", hide);
+    };
+  }, []);
+  return (answers) => {
+    unsaved.current = answers;
+    clearTimeout(timer.current);
+    timer.current = setTimeout(() => void flush(), SAVE_AFTER_MS);
+  };
 }
 
 interface ItemProps {

@@ -21,7 +21,6 @@ import { ConfirmButton } from "../parts/ConfirmButton";
 import { CheckField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import type { PageProps } from "../router";
-import { dropDraft } from "./answers";
 import { type Participating, startParticipating } from "./participating";
 import { Questionnaire } from "./Questionnaire";
 import { Paragraphs, StageTitle } from "./Stage";
@@ -38,11 +37,11 @@ export function StudyPage({ route }: PageProps<"study">) {
   }, [route.link]);
   // Other pages of the server are not part of the study.
   useLayoutEffect(() => leaveOut(["pages"]), []);
-  return part ? <Taking link={route.link} part={part} /> : null;
+  return part ? <Taking part={part} /> : null;
 }
 
 /** The study as it stands. */
-export function Taking({ link, part }: { link: string; part: Participating }) {
+export function Taking({ part }: { part: Participating }) {
   const words = t().studies;
   const view = part.view.value;
   const presence = part.presence.value;
@@ -82,7 +81,7 @@ export function Taking({ link, part }: { link: string; part: Participating }) {
     <div class={css.study} data-part="study">
       {part.link.value === "lost" && <Notice kind="fault">{words.lost}</Notice>}
       <Progress view={view} />
-      <Stage key={stageKey(view)} {...{ view, link, part }} />
+      <Stage key={stageKey(view)} {...{ view, part }} />
       <Withdraw view={view} part={part} />
     </div>
   );
@@ -117,11 +116,10 @@ function Progress({ view: { title, step, steps, content } }: { view: StudyView }
 
 interface StageProps {
   view: StudyView;
-  link: string;
   part: Participating;
 }
 
-function Stage({ view, link, part }: StageProps) {
+function Stage({ view, part }: StageProps) {
   const { content, step, title, traces, pseudonym } = view;
   switch (content.case) {
     case "consent":
@@ -129,7 +127,7 @@ function Stage({ view, link, part }: StageProps) {
     case "questionnaire":
       return (
         <section class={`sheet ${css.stage}`}>
-          <Questionnaire link={link} step={step} questionnaire={content.value} onAnswer={part.answer} />
+          <Questionnaire key={step} questionnaire={content.value} part={part} />
         </section>
       );
     case "externalQuestionnaire":
@@ -267,7 +265,6 @@ function Withdraw({ view, part }: { view: StudyView; part: Participating }) {
   if (end === StudyEndReason.DATA_DELETED) return null;
   const withdraw = async (deleteData: boolean) => {
     await part.withdraw(deleteData);
-    dropDraft();
     return false;
   };
   return (

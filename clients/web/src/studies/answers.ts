@@ -1,13 +1,13 @@
 // The answers of a participant to a questionnaire while they are entered: what is missing, and what
-// is sent. They survive a reload of this tab; after they were sent, nothing stays.
+// is sent. The server keeps them until they are given: a reload or another device shows them again.
 
-import type { StudyShownItem } from "../gen/chefshat/v1/study_pb";
+import type { StudyItemAnswer, StudyShownItem } from "../gen/chefshat/v1/study_pb";
 import type { ItemAnswer } from "./participating";
 
 /** An entered value: a point or the value of a slider, chosen options, or a text. */
 export type Value = number | readonly number[] | string;
 
-/** What was entered for an item, and when it last changed, milliseconds from the first rendering. */
+/** What was entered for an item, and when it last changed, milliseconds from reaching the step. */
 export interface Entered {
   readonly value: Value;
   readonly afterMs: number;
@@ -43,40 +43,12 @@ function sentOf(value: Value): NonNullable<ItemAnswer["value"]> {
   return { case: "options", value: { options: [...value].sort((one, other) => one - other) } };
 }
 
-const STORED = "chefshat.answers";
-
-/** Stores what was entered at a step of a participant, for a reload. */
-export function keepDraft(link: string, step: number, draft: Draft): void {
-  try {
-    sessionStorage.setItem(STORED, JSON.stringify({ link, step, draft }));
-  } catch {
-    // Storage is blocked or full: a reload starts with empty items.
-  }
-}
-
-/** What was entered at this step before a reload; empty if it was another step or participant. */
-export function keptDraft(link: string, step: number): Draft {
-  try {
-    const stored: unknown = JSON.parse(sessionStorage.getItem(STORED) ?? "null");
-    const { link: whose, step: at, draft }: Partial<Record<string, unknown>> = { ...(stored as object) };
-    if (whose !== link || at !== step || typeof draft !== "object" || draft === null) return {};
-    return Object.fromEntries(Object.entries(draft).filter(([, entered]) => isEntered(entered)));
-  } catch {
-    return {};
-  }
-}
-
-function isEntered(entered: unknown): entered is Entered {
-  const { value, afterMs }: Partial<Record<string, unknown>> = { ...(entered as object) };
-  const isValue = typeof value === "number" || typeof value === "string" || Array.isArray(value);
-  return isValue && typeof afterMs === "number";
-}
-
-/** Forgets what was entered. */
-export function dropDraft(): void {
-  try {
-    sessionStorage.removeItem(STORED);
-  } catch {
-    // There is nothing then.
-  }
+/** What was entered, from the answers that the server has kept. */
+export function draftOf(saved: readonly StudyItemAnswer[]): Draft {
+  const entered = saved.flatMap(({ item, value, answeredAfterMs }): [number, Entered][] => {
+    if (value.case === undefined) return [];
+    const what = value.case === "options" ? value.value.options : value.value;
+    return [[item, { value: what, afterMs: answeredAfterMs ?? 0 }]];
+  });
+  return Object.fromEntries(entered);
 }

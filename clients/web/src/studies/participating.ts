@@ -7,7 +7,7 @@ import { effect, type Signal, signal } from "@preact/signals";
 import { CALL_LIMIT_MS } from "../api/client";
 import { type Fault, faultOf, isPassing } from "../api/faults";
 import { type Following, follow, type Link } from "../api/follow";
-import type { StudyItemAnswerSchema, StudyTraceSchema, StudyView } from "../gen/chefshat/v1/study_pb";
+import type { StudyItemAnswer, StudyItemAnswerSchema, StudyTraceSchema, StudyView } from "../gen/chefshat/v1/study_pb";
 import { participationApi } from "./client";
 
 /**
@@ -21,6 +21,15 @@ export type ItemAnswer = MessageInitShape<typeof StudyItemAnswerSchema>;
 /** An interface trace. */
 export type Trace = MessageInitShape<typeof StudyTraceSchema>;
 
+/** How far a participant was at a step when the study was opened here. */
+export interface Progress {
+  readonly step: number;
+  /** When the step was reached, by performance.now(). */
+  readonly reachedAtMs: number;
+  /** What was entered there. */
+  readonly saved: readonly StudyItemAnswer[];
+}
+
 export interface Participating {
   readonly presence: Signal<Presence>;
   /** What is shown; undefined until the study is open. */
@@ -29,9 +38,13 @@ export interface Participating {
   readonly fault: Signal<Fault | undefined>;
   /** The state of the stream. */
   readonly link: Signal<Link>;
+  /** Of the step that is shown. */
+  progress(): Progress;
   /** Agrees to the text that is shown. */
   consent(): Promise<void>;
   answer(answers: ItemAnswer[]): Promise<void>;
+  /** Lets the server keep what was entered so far. */
+  save(answers: ItemAnswer[]): Promise<void>;
   /** Continues from a text, another site or a game. */
   proceed(): Promise<void>;
   sendTraces(gameId: string, traces: Trace[]): Promise<void>;
@@ -53,6 +66,7 @@ export function startParticipating(secret: string): Participating {
   const fault = signal<Fault | undefined>(undefined);
   const link = signal<Link>("connecting");
   let session = "";
+  let progress: Progress = { step: -1, reachedAtMs: 0, saved: [] };
   let following: Following | undefined;
   let unwatch = () => {};
   let stopped = false;
@@ -90,6 +104,11 @@ export function startParticipating(secret: string): Participating {
         const answer = await participationApi.openStudy({ link: secret }, { timeoutMs: CALL_LIMIT_MS });
         if (stopped || attempt !== opened) return;
         session = answer.session;
+        progress = {
+          step: answer.view?.step ?? -1,
+          reachedAtMs: performance.now() - Number(answer.stepAgeMs),
+          saved: answer.savedAnswers,
+        };
         view.value = answer.view;
         presence.value = "open";
         link.value = "open";
@@ -150,8 +169,17 @@ export function startParticipating(secret: string): Participating {
     view,
     fault,
     link,
+    progress: () => {
+      const step = view.peek()?.step ?? -1;
+      if (progress.step !== step) progress = { step, reachedAtMs: performance.now(), saved: [] };
+      return progress;
+    },
     consent: () => act((at) => participationApi.giveConsent(at, call)),
     answer: (answers) => act((at) => participationApi.answerQuestionnaire({ ...at, answers }, call)),
+    save: async (answers) => {
+      const step = view.peek()?.step ?? -1;
+      await participationApi.saveAnswers({ session, step, answers }, call);
+    },
     proceed: () => act((at) => participationApi.continueStudy(at, call)),
     sendTraces: async (gameId, traces) => {
       await participationApi.recordTraces({ session, gameId, traces }, call);

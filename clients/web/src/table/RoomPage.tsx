@@ -6,11 +6,11 @@ import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { faultOf, wordsOf } from "../api/faults";
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
-import { Again, JoinAgain } from "../lobby/Again";
+import { Again } from "../lobby/Again";
 import { Doorway } from "../lobby/Doorway";
 import { HostInvite } from "../lobby/HostInvite";
 import { LeaveButton, LeaveDialog } from "../lobby/Leaving";
-import { giveUpSeat, heldSeat, hostedRoom } from "../lobby/seat";
+import { giveUpSeat, heldSeat } from "../lobby/seat";
 import { Button } from "../parts/Button";
 import { ErrorPage } from "../parts/ErrorPage";
 import { Notice } from "../parts/Notice";
@@ -87,7 +87,6 @@ function Held({ session }: { session: Session }) {
   const banner = (
     <>
       <Banner session={session} />
-      {isOver(table) && <JoinAgain roomId={roomId} />}
     </>
   );
   const waiting = table.phase === "waiting";
@@ -110,7 +109,7 @@ function Held({ session }: { session: Session }) {
         acting={session}
         banner={banner}
         tools={!isOver(table) && leave}
-        onward={hostedRoom(roomId) && <Again roomId={roomId} others={others} />}
+        onward={<Again roomId={roomId} others={others} />}
         below={
           <>
             <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />

@@ -40,14 +40,12 @@ export function Organiser({ live }: { live: LiveTournament }) {
       {open && <Begin tournament={tournament} />}
       {open && tournament.settings?.physicalTables ? <AddAtTable tournamentId={tournamentId} /> : null}
       {open && (
-        <>
-          <Invite
-            title={words.invite}
-            code={hosted.joinCode}
-            address={address}
-            agent={isForAgents(tournament) ? { label: words.agent, command } : undefined}
-          />
-        </>
+        <Invite
+          title={words.invite}
+          code={hosted.joinCode}
+          address={address}
+          agent={isForAgents(tournament) ? { label: words.agent, command } : undefined}
+        />
       )}
       {state === TournamentState.PLAYING && <Pause tournament={tournament} />}
       <PhysicalGames tournament={tournament} games={games} />

@@ -7,7 +7,7 @@ import { expect } from "vitest";
 import { StudyLabels, type StudySettingsSchema } from "../../src/gen/chefshat/v1/study_pb";
 import { byClicks } from "./play";
 import { clientsOf } from "./rooms";
-import { type Server, until } from "./stage";
+import type { Server } from "./stage";
 import type { Tap } from "./tap";
 
 /** What no participant may meet: names of the study, its conditions, factors, seats and programs. */
@@ -98,7 +98,6 @@ export async function consent(page: Page): Promise<void> {
 /** Takes decisions up to a number, and continues once the game is over. Returns how many it took. */
 export async function playGame(page: Page, most = Number.POSITIVE_INFINITY): Promise<number> {
   const onward = page.locator('[data-part~="study-game"]').getByRole("button", { name: "Continue" });
-  const decision = page.locator("[data-decision]");
   let before = "";
   for (let taken = 0; taken < most; taken += 1) {
     const found = await page.waitForFunction((before) => {
@@ -116,6 +115,8 @@ export async function playGame(page: Page, most = Number.POSITIVE_INFINITY): Pro
     await byClicks(page);
   }
   // The last answer has reached the server.
-  await until(async () => (await decision.count()) === 0 || (await decision.getAttribute("data-decision")) !== before);
+  await page.waitForFunction((before) => {
+    return document.querySelector<HTMLElement>("[data-decision]")?.dataset.decision !== before;
+  }, before);
   return most;
 }

@@ -43,8 +43,13 @@ test("a participant goes through all stages, on two devices, without meeting a c
   await second.page.getByText("3 questions have no answer yet.").first().waitFor();
   expect(await inaccessible(second.page)).toEqual([]);
   expect(await tooWide(second.page)).toEqual([]);
+  const kept = second.page.waitForResponse((response) => response.url().endsWith("/SaveAnswers"));
   await second.page.getByRole("radio", { name: "4 of 5" }).check();
-  // What was entered survives a reload.
+  await (await kept).finished();
+  // What was entered survives a reload, and goes along to another device.
+  const third = await person(browser);
+  await third.page.goto(links[0] ?? "");
+  await until(() => third.page.getByRole("radio", { name: "4 of 5" }).isChecked());
   await second.page.reload();
   await until(() => second.page.getByRole("radio", { name: "4 of 5" }).isChecked());
   await second.page.getByRole("radio", { name: "6 of 7" }).check();

@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use chefshat_proto::v1::{self, participation_service_server::ParticipationService};
 use chefshat_record::convert::FieldProblem;
-use chefshat_study::{At, ParticipantLink, Refusal as StudyRefusal, SessionSecret};
+use chefshat_study::{At, ItemAnswer, ParticipantLink, Refusal as StudyRefusal, SessionSecret};
 use prost::Message as _;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status};
 
 use super::{Responses, StudyCalls, not_added, refused, stopped};
+use crate::clock::since_epoch_ms;
 use crate::config::FOLLOW_SEND_TIMEOUT;
 use crate::convert;
 use crate::grpc::follow::{changed, end};
@@ -69,6 +70,28 @@ impl StudyCalls {
     }
 }
 
+impl StudyCalls {
+    /// Reads answers, and charges a caller for storing them.
+    fn answers(
+        &self,
+        answers: Vec<v1::StudyItemAnswer>,
+        key: Key,
+    ) -> Result<Vec<ItemAnswer>, Status> {
+        let bytes = answers.iter().map(|answer| answer.encoded_len()).sum();
+        let answers = convert::answers_from_proto(answers).map_err(|item| {
+            status(
+                Code::InvalidArgument,
+                "ANSWER_REFUSED",
+                format!("item {item}: the answer is empty"),
+                [("item", &item.to_string())],
+            )
+        })?;
+        let rooms = self.studies.rooms();
+        rooms.may_store(key, bytes).map_err(Refusal::from)?;
+        Ok(answers)
+    }
+}
+
 /// What to show next.
 fn view_of(handle: &StudyHandle, number: u32, rooms: &Rooms) -> Result<v1::StudyView, Status> {
     // It has begun, so there is something to show.
@@ -95,7 +118,10 @@ impl ParticipationService for StudyCalls {
         let (handle, number) = self.of_link(&request.into_inner().link, key).await?;
         let opened = handle.open(number).await.map_err(stopped)?;
         let session = opened.map_err(refused)?;
+        let (saved_answers, step_age_ms) = handle.progress(number, since_epoch_ms());
         Ok(Response::new(v1::OpenStudyResponse {
+            saved_answers,
+            step_age_ms,
             session: match session {
                 0 => String::new(),
                 session => handle.session_secret(number, session),
@@ -158,23 +184,24 @@ impl ParticipationService for StudyCalls {
         let key = charged(request.extensions());
         let request = request.into_inner();
         let (handle, number, session) = self.of_session(&request.session, key).await?;
-        let bytes = (request.answers.iter())
-            .map(|answer| answer.encoded_len())
-            .sum();
-        let answers = convert::answers_from_proto(request.answers).map_err(|item| {
-            status(
-                Code::InvalidArgument,
-                "ANSWER_REFUSED",
-                format!("item {item}: the answer is empty"),
-                [("item", &item.to_string())],
-            )
-        })?;
-        let rooms = self.studies.rooms();
-        rooms.may_store(key, bytes).map_err(Refusal::from)?;
+        let answers = self.answers(request.answers, key)?;
         let answered = handle.answer(key, at(number, session, request.step), answers);
         answered.await.map_err(stopped)?.map_err(not_added)?;
         let view = Some(view_of(&handle, number, self.studies.rooms())?);
         Ok(Response::new(v1::AnswerQuestionnaireResponse { view }))
+    }
+
+    async fn save_answers(
+        &self,
+        request: Request<v1::SaveAnswersRequest>,
+    ) -> Result<Response<v1::SaveAnswersResponse>, Status> {
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let (handle, number, session) = self.of_session(&request.session, key).await?;
+        let answers = self.answers(request.answers, key)?;
+        let saved = handle.save(key, at(number, session, request.step), answers);
+        saved.await.map_err(stopped)?.map_err(not_added)?;
+        Ok(Response::new(v1::SaveAnswersResponse {}))
     }
 
     async fn continue_study(
@@ -320,7 +347,7 @@ mod tests {
                 waiting.push(method.output_type().to_owned());
             }
         }
-        assert_eq!(waiting.len(), 7);
+        assert_eq!(waiting.len(), 8);
         let mut seen = BTreeSet::new();
         while let Some(path) = waiting.pop() {
             if !seen.insert(path.clone()) {

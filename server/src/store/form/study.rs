@@ -1,5 +1,7 @@
 //! Headers, journals and interface traces of studies.
 
+use std::sync::Arc;
+
 use chefshat_proto::v1;
 use chefshat_study::{Answer, Change, ConsentGiven, ItemAnswer, Outcome, PlacedGame};
 use prost::Message;
@@ -24,7 +26,7 @@ struct HeaderForm {
 
 #[derive(Clone, PartialEq, Message)]
 struct ChangeForm {
-    #[prost(oneof = "KindForm", tags = "1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11")]
+    #[prost(oneof = "KindForm", tags = "1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12")]
     kind: Option<KindForm>,
 }
 
@@ -52,6 +54,8 @@ enum KindForm {
     Removed(MarkForm),
     #[prost(bool, tag = "11")]
     Closed(bool),
+    #[prost(message, tag = "12")]
+    Saved(AnsweredForm),
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -281,6 +285,11 @@ fn kind_of(change: &Change) -> KindForm {
             answers: answers.iter().map(answer_to_form).collect(),
             at_ms: *at_ms,
         }),
+        Change::Saved { number, answers } => KindForm::Saved(AnsweredForm {
+            number: *number,
+            answers: answers.iter().map(answer_to_form).collect(),
+            at_ms: 0,
+        }),
         Change::Placed { number, game } => KindForm::Placed(PlacedForm {
             number: *number,
             step: small(game.step),
@@ -336,10 +345,12 @@ fn change_of(kind: KindForm) -> Result<Change, Unreadable> {
         },
         KindForm::Answered(form) => Change::Answered {
             number: form.number,
-            answers: (form.answers.into_iter())
-                .map(answer_from_form)
-                .collect::<Result<_, _>>()?,
+            answers: answers_from_form(form.answers)?,
             at_ms: form.at_ms,
+        },
+        KindForm::Saved(form) => Change::Saved {
+            number: form.number,
+            answers: answers_from_form(form.answers)?,
         },
         KindForm::Placed(form) => Change::Placed {
             number: form.number,
@@ -396,6 +407,10 @@ fn answer_to_form(answer: &ItemAnswer) -> AnswerForm {
         }),
         answered_after_ms: answer.answered_after_ms,
     }
+}
+
+fn answers_from_form(forms: Vec<AnswerForm>) -> Result<Arc<[ItemAnswer]>, Unreadable> {
+    forms.into_iter().map(answer_from_form).collect()
 }
 
 fn answer_from_form(form: AnswerForm) -> Result<ItemAnswer, Unreadable> {

@@ -73,6 +73,10 @@ fn every_change() -> Vec<Change> {
             ]),
             at_ms,
         },
+        Change::Saved {
+            number,
+            answers: Arc::new([answer(2, Answer::Text("wor".to_owned()), Some(8))]),
+        },
         Change::Placed {
             number,
             game: game(None),

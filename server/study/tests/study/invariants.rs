@@ -5,10 +5,10 @@
 use std::collections::BTreeSet;
 
 use chefshat_study::testing::within;
-use chefshat_study::{Order, Outcome, Settings, Status};
+use chefshat_study::{Answer, Order, Outcome, Settings, Status};
 use proptest::prelude::*;
 
-use super::support::Lab;
+use super::support::{Lab, answer};
 
 /// Words that stand for conditions, and other identifiers that participants must not get.
 const HIDDEN: [&str; 6] = [
@@ -73,6 +73,12 @@ fn happen(lab: &mut Lab, (kind, who): Event) {
             .close()
             .into_iter()
             .for_each(|closed| lab.fold(closed)),
+        17 if is_active => {
+            let entered = vec![answer(0, Answer::Number(1))];
+            if let Ok(saved) = lab.study.save(lab.at(number), entered) {
+                lab.fold(saved);
+            }
+        }
         _ => {}
     }
 }
@@ -119,7 +125,7 @@ proptest! {
     #[test]
     fn it_stays_balanced_and_folds_to_the_same(
         plan in plans(),
-        events in prop::collection::vec((0..=16u8, 0..1000u32), 0..250),
+        events in prop::collection::vec((0..=17u8, 0..1000u32), 0..250),
     ) {
         let mut lab = Lab::new(plan, 6);
         for event in events {

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chefshat_study::testing::{settings, within};
 use chefshat_study::{
-    Answer, Content, Item, ItemAnswer, ItemKind, Language, Questionnaire, Refusal, Stage, Study,
-    Task, Template,
+    Answer, Change, Content, Item, ItemAnswer, ItemKind, Language, MAX_SAVES, Questionnaire,
+    Refusal, Stage, Study, Task, Template,
 };
 
 use super::support::{Lab, answer, valid};
@@ -161,6 +161,77 @@ fn answers_are_checked_item_by_item() {
     reversed.pop();
     reversed.reverse();
     assert!(lab.study.answer(lab.at(1), reversed, 0).is_ok());
+}
+
+#[test]
+fn what_is_entered_is_kept_until_it_is_answered_or_deleted() {
+    let mut settings = settings();
+    let stage = |id: &str| {
+        let id = id.to_owned();
+        Stage::Once(Task::Questionnaire(Questionnaire {
+            id,
+            ..questionnaire()
+        }))
+    };
+    settings
+        .stages
+        .splice(0..1, [stage("first"), stage("second")]);
+    let mut lab = Lab::new(settings, 1);
+    lab.open(1).unwrap();
+    let number = |item, value| answer(item, Answer::Number(value));
+    let saved = |lab: &Lab| lab.study.participant(1).unwrap().saved_answers.to_vec();
+    let save = |lab: &mut Lab, answers: &[ItemAnswer]| {
+        let change = lab.study.save(lab.at(1), answers.to_vec())?;
+        lab.fold(change);
+        Ok(())
+    };
+    // Not all is answered, and what is entered changes.
+    assert_eq!(save(&mut lab, &[number(0, 2)]), Ok(()));
+    let unticked = answer(4, Answer::Options(Vec::new()));
+    let second = [number(0, 3), unticked];
+    assert_eq!(save(&mut lab, &second), Ok(()));
+    assert_eq!(saved(&lab), second);
+    let mut problem = |answers: &[ItemAnswer]| match save(&mut lab, answers) {
+        Err(Refusal::Answers(problem)) => problem.to_string(),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(
+        problem(&[number(0, 9)]),
+        "item 0: 9 is not a point within 1..=7"
+    );
+    assert_eq!(
+        problem(&[number(0, 1), number(0, 1)]),
+        "item 0: it has two answers"
+    );
+    let earlier = lab.at(1);
+    lab.open(1).unwrap();
+    let superseded = lab.study.save(earlier, Vec::new());
+    assert_eq!(superseded, Err(Refusal::Superseded));
+    assert_eq!(saved(&lab), second, "on another device");
+
+    // The next questionnaire begins empty.
+    let first_step = lab.at(1);
+    lab.act(1);
+    assert_eq!(saved(&lab), []);
+    let late = lab.study.save(first_step, second.to_vec());
+    assert_eq!(late, Err(Refusal::StepOver));
+    while save(&mut lab, &second).is_ok() {}
+    assert_eq!(lab.study.participant(1).unwrap().saves, MAX_SAVES);
+    assert_eq!(save(&mut lab, &second), Err(Refusal::TooManySaves));
+    let deleted = lab.study.withdraw(1, true, 0).unwrap().unwrap();
+    lab.fold(deleted);
+    assert_eq!(saved(&lab), []);
+    let forgotten = lab.changes.iter_mut().filter_map(|change| {
+        change.forget(1);
+        match change {
+            Change::Saved { answers, .. } => Some(answers.is_empty()),
+            _ => None,
+        }
+    });
+    assert_eq!(
+        forgotten.collect::<Vec<_>>(),
+        vec![true; MAX_SAVES as usize]
+    );
 }
 
 #[test]

@@ -26,7 +26,7 @@ from chefshat._gen.chefshat.v1 import room_pb2 as chefshat_dot_v1_dot_room__pb2
 from chefshat._gen.chefshat.v1 import rules_pb2 as chefshat_dot_v1_dot_rules__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1e\x63hefshat/v1/room_service.proto\x12\x0b\x63hefshat.v1\x1a\x16\x63hefshat/v1/room.proto\x1a\x17\x63hefshat/v1/rules.proto\"\xb5\x02\n\x11\x43reateRoomRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12#\n\x05rules\x18\x02 \x01(\x0b\x32\x14.chefshat.v1.RuleSet\x12&\n\x05seats\x18\x03 \x03(\x0b\x32\x17.chefshat.v1.SeatConfig\x12\'\n\x06policy\x18\x04 \x01(\x0b\x32\x17.chefshat.v1.RoomPolicy\x12\x11\n\tgame_seed\x18\x05 \x01(\x0c\x12.\n\x08scripted\x18\x06 \x01(\x0b\x32\x1a.chefshat.v1.ScriptedShiftH\x00\x12*\n\x06\x62ranch\x18\x07 \x01(\x0b\x32\x18.chefshat.v1.BranchPointH\x00\x12\x12\n\nrequest_id\x18\x08 \x01(\x0c\x12\x10\n\x08physical\x18\t \x01(\x08\x42\x07\n\x05start\"s\n\x12\x43reateRoomResponse\x12\x1f\n\x04room\x18\x01 \x01(\x0b\x32\x11.chefshat.v1.Room\x12\x11\n\tjoin_code\x18\x02 \x01(\t\x12\x13\n\x0bowner_token\x18\x03 \x01(\t\x12\x14\n\x0ctable_ticket\x18\x04 \x01(\t\"M\n\x12SetNextRoomRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\x12\x11\n\tjoin_code\x18\x03 \x01(\t\"\x15\n\x13SetNextRoomResponse\"4\n\x0eGetRoomRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x11\n\tjoin_code\x18\x02 \x01(\t\"2\n\x0fGetRoomResponse\x12\x1f\n\x04room\x18\x01 \x01(\x0b\x32\x11.chefshat.v1.Room\"`\n\x10ListRoomsRequest\x12%\n\x05state\x18\x01 \x01(\x0e\x32\x16.chefshat.v1.RoomState\x12\x11\n\tpage_size\x18\x02 \x01(\r\x12\x12\n\npage_token\x18\x03 \x01(\t\"N\n\x11ListRoomsResponse\x12 \n\x05rooms\x18\x01 \x03(\x0b\x32\x11.chefshat.v1.Room\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"\xb1\x01\n\x0fJoinRoomRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x11\n\tjoin_code\x18\x02 \x01(\t\x12\x0c\n\x04name\x18\x03 \x01(\t\x12*\n\x04kind\x18\x04 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x11\n\x04seat\x18\x05 \x01(\rH\x00\x88\x01\x01\x12\x12\n\nrequest_id\x18\x06 \x01(\x0c\x12\x10\n\x08name_key\x18\x07 \x01(\x0c\x42\x07\n\x05_seat\"m\n\x10JoinRoomResponse\x12\x1f\n\x04room\x18\x01 \x01(\x0b\x32\x11.chefshat.v1.Room\x12\x0c\n\x04seat\x18\x02 \x01(\r\x12\x0e\n\x06ticket\x18\x03 \x01(\t\x12\x1a\n\x12preferred_endpoint\x18\x04 \x01(\t\"\"\n\x10LeaveRoomRequest\x12\x0e\n\x06ticket\x18\x01 \x01(\t\"4\n\x11LeaveRoomResponse\x12\x1f\n\x04room\x18\x01 \x01(\x0b\x32\x11.chefshat.v1.Room\"8\n\x10\x43loseRoomRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\"4\n\x11\x43loseRoomResponse\x12\x1f\n\x04room\x18\x01 \x01(\x0b\x32\x11.chefshat.v1.Room2\xa1\x04\n\x0bRoomService\x12M\n\nCreateRoom\x12\x1e.chefshat.v1.CreateRoomRequest\x1a\x1f.chefshat.v1.CreateRoomResponse\x12\x44\n\x07GetRoom\x12\x1b.chefshat.v1.GetRoomRequest\x1a\x1c.chefshat.v1.GetRoomResponse\x12J\n\tListRooms\x12\x1d.chefshat.v1.ListRoomsRequest\x1a\x1e.chefshat.v1.ListRoomsResponse\x12G\n\x08JoinRoom\x12\x1c.chefshat.v1.JoinRoomRequest\x1a\x1d.chefshat.v1.JoinRoomResponse\x12J\n\tLeaveRoom\x12\x1d.chefshat.v1.LeaveRoomRequest\x1a\x1e.chefshat.v1.LeaveRoomResponse\x12J\n\tCloseRoom\x12\x1d.chefshat.v1.CloseRoomRequest\x1a\x1e.chefshat.v1.CloseRoomResponse\x12P\n\x0bSetNextRoom\x12\x1f.chefshat.v1.SetNextRoomRequest\x1a .chefshat.v1.SetNextRoomResponseB\x94\x01\n\x15io.github.chefshat.v1P\x01Z9github.com/chefshat/chefshat/proto/chefshat/v1;chefshatv1\xa2\x02\x03\x43HX\xaa\x02\x0b\x43hefsHat.V1\xba\x02\x0c\x43hefsHat_V1_\xca\x02\x0b\x43hefsHat\\V1\xea\x02\x0c\x43hefsHat::V1b\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1e\x63hefshat/v1/room_service.proto\x12\x0b\x63hefshat.v1\x1a\x16\x63hefshat/v1/room.proto\x1a\x17\x63hefshat/v1/rules.proto\"\xb5\x02\n\x11\x43reateRoomRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12#\n\x05rules\x18\x02 \x01(\x0b\x32\x14.chefshat.v1.RuleSet\x12&\n\x05seats\x18\x03 \x03(\x0b\x32\x17.chefshat.v1.SeatConfig\x12\'\n\x06policy\x18\x04 \x01(\x0b\x32\x17.chefshat.v1.RoomPolicy\x12\x11\n\tgame_seed\x18\x05 \x01(\x0c\x12.\n\x08scripted\x18\x06 \x01(\x0b\x32\x1a.chefshat.v1.ScriptedShiftH\x00\x12*\n\x06\x62ranch\x18\x07 \x01(\x0b\x32\x18.chefshat.v1.BranchPointH\x00\x12\x12\n\nrequest_id\x18\x08 \x01(\x0c\x12\x10\n\x08physical\x18\t \x01(\x08\x42\x07\n\x05start\"s\n\x12\x43reateRoomResponse\x12\x1f\n\x04room\x18\x01 \x01(\x0b\x32\x11.chefshat.v1.Room\x12\x11\n\tjoin_code\x18\x02 \x01(\t\x12\x13\n\x0bowner_token\x18\x03 \x01(\t\x12\x14\n\x0ctable_ticket\x18\x04 \x01(\t\"]\n\x12SetNextRoomRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\x12\x11\n\tjoin_code\x18\x03 \x01(\t\x12\x0e\n\x06ticket\x18\x04 \x01(\t\"\x15\n\x13SetNextRoomResponse\"4\n\x0eGetRoomRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x11\n\tjoin_code\x18\x02 \x01(\t\"2\n\x0fGetRoomResponse\x12\x1f\n\x04room\x18\x01 \x01(\x0b\x32\x11.chefshat.v1.Room\"`\n\x10ListRoomsRequest\x12%\n\x05state\x18\x01 \x01(\x0e\x32\x16.chefshat.v1.RoomState\x12\x11\n\tpage_size\x18\x02 \x01(\r\x12\x12\n\npage_token\x18\x03 \x01(\t\"N\n\x11ListRoomsResponse\x12 \n\x05rooms\x18\x01 \x03(\x0b\x32\x11.chefshat.v1.Room\x12\x17\n\x0fnext_page_token\x18\x02 \x01(\t\"\xb1\x01\n\x0fJoinRoomRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x11\n\tjoin_code\x18\x02 \x01(\t\x12\x0c\n\x04name\x18\x03 \x01(\t\x12*\n\x04kind\x18\x04 \x01(\x0e\x32\x1c.chefshat.v1.ParticipantKind\x12\x11\n\x04seat\x18\x05 \x01(\rH\x00\x88\x01\x01\x12\x12\n\nrequest_id\x18\x06 \x01(\x0c\x12\x10\n\x08name_key\x18\x07 \x01(\x0c\x42\x07\n\x05_seat\"m\n\x10JoinRoomResponse\x12\x1f\n\x04room\x18\x01 \x01(\x0b\x32\x11.chefshat.v1.Room\x12\x0c\n\x04seat\x18\x02 \x01(\r\x12\x0e\n\x06ticket\x18\x03 \x01(\t\x12\x1a\n\x12preferred_endpoint\x18\x04 \x01(\t\"\"\n\x10LeaveRoomRequest\x12\x0e\n\x06ticket\x18\x01 \x01(\t\"4\n\x11LeaveRoomResponse\x12\x1f\n\x04room\x18\x01 \x01(\x0b\x32\x11.chefshat.v1.Room\"8\n\x10\x43loseRoomRequest\x12\x0f\n\x07room_id\x18\x01 \x01(\t\x12\x13\n\x0bowner_token\x18\x02 \x01(\t\"4\n\x11\x43loseRoomResponse\x12\x1f\n\x04room\x18\x01 \x01(\x0b\x32\x11.chefshat.v1.Room2\xa1\x04\n\x0bRoomService\x12M\n\nCreateRoom\x12\x1e.chefshat.v1.CreateRoomRequest\x1a\x1f.chefshat.v1.CreateRoomResponse\x12\x44\n\x07GetRoom\x12\x1b.chefshat.v1.GetRoomRequest\x1a\x1c.chefshat.v1.GetRoomResponse\x12J\n\tListRooms\x12\x1d.chefshat.v1.ListRoomsRequest\x1a\x1e.chefshat.v1.ListRoomsResponse\x12G\n\x08JoinRoom\x12\x1c.chefshat.v1.JoinRoomRequest\x1a\x1d.chefshat.v1.JoinRoomResponse\x12J\n\tLeaveRoom\x12\x1d.chefshat.v1.LeaveRoomRequest\x1a\x1e.chefshat.v1.LeaveRoomResponse\x12J\n\tCloseRoom\x12\x1d.chefshat.v1.CloseRoomRequest\x1a\x1e.chefshat.v1.CloseRoomResponse\x12P\n\x0bSetNextRoom\x12\x1f.chefshat.v1.SetNextRoomRequest\x1a .chefshat.v1.SetNextRoomResponseB\x94\x01\n\x15io.github.chefshat.v1P\x01Z9github.com/chefshat/chefshat/proto/chefshat/v1;chefshatv1\xa2\x02\x03\x43HX\xaa\x02\x0b\x43hefsHat.V1\xba\x02\x0c\x43hefsHat_V1_\xca\x02\x0b\x43hefsHat\\V1\xea\x02\x0c\x43hefsHat::V1b\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -39,29 +39,29 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_CREATEROOMRESPONSE']._serialized_start=408
   _globals['_CREATEROOMRESPONSE']._serialized_end=523
   _globals['_SETNEXTROOMREQUEST']._serialized_start=525
-  _globals['_SETNEXTROOMREQUEST']._serialized_end=602
-  _globals['_SETNEXTROOMRESPONSE']._serialized_start=604
-  _globals['_SETNEXTROOMRESPONSE']._serialized_end=625
-  _globals['_GETROOMREQUEST']._serialized_start=627
-  _globals['_GETROOMREQUEST']._serialized_end=679
-  _globals['_GETROOMRESPONSE']._serialized_start=681
-  _globals['_GETROOMRESPONSE']._serialized_end=731
-  _globals['_LISTROOMSREQUEST']._serialized_start=733
-  _globals['_LISTROOMSREQUEST']._serialized_end=829
-  _globals['_LISTROOMSRESPONSE']._serialized_start=831
-  _globals['_LISTROOMSRESPONSE']._serialized_end=909
-  _globals['_JOINROOMREQUEST']._serialized_start=912
-  _globals['_JOINROOMREQUEST']._serialized_end=1089
-  _globals['_JOINROOMRESPONSE']._serialized_start=1091
-  _globals['_JOINROOMRESPONSE']._serialized_end=1200
-  _globals['_LEAVEROOMREQUEST']._serialized_start=1202
-  _globals['_LEAVEROOMREQUEST']._serialized_end=1236
-  _globals['_LEAVEROOMRESPONSE']._serialized_start=1238
-  _globals['_LEAVEROOMRESPONSE']._serialized_end=1290
-  _globals['_CLOSEROOMREQUEST']._serialized_start=1292
-  _globals['_CLOSEROOMREQUEST']._serialized_end=1348
-  _globals['_CLOSEROOMRESPONSE']._serialized_start=1350
-  _globals['_CLOSEROOMRESPONSE']._serialized_end=1402
-  _globals['_ROOMSERVICE']._serialized_start=1405
-  _globals['_ROOMSERVICE']._serialized_end=1950
+  _globals['_SETNEXTROOMREQUEST']._serialized_end=618
+  _globals['_SETNEXTROOMRESPONSE']._serialized_start=620
+  _globals['_SETNEXTROOMRESPONSE']._serialized_end=641
+  _globals['_GETROOMREQUEST']._serialized_start=643
+  _globals['_GETROOMREQUEST']._serialized_end=695
+  _globals['_GETROOMRESPONSE']._serialized_start=697
+  _globals['_GETROOMRESPONSE']._serialized_end=747
+  _globals['_LISTROOMSREQUEST']._serialized_start=749
+  _globals['_LISTROOMSREQUEST']._serialized_end=845
+  _globals['_LISTROOMSRESPONSE']._serialized_start=847
+  _globals['_LISTROOMSRESPONSE']._serialized_end=925
+  _globals['_JOINROOMREQUEST']._serialized_start=928
+  _globals['_JOINROOMREQUEST']._serialized_end=1105
+  _globals['_JOINROOMRESPONSE']._serialized_start=1107
+  _globals['_JOINROOMRESPONSE']._serialized_end=1216
+  _globals['_LEAVEROOMREQUEST']._serialized_start=1218
+  _globals['_LEAVEROOMREQUEST']._serialized_end=1252
+  _globals['_LEAVEROOMRESPONSE']._serialized_start=1254
+  _globals['_LEAVEROOMRESPONSE']._serialized_end=1306
+  _globals['_CLOSEROOMREQUEST']._serialized_start=1308
+  _globals['_CLOSEROOMREQUEST']._serialized_end=1364
+  _globals['_CLOSEROOMRESPONSE']._serialized_start=1366
+  _globals['_CLOSEROOMRESPONSE']._serialized_end=1418
+  _globals['_ROOMSERVICE']._serialized_start=1421
+  _globals['_ROOMSERVICE']._serialized_end=1966
 # @@protoc_insertion_point(module_scope)

@@ -146,22 +146,28 @@ class SetNextRoomRequest(_message.Message):
     ROOM_ID_FIELD_NUMBER: _builtins.int
     OWNER_TOKEN_FIELD_NUMBER: _builtins.int
     JOIN_CODE_FIELD_NUMBER: _builtins.int
+    TICKET_FIELD_NUMBER: _builtins.int
     room_id: _builtins.str
     """Identifies the room whose participants play again."""
     owner_token: _builtins.str
     """`owner_token` of its CreateRoomResponse."""
     join_code: _builtins.str
     """`join_code` of the next room: 8 letters and digits."""
+    ticket: _builtins.str
+    """In place of the owner token: a ticket of the room. A participant's offer does not replace one that
+    can still be joined.
+    """
     def __init__(
         self,
         *,
         room_id: _builtins.str = ...,
         owner_token: _builtins.str = ...,
         join_code: _builtins.str = ...,
+        ticket: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["join_code", b"join_code", "owner_token", b"owner_token", "room_id", b"room_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["join_code", b"join_code", "owner_token", b"owner_token", "room_id", b"room_id", "ticket", b"ticket"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -138,8 +138,10 @@ class RoomServiceServicer(object):
 
     def SetNextRoom(self, request, context):
         """Sets the join code of the room in which the participants of a room play again
-        (`Room.next_join_code`); it replaces an earlier one. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
-        NOT_FOUND (ROOM_UNKNOWN).
+        (`Room.next_join_code`). The owner's replaces an earlier one. A participant's does so only if
+        nobody can join the earlier one any more: the first offer counts. FAILED_PRECONDITION
+        (NEXT_ROOM_SET); PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+        UNAUTHENTICATED (TICKET_UNKNOWN); NOT_FOUND (ROOM_UNKNOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

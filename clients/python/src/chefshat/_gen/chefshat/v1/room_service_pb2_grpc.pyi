@@ -71,8 +71,10 @@ class RoomServiceStub:
     """
     SetNextRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.SetNextRoomRequest, _room_service_pb2.SetNextRoomResponse]
     """Sets the join code of the room in which the participants of a room play again
-    (`Room.next_join_code`); it replaces an earlier one. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
-    NOT_FOUND (ROOM_UNKNOWN).
+    (`Room.next_join_code`). The owner's replaces an earlier one. A participant's does so only if
+    nobody can join the earlier one any more: the first offer counts. FAILED_PRECONDITION
+    (NEXT_ROOM_SET); PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+    UNAUTHENTICATED (TICKET_UNKNOWN); NOT_FOUND (ROOM_UNKNOWN).
     """
 
 @_typing.type_check_only
@@ -118,8 +120,10 @@ class RoomServiceAsyncStub(RoomServiceStub):
     """
     SetNextRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.SetNextRoomRequest, _room_service_pb2.SetNextRoomResponse]  # type: ignore[assignment]
     """Sets the join code of the room in which the participants of a room play again
-    (`Room.next_join_code`); it replaces an earlier one. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
-    NOT_FOUND (ROOM_UNKNOWN).
+    (`Room.next_join_code`). The owner's replaces an earlier one. A participant's does so only if
+    nobody can join the earlier one any more: the first offer counts. FAILED_PRECONDITION
+    (NEXT_ROOM_SET); PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+    UNAUTHENTICATED (TICKET_UNKNOWN); NOT_FOUND (ROOM_UNKNOWN).
     """
 
 class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -204,8 +208,10 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_room_service_pb2.SetNextRoomResponse, _abc.Awaitable[_room_service_pb2.SetNextRoomResponse]]:
         """Sets the join code of the room in which the participants of a room play again
-        (`Room.next_join_code`); it replaces an earlier one. PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
-        NOT_FOUND (ROOM_UNKNOWN).
+        (`Room.next_join_code`). The owner's replaces an earlier one. A participant's does so only if
+        nobody can join the earlier one any more: the first offer counts. FAILED_PRECONDITION
+        (NEXT_ROOM_SET); PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
+        UNAUTHENTICATED (TICKET_UNKNOWN); NOT_FOUND (ROOM_UNKNOWN).
         """
 
 def add_RoomServiceServicer_to_server(servicer: RoomServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...

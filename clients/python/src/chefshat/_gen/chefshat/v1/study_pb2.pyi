@@ -1499,8 +1499,8 @@ class StudyItemAnswer(_message.Message):
     text: _builtins.str
     """A free text."""
     answered_after_ms: _builtins.int
-    """Milliseconds from showing the questionnaire to the last change of this answer, measured by the
-    participant's device.
+    """Milliseconds from reaching the questionnaire to the last change of this answer, measured by the
+    participant's device, which counts on after a reload (`step_age_ms` of OpenStudyResponse).
     """
     @_builtins.property
     def options(self) -> Global___StudyChosen:

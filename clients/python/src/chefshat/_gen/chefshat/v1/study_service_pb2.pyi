@@ -667,23 +667,33 @@ class OpenStudyResponse(_message.Message):
 
     SESSION_FIELD_NUMBER: _builtins.int
     VIEW_FIELD_NUMBER: _builtins.int
+    SAVED_ANSWERS_FIELD_NUMBER: _builtins.int
+    STEP_AGE_MS_FIELD_NUMBER: _builtins.int
     session: _builtins.str
     """Secret of the session, for every call that takes a `session`; empty if the participation is
     over.
     """
+    step_age_ms: _builtins.int
+    """Milliseconds since the participant reached this step: `answered_after_ms` counts on from there."""
     @_builtins.property
     def view(self) -> _study_pb2.StudyView:
         """What to show."""
+
+    @_builtins.property
+    def saved_answers(self) -> _containers.RepeatedCompositeFieldContainer[_study_pb2.StudyItemAnswer]:
+        """What the participant has entered at this step so far (SaveAnswers), if it is a questionnaire."""
 
     def __init__(
         self,
         *,
         session: _builtins.str = ...,
         view: _study_pb2.StudyView | None = ...,
+        saved_answers: _abc.Iterable[_study_pb2.StudyItemAnswer] | None = ...,
+        step_age_ms: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["view", b"view"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["session", b"session", "view", b"view"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["saved_answers", b"saved_answers", "session", b"session", "step_age_ms", b"step_age_ms", "view", b"view"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -840,6 +850,55 @@ class AnswerQuestionnaireResponse(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___AnswerQuestionnaireResponse: _TypeAlias = AnswerQuestionnaireResponse  # noqa: Y015
+
+@_typing.final
+class SaveAnswersRequest(_message.Message):
+    """What was entered so far."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    SESSION_FIELD_NUMBER: _builtins.int
+    STEP_FIELD_NUMBER: _builtins.int
+    ANSWERS_FIELD_NUMBER: _builtins.int
+    session: _builtins.str
+    """`session` of OpenStudyResponse."""
+    step: _builtins.int
+    """`step` of the view that was shown."""
+    @_builtins.property
+    def answers(self) -> _containers.RepeatedCompositeFieldContainer[_study_pb2.StudyItemAnswer]:
+        """All that was entered so far, at most one answer for each item."""
+
+    def __init__(
+        self,
+        *,
+        session: _builtins.str = ...,
+        step: _builtins.int = ...,
+        answers: _abc.Iterable[_study_pb2.StudyItemAnswer] | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["answers", b"answers", "session", b"session", "step", b"step"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___SaveAnswersRequest: _TypeAlias = SaveAnswersRequest  # noqa: Y015
+
+@_typing.final
+class SaveAnswersResponse(_message.Message):
+    """The answers are kept."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    def __init__(
+        self,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___SaveAnswersResponse: _TypeAlias = SaveAnswersResponse  # noqa: Y015
 
 @_typing.final
 class ContinueStudyRequest(_message.Message):

@@ -600,6 +600,11 @@ class ParticipationServiceStub(object):
                 request_serializer=chefshat_dot_v1_dot_study__service__pb2.AnswerQuestionnaireRequest.SerializeToString,
                 response_deserializer=chefshat_dot_v1_dot_study__service__pb2.AnswerQuestionnaireResponse.FromString,
                 _registered_method=True)
+        self.SaveAnswers = channel.unary_unary(
+                '/chefshat.v1.ParticipationService/SaveAnswers',
+                request_serializer=chefshat_dot_v1_dot_study__service__pb2.SaveAnswersRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_study__service__pb2.SaveAnswersResponse.FromString,
+                _registered_method=True)
         self.ContinueStudy = channel.unary_unary(
                 '/chefshat.v1.ParticipationService/ContinueStudy',
                 request_serializer=chefshat_dot_v1_dot_study__service__pb2.ContinueStudyRequest.SerializeToString,
@@ -662,6 +667,15 @@ class ParticipationServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def SaveAnswers(self, request, context):
+        """Keeps what was entered in the questionnaire of the step so far, for a reload or another device: it
+        replaces what was kept before, and is forgotten when the questionnaire is answered. Not every item
+        needs an answer. RESOURCE_EXHAUSTED (TOO_MANY_SAVES after 1000); else as AnswerQuestionnaire.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def ContinueStudy(self, request, context):
         """Continues from a text, a questionnaire on another site, or a game that has ended.
         FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
@@ -711,6 +725,11 @@ def add_ParticipationServiceServicer_to_server(servicer, server):
                     servicer.AnswerQuestionnaire,
                     request_deserializer=chefshat_dot_v1_dot_study__service__pb2.AnswerQuestionnaireRequest.FromString,
                     response_serializer=chefshat_dot_v1_dot_study__service__pb2.AnswerQuestionnaireResponse.SerializeToString,
+            ),
+            'SaveAnswers': grpc.unary_unary_rpc_method_handler(
+                    servicer.SaveAnswers,
+                    request_deserializer=chefshat_dot_v1_dot_study__service__pb2.SaveAnswersRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_study__service__pb2.SaveAnswersResponse.SerializeToString,
             ),
             'ContinueStudy': grpc.unary_unary_rpc_method_handler(
                     servicer.ContinueStudy,
@@ -840,6 +859,33 @@ class ParticipationService(object):
             '/chefshat.v1.ParticipationService/AnswerQuestionnaire',
             chefshat_dot_v1_dot_study__service__pb2.AnswerQuestionnaireRequest.SerializeToString,
             chefshat_dot_v1_dot_study__service__pb2.AnswerQuestionnaireResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def SaveAnswers(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.ParticipationService/SaveAnswers',
+            chefshat_dot_v1_dot_study__service__pb2.SaveAnswersRequest.SerializeToString,
+            chefshat_dot_v1_dot_study__service__pb2.SaveAnswersResponse.FromString,
             options,
             channel_credentials,
             insecure,

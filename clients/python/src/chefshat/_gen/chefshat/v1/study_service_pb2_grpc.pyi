@@ -312,6 +312,11 @@ class ParticipationServiceStub:
     RESOURCE_EXHAUSTED (TOO_MANY_ANSWERS if the answers of all studies, or of this caller, take too
     much memory; DISK_NEARLY_FULL); else as GiveConsent.
     """
+    SaveAnswers: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.SaveAnswersRequest, _study_service_pb2.SaveAnswersResponse]
+    """Keeps what was entered in the questionnaire of the step so far, for a reload or another device: it
+    replaces what was kept before, and is forgotten when the questionnaire is answered. Not every item
+    needs an answer. RESOURCE_EXHAUSTED (TOO_MANY_SAVES after 1000); else as AnswerQuestionnaire.
+    """
     ContinueStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.ContinueStudyRequest, _study_service_pb2.ContinueStudyResponse]
     """Continues from a text, a questionnaire on another site, or a game that has ended.
     FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
@@ -358,6 +363,11 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
     """Answers the questionnaire of the step. INVALID_ARGUMENT (ANSWER_REFUSED; metadata `item`);
     RESOURCE_EXHAUSTED (TOO_MANY_ANSWERS if the answers of all studies, or of this caller, take too
     much memory; DISK_NEARLY_FULL); else as GiveConsent.
+    """
+    SaveAnswers: _aio.UnaryUnaryMultiCallable[_study_service_pb2.SaveAnswersRequest, _study_service_pb2.SaveAnswersResponse]  # type: ignore[assignment]
+    """Keeps what was entered in the questionnaire of the step so far, for a reload or another device: it
+    replaces what was kept before, and is forgotten when the questionnaire is answered. Not every item
+    needs an answer. RESOURCE_EXHAUSTED (TOO_MANY_SAVES after 1000); else as AnswerQuestionnaire.
     """
     ContinueStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.ContinueStudyRequest, _study_service_pb2.ContinueStudyResponse]  # type: ignore[assignment]
     """Continues from a text, a questionnaire on another site, or a game that has ended.
@@ -426,6 +436,17 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
         """Answers the questionnaire of the step. INVALID_ARGUMENT (ANSWER_REFUSED; metadata `item`);
         RESOURCE_EXHAUSTED (TOO_MANY_ANSWERS if the answers of all studies, or of this caller, take too
         much memory; DISK_NEARLY_FULL); else as GiveConsent.
+        """
+
+    @_abc_1.abstractmethod
+    def SaveAnswers(
+        self,
+        request: _study_service_pb2.SaveAnswersRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_study_service_pb2.SaveAnswersResponse, _abc.Awaitable[_study_service_pb2.SaveAnswersResponse]]:
+        """Keeps what was entered in the questionnaire of the step so far, for a reload or another device: it
+        replaces what was kept before, and is forgotten when the questionnaire is answered. Not every item
+        needs an answer. RESOURCE_EXHAUSTED (TOO_MANY_SAVES after 1000); else as AnswerQuestionnaire.
         """
 
     @_abc_1.abstractmethod
