@@ -36,6 +36,7 @@ def base(images: Images) -> str:
     return images.base("node", [], files, {"usr/local/bin/npm": script})
 
 
+@pytest.mark.slow
 def test_a_server_and_an_agent_of_the_images_play(images: Images, base: str) -> None:
     binary = os.environ.get("CHEFSHAT_BIN")
     if not binary:

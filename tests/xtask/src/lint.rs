@@ -34,6 +34,7 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
         }),
         Box::new(|steps| {
             documents(places, steps)?;
+            licences(places, steps)?;
             if places.python_packages().is_empty() {
                 steps.skip("ruff, mypy", NO_PYTHON_PACKAGE);
             } else {
@@ -95,8 +96,8 @@ pub(crate) fn sources(places: &Places, steps: &mut Steps) -> Result<(), Failure>
     steps.run("circles between files", || circles::check(places))
 }
 
-/// The checks of everything but programs: protocol, book, files of docker/, licences of what is
-/// built with. And the format of the agent in C++, which the same environment checks.
+/// The checks of everything but programs: protocol, book, files of docker/. And the format of the agent
+/// in C++, which the same environment checks.
 pub(crate) fn documents(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.run("set up checkers", || setup::tools(places))?;
     steps.program("buf lint", tool(places, "buf").args(["lint", "proto"]))?;
@@ -125,7 +126,12 @@ pub(crate) fn documents(places: &Places, steps: &mut Steps) -> Result<(), Failur
         tool(places, "hadolint").arg("docker/Dockerfile"),
     )?;
     let format = ["--dry-run", "--Werror", "clients/cpp/agent.cpp"];
-    steps.program("clang-format", tool(places, "clang-format").args(format))?;
+    steps.program("clang-format", tool(places, "clang-format").args(format))
+}
+
+/// The licences and sources of what is built with, which change with Cargo.lock alone. The tool is
+/// compiled first, which takes minutes.
+pub(crate) fn licences(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.run("cargo deny", || {
         let deny = ["--workspace", "check", "licenses", "bans", "sources"];
         command::run(in_root(places, setup::cargo_deny(places)?).args(deny))

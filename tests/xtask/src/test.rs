@@ -83,11 +83,11 @@ pub(crate) struct Options {
     /// Run only the tests of one part.
     #[arg(long, value_enum)]
     only: Option<Part>,
-    /// Also run what takes many minutes: long tests, the wheels and the images
-    /// built from source, idle streams, checks for Windows and macOS.
+    /// Also run what takes many minutes: long tests, the images, the wheels, idle
+    /// streams, checks for Windows and macOS, licences.
     #[arg(long)]
     slow: bool,
-    /// Also run the checks of `cargo xtask lint`, in the same build.
+    /// Also run the checks of `cargo xtask lint` but that of licences, in the same build.
     #[arg(long, conflicts_with = "only")]
     lint: bool,
 }
@@ -179,6 +179,9 @@ pub(crate) fn run(
             }
             if lint {
                 lint::documents(places, steps)?;
+            }
+            if slow {
+                lint::licences(places, steps)?;
             }
             Ok(())
         }),
@@ -274,12 +277,12 @@ fn test_deployment(places: &Places, steps: &mut Steps, slow: bool) -> Result<(),
     steps.run("set up proxies and a browser", || {
         setup::proxies().and_then(|()| setup::chromium())
     })?;
-    if let Err(failure) = setup::images() {
-        steps.skip("images", &failure.to_string());
-    }
     let (name, mut command) = pytest(places, DEPLOYMENT, &[]);
     steps.program(&name, &mut command)?;
     if slow {
+        if let Err(failure) = setup::images() {
+            steps.skip("images", &failure.to_string());
+        }
         let (name, mut command) = pytest(places, DEPLOYMENT, &["-m", "slow"]);
         steps.program(&name, &mut command)?;
     }
