@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncIterator, Iterator
+from dataclasses import replace
 from typing import cast
 
 import grpc
@@ -165,6 +166,23 @@ def test_cards_of_one_face_on_a_play_are_a_play_of_their_own(table: Table, bridg
 
     run(test())
     assert [list(report.laid.cards.cards) for report in table.reports] == [[9, 9], [9]]
+
+
+def test_who_laid_cards_is_named_if_its_side_of_the_field_shows_it(table: Table, bridge: Bridge) -> None:
+    table.state.seats.extend(pb.TableSeat(at_table=seat != 3) for seat in range(4))
+
+    async def test() -> None:
+        # The bridge learns of the seats from the answer to its first report.
+        await bridge.observed(PassShown(0, 0.0, 0))
+        await bridge.observed(replace(laid(CARDS[9][:2]), side=2))
+        await bridge.observed(replace(laid(CARDS[8][:2]), side=None))
+        # A remote seat lays nothing itself, and its cards may be laid from any side.
+        table.state.to_lay.add(seat=3, pizza=1, cards=pb.SeenCards(cards=[6, 6]))
+        await bridge.observed(replace(laid(CARDS[7][:2]), side=3))
+        await bridge.observed(replace(laid(CARDS[6][:2]), side=1))
+
+    run(test())
+    assert [report.laid.seat if report.laid.HasField("seat") else None for report in table.reports[1:]] == [2, None, None, None]
 
 
 def test_nothing_is_added_to_what_a_remote_seat_decided(table: Table, bridge: Bridge) -> None:

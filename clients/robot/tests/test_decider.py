@@ -28,6 +28,7 @@ class Table:
         self.decider = Decider()
         self.events: list[Observed] = []
         self.reaching = False
+        self.sides: tuple[int, ...] = ()
         self._frame = 0
         self._still = [9] * len(SPOTS)
         self._looks = [1] * len(SPOTS)
@@ -43,7 +44,7 @@ class Table:
                 for still, look, before, empty in zip(self._still, self._looks, self._before, self._empty, strict=True)
             )
             tags = tuple(tag for spot, piece in enumerate(self._tops) if piece for tag in tags_of(piece, spot))
-            self.events += self.decider.see(Sighting(self._frame, self._frame / FPS, None, tags, self.reaching, places))
+            self.events += self.decider.see(Sighting(self._frame, self._frame / FPS, None, tags, self.reaching, places, self.sides))
             self._frame += 1
             self._still = [still + 1 for still in self._still]
 
@@ -158,6 +159,26 @@ def test_a_play_that_a_hand_lays_card_by_card_is_reported_when_it_has_left() -> 
     (event,) = table.said()
     assert isinstance(event, Laid)
     assert event.cards == NINES
+
+
+@pytest.mark.parametrize(
+    ("sides", "expected"), [([(2,)], 2), ([()], None), ([(0, 1)], None), ([(3,), (3,)], 3), ([(1,), (2,)], None)]
+)
+def test_who_laid_cards_is_seen_by_the_arm_that_reached_in(sides: list[tuple[int, ...]], expected: int | None) -> None:
+    table = Table()
+    for place, reached in enumerate(sides):
+        table.reaching, table.sides = True, reached
+        table.wait(3)
+        table.put(place, cards=(NINES[place],))
+        table.wait(2)
+    # The arm leaves, and that of another comes before the cards were read.
+    table.sides = (1, 3)
+    table.wait(8)
+    table.reaching, table.sides = False, ()
+    table.wait(4)
+    (event,) = table.said()
+    assert isinstance(event, Laid)
+    assert event.side == expected
 
 
 def test_a_place_that_looked_empty_for_a_moment_is_cleared_with_the_others() -> None:

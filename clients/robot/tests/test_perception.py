@@ -125,7 +125,13 @@ def happened(events: Sequence[Observed]) -> list[tuple[Any, ...]]:
 
 
 def assert_true(table: SyntheticTable, events: Sequence[Observed]) -> None:
-    """The events are what truly happened; withdrawn pass cards may come before or after the clearing beside them."""
+    """The events are what truly happened; withdrawn pass cards may come before or after the clearing beside them.
+
+    From which side cards were laid is right, or not known.
+    """
+    by_cards = {true_event.cards: true_event.seat for true_event in table.true_events if true_event.kind == "laid"}
+    wrong = [event for event in events if isinstance(event, Laid) and event.side not in (None, by_cards.get(event.cards))]
+    assert not wrong
     assert sorted(map(str, happened(events))) == sorted(str(said(true_event)) for true_event in table.true_events)
     laid = [event for event in happened(events) if event[0] in ("laid", "cleared")]
     assert laid == [said(true_event) for true_event in table.true_events if true_event.kind in ("laid", "cleared")]
@@ -138,6 +144,12 @@ def test_the_first_pizzas_of_a_shift(name: str) -> None:
     table = SyntheticTable(acts, difficulty, seed=11)
     assert len(table.true_events) >= 8
     assert_true(table, watch(table))
+
+
+def test_most_plays_show_from_which_side_they_were_laid() -> None:
+    acts = [act for act in acts_of_steps(random_shift(11), 11, EASY.pause, EASY.hovers) if act.start < 18.0]
+    laid = [event for event in watch(SyntheticTable(acts, EASY, seed=11)) if isinstance(event, Laid)]
+    assert sum(event.side is not None for event in laid) >= 0.8 * len(laid)
 
 
 DISTURBANCES: dict[str, Difficulty] = {

@@ -32,6 +32,9 @@ LOG = logging.getLogger("chefshat_robot")
 MAX_PICTURE_BYTES = 32 * 1024
 """The largest picture a question may have."""
 
+SIDES = 4
+"""At tables with so many seats or fewer, each has a side of the field of its own."""
+
 OnAnswer: TypeAlias = Callable[[int], Awaitable[None]]
 """What is done with the index of the right option of a question."""
 
@@ -66,12 +69,14 @@ class _Play:
         cards: The cards.
         places: Where they lie, 1..11.
         report: The number of the report; 0 if it does not count.
+        seat: Who laid them; None if that is not known.
         complete: Whether they are what a remote seat decided: nothing can be added.
     """
 
     cards: list[Card]
     places: set[int]
     report: int
+    seat: int | None
     complete: bool
 
 
@@ -208,7 +213,7 @@ class Bridge:
             return
         match event:
             case Laid():
-                await self._laid(list(event.cards), set(event.places))
+                await self._laid(list(event.cards), set(event.places), self._seat_at(event.side))
             case TakenBack():
                 await self._taken_back(list(event.cards))
             case Cleared():
@@ -234,16 +239,23 @@ class Bridge:
             case FieldChanged():
                 await self._withdraw("field")
 
-    async def _laid(self, cards: list[Card], places: set[int]) -> None:
+    def _seat_at(self, side: int | None) -> int | None:
+        """The seat that laid cards from a side of the field; None if it is not sure: those of remote seats come from anywhere."""
+        state = self.state
+        if side is None or state is None or len(state.seats) > SIDES or any(wanted.pizza for wanted in state.to_lay):
+            return None
+        return side if side < len(state.seats) and state.seats[side].at_table else None
+
+    async def _laid(self, cards: list[Card], places: set[int], seat: int | None) -> None:
         """Reports cards on the board: a play, or perhaps an addition to the last one."""
         play = self._play
         if play is None or play.complete or play.places & places or not _may_belong(cards, play.cards):
-            await self._new_play(cards, places)
+            await self._new_play(cards, places, seat)
             return
 
         async def add(option: int) -> None:
             if option == 1:
-                await self._new_play(cards, places)
+                await self._new_play(cards, places, seat)
             elif self._play is play:
                 play.cards, play.places = play.cards + cards, play.places | places
                 await self._replace(play)
@@ -254,12 +266,12 @@ class Bridge:
         text = f"{_names(cards)} laid beside {_names(play.cards)}: do they belong to this play?"
         await self._ask("added", text, ["Yes, it is one play", "No, somebody else laid them"], add)
 
-    async def _new_play(self, cards: list[Card], places: set[int]) -> None:
+    async def _new_play(self, cards: list[Card], places: set[int], seat: int | None) -> None:
         seen = seen_cards(cards)
         decided = [wanted.cards.cards for wanted in self.state.to_lay if wanted.pizza] if self.state is not None else []
-        response = await self._report(pb.TableReport(laid=pb.CardsLaid(cards=seen)))
+        response = await self._report(pb.TableReport(laid=pb.CardsLaid(seat=seat, cards=seen)))
         number = response.report if response.verdict in (pb.REPORT_VERDICT_ACCEPTED, pb.REPORT_VERDICT_HELD) else 0
-        self._play = _Play(cards, places, number, complete=list(seen.cards) in [list(faces) for faces in decided])
+        self._play = _Play(cards, places, number, seat, complete=list(seen.cards) in [list(faces) for faces in decided])
 
     async def _taken_back(self, cards: list[Card]) -> None:
         """Cards were taken back. A play that counts is taken back only if somebody says so."""
@@ -286,9 +298,9 @@ class Bridge:
         if not play.report:
             self._play = None
             if play.cards:
-                await self._new_play(play.cards, play.places)
+                await self._new_play(play.cards, play.places, play.seat)
             return
-        instead = pb.TableReport(laid=pb.CardsLaid(cards=seen_cards(play.cards))) if play.cards else None
+        instead = pb.TableReport(laid=pb.CardsLaid(seat=play.seat, cards=seen_cards(play.cards))) if play.cards else None
         try:
             response = await self._report(pb.TableReport(correction=pb.ReportCorrection(report=play.report, instead=instead)))
         except ChefsHatError as error:

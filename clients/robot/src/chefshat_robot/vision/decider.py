@@ -19,6 +19,7 @@ The decider sees no pictures, so that a recording of sightings gives the same ev
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
@@ -45,6 +46,10 @@ TOGETHER_SECONDS = 0.8
 """What begins no more than this before the first card of a play, or before clearing, is of the same movement of a hand, in s."""
 REACH = 45.0
 """A card belongs to the nearest place, if its centre is no further from it than this, in mm."""
+REMEMBERED = 120
+"""Frames of which it is remembered over which sides of the field something reached."""
+LAID_FRAMES = 6
+"""A card was laid in so many frames before its place became still: whose arm reached in then laid it."""
 TRUSTED_HAMMING = 1
 """Readings of tags with more corrected bits count half."""
 SAME_CARD_MM = 12.0
@@ -156,6 +161,13 @@ class _Play:
     """Its open doubts."""
     closed: bool = False
     """Whether no further card can belong to it."""
+    sides: set[int | None] = dataclass_field(default_factory=set)
+    """The sides from which its cards were laid; None for one that is not known."""
+
+    @property
+    def side(self) -> int | None:
+        """The side from which all its cards were laid; None if that is not sure."""
+        return next(iter(self.sides)) if len(self.sides) == 1 else None
 
 
 @dataclass
@@ -204,6 +216,8 @@ class Decider:
         self._time = 0.0
         self._moved = 0.0
         self._reaching = False
+        # The sides over which something reached in the latest frames.
+        self._reached: deque[tuple[int, ...]] = deque(maxlen=REMEMBERED)
         self._places: tuple[SeenPlace, ...] = ()
 
     # What a bridge and a reader may ask.
@@ -249,6 +263,7 @@ class Decider:
             self._tracks.clear()
         self._places = sighting.places
         self._reaching = sighting.reaching
+        self._reached.append(sighting.sides)
         if sighting.places:
             if any(sighting.places[spot].still == 0 for spot in CARD_SPOTS):
                 self._moved = self._time
@@ -423,7 +438,15 @@ class Decider:
             play = _Play(self._time)
             self._queue.append(play)
         play.cards[card] = track.spot
+        play.sides.add(self._side_of(track.spot))
         self._explained(track.spot, events)
+
+    def _side_of(self, spot: int) -> int | None:
+        """The side from which the card on top of a place was laid; None if nothing reached in then, or over several sides."""
+        became_still = len(self._reached) - self._places[spot].still
+        laid = list(self._reached)[max(became_still - LAID_FRAMES, 0) : max(became_still, 0)]
+        sides = {side for reached in laid for side in reached}
+        return sides.pop() if len(sides) == 1 else None
 
     def _open_play(self) -> _Play | None:
         """The play that further cards may belong to."""
@@ -618,7 +641,7 @@ class Decider:
                     return
                 entry.closed = True
                 if entry.cards:
-                    events.append(Laid(self._frame, self._time, *_in_order(entry.cards)))
+                    events.append(Laid(self._frame, self._time, *_in_order(entry.cards), entry.side))
             elif isinstance(entry, _PassMoved):
                 events.append((PassShown if entry.shown else PassWithdrawn)(self._frame, self._time, entry.seat))
             elif entry.cards is None:

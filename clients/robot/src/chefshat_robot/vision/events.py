@@ -30,12 +30,15 @@ class Laid:
     Attributes:
         cards: The cards, in order of their places.
         places: The place of each card, 1..11, in the same order.
+        side: The side of the field from which an arm reached in as they were laid: 0 the bottom, where seat 0 sits, then clockwise.
+            None if the picture shows none, or several.
     """
 
     frame: int
     time: float
     cards: tuple[Card, ...]
     places: tuple[int, ...]
+    side: int | None = None
 
 
 @dataclass(frozen=True)

@@ -124,6 +124,8 @@ class Sighting:
         field: The change of the field's state, if any.
         tags: The tags read, each once.
         reaching: Whether an arm or something else reaches over the edge of the field.
+        sides: The sides over whose edges it reaches: 0 the bottom, where seat 0 sits, then clockwise. Empty in recordings that were
+            made before there were sides.
         places: The eleven places for cards, then the four for pass cards; empty while the field is not found.
     """
 
@@ -133,6 +135,7 @@ class Sighting:
     tags: tuple[SeenTag, ...]
     reaching: bool
     places: tuple[SeenPlace, ...]
+    sides: tuple[int, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The sighting as a JSON object."""
@@ -157,6 +160,7 @@ class Sighting:
                 tags=tuple(SeenTag(*tag) for tag in values["tags"]),
                 reaching=bool(values["reaching"]),
                 places=tuple(SeenPlace(*place) for place in values["places"]),
+                sides=tuple(values.get("sides", ())),
             )
         except (KeyError, TypeError) as error:
             raise ValueError(f"not a line of a recording: {values!r}") from error
@@ -241,7 +245,8 @@ class Reader:
         to_read += [number for number in closely if number not in to_read]
         tags = self._read_tags(grey, [number for number in to_read if number not in closely], closely)
         places = tuple(self._seen(number, number in to_read, tags) for number in range(len(SPOTS)))
-        return Sighting(frame.index, frame.time, changed, tuple(tags), self._is_reaching(blocks), places)
+        reaching, sides = self._reached(blocks)
+        return Sighting(frame.index, frame.time, changed, tuple(tags), reaching, places, sides)
 
     def cut_out(self, image: Picture, spot: int) -> Picture:
         """The picture of a place, seen from straight above, `view.MAP_SCALE` pixels per mm."""
@@ -251,16 +256,20 @@ class Reader:
             max(round(place.x - half_width - 12), 0) : round(place.x + half_width + 12),
         ].copy()
 
-    def _is_reaching(self, blocks: NDArray[np.float32]) -> bool:
-        """Whether something reaches over the edge of the field: the edge looks otherwise than it did."""
+    def _reached(self, blocks: NDArray[np.float32]) -> tuple[bool, tuple[int, ...]]:
+        """Whether something reaches over the edge of the field, and over which sides: the edge looks otherwise than it did."""
         coarse = _shrunk(blocks, EDGE)
-        edge = np.concatenate([coarse[0], coarse[-1], coarse[:, 0], coarse[:, -1]])
+        sides = [coarse[-1], coarse[:, 0], coarse[0], coarse[:, -1]]
+        edge = np.concatenate(sides)
         if self._edge is None:
             self._edge = edge
         change = np.abs(edge - self._edge)
         self._edge += EDGE_ADAPT * (edge - self._edge)
         noise = float(np.median(change)) / 0.6745
-        return int(np.count_nonzero(change > max(EDGE_CHANGE, MOVEMENT_SIGMAS * noise))) >= EDGE_BLOCKS
+        changed = change > max(EDGE_CHANGE, MOVEMENT_SIGMAS * noise)
+        of_sides = np.split(changed, np.cumsum([len(side) for side in sides])[:-1])
+        reached = tuple(number for number, side in enumerate(of_sides) if np.count_nonzero(side) >= EDGE_BLOCKS)
+        return int(np.count_nonzero(changed)) >= EDGE_BLOCKS, reached
 
     def _movement(self, blocks: NDArray[np.float32], around: NDArray[np.float32]) -> NDArray[np.bool_] | None:
         """Which blocks of the map, with the brightness of their surroundings, moved since the last frame; None: all of them."""
