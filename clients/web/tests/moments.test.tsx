@@ -30,7 +30,8 @@ const play = (seat: number, face: number, quantity: number, cardsLeft: number): 
   return { case: "play", value: { seat, face, quantity, cardsLeft } };
 };
 
-afterEach(() => {
+afterEach(async () => {
+  await act(() => render(null, root));
   vi.useRealTimers();
   setPreference("moments", true);
 });
@@ -79,16 +80,34 @@ test("a moment is shown for a while; the past of a table is not", async () => {
   expect(shown()).toBeUndefined();
 });
 
+/** What is read out of a table. */
+function Heard({ table }: { table: TableState }) {
+  useAnnounced(table, undefined, undefined);
+  return (
+    <>
+      <Moment table={table} />
+      <Announcer />
+    </>
+  );
+}
+
+test.each([
+  ["of a Shift when it ends", [shiftEnds()], /^Shift 1 is over, Ada finished first\. 1st Ada, 5 points\./],
+  [
+    "of the game once, if its last Shift ends it",
+    [shiftEnds(), gameEnds()],
+    /first\. The game is over\. Ada won\. 1st Ada/,
+  ],
+])("the points %s are read out", async (_, kinds, expected) => {
+  const dealt = played(start(), deal);
+  await act(() => render(<Heard table={dealt} />, root));
+  await act(() => render(<Heard table={played(dealt, ...kinds)} />, root));
+  const heard = () => root.querySelector('[role="status"]')?.textContent ?? "";
+  await vi.waitFor(() => expect(heard()).toMatch(expected));
+  expect(heard().match(/\d points?/g)).toEqual(["5 points", "3 points", "1 point", "0 points"]);
+});
+
 test("what a moment means is read out after who played", async () => {
-  const Heard = ({ table }: { table: TableState }) => {
-    useAnnounced(table, undefined, undefined);
-    return (
-      <>
-        <Moment table={table} />
-        <Announcer />
-      </>
-    );
-  };
   const dealt = played(start(), deal);
   await act(() => render(<Heard table={dealt} />, root));
   await act(() => render(<Heard table={played(dealt, play(1, 11, 2, 15))} />, root));
@@ -113,6 +132,16 @@ test("moments can be switched off", async () => {
   await act(() => render(<Moment table={played(dealt, play(1, 11, 2, 15))} />, root));
   expect(root.querySelector('[data-part~="moment"]')).toBeNull();
 });
+
+function shiftEnds(): Kind {
+  const points = [5n, 3n, 1n, 0n];
+  return { case: "shiftEnded", value: { shift: 1, order: [0, 1, 2, 3], shiftPoints: points.map(Number), points } };
+}
+
+function gameEnds(): Kind {
+  const standings = [5n, 3n, 1n, 0n].map((points, seat) => ({ seat, points, place: seat + 1 }));
+  return { case: "gameEnded", value: { standings } };
+}
 
 function declared(action: SpecialAction): Kind {
   return { case: "specialActionDeclared", value: { seat: 1, action } };

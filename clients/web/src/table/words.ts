@@ -137,7 +137,8 @@ export function outcomeWords(table: TableState, { entry }: LogLine): string {
   const line = (seat: number, place: number, points: number) =>
     `${t().common.place(place)} ${distinctName(table, seat)}, ${t().common.points(points)}.`;
   const { result, standings } = table;
-  if (entry.kind === "shiftOver" && result?.shift === entry.shift)
+  // Of the last Shift it is that of the game, which follows.
+  if (entry.kind === "shiftOver" && result?.shift === entry.shift && standings.length === 0)
     return result.order.map((seat, index) => line(seat, index + 1, result.points[seat] ?? 0)).join(" ");
   const [winner] = standings;
   if (entry.kind !== "gameOver" || winner === undefined) return "";
