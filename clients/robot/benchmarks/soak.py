@@ -44,7 +44,7 @@ REMOTE = 2
 BETWEEN_TROUBLES_S = (4.0, 20.0)
 ANSWERED_AFTER_S = (0.0, 6.0)
 AWAY_FRAMES = (15, 75)
-GAME_LIMIT_S = 1200.0
+GAME_LIMIT_S = 600.0
 
 
 class Server:
@@ -127,14 +127,16 @@ async def play_game(server: Server, seed: int, tally: Tally) -> None:
             while not over.is_set():
                 running = asyncio.create_task(bridge.run(eye.frames(), after))
                 ended = asyncio.create_task(again.wait())
-                await asyncio.wait([running, ended], return_when=asyncio.FIRST_COMPLETED)
-                ended.cancel()
-                if running.done():
-                    running.result()
-                    over.set()
-                    return
-                running.cancel()
-                await asyncio.gather(running, return_exceptions=True)
+                try:
+                    await asyncio.wait([running, ended], return_when=asyncio.FIRST_COMPLETED)
+                    if running.done():
+                        running.result()
+                        over.set()
+                        return
+                finally:
+                    for task in (running, ended):
+                        task.cancel()
+                    await asyncio.gather(running, ended, return_exceptions=True)
                 again.clear()
                 bridge = Bridge(client, ticket, Perception(table.camera, deck=0))
 
@@ -176,7 +178,7 @@ async def play_game(server: Server, seed: int, tally: Tally) -> None:
                 await watch()
                 result = await playing
         except TimeoutError:
-            tally.hung.append(f"game {seed}: {bridge.state.waiting_for if bridge.state else 'no state'}")
+            tally.hung.append(f"game {seed}: {_waits_for(bridge.state)}")
             return
         finally:
             over.set()
@@ -199,6 +201,16 @@ async def play_game(server: Server, seed: int, tally: Tally) -> None:
             break
     if len(recorded) < len(laid) or any(seat < REMOTE for seat, _ in recorded[len(laid) :]):
         tally.wrong.append(f"game {seed}: {len(recorded)} plays recorded, {len(laid)} laid")
+
+
+def _waits_for(state: pb.TableState | None) -> str:
+    """What a table waits for."""
+    if state is None:
+        return "no state"
+    asked = [f"{question.text} {list(question.options)}" for question in state.questions]
+    to_lay = [wanted.text for wanted in state.to_lay]
+    reported = [report.text for report in state.reports[-3:]]
+    return f"{state.waiting_for}; paused: {state.paused}; asked: {asked}; to lay: {to_lay}; reported last: {reported}"
 
 
 async def soak(arguments: argparse.Namespace) -> Tally:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import random
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from chefshat import pb
@@ -24,6 +24,8 @@ PAUSE_S = 0.8
 """Time between the end of one act and the start of the next, by the clock of the frames."""
 PATIENCE_S = 6.0
 """How long people wait for the table to notice what they did, by the clock of the frames, before they do something else."""
+TURN_S = 2.0
+"""Time to take a card up before it is laid with its face up."""
 MAX_PLACES = 11
 
 
@@ -103,13 +105,32 @@ class Rehearsal:
             if state.version <= version and time < until:
                 return
             self._expected = None
+            if state.version <= version and not state.questions and (turned := self._turn_over(time)):
+                self._do(turned, state)
+                return
         if state.observation.shift > self._dealt:
             self._deal(state)
-        act = await self._next(state, time)
-        if act is not None:
-            for one in act:
-                self.table.perform(one)
-            self._expected = (state.version, self.table.busy_until + PATIENCE_S)
+        acts = await self._next(state, time)
+        if acts is not None:
+            self._do(acts, state)
+
+    def _do(self, acts: Sequence[Act], state: pb.TableState) -> None:
+        """Lets hands act, and waits for the table to notice it."""
+        for act in acts:
+            self.table.perform(act)
+        self._expected = (state.version, self.table.busy_until + PATIENCE_S)
+
+    def _turn_over(self, time: float) -> list[Act] | None:
+        """A card that lies with its back up and was not noticed is turned over; None if there is none.
+
+        A camera that was switched on later takes its back for the empty place.
+        """
+        if not self._lying or not self._lying[-1].face_down:
+            return None
+        down = self._lying.pop()
+        up = replace(down, start=time + TURN_S, face_down=False)
+        self._lying.append(up)
+        return [TakeBack(time + 0.05, down.seat, down.places), up]
 
     def _deal(self, state: pb.TableState) -> None:
         """Shuffles and deals the cards of a Shift."""
@@ -222,7 +243,8 @@ class Rehearsal:
             await self._report(gift=pb.GiftSeen(seat=seat, cards=wanted.cards))
         elif wanted.cards.cards:
             if wanted == self._carried_out:
-                return None  # The cards lie there; the camera has not reported them yet.
+                # The cards lie there; the camera has not reported them yet.
+                return self._turn_over(start)
             self._carried_out = wanted
             cards = self._take(seat, wanted.cards)
             self._play(seat, cards)
