@@ -275,18 +275,9 @@ impl StudyHandle {
         at: At,
         answers: Vec<ItemAnswer>,
     ) -> Result<Result<u32, NotAdded>, Stopped> {
-        let memory = match self.data.for_answers(key, &answers) {
-            Ok(memory) => memory,
-            Err(refused) => return Ok(Err(refused.into())),
-        };
-        let data = Arc::clone(&self.data);
-        let answered = self.command(move |study, now_ms| {
-            let change = study.answer(at, answers, now_ms)?;
-            // Here, because the caller may go before it gets its answer.
-            data.keep_answers(at.number, memory);
-            Ok((vec![change], 0))
-        });
-        Ok(answered.await?.map_err(NotAdded::from))
+        let change = move |study: &Study, answers, now_ms| study.answer(at, answers, now_ms);
+        self.keep(key, at.number, answers, change, StudyData::keep_answers)
+            .await
     }
 
     /// Saves what a participant has entered so far, and charges a caller for its memory.
@@ -299,18 +290,42 @@ impl StudyHandle {
         at: At,
         answers: Vec<ItemAnswer>,
     ) -> Result<Result<u32, NotAdded>, Stopped> {
+        let change = move |study: &Study, answers, _| study.save(at, answers);
+        self.keep(
+            key,
+            at.number,
+            answers,
+            change,
+            StudyData::keep_saved_answers,
+        )
+        .await
+    }
+
+    /// Makes the change of answers of a participant, and charges a caller for their memory, which
+    /// `kept` holds.
+    async fn keep(
+        &self,
+        key: Key,
+        number: u32,
+        answers: Vec<ItemAnswer>,
+        change: impl FnOnce(&Study, Vec<ItemAnswer>, u64) -> Result<Change, Refusal>
+        + Send
+        + Sync
+        + 'static,
+        kept: fn(&StudyData, u32, Held),
+    ) -> Result<Result<u32, NotAdded>, Stopped> {
         let memory = match self.data.for_answers(key, &answers) {
             Ok(memory) => memory,
             Err(refused) => return Ok(Err(refused.into())),
         };
         let data = Arc::clone(&self.data);
-        let saved = self.command(move |study, _| {
-            let change = study.save(at, answers)?;
+        let changed = self.command(move |study, now_ms| {
+            let change = change(study, answers, now_ms)?;
             // Here, because the caller may go before it gets its answer.
-            data.keep_saved_answers(at.number, memory);
+            kept(&data, number, memory);
             Ok((vec![change], 0))
         });
-        Ok(saved.await?.map_err(NotAdded::from))
+        Ok(changed.await?.map_err(NotAdded::from))
     }
 
     /// What a participant has entered at its step so far, and how long ago it reached the step, in

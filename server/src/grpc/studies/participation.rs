@@ -68,9 +68,7 @@ impl StudyCalls {
             )
         })
     }
-}
 
-impl StudyCalls {
     /// Reads answers, and charges a caller for storing them.
     fn answers(
         &self,
