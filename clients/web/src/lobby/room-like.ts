@@ -8,7 +8,7 @@ import { GameOrigin, type Participant, ParticipantKind, type Room, RoomPolicySch
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
 import { NO_KEY, nameKey } from "../name-key";
 import { navigate } from "../router";
-import { closeRoom, createRoom, type HeldSeat, hostedRoom, takeSeat } from "./seat";
+import { closeRoom, createRoom, type HeldSeat, hostedRoom, saidRoom, takeSeat } from "./seat";
 
 /** The request for a room with the rules, the policy and the agents of another. */
 export function requestLike(room: Room): MessageInitShape<typeof CreateRoomRequestSchema> {
@@ -59,8 +59,7 @@ export async function roomOfTicket(roomId: string, ticket: string, signal?: Abor
   const headers = { [SECRET_HEADER]: ticket };
   const call = { headers, timeoutMs: CALL_LIMIT_MS, ...(signal && { signal }) };
   const { room } = await roomApi.getRoom({ roomId }, call);
-  if (!room) throw new Error("the server did not say which room it is");
-  return room;
+  return saidRoom(room);
 }
 
 /** Takes the same seat in the room in which the participants of a room play again, and navigates to it. */

@@ -146,7 +146,8 @@ export function invitation(code: string): string {
   return `${location.origin}/join/${canonical(code)}`;
 }
 
-function saidRoom(room: Room | undefined): Room {
+/** The room of a response. */
+export function saidRoom(room: Room | undefined): Room {
   if (!room) throw new Error("the server did not say which room it is");
   return room;
 }

@@ -183,7 +183,7 @@ test("after a game everybody is one click away from another with the same seats"
   await sitDown(rosa.page, server, code, "Rosa");
   await sitDown(karl.page, server, code, "Karl");
   await Promise.all([playOn(rosa.page, byClicks), playOn(karl.page, byClicks)]);
-  // Whoever is first: nobody here created the room.
+  // Nobody here created the room: the first one to offer a rematch counts.
   await rosa.page.getByRole("button", { name: "Invite to a rematch" }).waitFor();
   await karl.page.getByRole("button", { name: "Invite to a rematch" }).click();
   await karl.page.waitForURL((url) => url.pathname.startsWith("/rooms/") && !url.pathname.endsWith(roomId));
