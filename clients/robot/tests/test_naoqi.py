@@ -165,7 +165,7 @@ class Arm(Log):
 class Pepper:
     """A robot's session with its services."""
 
-    def __init__(self, *, arm: bool = True, animated: bool = False) -> None:
+    def __init__(self, *, arm: bool = True, animated: bool = False, awareness: object | None = None) -> None:
         self.session = qi.Session()
         self.session.listenStandalone("tcp://127.0.0.1:0")
         self.url = str(self.session.endpoints()[0])
@@ -173,7 +173,7 @@ class Pepper:
         self.memory, self.arm, self.animated = Memory(), Arm(), TextToSpeech()
         self.motion, self.awareness, self.recognition = Motion(), Awareness(), Recognition()
         self.session.registerService("ALMotion", self.motion)
-        self.session.registerService("ALBasicAwareness", self.awareness)
+        self.session.registerService("ALBasicAwareness", awareness or self.awareness)
         self.session.registerService("ALSpeechRecognition", self.recognition)
         self.session.registerService("ALTextToSpeech", self.speech)
         self.session.registerService("ALTracker", self.tracker)
@@ -278,6 +278,21 @@ def test_the_robot_wakes_up_attends_to_the_game_and_listens_for_words_until_it_i
             async with NaoqiDriver(url=pepper.url):
                 pass
             assert not pepper.awareness.enabled
+        finally:
+            await asyncio.to_thread(pepper.session.close)
+
+    run(test())
+
+
+def test_a_robot_that_cannot_say_whether_it_turns_to_people_plays() -> None:
+    class Older:
+        """Has neither isEnabled nor setEnabled."""
+
+    async def test() -> None:
+        pepper = await asyncio.to_thread(Pepper, awareness=Older())
+        try:
+            async with NaoqiDriver(url=pepper.url) as driver:
+                assert await attempt(driver, Say("Hello"), FAR_S) == Done()
         finally:
             await asyncio.to_thread(pepper.session.close)
 

@@ -12,7 +12,7 @@ Its argument is a text, the moves as JSON (`chefshat_robot.wire`); it returns ""
 not pick up cards: without such a service, the robot asks the people to lay its cards. Touches are reported, and the words that
 speech recognition understands (`WordRecognized`): those of `words=`, such as "pass;my turn", or of a vocabulary of your own.
 
-When it connects, the robot wakes up (ALMotion.wakeUp), and no longer turns to whoever moves or speaks (ALBasicAwareness), which
+When it connects, the robot wakes up (ALMotion.wakeUp), and no longer turns to people who move or speak (ALBasicAwareness), which
 would fight with the gazes of the game; when it is closed, it does again if it did before.
 """
 
@@ -96,7 +96,7 @@ class NaoqiDriver(Driver):
         self._distance, self._table = distance, table
         self._arm = arm
         self._words = [word for part in words.split(";") if (word := part.strip())]
-        # Whether the robot turned to whoever moves or speaks before it played.
+        # Whether the robot turned to people who move or speak before it played.
         self._was_aware = False
         self._session: Any = None
         self._language = ""
@@ -133,7 +133,9 @@ class NaoqiDriver(Driver):
         await self._try("ALMotion", "wakeUp")
         awareness = await self._service("ALBasicAwareness")
         if awareness is not None:
-            self._was_aware = self._was_aware or bool(await self._result(awareness.isEnabled(_async=True)))
+            # Older versions of NAOqi do not say whether it did.
+            with contextlib.suppress(AttributeError, RobotError):
+                self._was_aware = self._was_aware or bool(await self._result(awareness.isEnabled(_async=True)))
             await self._try("ALBasicAwareness", "setEnabled", False)
         if self._words:
             await self._try("ALSpeechRecognition", "pause", True)
