@@ -8,8 +8,11 @@ import { expect } from "vitest";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 
-/** The size of a small phone. */
-export const PHONE = { width: 360, height: 740 };
+/** As narrow as the smallest phone, or a computer whose page is enlarged to 400 %. */
+export const PHONE = { width: 320, height: 740 };
+
+/** Phones, the smallest first, and one on its side. */
+export const PHONES = [PHONE, { width: 375, height: 667 }, { width: 390, height: 664 }, { width: 667, height: 375 }];
 
 /** Everything that axe-core finds in the light and the dark theme, with any impact, also against best practice. */
 export async function inaccessible(page: Page): Promise<string[]> {

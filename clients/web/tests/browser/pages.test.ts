@@ -5,7 +5,7 @@ import type { Page } from "playwright-core";
 import { beforeAll, expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
 import { languages } from "../../src/i18n";
-import { inaccessible, PHONE, tooWide, unnamed } from "./checks";
+import { inaccessible, PHONES, tooWide, unnamed } from "./checks";
 import { newStudy } from "./participants";
 import { byClicks, nextDecision, sitDown } from "./play";
 import { agent, clientsOf, gameOf, newPhysicalRoom, newRoom } from "./rooms";
@@ -160,9 +160,11 @@ test.each(Object.keys(PAGES))("%s: accessible in both themes, and no wider than 
   await page.locator(ready).first().waitFor();
   if (opened) await page.locator(opened).first().click();
   expect(await inaccessible(page)).toEqual([]);
-  await page.setViewportSize(PHONE);
-  // The page adapts to the new size over a few frames.
-  await expect.poll(() => tooWide(page)).toEqual([]);
+  for (const phone of PHONES.toReversed()) {
+    await page.setViewportSize(phone);
+    // The page adapts to the new size over a few frames.
+    await expect.poll(() => tooWide(page), { message: JSON.stringify(phone) }).toEqual([]);
+  }
   // Texts in other languages are longer.
   for (const { value } of languages.filter(({ value }) => value !== "en")) {
     await page.goto(`${server.url}${path()}${path().includes("?") ? "&" : "?"}lang=${value}`);
