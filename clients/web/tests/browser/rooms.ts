@@ -51,7 +51,9 @@ interface Wanted {
   >;
 }
 
-/** Creates a room for a few Shifts with an hour per decision. */
+const AN_HOUR_MS = 3_600_000;
+
+/** Creates a room for a few Shifts that waits an hour for each decision, also of those who are away. */
 export async function newRoom(
   server: Server,
   wanted: Wanted,
@@ -60,7 +62,7 @@ export async function newRoom(
     name: wanted.name ?? "Friday evening",
     rules: { preset: "paper", faces: wanted.faces ?? 11, stop: { case: "targetShifts", value: wanted.shifts ?? 1 } },
     seats: wanted.seats.map((who) => ({ filledBy: filledBy(who) })),
-    policy: { decisionTimeMs: 3_600_000, paceMs: 0, spectators: true, ...wanted.policy },
+    policy: { decisionTimeMs: AN_HOUR_MS, absenceTimeMs: AN_HOUR_MS, paceMs: 0, spectators: true, ...wanted.policy },
     ...(wanted.hands && { start: { case: "scripted" as const, value: secondShift(wanted.hands, wanted.faces ?? 11) } }),
     ...(wanted.rated ? {} : { gameSeed: new Uint8Array(32).fill(7) }),
   });
