@@ -169,6 +169,7 @@ export const byKeys: Way = async (page) => {
   const ready = page.locator(
     '[data-action="play"][aria-disabled="false"], [data-action="give"][aria-disabled="false"]',
   );
+  const picked = page.locator('[data-part~="hand-card"][aria-pressed="true"]');
   const onHand = (on: Focus) => on.card !== "" || on.label === HAND;
   if (!onHand(await focus(page))) await tabTo(page, onHand, (await focus(page)).action ? "Shift+Tab" : "Tab");
   await page.keyboard.press("End");
@@ -176,8 +177,10 @@ export const byKeys: Way = async (page) => {
   for (let at = cards; at > 0 && (await ready.count()) === 0; at -= 1) {
     const on = await focus(page);
     if (!on.disabled && !on.pressed) {
+      const already = await picked.count();
       await page.keyboard.press("Space");
-      await until(async () => (await focus(page)).pressed);
+      // The Golden card is picked first of its face, where it must be played.
+      await until(async () => (await picked.count()) !== already);
     }
     if ((await ready.count()) === 0) await page.keyboard.press("ArrowLeft");
   }

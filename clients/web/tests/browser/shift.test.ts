@@ -48,8 +48,9 @@ test("a play that is pressed while the network is gone arrives when it is back",
   await tap.stop();
 });
 
-test("a person plays a complete Shift with the keyboard alone, and hears every turn", async () => {
-  const { roomId, code } = await newRoom(server, { seats: ["person", ...OPPONENTS], faces: 9 });
+test("a person plays a complete game with the keyboard alone, and hears all that happens in its order", async () => {
+  const names = ["Rosa", "greedy", "random", "trained"];
+  const { roomId, code } = await newRoom(server, { seats: ["person", ...names.slice(1)], faces: 9, shifts: 2 });
   const { page, faults } = await person(browser);
   const heard = await hearing(page);
   await page.goto(`${server.url}/join/${code}`);
@@ -65,6 +66,23 @@ test("a person plays a complete Shift with the keyboard alone, and hears every t
   await expectEnd(page, roomId, taken);
   await expect.poll(() => heard.join(" ").match(/Your turn\./g)?.length).toBe(taken);
   await expect.poll(() => heard.join(" ")).toMatch(/The game is over\. .+ won\. 1st .+, \d+ points?\. 2nd /);
+  const record = await recordOf(server, await gameOf(server, roomId));
+  const happened = record.flatMap(({ line }) => {
+    const { case: kind, value } = line.case === "event" ? line.value.kind : { case: undefined, value: undefined };
+    if (kind === "play") return [`${names[value.seat]} plays`];
+    if (kind === "pass") return [`${names[value.seat]} passes`];
+    if (kind === "seatFinished") return [`${names[value.seat]} finishes`];
+    if (kind === "cardsExchanged") return [`${names[value.giver]} gives`];
+    if (kind === "pizzaDone") return [`Pizza ${value.pizza} is done`];
+    if (kind === "shiftEnded") return [`Shift ${value.shift} is over`];
+    return [];
+  });
+  const words = `(${names.join("|")}) (plays|passes|finishes|gives)|Pizza \\d+ is done|Shift \\d is over`;
+  const said = heard.join(" ").match(new RegExp(words, "g")) ?? [];
+  // What happened while the page loaded is seen, not heard.
+  const fromOwnTurn = (all: string[]) => all.slice(all.findIndex((what) => what.startsWith("Rosa ")));
+  expect(fromOwnTurn(said)).toEqual(fromOwnTurn(happened));
+  expect(heard.join(" ")).toMatch(/Rosa: .+\. greedy: .+\. random: .+\. trained: /);
   // The focus is on the result, from where the next step is a few keys away.
   await expect.poll(async () => (await focus(page)).label).toMatch(/ won|You won/);
   await tabTo(page, (on) => on.label === "Watch the replay");
