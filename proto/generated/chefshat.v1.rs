@@ -12199,7 +12199,7 @@ pub struct TableQuestion {
     /// The question, for people, 1..=200 characters: "7 or 9 at place 4?"
     #[prost(string, tag = "2")]
     pub text: ::prost::alloc::string::String,
-    /// The possible answers, 2..=12 texts of 1..=64 characters.
+    /// The possible answers, 2..=16 texts of 1..=64 characters.
     #[prost(string, repeated, tag = "3")]
     pub options: ::prost::alloc::vec::Vec<::prost::alloc::string::String>,
     /// The seat it concerns, if that is known.

@@ -24,7 +24,7 @@ const MAX_QUESTION: usize = 200;
 /// Longest option of a question, characters.
 const MAX_OPTION: usize = 64;
 /// Numbers of options of a question.
-const OPTIONS: std::ops::RangeInclusive<usize> = 2..=12;
+const OPTIONS: std::ops::RangeInclusive<usize> = 2..=16;
 /// Largest picture of a question, bytes.
 const MAX_PICTURE_BYTES: usize = 32 * 1024;
 /// Oldest event that can be reported, milliseconds.

@@ -580,7 +580,7 @@ class TableQuestion(_message.Message):
     """What the camera sees: a PNG or JPEG picture of at most 32 KiB, or empty. Not stored."""
     @_builtins.property
     def options(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
-        """The possible answers, 2..=12 texts of 1..=64 characters."""
+        """The possible answers, 2..=16 texts of 1..=64 characters."""
 
     def __init__(
         self,
