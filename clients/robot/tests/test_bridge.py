@@ -237,7 +237,7 @@ def test_a_doubt_is_a_question_whose_answer_perception_gets(table: Table, eyes: 
     picture = np.full((80, 60, 3), 200, dtype=np.uint8)
     run(bridge.observed(Doubt(0, 0.0, 4, "1", 0.0, (CARDS[7][0], CARDS[9][0]), picture)))
     question = table.reports[-1].question
-    assert (question.text, list(question.options)) == ("7 or 9 at place 1?", ["7", "9"])
+    assert (question.text, list(question.options)) == ("7 or 9 at place 1?", ["7", "9", "No new card"])
     assert question.picture.startswith(b"\xff\xd8")
     answer(table, bridge, 1)
     assert eyes.answered == [(4, CARDS[9][0])]
@@ -246,9 +246,68 @@ def test_a_doubt_is_a_question_whose_answer_perception_gets(table: Table, eyes: 
 
 def test_a_doubt_without_candidates_offers_every_face(table: Table, eyes: Eyes, bridge: Bridge) -> None:
     run(bridge.observed(Doubt(0, 0.0, 4, "1", 0.0, ())))
-    assert list(table.reports[-1].question.options) == [*map(str, range(1, 12)), "Joker"]
-    answer(table, bridge, None)
-    assert eyes.answered == []
+    assert list(table.reports[-1].question.options) == [*map(str, range(1, 12)), "Joker", "No new card"]
+    answer(table, bridge, 12)
+    assert eyes.answered == [(4, False)]
+
+
+@pytest.mark.parametrize(("place", "reading"), [("1", False), ("pass 1", False), ("pass 2", True)])
+def test_a_doubt_whose_question_somebody_withdraws_leaves_all_as_it_was(
+    place: str, reading: bool, table: Table, eyes: Eyes, bridge: Bridge
+) -> None:
+    table.state.observation.passed = bytes([0, 0, 1, 0])
+    run(bridge.observed(Doubt(0, 0.0, 4, place, 0.0, ())))
+    observation = table.state.observation
+    question = table.reports[-1].question
+    table.state = pb.TableState(version=2, observation=observation)
+    table.state.answers.add(question_id=question.question_id)
+    run(bridge.run(iter([FRAME])))
+    assert eyes.answered == [(4, reading)]
+
+
+def found(cards: list[Card]) -> Laid:
+    return replace(laid(cards), found=True)
+
+
+@pytest.mark.parametrize("opens", [True, False])
+def test_cards_that_were_found_before_anybody_played_are_asked_about(opens: bool, table: Table, bridge: Bridge) -> None:
+    run(bridge.observed(found(CARDS[8][:1])))
+    assert table.reports[-1].question.text == "8 found on the field: does this open the pizza?"
+    answer(table, bridge, 0 if opens else 1)
+    assert table.kinds() == ["question"] + ["laid"] * opens
+
+
+def test_cards_that_were_found_and_are_swept_away_need_no_answer(table: Table, bridge: Bridge) -> None:
+    async def test() -> None:
+        await bridge.observed(found(CARDS[8][:1]))
+        await bridge.observed(PassShown(0, 0.0, 1, found=True))
+        await bridge.observed(PassWithdrawn(0, 0.0, 1))
+        await bridge.observed(Cleared(0, 0.0))
+
+    run(test())
+    assert table.kinds() == ["question", "question", "answer", "answer", "cleared"]
+    assert table.reports[2].answer.question_id == table.reports[1].question.question_id
+    assert table.reports[3].answer.question_id == table.reports[0].question.question_id
+
+
+def test_cards_that_were_found_in_a_pizza_are_its_last_play_or_a_new_one(table: Table, bridge: Bridge) -> None:
+    async def test() -> None:
+        table.state = pb.TableState(version=2)
+        table.state.observation.board_size = 2
+        await bridge.observed(Cleared(0, 0.0))
+        await bridge.observed(found(CARDS[8][:2]))
+        await bridge.observed(PassShown(0, 0.0, 1, found=True))
+
+    run(test())
+    assert table.kinds() == ["cleared", "laid", "pass"]
+
+
+@pytest.mark.parametrize("shown", [True, False])
+def test_a_pass_card_that_was_found_before_anybody_played_is_asked_about(shown: bool, table: Table, bridge: Bridge) -> None:
+    run(bridge.observed(PassShown(0, 0.0, 1, found=True)))
+    assert table.reports[-1].question.text == "The pass card of seat 1 lies at its place: is it shown in this pizza?"
+    answer(table, bridge, 0 if shown else 1)
+    assert table.kinds() == ["question"] + ["pass"] * shown
 
 
 def test_questions_that_need_no_answer_any_more_are_withdrawn(table: Table, bridge: Bridge) -> None:

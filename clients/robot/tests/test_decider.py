@@ -149,6 +149,7 @@ def test_cards_that_a_hand_sweeps_before_it_lays_others_were_cleared() -> None:
 
 def test_a_play_that_a_hand_lays_card_by_card_is_reported_when_it_has_left() -> None:
     table = Table()
+    table.wait()
     table.reaching = True
     for spot, card in enumerate(NINES):
         table.put(spot, cards=(card,))
@@ -159,6 +160,62 @@ def test_a_play_that_a_hand_lays_card_by_card_is_reported_when_it_has_left() -> 
     (event,) = table.said()
     assert isinstance(event, Laid)
     assert event.cards == NINES
+
+
+def test_what_lies_there_from_the_first_frame_was_found() -> None:
+    table = Table()
+    table.put(0, 1, cards=NINES[:2])
+    table.change(PASS_1, Piece(PieceKind.PASS, 0, 1))
+    table.wait()
+    assert [(type(event), getattr(event, "found", None)) for event in table.said()] == [(Laid, True), (PassShown, True)]
+    table.put(0, 1, 2, cards=FOURS)
+    table.change(PASS_3, Piece(PieceKind.PASS, 0, 3))
+    table.wait()
+    assert [(type(event), getattr(event, "found", None)) for event in table.said()] == [(Laid, False), (PassShown, False)]
+
+
+def test_cards_laid_beside_cards_that_were_found_are_another_event() -> None:
+    table = Table()
+    table.put(0, cards=NINES[:1])
+    table.put(1, cards=NINES[1:2])
+    table.change(2, None, empty=True)
+    table.wait(3)
+    table.put(2, cards=NINES[2:])
+    table.wait()
+    found, laid_later = table.said()
+    assert isinstance(found, Laid)
+    assert isinstance(laid_later, Laid)
+    assert (found.cards, found.found) == (NINES[:2], True)
+    assert (laid_later.cards, laid_later.found) == (NINES[2:], False)
+
+
+def test_cards_that_are_swept_away_while_perception_begins_were_found() -> None:
+    table = Table()
+    table.reaching = True
+    for spot in range(3):
+        table.change(spot, None, empty=True)
+    table.change(2, Piece(PieceKind.CARD, NINES[2].deck, NINES[2].index))
+    table.wait()
+    table.sweep(2)
+    table.reaching = False
+    table.wait()
+    found, cleared = table.said()
+    assert isinstance(found, Laid)
+    assert (found.cards, found.found) == (NINES[2:], True)
+    assert isinstance(cleared, Cleared)
+
+
+def test_a_card_that_cannot_be_read_from_the_first_frame_is_asked_about() -> None:
+    table = Table()
+    table.put(4)
+    table.wait(DOUBTED)
+    (doubt,) = table.said()
+    assert isinstance(doubt, Doubt)
+    assert doubt.place == "5"
+    table.events += table.decider.answer(doubt.number, NINES[0])
+    _, told = table.said()
+    assert isinstance(told, Laid)
+    assert (told.cards, told.found) == (NINES[:1], True)
 
 
 @pytest.mark.parametrize(

@@ -89,24 +89,3 @@ def test_people_a_robot_and_a_remote_agent_play_a_game_at_a_synthetic_table(serv
     work = [["verify"], ["export", "--out", str(tmp_path / "dataset")], ["render", "--out", str(tmp_path / "game.svg")]]
     for arguments in work:
         subprocess.run([os.environ[BINARY], *arguments, str(file)], check=True)
-
-
-def test_a_card_with_its_back_up_that_nobody_noticed_is_turned_over() -> None:
-    required = pb.PlayRequirement(lowest_face=1, highest_face=FACES, fewest_cards=1)
-    seats = [pb.TableSeat(at_table=True)] * 4
-    state = pb.TableState(version=7, stage=pb.TABLE_STAGE_TURN, seat=1, seats=seats, play_requirement=required)
-    state.observation.shift = 1
-
-    async def laid(seed: int) -> list[tuple[str, int]]:
-        table = SyntheticTable([], DIFFICULTIES["easy"], seed=seed)
-        async with aio.Client("127.0.0.1:1") as nobody:
-            rehearsal = Rehearsal(table, nobody, "", seed=seed, face_down=1.0)
-            await rehearsal.step(state, 1.0)
-            # The table notices nothing, in vain.
-            for waited in (3.0, 20.0, 40.0):
-                await rehearsal.step(state, 1.0 + waited)
-        return [(event.kind, len(event.cards)) for event in table.true_events]
-
-    # The first seed whose first play is a single card.
-    single = next(found for found in (asyncio.run(laid(seed)) for seed in range(40)) if found[0] == ("laid", 1))
-    assert single[1:3] == [("taken_back", 1), ("laid", 1)]

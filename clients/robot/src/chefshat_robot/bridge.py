@@ -35,8 +35,8 @@ MAX_PICTURE_BYTES = 32 * 1024
 SIDES = 4
 """At tables with so many seats or fewer, each has a side of the field of its own."""
 
-OnAnswer: TypeAlias = Callable[[int], Awaitable[None]]
-"""What is done with the index of the right option of a question."""
+OnAnswer: TypeAlias = Callable[[int | None], Awaitable[None]]
+"""What is done with the index of the right option of a question; None if somebody withdrew it."""
 
 _COUNTS = (pb.REPORT_VERDICT_ACCEPTED, pb.REPORT_VERDICT_KNOWN, pb.REPORT_VERDICT_HELD)
 
@@ -212,6 +212,8 @@ class Bridge:
         if self._is_over():
             return
         match event:
+            case Laid(found=True) if self._may_be_old():
+                await self._found(list(event.cards), set(event.places))
             case Laid():
                 await self._laid(list(event.cards), set(event.places), self._seat_at(event.side))
             case TakenBack():
@@ -219,16 +221,17 @@ class Bridge:
             case Cleared():
                 self._play = None
                 await self._withdraw("taken-back")
+                await self._withdraw("found")
                 await self._report(pb.TableReport(cleared=pb.BoardCleared()))
+            case PassSeen(found=True) if self._may_be_old() and not self._has_passed(event.seat):
+                await self._found_pass(event.seat)
             case PassSeen():
-                report = pb.TableReport()
-                # `pass` is a keyword of Python.
-                getattr(report, "pass").CopyFrom(pb.PassShown(seat=event.seat))
-                await self._report(report)
-            case PassGone() if self._has_passed(event.seat):
-                await self._report(pb.TableReport(pass_withdrawn=pb.PassWithdrawn(seat=event.seat)))
+                await self._passed(event.seat)
             case PassGone():
-                pass  # The pizza is over: all take their pass cards back.
+                await self._withdraw(f"found-pass-{event.seat}")
+                # Else the pizza is over: all take their pass cards back.
+                if self._has_passed(event.seat):
+                    await self._report(pb.TableReport(pass_withdrawn=pb.PassWithdrawn(seat=event.seat)))
             case Doubt():
                 await self._doubt(event)
             case DoubtResolved():
@@ -246,6 +249,37 @@ class Bridge:
             return None
         return side if side < len(state.seats) and state.seats[side].at_table else None
 
+    def _may_be_old(self) -> bool:
+        """Whether what perception found may be of a pizza that is over: nobody has played in this one."""
+        return self.state is None or not self.state.observation.board_size
+
+    async def _found(self, cards: list[Card], places: set[int]) -> None:
+        """Asks whether cards that perception found open the pizza."""
+
+        async def answer(option: int | None) -> None:
+            if option == 0:
+                await self._new_play(cards, places, None)
+
+        text = f"{_names(cards)} found on the field: does this open the pizza?"
+        await self._ask("found", text, ["Yes, it is a new play", "No, it lies there from before"], answer)
+
+    async def _found_pass(self, seat: int) -> None:
+        """Asks whether a pass card that perception found is shown in this pizza."""
+
+        async def answer(option: int | None) -> None:
+            if option == 0:
+                await self._passed(seat)
+
+        text = f"The pass card of {self._name(seat)} lies at its place: is it shown in this pizza?"
+        await self._ask(f"found-pass-{seat}", text, ["Yes", "No, it lies there from before"], answer)
+
+    async def _passed(self, seat: int) -> None:
+        """Reports a pass."""
+        report = pb.TableReport()
+        # `pass` is a keyword of Python.
+        getattr(report, "pass").CopyFrom(pb.PassShown(seat=seat))
+        await self._report(report)
+
     async def _laid(self, cards: list[Card], places: set[int], seat: int | None) -> None:
         """Reports cards on the board: a play, or perhaps an addition to the last one."""
         play = self._play
@@ -253,10 +287,10 @@ class Bridge:
             await self._new_play(cards, places, seat)
             return
 
-        async def add(option: int) -> None:
+        async def add(option: int | None) -> None:
             if option == 1:
                 await self._new_play(cards, places, seat)
-            elif self._play is play:
+            elif option == 0 and self._play is play:
                 play.cards, play.places = play.cards + cards, play.places | places
                 await self._replace(play)
 
@@ -279,7 +313,7 @@ class Bridge:
         if play is None or play.complete or not set(cards) & set(play.cards):
             return
 
-        async def take_back(option: int) -> None:
+        async def take_back(option: int | None) -> None:
             if option == 0 and self._play is play:
                 play.cards = [card for card in play.cards if card not in cards]
                 await self._replace(play)
@@ -290,7 +324,7 @@ class Bridge:
         text = f"{_names(cards)} taken from the board: is it taken back?"
         await self._ask("taken-back", text, ["Yes, it does not count", "No, it stands"], take_back)
 
-    async def _look_again(self, _option: int) -> None:
+    async def _look_again(self, _option: int | None) -> None:
         """Perception looks for the field all the time."""
 
     async def _replace(self, play: _Play) -> None:
@@ -317,15 +351,20 @@ class Bridge:
         """Asks what lies at a place."""
         readings: list[Card | bool]
         if doubt.place.startswith("pass "):
+            seat = int(doubt.place.removeprefix("pass "))
             readings, names = [True, False], ["Yes", "No"]
-            text = f"Does the pass card of {self._name(int(doubt.place.removeprefix('pass ')))} lie at its place?"
+            text = f"Does the pass card of {self._name(seat)} lie at its place?"
         else:
+            seat = None
             cards = list(doubt.options) if len(doubt.options) > 1 else self.perception.answers(int(doubt.place))
-            readings, names = [*cards], [face_name(card.face) for card in cards]
+            readings, names = [*cards, False], [face_name(card.face) for card in cards]
             text = f"{' or '.join(names) if len(names) <= 3 else 'Which card lies'} at place {doubt.place}?"
+            names.append("No new card")
 
-        async def answer(option: int) -> None:
-            await self._perceived(partial(self.perception.answer, doubt.number, readings[option]))
+        async def answer(option: int | None) -> None:
+            as_it_was = seat is not None and self._has_passed(seat)
+            reading = as_it_was if option is None else readings[option]
+            await self._perceived(partial(self.perception.answer, doubt.number, reading))
 
         await self._ask(f"doubt-{doubt.number}", text, names, answer, doubt.picture)
 
@@ -359,8 +398,7 @@ class Bridge:
             if answer is None or self._asked.get(name) is not question:
                 continue
             del self._asked[name]
-            if answer.HasField("option"):
-                await question.on_answer(answer.option)
+            await question.on_answer(answer.option if answer.HasField("option") else None)
 
     async def _report(self, report: pb.TableReport) -> pb.ReportResponse:
         """Reports something. Repeats it while the server is away."""

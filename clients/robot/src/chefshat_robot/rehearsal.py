@@ -10,7 +10,7 @@ from __future__ import annotations
 import random
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from chefshat import pb
@@ -24,8 +24,6 @@ PAUSE_S = 0.8
 """Time between the end of one act and the start of the next, by the clock of the frames."""
 PATIENCE_S = 6.0
 """How long people wait for the table to notice what they did, by the clock of the frames, before they do something else."""
-TURN_S = 2.0
-"""Time to take a card up before it is laid with its face up."""
 MAX_PLACES = 11
 
 
@@ -78,6 +76,8 @@ class Rehearsal:
     _mistake: LayCards | None = None
     _carried_out: pb.CardsToLay | None = None
     _lying: list[LayCards] = field(default_factory=list)
+    _laid: tuple[int, int, int] | None = None
+    """The Shift, the seat and the cards it had left, as the table knew them, when a person laid cards last."""
     _shown: set[int] = field(default_factory=set)
     _pizza: tuple[int, int] = (0, 0)
 
@@ -105,9 +105,6 @@ class Rehearsal:
             if state.version <= version and time < until:
                 return
             self._expected = None
-            if state.version <= version and not state.questions and (turned := self._turn_over(time)):
-                self._do(turned, state)
-                return
         if state.observation.shift > self._dealt:
             self._deal(state)
         acts = await self._next(state, time)
@@ -119,18 +116,6 @@ class Rehearsal:
         for act in acts:
             self.table.perform(act)
         self._expected = (state.version, self.table.busy_until + PATIENCE_S)
-
-    def _turn_over(self, time: float) -> list[Act] | None:
-        """A card that lies with its back up and was not noticed is turned over; None if there is none.
-
-        A camera that was switched on later takes its back for the empty place.
-        """
-        if not self._lying or not self._lying[-1].face_down:
-            return None
-        down = self._lying.pop()
-        up = replace(down, start=time + TURN_S, face_down=False)
-        self._lying.append(up)
-        return [TakeBack(time + 0.05, down.seat, down.places), up]
 
     def _deal(self, state: pb.TableState) -> None:
         """Shuffles and deals the cards of a Shift."""
@@ -162,10 +147,7 @@ class Rehearsal:
             # It was not noticed as a violation: the cards stay where they are.
             self._play(act.seat, list(act.cards))
         wanted = next(iter(state.to_lay), None)
-        if wanted is not None and wanted.pizza:
-            pizza = (wanted.shift, wanted.pizza)
-        else:
-            pizza = (state.observation.shift, state.observation.pizza)
+        pizza = self._pizza_of(state)
         if (self._lying or self._shown) and pizza != self._pizza:
             return self._sweep(state, start)
         self._pizza = pizza
@@ -190,12 +172,22 @@ class Rehearsal:
                 await self._report(end_confirmed=pb.EndConfirmed())
         return None
 
+    @staticmethod
+    def _pizza_of(state: pb.TableState) -> tuple[int, int]:
+        """The Shift and pizza of which cards are laid next."""
+        wanted = next(iter(state.to_lay), None)
+        if wanted is not None and wanted.pizza:
+            return wanted.shift, wanted.pizza
+        return state.observation.shift, state.observation.pizza
+
     def _opener(self) -> int:
         """The seat with the Golden card."""
         return next(seat for seat, hand in enumerate(self.hands) if any(card.is_golden for card in hand))
 
-    def _take_turn(self, state: pb.TableState, seat: int, start: float) -> list[Act]:
-        """A person plays or passes."""
+    def _take_turn(self, state: pb.TableState, seat: int, start: float) -> list[Act] | None:
+        """A person plays or passes; nothing if it has laid cards that the table has not noticed yet."""
+        if self._laid == _left(state, seat):
+            return None
         required = state.play_requirement
         if state.stage == pb.TABLE_STAGE_OPENING or required.golden_card:
             required = pb.PlayRequirement(lowest_face=FACES, highest_face=FACES, fewest_cards=1, golden_card=True)
@@ -209,6 +201,7 @@ class Rehearsal:
         if plays and (not required.may_pass or self._rng.random() < 0.85):
             cards = self._rng.choices(plays, weights=[len(play) ** 3 for play in plays])[0]
             self._play(seat, cards)
+            self._laid = _left(state, seat)
             return [self._lay(start, seat, cards)]
         self._shown.add(seat)
         return [ShowPass(start, seat)]
@@ -244,7 +237,7 @@ class Rehearsal:
         elif wanted.cards.cards:
             if wanted == self._carried_out:
                 # The cards lie there; the camera has not reported them yet.
-                return self._turn_over(start)
+                return None
             self._carried_out = wanted
             cards = self._take(seat, wanted.cards)
             self._play(seat, cards)
@@ -299,7 +292,13 @@ class Rehearsal:
         place = question.text.rpartition("at place ")[2].rstrip("?")
         if place.isdigit():
             there = [card for act in self._lying for card, at in zip(act.cards, act.places, strict=True) if at == int(place)]
-            return options.index(face_name(there[-1].face)) if there and face_name(there[-1].face) in options else None
+            lies = face_name(there[-1].face) if there else "No new card"
+            return options.index(lies) if lies in options else None
+        if question.text.endswith("open the pizza?"):
+            return 0 if self._lying and self._pizza == self._pizza_of(state) else 1
+        if question.text.endswith("is it shown in this pizza?"):
+            asked = [seat for seat, taken in enumerate(state.room.seats) if taken.name in question.text]
+            return 0 if self._shown.issuperset(asked) and self._pizza == self._pizza_of(state) else 1
         if question.text.endswith("belong to this play?"):
             return 0 if self._mistake is None else 1
         if question.text.startswith("Who opened"):
@@ -316,6 +315,11 @@ class Rehearsal:
         report = pb.TableReport(source=pb.REPORT_SOURCE_ATTENDANT, **kind)  # type: ignore[arg-type]
         response = await self.attendant.report(self.ticket, report)
         self._expected = (response.state.version - 1, float("inf"))
+
+
+def _left(state: pb.TableState, seat: int) -> tuple[int, int, int]:
+    """The Shift, a seat and the number of its cards, as the table knows them."""
+    return state.observation.shift, seat, state.observation.cards_left[seat]
 
 
 def _plays(hand: list[Card], required: pb.PlayRequirement) -> list[list[Card]]:

@@ -39,7 +39,7 @@ NO_FIELD = (
 )
 
 _DESCRIPTION = """\
-Watch the table and print what happens, each event with the time at which it became certain. Start while the field is empty.
+Watch the table and print what happens, each event with the time at which it became certain. What lies there already is found.
 A doubt is a place that cannot be read for sure; events after it wait until it can be read, at most 5 seconds.
 
 Examples:
@@ -141,14 +141,14 @@ def _print_all(events: Iterable[Observed], as_json: bool, doubts: Path | None) -
 def _text(event: Observed) -> str:
     """An event in words."""
     match event:
-        case Laid(cards=cards, places=places):
-            return "laid: " + ", ".join(f"{_card(card)} at {place}" for card, place in zip(cards, places, strict=True))
+        case Laid(cards=cards, places=places, found=found):
+            return ("found: " if found else "laid: ") + _at_places(cards, places)
         case TakenBack(cards=cards, places=places):
-            return "taken back: " + ", ".join(f"{_card(card)} at {place}" for card, place in zip(cards, places, strict=True))
+            return "taken back: " + _at_places(cards, places)
         case Cleared():
             return "cleared"
-        case PassShown(seat=seat):
-            return f"seat {seat} passes"
+        case PassShown(seat=seat, found=found):
+            return f"the pass card of seat {seat} is found" if found else f"seat {seat} passes"
         case PassWithdrawn(seat=seat):
             return f"seat {seat} takes its pass card back"
         case Doubt(number=number, place=place, options=options):
@@ -158,6 +158,11 @@ def _text(event: Observed) -> str:
             return f"doubt {number} is resolved"
         case FieldChanged(state=state):
             return f"the field: {state.value}"
+
+
+def _at_places(cards: Iterable[Card], places: Iterable[int]) -> str:
+    """Cards and their places in words."""
+    return ", ".join(f"{_card(card)} at {place}" for card, place in zip(cards, places, strict=True))
 
 
 def _card(card: Card) -> str:

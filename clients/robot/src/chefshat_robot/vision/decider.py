@@ -14,6 +14,8 @@ The decider sees no pictures, so that a recording of sightings gives the same ev
   if only some are, when none of the others can be read as new cards come. If others can still be read after `TAKEN_SECONDS` in
   which nothing moved, cards were taken back: before that, more strokes may sweep the rest away. Cards on others were taken back
   when a tag is read that they covered.
+- What is read at a place before anything else was seen there, empty or another card, was **found**: it may have lain there before
+  the first frame.
 """
 
 from __future__ import annotations
@@ -144,6 +146,8 @@ class _Spot:
     """The open doubt about its present look."""
     gone_since: float | None = None
     """Since when it looks empty although cards lay there, in s."""
+    watched: bool = False
+    """Whether it was seen empty, or what lay there was read or asked about: what is new there was not found."""
 
 
 @dataclass
@@ -163,6 +167,8 @@ class _Play:
     """Whether no further card can belong to it."""
     sides: set[int | None] = dataclass_field(default_factory=set)
     """The sides from which its cards were laid; None for one that is not known."""
+    found: bool = False
+    """Whether its cards were found."""
 
     @property
     def side(self) -> int | None:
@@ -180,11 +186,12 @@ class _Gone:
 
 @dataclass
 class _PassMoved:
-    """The pass card of a seat was shown or withdrawn."""
+    """The pass card of a seat was shown, or found, or withdrawn."""
 
     since: float
     seat: int
     shown: bool
+    found: bool = False
 
 
 @dataclass
@@ -335,7 +342,7 @@ class Decider:
         piece = next((piece for piece, known in self._known.items() if known.spot == doubt.spot), None)
         if shown == (piece is not None):
             return
-        self._queue.insert(self._queue.index(doubt.play), _PassMoved(doubt.play.since, seat, shown))
+        self._queue.insert(self._queue.index(doubt.play), _PassMoved(doubt.play.since, seat, shown, doubt.play.found))
         if piece is not None:
             del self._known[piece]
         else:
@@ -403,7 +410,7 @@ class Decider:
                     self._explained(track.spot, events)
             elif track.piece.card is None:
                 self._known[track.piece] = _Known(track.spot, pose=track.pose)
-                self._queue.append(_PassMoved(self._time, track.piece.number, True))
+                self._queue.append(_PassMoved(self._time, track.piece.number, True, not self._spots[track.spot].watched))
                 self._explained(track.spot, events)
             else:
                 self._settle_card(track, track.piece.card, events)
@@ -434,8 +441,11 @@ class Decider:
         elif spot.covered is not None or (play is not None and track.spot in play.cards.values()):
             self._close_play(events)
             play = None
+        if play is not None and play.found == spot.watched:
+            self._close_play(events)
+            play = None
         if play is None:
-            play = _Play(self._time)
+            play = _Play(self._time, found=not spot.watched)
             self._queue.append(play)
         play.cards[card] = track.spot
         play.sides.add(self._side_of(track.spot))
@@ -476,7 +486,7 @@ class Decider:
     def _explained(self, number: int, events: list[Observed]) -> None:
         """A place's present look is explained, and with it a doubt about this look."""
         spot = self._spots[number]
-        spot.explained = self._places[number].look
+        spot.explained, spot.watched = self._places[number].look, True
         spot.unexplained, spot.waited, spot.frames, spot.covered = False, 0.0, 0, None
         if spot.doubt is not None and self._doubts[spot.doubt].look == spot.explained:
             self._close_doubt(spot.doubt, events)
@@ -486,8 +496,12 @@ class Decider:
         for number, (spot, seen) in enumerate(zip(self._spots, self._places, strict=True)):
             if seen.still < STILL_FRAMES:
                 continue
+            spot.watched = spot.watched or bool(seen.empty)
             occupied = self._top(number) is not None
-            if not occupied and seen.empty is not False:
+            if not occupied and seen.empty is None:
+                # Too little was seen of it yet.
+                continue
+            if not occupied and seen.empty:
                 spot.explained = seen.look
             was_unexplained, spot.unexplained = spot.unexplained, seen.look != spot.explained and not seen.empty
             if occupied and seen.look == spot.explained:
@@ -526,9 +540,11 @@ class Decider:
         """Asks about a look of a place, whose card belongs to a play; or to one of its own, in the order of the times."""
         spot = self._spots[number]
         spot.covered = None
-        if play is None or riddle.since < play.since - TOGETHER_SECONDS or number in play.cards.values():
-            play = _Play(riddle.since)
+        elsewhere = play is None or riddle.since < play.since - TOGETHER_SECONDS or number in play.cards.values()
+        if play is None or elsewhere or play.found == spot.watched:
+            play = _Play(riddle.since, found=not spot.watched)
             self._queue.insert(sum(entry.since <= riddle.since for entry in self._queue), play)
+        spot.watched = True
         play.doubts.add(self._next_doubt)
         play.closed = True
         if riddle.look == self._places[number].look:
@@ -641,9 +657,11 @@ class Decider:
                     return
                 entry.closed = True
                 if entry.cards:
-                    events.append(Laid(self._frame, self._time, *_in_order(entry.cards), entry.side))
+                    events.append(Laid(self._frame, self._time, *_in_order(entry.cards), entry.side, entry.found))
+            elif isinstance(entry, _PassMoved) and entry.shown:
+                events.append(PassShown(self._frame, self._time, entry.seat, entry.found))
             elif isinstance(entry, _PassMoved):
-                events.append((PassShown if entry.shown else PassWithdrawn)(self._frame, self._time, entry.seat))
+                events.append(PassWithdrawn(self._frame, self._time, entry.seat))
             elif entry.cards is None:
                 events.append(Cleared(self._frame, self._time))
             else:

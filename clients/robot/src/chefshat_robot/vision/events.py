@@ -32,6 +32,7 @@ class Laid:
         places: The place of each card, 1..11, in the same order.
         side: The side of the field from which an arm reached in as they were laid: 0 the bottom, where seat 0 sits, then clockwise.
             None if the picture shows none, or several.
+        found: Whether they may have lain there before perception began: nothing else was seen at their places until then.
     """
 
     frame: int
@@ -39,6 +40,7 @@ class Laid:
     cards: tuple[Card, ...]
     places: tuple[int, ...]
     side: int | None = None
+    found: bool = False
 
 
 @dataclass(frozen=True)
@@ -70,11 +72,13 @@ class PassShown:
 
     Attributes:
         seat: The seat, 0..3.
+        found: Whether it may have lain there before perception began.
     """
 
     frame: int
     time: float
     seat: int
+    found: bool = False
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ KEPT_LOOKS = 5
 class Perception:
     """Watches the table through one camera.
 
-    Start it while the field is empty: it then learns how empty places look.
+    Best started while the field is empty. What lies there already was *found* (`Laid.found`): it may have lain there for long.
 
     Args:
         camera: The intrinsics of the camera; None: a lens without distortion is assumed.

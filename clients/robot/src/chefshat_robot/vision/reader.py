@@ -54,6 +54,9 @@ LOOKS = 3
 """So many looks of a place are remembered: a hand that rests over a card is a look too, and then the card's look returns."""
 EMPTY = 0.06
 """Mean difference from the empty place up to which a place is empty."""
+PLAIN = 0.07
+"""Mean difference of a place from its own brightness, relative to its surroundings, up to which it can be the empty place. Its
+print is faint: faces and backs of cards are not."""
 EMPTY_FRAMES = 4
 """Frames for which a place must be still and without tags to be remembered as empty, at first."""
 AVERAGE_FRAMES = 4
@@ -104,7 +107,8 @@ class SeenPlace:
     Attributes:
         still: For how many frames nothing has moved there; 0 while something moves.
         look: Number of its look; the last one while something moves.
-        empty: Whether it looks as it did when it was empty; None while something moves, or before that is known.
+        empty: Whether it looks as it did when it was empty, or before that is known, as if it could be; None while something moves
+            there, or too little was seen.
         read: Whether tags were read there in this frame.
     """
 
@@ -333,21 +337,24 @@ class Reader:
         if spot.average is None or spot.still < STILL_FRAMES:
             return SeenPlace(spot.still, spot.look, None, read)
         if spot.empty is None:
-            left, top, right, bottom = _AREA[number]
-            has_tag = any(left < tag.x < right and top < tag.y < bottom for tag in tags)
+            half_width, half_height = half_size(SPOTS[number])
+            place = SPOTS[number]
+            has_tag = any(abs(tag.x - place.x) < half_width and abs(tag.y - place.y) < half_height for tag in tags)
             spot.bare = 0 if has_tag else spot.bare + read
-            if spot.bare >= EMPTY_FRAMES:
-                spot.empty = spot.average.copy()
-            return SeenPlace(spot.still, spot.look, None, read)
+            if spot.bare < EMPTY_FRAMES:
+                return SeenPlace(spot.still, spot.look, None, read)
+            if difference(spot.average, spot.average.mean()) > PLAIN:
+                return SeenPlace(spot.still, spot.look, False, read)
+            spot.empty = spot.average.copy()
         empty = difference(spot.average, spot.empty) <= EMPTY
         if empty:
             spot.empty += ADAPT * (spot.average - spot.empty)
         return SeenPlace(spot.still, spot.look, empty, read)
 
 
-def difference(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
-    """The mean difference of two looks, relative to the local brightness."""
-    return float(cv2.norm(one, other, cv2.NORM_L1)) / one.size
+def difference(one: NDArray[np.float32], other: NDArray[np.float32] | np.float32) -> float:
+    """The mean difference of two looks, or of a look and a brightness, relative to the local brightness."""
+    return float(np.abs(one - other).mean())
 
 
 def _relative(grey: Picture) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
