@@ -73,11 +73,13 @@ class Eyes:
     Attributes:
         events: what the next frames show.
         answered: the answers to doubts.
+        resolved: doubts that need no answer any more.
     """
 
     def __init__(self) -> None:
         self.events: list[list[Laid]] = []
-        self.answered: list[tuple[int, Card | bool]] = []
+        self.answered: list[tuple[int, Card | bool | None]] = []
+        self.resolved: set[int] = set()
 
     def see(self, frame: Frame) -> list[Laid]:
         return self.events.pop(0) if self.events else []
@@ -85,9 +87,12 @@ class Eyes:
     def answers(self, place: int) -> list[Card]:
         return [cards[0] for cards in CARDS.values()]
 
-    def answer(self, number: int, reading: Card | bool) -> list[Laid]:
+    def answer(self, number: int, reading: Card | bool | None) -> list[Laid]:
         self.answered.append((number, reading))
         return [laid([reading])] if isinstance(reading, Card) else []
+
+    def is_open(self, number: int) -> bool:
+        return number not in self.resolved
 
 
 @pytest.fixture
@@ -251,30 +256,65 @@ def test_a_doubt_without_candidates_offers_every_face(table: Table, eyes: Eyes, 
     assert eyes.answered == [(4, False)]
 
 
-@pytest.mark.parametrize(("place", "reading"), [("1", False), ("pass 1", False), ("pass 2", True)])
+@pytest.mark.parametrize("place", ["1", "pass 2"])
 def test_a_doubt_whose_question_somebody_withdraws_leaves_all_as_it_was(
-    place: str, reading: bool, table: Table, eyes: Eyes, bridge: Bridge
+    place: str, table: Table, eyes: Eyes, bridge: Bridge
 ) -> None:
-    table.state.observation.passed = bytes([0, 0, 1, 0])
     run(bridge.observed(Doubt(0, 0.0, 4, place, 0.0, ())))
-    observation = table.state.observation
-    question = table.reports[-1].question
-    table.state = pb.TableState(version=2, observation=observation)
-    table.state.answers.add(question_id=question.question_id)
+    answer(table, bridge, None)
+    assert eyes.answered == [(4, None)]
+
+
+def test_an_answer_to_what_the_camera_could_read_after_all_changes_nothing(table: Table, eyes: Eyes, bridge: Bridge) -> None:
+    run(bridge.observed(Doubt(0, 0.0, 4, "1", 0.0, ())))
+    eyes.resolved.add(4)
+    answer(table, bridge, 1)
+    assert eyes.answered == []
+
+
+def test_questions_of_a_bridge_that_was_killed_are_withdrawn(table: Table, bridge: Bridge) -> None:
+    table.state.questions.add(question_id="bridge-0001-doubt-1-1", text="Which card lies at place 1?")
+    table.state.questions.add(question_id="referee-3", text="Did Bo pass?")
     run(bridge.run(iter([FRAME])))
-    assert eyes.answered == [(4, reading)]
+    assert [report.answer.question_id for report in table.reports] == ["bridge-0001-doubt-1-1"]
+    assert not table.reports[0].answer.HasField("option")
 
 
 def found(cards: list[Card]) -> Laid:
     return replace(laid(cards), found=True)
 
 
-@pytest.mark.parametrize("opens", [True, False])
-def test_cards_that_were_found_before_anybody_played_are_asked_about(opens: bool, table: Table, bridge: Bridge) -> None:
+@pytest.mark.parametrize("is_new", [True, False])
+def test_cards_that_were_found_before_anybody_played_are_asked_about(is_new: bool, table: Table, bridge: Bridge) -> None:
     run(bridge.observed(found(CARDS[8][:1])))
-    assert table.reports[-1].question.text == "8 found on the field: does this open the pizza?"
-    answer(table, bridge, 0 if opens else 1)
-    assert table.kinds() == ["question"] + ["laid"] * opens
+    assert table.reports[-1].question.text == "8 found on the field: is it a new play?"
+    answer(table, bridge, 0 if is_new else 1)
+    assert table.kinds() == ["question"] + ["laid"] * is_new
+
+
+def test_cards_that_are_found_one_after_the_other_are_one_question(table: Table, bridge: Bridge) -> None:
+    async def test() -> None:
+        await bridge.observed(found(CARDS[8][:1]))
+        await bridge.observed(replace(found(CARDS[8][1:2]), places=(2,)))
+
+    run(test())
+    assert table.kinds() == ["question", "answer", "question"]
+    answer(table, bridge, 0)
+    assert list(table.reports[-1].laid.cards.cards) == [8, 8]
+
+
+def test_what_happens_after_something_was_found_waits_for_the_answer(table: Table, bridge: Bridge) -> None:
+    async def test() -> None:
+        await bridge.observed(found(CARDS[8][:1]))
+        await bridge.observed(laid(CARDS[5][:1]))
+        await bridge.observed(PassShown(0, 0.0, 2))
+        await bridge.observed(Cleared(0, 0.0))
+
+    run(test())
+    assert table.kinds() == ["question"]
+    answer(table, bridge, 0)
+    assert table.kinds() == ["question", "laid", "laid", "pass", "cleared"]
+    assert [list(report.laid.cards.cards) for report in table.reports[1:3]] == [[8], [5]]
 
 
 def test_cards_that_were_found_and_are_swept_away_need_no_answer(table: Table, bridge: Bridge) -> None:
@@ -290,16 +330,21 @@ def test_cards_that_were_found_and_are_swept_away_need_no_answer(table: Table, b
     assert table.reports[3].answer.question_id == table.reports[0].question.question_id
 
 
-def test_cards_that_were_found_in_a_pizza_are_its_last_play_or_a_new_one(table: Table, bridge: Bridge) -> None:
+@pytest.mark.parametrize(("pending", "asked"), [(False, False), (True, True)])
+def test_cards_that_were_found_in_a_pizza_are_asked_about_if_a_remote_seat_may_have_opened_it(
+    pending: bool, asked: bool, table: Table, bridge: Bridge
+) -> None:
     async def test() -> None:
         table.state = pb.TableState(version=2)
         table.state.observation.board_size = 2
+        if pending:
+            table.state.to_lay.add(seat=2, pizza=4, cards=pb.SeenCards(cards=[9, 9]))
         await bridge.observed(Cleared(0, 0.0))
-        await bridge.observed(found(CARDS[8][:2]))
-        await bridge.observed(PassShown(0, 0.0, 1, found=True))
+        await bridge.observed(replace(found(CARDS[8][:2]), side=1))
 
     run(test())
-    assert table.kinds() == ["cleared", "laid", "pass"]
+    assert table.kinds() == ["cleared", "question" if asked else "laid"]
+    assert not table.reports[-1].laid.HasField("seat")
 
 
 @pytest.mark.parametrize("shown", [True, False])

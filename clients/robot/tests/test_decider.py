@@ -36,14 +36,15 @@ class Table:
         self._empty = [True] * len(SPOTS)
         self._tops: list[Piece | None] = [None] * len(SPOTS)
 
-    def wait(self, frames: int = 8) -> None:
-        """Shows the table for some frames."""
+    def wait(self, frames: int = 8, beneath: list[SeenTag] | None = None) -> None:
+        """Shows the table for some frames, with tags of cards beneath others that can be read."""
         for _ in range(frames):
             places = tuple(
                 SeenPlace(still, look if still >= STILL_FRAMES else before, empty if still >= STILL_FRAMES else None, True)
                 for still, look, before, empty in zip(self._still, self._looks, self._before, self._empty, strict=True)
             )
-            tags = tuple(tag for spot, piece in enumerate(self._tops) if piece for tag in tags_of(piece, spot))
+            tops = (tag for spot, piece in enumerate(self._tops) if piece for tag in tags_of(piece, spot))
+            tags = (*(beneath or ()), *tops)
             self.events += self.decider.see(Sighting(self._frame, self._frame / FPS, None, tags, self.reaching, places, self.sides))
             self._frame += 1
             self._still = [still + 1 for still in self._still]
@@ -203,6 +204,16 @@ def test_cards_that_are_swept_away_while_perception_begins_were_found() -> None:
     assert isinstance(found, Laid)
     assert (found.cards, found.found) == (NINES[2:], True)
     assert isinstance(cleared, Cleared)
+
+
+def test_of_a_pile_that_was_found_the_play_is_what_lies_on_top() -> None:
+    table = Table()
+    table.put(0, cards=FOURS[:1])
+    beneath = tags_of(Piece(PieceKind.CARD, NINES[0].deck, NINES[0].index), 0)[:1]
+    table.wait(8, beneath)
+    (found,) = table.said()
+    assert isinstance(found, Laid)
+    assert (found.cards, found.found) == (FOURS[:1], True)
 
 
 def test_a_card_that_cannot_be_read_from_the_first_frame_is_asked_about() -> None:

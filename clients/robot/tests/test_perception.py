@@ -264,6 +264,55 @@ def test_a_pass_card_that_lies_face_down_is_asked_about_at_every_place(seat: int
         assert happened(events) == [("pass_shown", seat), ("pass_withdrawn", seat)]
 
 
+def begin_in_the_middle(table: SyntheticTable, begin: float) -> list[Observed]:
+    """What a perception says that sees only the frames from a time on; each doubt is answered with the truth."""
+    perception = Perception(table.camera)
+    events: list[Observed] = []
+    for frame, truth in table.frames():
+        seen = perception.see(frame) if frame.time >= begin else []
+        events += seen
+        for event in seen:
+            if isinstance(event, Doubt):
+                events += perception.answer(event.number, the_truth(event, truth, perception))
+    return events
+
+
+@pytest.mark.parametrize("difficulty", [EASY, MEDIUM])
+@pytest.mark.parametrize("face_down", [False, True])
+def test_what_lies_there_when_perception_begins_was_found(difficulty: Difficulty, face_down: bool) -> None:
+    acts: list[Act] = [
+        LayCards(0.6, 0, (Card(0, 65), Card(0, 58)), (1, 2), face_down),
+        ShowPass(2.0, 1),
+        Clear(9.0, 3),
+        WithdrawPass(9.2, 1),
+        LayCards(11.0, 2, (Card(0, 20),), (1,)),
+    ]
+    events = begin_in_the_middle(SyntheticTable(acts, difficulty, seed=7), 4.0)
+    found = [(said(event)[0], event.found) for event in events if isinstance(event, Laid | PassShown)]
+    assert set(found[:-1]) == {("laid", True), ("pass_shown", True)}
+    assert found[-1] == ("laid", False)
+    assert [event.place for event in events if isinstance(event, Doubt)] == ["1", "2"] * face_down
+    assert {kind for kind, *_ in happened(events)[-3:-1]} == {"cleared", "pass_withdrawn"}
+
+
+def test_a_place_that_is_said_to_be_empty_is_known_to_be_so() -> None:
+    dirty = [LayCards(0.2, 0, (Card(0, 30),), (4,), face_down=True)]
+    table = SyntheticTable(dirty, EASY, seed=7, tail=8.0)
+    perception = Perception(table.camera)
+    number = 0
+    for frame, _ in table.frames():
+        if frame.time < 2.0:
+            continue
+        for event in perception.see(frame):
+            assert not (number and isinstance(event, Doubt))
+            if isinstance(event, Doubt):
+                number = event.number
+                perception.answer(number, False)
+    assert number
+    assert perception.sighting is not None
+    assert perception.sighting.places[3].empty
+
+
 def test_answers_must_fit() -> None:
     table = SyntheticTable([LayCards(0.6, 0, (Card(0, 30),), (4,))], replace(EASY, smudged=1.0), seed=7)
     perception = Perception(table.camera)

@@ -38,6 +38,9 @@ SIDES = 4
 OnAnswer: TypeAlias = Callable[[int | None], Awaitable[None]]
 """What is done with the index of the right option of a question; None if somebody withdrew it."""
 
+_QUESTION_IDS = "bridge-"
+"""Ids of the questions of bridges begin so. A table has one bridge."""
+
 _COUNTS = (pb.REPORT_VERDICT_ACCEPTED, pb.REPORT_VERDICT_KNOWN, pb.REPORT_VERDICT_HELD)
 
 
@@ -70,7 +73,7 @@ class _Play:
         places: Where they lie, 1..11.
         report: The number of the report; 0 if it does not count.
         seat: Who laid them; None if that is not known.
-        complete: Whether they are what a remote seat decided: nothing can be added.
+        complete: Whether they are what a remote seat decided, or what the table knew: nothing can be added.
     """
 
     cards: list[Card]
@@ -120,6 +123,12 @@ class Bridge:
     _questions: int = 0
     _asked: dict[str, _Question] = field(default_factory=dict)
     """The open questions, by their names."""
+    _found: dict[Card, int] = field(default_factory=dict)
+    """The cards that are asked about because they were found, and the place of each."""
+    _held: list[Observed] = field(default_factory=list)
+    """What happened since something was found that is asked about."""
+    _known: asyncio.Event = field(default_factory=asyncio.Event)
+    """Set when the state of the table is known."""
     _perceiving: asyncio.Lock = field(default_factory=asyncio.Lock)
     _seen: asyncio.Queue[list[Observed]] = field(default_factory=asyncio.Queue)
     """What is to be reported, in the order in which it happened."""
@@ -145,6 +154,7 @@ class Bridge:
                 for event in await self._seen.get():
                     await self.observed(event)
                 await self._take_answers()
+                await self._release()
                 self._seen.task_done()
                 for task in (watching, seeing):
                     if task.done():
@@ -161,6 +171,8 @@ class Bridge:
 
     async def _see(self, frames: Iterator[Frame], after: Callable[[Frame], Awaitable[None]] | None) -> None:
         """Watches the frames."""
+        await self._known.wait()
+        await self._withdraw_orphans()
         while (frame := await asyncio.to_thread(next, frames, None)) is not None:
             await self._perceived(partial(self.perception.see, frame))
             if after is not None:
@@ -208,30 +220,52 @@ class Bridge:
         return state.observation.cards_left[seat] == size
 
     async def observed(self, event: Observed) -> None:
-        """Reports an event of perception."""
+        """Reports an event of perception. What happens after something was found that is asked about waits for the answer."""
+        match event:
+            case PassGone() if f"found-pass-{event.seat}" in self._asked:
+                await self._withdraw(f"found-pass-{event.seat}")
+            case Cleared() if not self._held:
+                await self._withdraw("found")
+                self._found = {}
+                await self._report_event(event)
+            case Laid() | TakenBack() | Cleared() | PassSeen() | PassGone() if self._awaits_found() and not _is_found(event):
+                self._held.append(event)
+            case _:
+                await self._report_event(event)
+        await self._release()
+
+    async def _release(self) -> None:
+        """Reports what waited, if nothing that was found is asked about any more."""
+        while self._held and not self._awaits_found():
+            await self._report_event(self._held.pop(0))
+
+    def _awaits_found(self) -> bool:
+        """Whether something that was found is asked about."""
+        return any(name.startswith("found") for name in self._asked)
+
+    async def _report_event(self, event: Observed) -> None:
         if self._is_over():
             return
         match event:
             case Laid(found=True) if self._may_be_old():
-                await self._found(list(event.cards), set(event.places))
+                await self._ask_about(dict(zip(event.cards, event.places, strict=True)))
             case Laid():
-                await self._laid(list(event.cards), set(event.places), self._seat_at(event.side))
+                seat = None if event.found else self._seat_at(event.side)
+                await self._laid(list(event.cards), set(event.places), seat)
             case TakenBack():
                 await self._taken_back(list(event.cards))
             case Cleared():
                 self._play = None
                 await self._withdraw("taken-back")
-                await self._withdraw("found")
                 await self._report(pb.TableReport(cleared=pb.BoardCleared()))
-            case PassSeen(found=True) if self._may_be_old() and not self._has_passed(event.seat):
-                await self._found_pass(event.seat)
+            case PassSeen(found=True) if not self._has_passed(event.seat):
+                await self._ask_about_pass(event.seat)
             case PassSeen():
                 await self._passed(event.seat)
+            case PassGone() if self._has_passed(event.seat):
+                await self._report(pb.TableReport(pass_withdrawn=pb.PassWithdrawn(seat=event.seat)))
             case PassGone():
-                await self._withdraw(f"found-pass-{event.seat}")
-                # Else the pizza is over: all take their pass cards back.
-                if self._has_passed(event.seat):
-                    await self._report(pb.TableReport(pass_withdrawn=pb.PassWithdrawn(seat=event.seat)))
+                pass  # The pizza is over: all take their pass cards back.
             case Doubt():
                 await self._doubt(event)
             case DoubtResolved():
@@ -250,21 +284,25 @@ class Bridge:
         return side if side < len(state.seats) and state.seats[side].at_table else None
 
     def _may_be_old(self) -> bool:
-        """Whether what perception found may be of a pizza that is over: nobody has played in this one."""
-        return self.state is None or not self.state.observation.board_size
+        """Whether cards that were found may be of a pizza that is over: perhaps no play of this one lies there yet."""
+        state = self.state
+        return state is None or not state.observation.board_size or any(wanted.pizza for wanted in state.to_lay)
 
-    async def _found(self, cards: list[Card], places: set[int]) -> None:
-        """Asks whether cards that perception found open the pizza."""
+    async def _ask_about(self, found: dict[Card, int]) -> None:
+        """Asks whether cards that were found, and those found just before, are a new play."""
+        self._found.update(found)
+        cards = list(self._found)
 
         async def answer(option: int | None) -> None:
+            places, self._found = set(self._found.values()), {}
             if option == 0:
                 await self._new_play(cards, places, None)
 
-        text = f"{_names(cards)} found on the field: does this open the pizza?"
-        await self._ask("found", text, ["Yes, it is a new play", "No, it lies there from before"], answer)
+        text = f"{_names(cards)} found on the field: is it a new play?"
+        await self._ask("found", text, ["Yes, a new play", "No, it lies there from before"], answer)
 
-    async def _found_pass(self, seat: int) -> None:
-        """Asks whether a pass card that perception found is shown in this pizza."""
+    async def _ask_about_pass(self, seat: int) -> None:
+        """Asks whether a pass card that was found is shown in this pizza."""
 
         async def answer(option: int | None) -> None:
             if option == 0:
@@ -305,7 +343,8 @@ class Bridge:
         decided = [wanted.cards.cards for wanted in self.state.to_lay if wanted.pizza] if self.state is not None else []
         response = await self._report(pb.TableReport(laid=pb.CardsLaid(seat=seat, cards=seen)))
         number = response.report if response.verdict in (pb.REPORT_VERDICT_ACCEPTED, pb.REPORT_VERDICT_HELD) else 0
-        self._play = _Play(cards, places, number, seat, complete=list(seen.cards) in [list(faces) for faces in decided])
+        complete = response.verdict == pb.REPORT_VERDICT_KNOWN or list(seen.cards) in [list(faces) for faces in decided]
+        self._play = _Play(cards, places, number, seat, complete)
 
     async def _taken_back(self, cards: list[Card]) -> None:
         """Cards were taken back. A play that counts is taken back only if somebody says so."""
@@ -351,20 +390,20 @@ class Bridge:
         """Asks what lies at a place."""
         readings: list[Card | bool]
         if doubt.place.startswith("pass "):
-            seat = int(doubt.place.removeprefix("pass "))
             readings, names = [True, False], ["Yes", "No"]
-            text = f"Does the pass card of {self._name(seat)} lie at its place?"
+            text = f"Does the pass card of {self._name(int(doubt.place.removeprefix('pass ')))} lie at its place?"
         else:
-            seat = None
             cards = list(doubt.options) if len(doubt.options) > 1 else self.perception.answers(int(doubt.place))
             readings, names = [*cards, False], [face_name(card.face) for card in cards]
             text = f"{' or '.join(names) if len(names) <= 3 else 'Which card lies'} at place {doubt.place}?"
             names.append("No new card")
 
+        def tell(reading: Card | bool | None) -> list[Observed]:
+            # The camera may have read the place while the answer was on its way.
+            return self.perception.answer(doubt.number, reading) if self.perception.is_open(doubt.number) else []
+
         async def answer(option: int | None) -> None:
-            as_it_was = seat is not None and self._has_passed(seat)
-            reading = as_it_was if option is None else readings[option]
-            await self._perceived(partial(self.perception.answer, doubt.number, reading))
+            await self._perceived(partial(tell, None if option is None else readings[option]))
 
         await self._ask(f"doubt-{doubt.number}", text, names, answer, doubt.picture)
 
@@ -372,7 +411,7 @@ class Bridge:
         """Asks the people at the table. A question of the same name that is still open is withdrawn."""
         await self._withdraw(name)
         self._questions += 1
-        number = f"{self._session}-{name}-{self._questions}"
+        number = f"{_QUESTION_IDS}{self._session}-{name}-{self._questions}"
         self._asked[name] = _Question(number, on_answer)
         question = pb.TableQuestion(question_id=number, text=text, options=options, picture=_encoded(picture))
         await self._report(pb.TableReport(question=question))
@@ -382,6 +421,12 @@ class Bridge:
         question = self._asked.pop(name, None)
         if question is not None:
             await self._report(pb.TableReport(answer=pb.QuestionAnswered(question_id=question.number)))
+
+    async def _withdraw_orphans(self) -> None:
+        """Withdraws the questions of a bridge that ended without doing so: nobody would hear the answers."""
+        for question in self.state.questions if self.state is not None else ():
+            if question.question_id.startswith(_QUESTION_IDS):
+                await self._report(pb.TableReport(answer=pb.QuestionAnswered(question_id=question.question_id)))
 
     async def _withdraw_all(self) -> None:
         """Withdraws the open questions: nobody would hear the answers."""
@@ -428,6 +473,7 @@ class Bridge:
     def _newer(self, state: pb.TableState) -> None:
         if self.state is None or state.version >= self.state.version:
             self.state = state
+        self._known.set()
 
     def _is_over(self) -> bool:
         return self.state is not None and self.state.stage == pb.TABLE_STAGE_OVER
@@ -439,6 +485,11 @@ class Bridge:
     def _name(self, seat: int) -> str:
         seats = self.state.room.seats if self.state is not None else ()
         return seats[seat].name if seat < len(seats) else f"seat {seat}"
+
+
+def _is_found(event: Observed) -> bool:
+    """Whether something was found."""
+    return isinstance(event, Laid | PassSeen) and event.found
 
 
 def _may_belong(cards: list[Card], to: list[Card]) -> bool:

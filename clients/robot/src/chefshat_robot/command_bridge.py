@@ -21,8 +21,8 @@ from chefshat_robot.vision.hand import HandReader
 
 DESCRIPTION = """\
 Watches a table with real cards through a camera and reports what happens to its physical room. What the camera cannot decide is
-asked on the page, in the terminal, or by a robot. Best started while the field is empty, since it may ask about
-what lies there already.
+asked on the page, in the terminal, or by a robot. Start while the field is empty if you can: it may ask about
+cards that lie there already.
 
 Examples:
   chefshat-robot bridge 0 --ticket TICKET --camera camera.json --deck 0

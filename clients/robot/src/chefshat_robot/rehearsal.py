@@ -10,7 +10,7 @@ from __future__ import annotations
 import random
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from chefshat import pb
@@ -24,6 +24,10 @@ PAUSE_S = 0.8
 """Time between the end of one act and the start of the next, by the clock of the frames."""
 PATIENCE_S = 6.0
 """How long people wait for the table to notice what they did, by the clock of the frames, before they do something else."""
+AGAIN_S = 12.0
+"""How long they wait before they lay the same cards again."""
+UP_S = 2.0
+"""Time to take cards up before they are laid again."""
 MAX_PLACES = 11
 
 
@@ -78,6 +82,8 @@ class Rehearsal:
     _lying: list[LayCards] = field(default_factory=list)
     _laid: tuple[int, int, int] | None = None
     """The Shift, the seat and the cards it had left, as the table knew them, when a person laid cards last."""
+    _again: float = 0.0
+    """When cards that were laid are laid again if the table has not noticed them, in s."""
     _shown: set[int] = field(default_factory=set)
     _pizza: tuple[int, int] = (0, 0)
 
@@ -185,9 +191,9 @@ class Rehearsal:
         return next(seat for seat, hand in enumerate(self.hands) if any(card.is_golden for card in hand))
 
     def _take_turn(self, state: pb.TableState, seat: int, start: float) -> list[Act] | None:
-        """A person plays or passes; nothing if it has laid cards that the table has not noticed yet."""
+        """A person plays or passes, or waits for the table to notice its cards, and lays them again if it does not."""
         if self._laid == _left(state, seat):
-            return None
+            return self._lay_again(start)
         required = state.play_requirement
         if state.stage == pb.TABLE_STAGE_OPENING or required.golden_card:
             required = pb.PlayRequirement(lowest_face=FACES, highest_face=FACES, fewest_cards=1, golden_card=True)
@@ -215,8 +221,19 @@ class Rehearsal:
         if face_down is None:
             face_down = len(cards) == 1 and self._rng.random() < self.face_down
         act = LayCards(start, seat, tuple(cards), tuple(range(1, len(cards) + 1)), face_down)
+        self._again = start + AGAIN_S
         self._lying.append(act)
         return act
+
+    def _lay_again(self, start: float) -> list[Act] | None:
+        """The cards that were laid last are taken up and laid again, with their faces up, if they have lain there for long."""
+        if start < self._again:
+            return None
+        act = self._lying.pop()
+        again = replace(act, start=start + UP_S, face_down=False)
+        self._lying.append(again)
+        self._again = again.start + AGAIN_S
+        return [TakeBack(start, act.seat, act.places), again]
 
     def _sweep(self, state: pb.TableState, start: float) -> list[Act]:
         """The pizza is over: the cards are swept away, and all take their pass cards back."""
@@ -237,7 +254,7 @@ class Rehearsal:
         elif wanted.cards.cards:
             if wanted == self._carried_out:
                 # The cards lie there; the camera has not reported them yet.
-                return None
+                return self._lay_again(start)
             self._carried_out = wanted
             cards = self._take(seat, wanted.cards)
             self._play(seat, cards)
@@ -294,8 +311,8 @@ class Rehearsal:
             there = [card for act in self._lying for card, at in zip(act.cards, act.places, strict=True) if at == int(place)]
             lies = face_name(there[-1].face) if there else "No new card"
             return options.index(lies) if lies in options else None
-        if question.text.endswith("open the pizza?"):
-            return 0 if self._lying and self._pizza == self._pizza_of(state) else 1
+        if question.text.endswith("is it a new play?"):
+            return 1 if self._counts(state) else 0
         if question.text.endswith("is it shown in this pizza?"):
             asked = [seat for seat, taken in enumerate(state.room.seats) if taken.name in question.text]
             return 0 if self._shown.issuperset(asked) and self._pizza == self._pizza_of(state) else 1
@@ -310,6 +327,17 @@ class Rehearsal:
             faces = [sorted(card.face for card in act.cards) for act in self._lying[-2:]]
             return 0 if len(faces) == 2 and faces[0] == faces[1] else 1
         return 0
+
+    def _counts(self, state: pb.TableState) -> bool:
+        """Whether the table knows the cards that lie on top, or none lie there."""
+        if not self._lying:
+            return True
+        if self._mistake is not None:
+            return state.HasField("violation")
+        seat = self._lying[-1].seat
+        if not state.seats[seat].at_table:
+            return self._carried_out not in state.to_lay
+        return state.observation.cards_left[seat] == len(self.hands[seat])
 
     async def _report(self, **kind: object) -> None:
         report = pb.TableReport(source=pb.REPORT_SOURCE_ATTENDANT, **kind)  # type: ignore[arg-type]

@@ -39,7 +39,8 @@ NO_FIELD = (
 )
 
 _DESCRIPTION = """\
-Watch the table and print what happens, each event with the time at which it became certain. What lies there already is found.
+Watch the table and print what happens, each event with the time at which it became certain. Cards that lie there already are
+printed as found.
 A doubt is a place that cannot be read for sure; events after it wait until it can be read, at most 5 seconds.
 
 Examples:

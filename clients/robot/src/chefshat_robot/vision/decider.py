@@ -14,8 +14,7 @@ The decider sees no pictures, so that a recording of sightings gives the same ev
   if only some are, when none of the others can be read as new cards come. If others can still be read after `TAKEN_SECONDS` in
   which nothing moved, cards were taken back: before that, more strokes may sweep the rest away. Cards on others were taken back
   when a tag is read that they covered.
-- What is read at a place before anything else was seen there, empty or another card, was **found**: it may have lain there before
-  the first frame.
+- What lies at a place from the first frame, until something moves there, was **found**: it may have lain there for long.
 """
 
 from __future__ import annotations
@@ -116,12 +115,14 @@ class _Riddle:
         since: When it was first seen, in s.
         seen: When it was last seen, in s.
         options: The cards it may show, the likeliest first.
+        found: Whether what it shows was found.
     """
 
     look: int
     since: float
     seen: float
     options: tuple[Card, ...]
+    found: bool
 
 
 @dataclass
@@ -147,7 +148,7 @@ class _Spot:
     gone_since: float | None = None
     """Since when it looks empty although cards lay there, in s."""
     watched: bool = False
-    """Whether it was seen empty, or what lay there was read or asked about: what is new there was not found."""
+    """Whether it was seen empty, or something moved over what was found there: what is new there was not found."""
 
 
 @dataclass
@@ -253,6 +254,10 @@ class Decider:
         of_face = {card.face: card for card in reversed(left)} | {card.face: card for card in beneath}
         return [of_face[face] for face in sorted(of_face)]
 
+    def lies_at(self, spot: int) -> bool:
+        """Whether something lies at a place, an index of `SPOTS`, as far as is known."""
+        return self._top(spot) is not None
+
     def look_of_doubt(self, number: int) -> tuple[int, int] | None:
         """The place that an open doubt is about, as an index of `SPOTS`, and its look; None if the doubt is not open."""
         doubt = self._doubts.get(number)
@@ -284,13 +289,13 @@ class Decider:
         self._flush(events)
         return events
 
-    def answer(self, number: int, reading: Card | bool) -> list[Observed]:
+    def answer(self, number: int, reading: Card | bool | None) -> list[Observed]:
         """Answers a doubt and returns the events that were waiting for it.
 
         Args:
             number: The number of the doubt.
             reading: The card that lies there. At a pass place: whether the pass card lies there. False at a place for cards:
-                nothing new lies there.
+                nothing new lies there. None: that is not known, and nothing is reported.
 
         Raises:
             ValueError: There is no such open doubt, or the answer does not fit its place.
@@ -299,12 +304,12 @@ class Decider:
             raise ValueError(f"doubt {number} is not open: it was answered or resolved before")
         doubt = self._doubts[number]
         is_pass = doubt.spot >= _FIRST_PASS
-        if isinstance(reading, bool) != (is_pass or reading is False):
+        if reading is not None and isinstance(reading, bool) != (is_pass or reading is False):
             raise ValueError("answer with True or False at a pass place, and with a card or False at a place for cards")
         events: list[Observed] = []
         if isinstance(reading, Card):
             self._add_told(doubt, reading)
-        elif is_pass:
+        elif is_pass and reading is not None:
             self._tell_pass(doubt, reading)
         self._close_doubt(number, events)
         self._flush(events)
@@ -367,6 +372,8 @@ class Decider:
             if seen.still == 0:
                 if spot.frames >= SETTLE_READS and spot.covered is None and spot.doubt is None:
                     spot.covered = self._riddle(number)
+                is_something = spot.covered is not None or spot.doubt is not None or self._top(number) is not None
+                spot.watched = spot.watched or is_something
                 spot.unexplained, spot.waited, spot.frames = False, 0.0, 0
         self._tracks = {piece: track for piece, track in self._tracks.items() if self._places[track.spot].still > 0}
 
@@ -398,7 +405,8 @@ class Decider:
 
     def _settle(self, events: list[Observed]) -> None:
         """Takes note of the pieces that settled."""
-        for track in list(self._tracks.values()):
+        # Of a pile, the card that is seen whole lies on top.
+        for track in sorted(self._tracks.values(), key=lambda track: len(track.ends)):
             if track.readings < SETTLE_READS or track.piece not in self._tracks:
                 continue
             known = self._known.get(track.piece)
@@ -438,10 +446,10 @@ class Decider:
         play = self._open_play()
         if spot.covered is not None and play is not None and spot.covered.since < play.since - TOGETHER_SECONDS:
             self._raise_doubt(track.spot, spot.covered, events, play)
-        elif spot.covered is not None or (play is not None and track.spot in play.cards.values()):
-            self._close_play(events)
-            play = None
-        if play is not None and play.found == spot.watched:
+        elif play is not None and play.found and not spot.watched:
+            # Of what was found, the play is what lies on top.
+            play.cards = {other: at for other, at in play.cards.items() if at != track.spot}
+        elif spot.covered is not None or (play is not None and (play.found == spot.watched or track.spot in play.cards.values())):
             self._close_play(events)
             play = None
         if play is None:
@@ -486,7 +494,7 @@ class Decider:
     def _explained(self, number: int, events: list[Observed]) -> None:
         """A place's present look is explained, and with it a doubt about this look."""
         spot = self._spots[number]
-        spot.explained, spot.watched = self._places[number].look, True
+        spot.explained = self._places[number].look
         spot.unexplained, spot.waited, spot.frames, spot.covered = False, 0.0, 0, None
         if spot.doubt is not None and self._doubts[spot.doubt].look == spot.explained:
             self._close_doubt(spot.doubt, events)
@@ -494,13 +502,10 @@ class Decider:
     def _explain(self, passed: float) -> None:
         """Finds the places that are still and not explained; `passed` is the time since the last frame, in s."""
         for number, (spot, seen) in enumerate(zip(self._spots, self._places, strict=True)):
-            if seen.still < STILL_FRAMES:
+            if seen.still < STILL_FRAMES or self._is_unclear(number):
                 continue
             spot.watched = spot.watched or bool(seen.empty)
             occupied = self._top(number) is not None
-            if not occupied and seen.empty is None:
-                # Too little was seen of it yet.
-                continue
             if not occupied and seen.empty:
                 spot.explained = seen.look
             was_unexplained, spot.unexplained = spot.unexplained, seen.look != spot.explained and not seen.empty
@@ -534,17 +539,16 @@ class Decider:
         tracks = sorted((track for track in self._tracks.values() if track.spot == number), key=lambda track: -track.readings)
         options = tuple(card for track in tracks if track.piece not in self._known and (card := track.piece.card) is not None)
         spot = self._spots[number]
-        return _Riddle(self._places[number].look, spot.since, spot.seen, options)
+        return _Riddle(self._places[number].look, spot.since, spot.seen, options, not spot.watched)
 
     def _raise_doubt(self, number: int, riddle: _Riddle, events: list[Observed], play: _Play | None) -> None:
         """Asks about a look of a place, whose card belongs to a play; or to one of its own, in the order of the times."""
         spot = self._spots[number]
         spot.covered = None
         elsewhere = play is None or riddle.since < play.since - TOGETHER_SECONDS or number in play.cards.values()
-        if play is None or elsewhere or play.found == spot.watched:
-            play = _Play(riddle.since, found=not spot.watched)
+        if play is None or elsewhere or play.found != riddle.found:
+            play = _Play(riddle.since, found=riddle.found)
             self._queue.insert(sum(entry.since <= riddle.since for entry in self._queue), play)
-        spot.watched = True
         play.doubts.add(self._next_doubt)
         play.closed = True
         if riddle.look == self._places[number].look:
@@ -673,6 +677,10 @@ class Decider:
         covered = [spot.covered.since for spot in self._spots if spot.covered is not None]
         return covered + [spot.since for spot in self._spots if spot.unexplained and spot.doubt is None]
 
+    def _is_unclear(self, spot: int) -> bool:
+        """Whether too little was seen of a place yet to tell whether something lies there."""
+        return self._places[spot].empty is None and self._top(spot) is None
+
     def _is_quiet(self) -> bool:
         """Whether no arm reaches over the field, nothing moves at the places for cards, and all of them are explained."""
         return (
@@ -680,6 +688,7 @@ class Decider:
             and not self._reaching
             and all(
                 self._places[spot].still >= QUIET_FRAMES
+                and not self._is_unclear(spot)
                 and (not self._spots[spot].unexplained or self._spots[spot].doubt is not None)
                 for spot in CARD_SPOTS
             )

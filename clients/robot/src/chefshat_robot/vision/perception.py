@@ -21,7 +21,7 @@ KEPT_LOOKS = 5
 class Perception:
     """Watches the table through one camera.
 
-    Best started while the field is empty. What lies there already was *found* (`Laid.found`): it may have lain there for long.
+    Start it while the field is empty if you can. Cards that lie there already are reported as found (`Laid.found`).
 
     Args:
         camera: The intrinsics of the camera; None: a lens without distortion is assumed.
@@ -64,9 +64,16 @@ class Perception:
         for frame in frames:
             yield from self.see(frame)
 
-    def answer(self, number: int, reading: Card | bool) -> list[Observed]:
+    def is_open(self, number: int) -> bool:
+        """Whether a doubt is open: neither answered nor resolved."""
+        return self._decider.look_of_doubt(number) is not None
+
+    def answer(self, number: int, reading: Card | bool | None) -> list[Observed]:
         """Answers a doubt and returns the events that were waiting for it; see `Decider.answer`."""
+        about = self._decider.look_of_doubt(number)
         events = self._decider.answer(number, reading)
+        if about is not None and reading is False and not self._decider.lies_at(about[0]) and self._shows(about):
+            self._reader.learn_empty(about[0])
         if self._recorder is not None:
             self._recorder.answered(number, reading)
         return self._reported(events)
@@ -86,6 +93,10 @@ class Perception:
             for event in events:
                 self._recorder.reported(event)
         return events
+
+    def _shows(self, about: tuple[int, int]) -> bool:
+        """Whether a place has a look now."""
+        return self.sighting is not None and bool(self.sighting.places) and self.sighting.places[about[0]].look == about[1]
 
     def _with_picture(self, doubt: Doubt) -> Doubt:
         about = self._decider.look_of_doubt(doubt.number)

@@ -55,10 +55,10 @@ LOOKS = 3
 EMPTY = 0.06
 """Mean difference from the empty place up to which a place is empty."""
 PLAIN = 0.07
-"""Mean difference of a place from its own brightness, relative to its surroundings, up to which it can be the empty place. Its
-print is faint: faces and backs of cards are not."""
+"""Mean difference of a place from its own mean, relative to the local brightness, up to which it can be the empty place, whose
+print is faint. Faces and backs of cards differ more."""
 EMPTY_FRAMES = 4
-"""Frames for which a place must be still and without tags to be remembered as empty, at first."""
+"""Frames for which a place must be still and plain to be remembered as empty, at first."""
 AVERAGE_FRAMES = 4
 """The appearance of a still place is averaged over so many frames, against noise."""
 ADAPT = 0.03
@@ -107,8 +107,8 @@ class SeenPlace:
     Attributes:
         still: For how many frames nothing has moved there; 0 while something moves.
         look: Number of its look; the last one while something moves.
-        empty: Whether it looks as it did when it was empty, or before that is known, as if it could be; None while something moves
-            there, or too little was seen.
+        empty: Whether it looks as it did when it was empty; False until it was seen empty. None while something moves, or before it
+            was still for long enough to tell.
         read: Whether tags were read there in this frame.
     """
 
@@ -194,8 +194,6 @@ class _Spot:
     """Its appearance since it became still, averaged; None while something moves."""
     empty: NDArray[np.float32] | None = None
     """The look of the empty place."""
-    bare: int = 0
-    """Frames read in a row without a tag, while the empty place is not known."""
 
     def recognize(self, appearance: NDArray[np.float32]) -> None:
         """Finds the look of an appearance, or makes a new one."""
@@ -248,7 +246,7 @@ class Reader:
         closely = [number for number in attention if self._spots[number].still]
         to_read += [number for number in closely if number not in to_read]
         tags = self._read_tags(grey, [number for number in to_read if number not in closely], closely)
-        places = tuple(self._seen(number, number in to_read, tags) for number in range(len(SPOTS)))
+        places = tuple(self._seen(number, number in to_read) for number in range(len(SPOTS)))
         reaching, sides = self._reached(blocks)
         return Sighting(frame.index, frame.time, changed, tuple(tags), reaching, places, sides)
 
@@ -288,7 +286,7 @@ class Reader:
         """Follows a place through the frame, and returns whether its tags should be read."""
         spot = self._spots[number]
         if moving is None or np.count_nonzero(moving[_OUTER[number]]) >= MOVING_BLOCKS:
-            spot.still, spot.average, spot.bare = 0, None, 0
+            spot.still, spot.average = 0, None
             return False
         spot.still += 1
         seen = cells[_CORE[number]]
@@ -331,21 +329,23 @@ class Reader:
         angle = float(np.degrees(np.arctan2(across[1], across[0])))
         return SeenTag(tag.number, round(float(x), 2), round(float(y), 2), round(angle, 1), tag.hamming, round(tag.margin, 1))
 
-    def _seen(self, number: int, read: bool, tags: list[SeenTag]) -> SeenPlace:
+    def learn_empty(self, number: int) -> None:
+        """Remembers the present look of a place, an index of `SPOTS`, as that of the empty place."""
+        spot = self._spots[number]
+        spot.empty = None if spot.average is None else spot.average.copy()
+
+    def _seen(self, number: int, read: bool) -> SeenPlace:
         """What a place shows in this frame."""
         spot = self._spots[number]
         if spot.average is None or spot.still < STILL_FRAMES:
             return SeenPlace(spot.still, spot.look, None, read)
         if spot.empty is None:
-            half_width, half_height = half_size(SPOTS[number])
-            place = SPOTS[number]
-            has_tag = any(abs(tag.x - place.x) < half_width and abs(tag.y - place.y) < half_height for tag in tags)
-            spot.bare = 0 if has_tag else spot.bare + read
-            if spot.bare < EMPTY_FRAMES:
+            if spot.still < EMPTY_FRAMES:
                 return SeenPlace(spot.still, spot.look, None, read)
             if difference(spot.average, spot.average.mean()) > PLAIN:
                 return SeenPlace(spot.still, spot.look, False, read)
-            spot.empty = spot.average.copy()
+            self.learn_empty(number)
+            return SeenPlace(spot.still, spot.look, True, read)
         empty = difference(spot.average, spot.empty) <= EMPTY
         if empty:
             spot.empty += ADAPT * (spot.average - spot.empty)

@@ -53,7 +53,7 @@ class Recorder:
             path = self._frames / f"{frame.index:08}.jpg"
             cv2.imwrite(str(path), frame.image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
 
-    def answered(self, number: int, reading: Card | bool) -> None:
+    def answered(self, number: int, reading: Card | bool | None) -> None:
         """Writes the answer to a doubt."""
         value = {"deck": reading.deck, "index": reading.index} if isinstance(reading, Card) else reading
         _write(self._sightings, {"answer": number, "reading": value})
@@ -93,7 +93,7 @@ def replay(folder: Path) -> Iterator[Observed]:
                     decider = Decider(values["deck"])
                 elif "answer" in values:
                     reading = values["reading"]
-                    yield from decider.answer(values["answer"], reading if isinstance(reading, bool) else Card(**reading))
+                    yield from decider.answer(values["answer"], Card(**reading) if isinstance(reading, dict) else reading)
                 else:
                     yield from decider.see(Sighting.from_json(values))
             except (KeyError, TypeError, ValueError) as error:
