@@ -124,6 +124,23 @@ def test_the_program_of_the_archive_plays(system: System) -> None:
     assert {file.name for file in (folder / "completions").iterdir()} == {"chefshat", "_chefshat", "chefshat.fish"}
 
 
+def test_everything_that_runs_has_the_licences_of_what_it_contains(tmp_path: Path) -> None:
+    listed = {"tokio 1", "preact 11", "Atkinson Hyperlegible Next", "pyo3 0", "Apache License"}
+    name = f"chefshat-{VERSION}-x86_64-linux"
+    shutil.unpack_archive(DIST / f"{name}.tar.gz", tmp_path)
+    notices = (tmp_path / name / "NOTICES.txt").read_text()
+    assert {words for words in listed if words in notices} == listed
+    contents = subprocess.run(
+        ["dpkg-deb", "--contents", DIST / f"chefshat_{VERSION}_amd64.deb"], capture_output=True, check=True, text=True
+    )
+    assert "/usr/share/doc/chefshat/NOTICES.txt" in contents.stdout
+    for wheel in [*DIST.glob("chefshat_native-*.whl"), *DIST.glob("chefshat_server-*.whl")]:
+        shutil.unpack_archive(wheel, tmp_path / wheel.stem, "zip")
+        (file,) = (tmp_path / wheel.stem).glob("*.dist-info/licenses/NOTICES.txt")
+        text = file.read_text()
+        assert {words for words in listed if words in text} == listed
+
+
 def test_the_debian_package_has_a_service(system: System) -> None:
     system.download(DIST / f"chefshat_{VERSION}_amd64.deb")
     assert "place" in system.type(block("sudo dpkg").replace("sudo ", ""))

@@ -10,6 +10,7 @@ use std::process::Command;
 use crate::book;
 use crate::command::{cargo, git, python_command, read, run as run_command, succeeds};
 use crate::failure::Failure;
+use crate::notices::{FILE as NOTICES, notices};
 use crate::places::{DEPLOYMENT, Places};
 use crate::setup::{self, at};
 use crate::steps::Steps;
@@ -68,6 +69,7 @@ pub(crate) fn run(
         stage: &stage,
         date: read(git(places).args(["log", "-1", "--format=%ct"]))?,
     };
+    steps.run("licences of what it contains", || release.notices())?;
     steps.program("static binary", &mut release.static_binary())?;
     steps.run("check that it is static and names no folder", || {
         release.check_static()
@@ -155,6 +157,10 @@ impl Release<'_> {
         }
     }
 
+    fn notices(&self) -> Result<(), Failure> {
+        write(&self.stage.join(NOTICES), &notices(self.places, TARGET)?)
+    }
+
     /// The binary with its manual pages, completions and unit, to unpack anywhere.
     fn binary_archive(&self) -> Result<(), Failure> {
         let name = format!("chefshat-{VERSION}-{PLATFORM}");
@@ -166,6 +172,7 @@ impl Release<'_> {
             let from = self.places.root.join(document);
             copy(&from, &folder.join(file_name(&from)))?;
         }
+        copy(&self.stage.join(NOTICES), &folder.join(NOTICES))?;
         for unit in ["chefshat.service", "chefshat.socket"] {
             let from = self.places.root.join("docker/systemd").join(unit);
             copy(&from, &folder.join("systemd").join(unit))?;
@@ -210,6 +217,8 @@ impl Release<'_> {
         }
         let licence = root.join("usr/share/doc/chefshat/copyright");
         copy(&unpacked.join("LICENSE"), &licence)?;
+        let notices = root.join("usr/share/doc/chefshat").join(NOTICES);
+        copy(&unpacked.join(NOTICES), &notices)?;
         let mut config = Command::new(self.binary());
         config.arg("config").env_clear();
         // As comments, so that a later version's defaults count.
@@ -353,6 +362,7 @@ impl Release<'_> {
         for program in PROGRAMS {
             copy(&self.program(program), &programs.join(program))?;
         }
+        copy(&self.stage.join(NOTICES), &programs.join(NOTICES))?;
         self.base_image("binary", &programs.display().to_string(), "/")?;
         let root = self.places.root.display();
         let name = format!("localhost/chefshat:{VERSION}");

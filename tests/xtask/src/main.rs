@@ -12,6 +12,7 @@ mod command;
 mod dist;
 mod failure;
 mod lint;
+mod notices;
 mod places;
 mod setup;
 mod steps;

@@ -7,6 +7,7 @@ use std::process::Command;
 
 use crate::command::{git, read, run as run_command};
 use crate::failure::Failure;
+use crate::notices::{self, notices};
 use crate::places::Places;
 use crate::setup::{self, at};
 use crate::steps::Steps;
@@ -14,6 +15,9 @@ use crate::web;
 
 /// The oldest systems on which the wheels with programs run: glibc 2.17, those of numpy's wheels.
 const PLATFORM: &str = "manylinux_2_17";
+
+/// What programs in wheels are built for.
+const HOST: &str = "x86_64-unknown-linux-gnu";
 
 /// The packages built by maturin, from Rust.
 const BUILT_FROM_RUST: [&str; 2] = ["clients/python/native", "clients/python/server"];
@@ -50,6 +54,12 @@ pub(crate) fn run(
         hatchling.args(["build", "-t", "wheel", "-d"]).arg(&wheels);
         steps.program(&format!("wheel of {package}"), &mut hatchling)?;
     }
+    steps.run("licences of what they contain", || {
+        let notices = notices(places, HOST)?;
+        let built = built(&wheels)?;
+        let mut binary = built.iter().filter(|wheel| !is_pure(wheel));
+        binary.try_for_each(|wheel| add_notices(places, wheel, &notices))
+    })?;
     steps.run("auditwheel", || {
         built(&wheels)?
             .iter()
@@ -98,6 +108,26 @@ fn try_wheels(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
         fs::copy(&script, &copy).map_err(|error| at(&script, &error))?;
         run_command(&mut attempt)
     })
+}
+
+/// Puts the notices beside the licence of a wheel.
+fn add_notices(places: &Places, wheel: &Path, notices: &str) -> Result<(), Failure> {
+    let unpacked = places.own.join("wheel");
+    if unpacked.exists() {
+        fs::remove_dir_all(&unpacked).map_err(|error| at(&unpacked, &error))?;
+    }
+    let mut unpack = tool(places, "wheel", "");
+    run_command(unpack.arg("unpack").arg(wheel).arg("--dest").arg(&unpacked))?;
+    let name = wheel.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.split('-').take(2).collect::<Vec<_>>().join("-");
+    let folder = unpacked.join(&name);
+    let licences = folder.join(format!("{name}.dist-info/licenses"));
+    fs::create_dir_all(&licences).map_err(|error| at(&licences, &error))?;
+    let file = licences.join(notices::FILE);
+    fs::write(&file, notices).map_err(|error| at(&file, &error))?;
+    let mut pack = tool(places, "wheel", "");
+    pack.arg("pack").arg(&folder);
+    run_command(pack.arg("--dest-dir").arg(places.wheels()))
 }
 
 /// Checks that a wheel runs on every system that its name promises.
