@@ -227,6 +227,32 @@ def test_a_play_that_counts_is_taken_back_if_somebody_says_so(table: Table, brid
     assert not table.reports[-1].correction.HasField("instead")
 
 
+def test_what_happens_while_an_addition_is_asked_about_waits_for_the_answer(table: Table, bridge: Bridge) -> None:
+    async def test() -> None:
+        await bridge.observed(laid(CARDS[9][:1]))
+        await bridge.observed(laid(CARDS[9][1:3], first=2))
+        await bridge.observed(laid(CARDS[5][:3]))
+        await bridge.observed(Cleared(0, 0.0))
+
+    run(test())
+    assert table.kinds() == ["laid", "question"]
+    answer(table, bridge, 0)
+    assert table.kinds() == ["laid", "question", "correction", "laid", "cleared"]
+    assert list(table.reports[2].correction.instead.laid.cards.cards) == [9, 9, 9]
+
+
+def test_a_play_taken_back_is_asked_about_before_the_next_is_reported(table: Table, bridge: Bridge) -> None:
+    async def test() -> None:
+        await bridge.observed(laid(CARDS[9][:2]))
+        await bridge.observed(TakenBack(0, 0.0, tuple(CARDS[9][:2]), (1, 2)))
+        await bridge.observed(laid(CARDS[7][:2]))
+
+    run(test())
+    assert table.kinds() == ["laid", "question"]
+    answer(table, bridge, 0)
+    assert table.kinds() == ["laid", "question", "correction", "laid"]
+
+
 def test_what_was_taken_from_a_board_that_is_then_cleared_was_swept_away(table: Table, bridge: Bridge) -> None:
     async def test() -> None:
         await bridge.observed(laid(CARDS[9][:2]))
@@ -378,10 +404,10 @@ def test_a_game_that_a_remote_seat_ended_ends_the_bridge(table: Table, eyes: Eye
 
 def test_no_two_questions_have_one_id_and_the_open_ones_end_with_the_bridge(table: Table, bridge: Bridge) -> None:
     async def test() -> None:
-        for cards in (CARDS[9][:2], CARDS[8][:2]):
-            await bridge.observed(laid(cards))
-            await bridge.observed(laid([CARDS[12][0]], first=5))
+        await bridge.observed(laid(CARDS[9][:2]))
+        await bridge.observed(laid([CARDS[12][0]], first=5))
         await bridge.observed(Doubt(0, 0.0, 4, "pass 2", 0.0, ()))
+        await bridge.observed(Doubt(0, 0.0, 5, "pass 3", 0.0, ()))
         await bridge.run(iter([FRAME]))
 
     run(test())

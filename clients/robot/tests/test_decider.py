@@ -49,6 +49,14 @@ class Table:
             self._frame += 1
             self._still = [still + 1 for still in self._still]
 
+    def read(self, spot: int, card: Card) -> None:
+        """From now on the card that lies at a place can be read."""
+        self._tops[spot] = Piece(PieceKind.CARD, card.deck, card.index)
+
+    def skip(self, frames: int) -> None:
+        """The camera is away for some frames."""
+        self._frame += frames
+
     def put(self, *spots: int, cards: tuple[Card, ...] | None = None, look: int | None = None) -> None:
         """Lays cards at places, or something without a tag that can be read."""
         for number, spot in enumerate(spots):
@@ -204,6 +212,21 @@ def test_cards_that_are_swept_away_while_perception_begins_were_found() -> None:
     assert isinstance(found, Laid)
     assert (found.cards, found.found) == (NINES[2:], True)
     assert isinstance(cleared, Cleared)
+
+
+def test_nobody_waited_for_anything_while_the_camera_was_away() -> None:
+    table = Table()
+    table.wait()
+    table.put(0, 1, cards=NINES[:2])
+    table.put(2)
+    table.wait(STILL_FRAMES)
+    table.skip(60)
+    table.wait(1)
+    table.read(2, NINES[2])
+    table.wait()
+    (event,) = table.said()
+    assert isinstance(event, Laid)
+    assert event.cards == NINES
 
 
 def test_of_a_pile_that_was_found_the_play_is_what_lies_on_top() -> None:

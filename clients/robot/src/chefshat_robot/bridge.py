@@ -126,7 +126,7 @@ class Bridge:
     _found: dict[Card, int] = field(default_factory=dict)
     """The cards that are asked about because they were found, and the place of each."""
     _held: list[Observed] = field(default_factory=list)
-    """What happened since something was found that is asked about."""
+    """What happened since the open questions about plays."""
     _known: asyncio.Event = field(default_factory=asyncio.Event)
     """Set when the state of the table is known."""
     _perceiving: asyncio.Lock = field(default_factory=asyncio.Lock)
@@ -220,28 +220,29 @@ class Bridge:
         return state.observation.cards_left[seat] == size
 
     async def observed(self, event: Observed) -> None:
-        """Reports an event of perception. What happens after something was found that is asked about waits for the answer."""
+        """Reports an event of perception. While a question about a play is open, what happens at the table waits for the answer."""
         match event:
             case PassGone() if f"found-pass-{event.seat}" in self._asked:
                 await self._withdraw(f"found-pass-{event.seat}")
-            case Cleared() if not self._held:
+            case Cleared() if not self._held and "added" not in self._asked:
+                await self._withdraw("taken-back")
                 await self._withdraw("found")
                 self._found = {}
                 await self._report_event(event)
-            case Laid() | TakenBack() | Cleared() | PassSeen() | PassGone() if self._awaits_found() and not _is_found(event):
+            case Laid() | TakenBack() | Cleared() | PassSeen() | PassGone() if self._asks_about_play() and not _is_found(event):
                 self._held.append(event)
             case _:
                 await self._report_event(event)
         await self._release()
 
     async def _release(self) -> None:
-        """Reports what waited, if nothing that was found is asked about any more."""
-        while self._held and not self._awaits_found():
+        """Reports what waited, until a question about a play is open."""
+        while self._held and not self._asks_about_play():
             await self._report_event(self._held.pop(0))
 
-    def _awaits_found(self) -> bool:
-        """Whether something that was found is asked about."""
-        return any(name.startswith("found") for name in self._asked)
+    def _asks_about_play(self) -> bool:
+        """Whether a question is open whose answer decides what was played: its place in the order is before what happens now."""
+        return any(name in ("added", "taken-back") or name.startswith("found") for name in self._asked)
 
     async def _report_event(self, event: Observed) -> None:
         if self._is_over():
@@ -256,7 +257,6 @@ class Bridge:
                 await self._taken_back(list(event.cards))
             case Cleared():
                 self._play = None
-                await self._withdraw("taken-back")
                 await self._report(pb.TableReport(cleared=pb.BoardCleared()))
             case PassSeen(found=True) if not self._has_passed(event.seat):
                 await self._ask_about_pass(event.seat)

@@ -41,6 +41,8 @@ GONE_FRAMES = 3
 """A place is empty when it has looked empty for so many frames."""
 DOUBT_SECONDS = 1.2
 """A place that cannot be explained for this long becomes a doubt, in s."""
+LONGEST_FRAME = 0.25
+"""A frame after a longer time counts as so long, in s: while the camera was away, nobody waited for anything."""
 TAKEN_SECONDS = 1.2
 """Cards that are gone while others stay were taken back when nothing has moved for this long, in s."""
 TOGETHER_SECONDS = 0.8
@@ -267,7 +269,7 @@ class Decider:
 
     def see(self, sighting: Sighting) -> list[Observed]:
         """Takes in the next frame and returns what is now certain."""
-        passed = sighting.time - self._time
+        passed = min(sighting.time - self._time, LONGEST_FRAME)
         self._frame, self._time = sighting.frame, sighting.time
         events: list[Observed] = []
         if sighting.field is not None:
