@@ -260,6 +260,10 @@ class Decider:
         """Whether something lies at a place, an index of `SPOTS`, as far as is known."""
         return self._top(spot) is not None
 
+    def shows(self, spot: int, look: int) -> bool:
+        """Whether a place, an index of `SPOTS`, has a look now."""
+        return bool(self._places) and self._places[spot].look == look
+
     def look_of_doubt(self, number: int) -> tuple[int, int] | None:
         """The place that an open doubt is about, as an index of `SPOTS`, and its look; None if the doubt is not open."""
         doubt = self._doubts.get(number)
@@ -361,7 +365,7 @@ class Decider:
         spot = self._spots[doubt.spot]
         if spot.doubt == number:
             spot.doubt = None
-            if self._places and self._places[doubt.spot].look == doubt.look:
+            if self.shows(doubt.spot, doubt.look):
                 spot.explained = doubt.look
                 spot.unexplained, spot.waited, spot.frames = False, 0.0, 0
         events.append(DoubtResolved(self._frame, self._time, number))
@@ -374,7 +378,7 @@ class Decider:
             if seen.still == 0:
                 if spot.frames >= SETTLE_READS and spot.covered is None and spot.doubt is None:
                     spot.covered = self._riddle(number)
-                is_something = spot.covered is not None or spot.doubt is not None or self._top(number) is not None
+                is_something = spot.covered is not None or spot.doubt is not None or self.lies_at(number)
                 spot.watched = spot.watched or is_something
                 spot.unexplained, spot.waited, spot.frames = False, 0.0, 0
         self._tracks = {piece: track for piece, track in self._tracks.items() if self._places[track.spot].still > 0}
@@ -507,7 +511,7 @@ class Decider:
             if seen.still < STILL_FRAMES or self._is_unclear(number):
                 continue
             spot.watched = spot.watched or bool(seen.empty)
-            occupied = self._top(number) is not None
+            occupied = self.lies_at(number)
             if not occupied and seen.empty:
                 spot.explained = seen.look
             was_unexplained, spot.unexplained = spot.unexplained, seen.look != spot.explained and not seen.empty
@@ -528,7 +532,7 @@ class Decider:
         """Asks about places that stay unexplained."""
         for number, spot in enumerate(self._spots):
             open_play = self._open_play() if number in CARD_SPOTS else None
-            if spot.covered is not None and self._top(number) is None and self._is_empty(number):
+            if spot.covered is not None and not self.lies_at(number) and self._is_empty(number):
                 self._raise_doubt(number, spot.covered, events, open_play)
             elif spot.doubt is None and spot.waited >= DOUBT_SECONDS:
                 if spot.covered is not None:
@@ -547,8 +551,12 @@ class Decider:
         """Asks about a look of a place, whose card belongs to a play; or to one of its own, in the order of the times."""
         spot = self._spots[number]
         spot.covered = None
-        elsewhere = play is None or riddle.since < play.since - TOGETHER_SECONDS or number in play.cards.values()
-        if play is None or elsewhere or play.found != riddle.found:
+        if (
+            play is None
+            or play.found != riddle.found
+            or riddle.since < play.since - TOGETHER_SECONDS
+            or number in play.cards.values()
+        ):
             play = _Play(riddle.since, found=riddle.found)
             self._queue.insert(sum(entry.since <= riddle.since for entry in self._queue), play)
         play.doubts.add(self._next_doubt)
@@ -681,7 +689,7 @@ class Decider:
 
     def _is_unclear(self, spot: int) -> bool:
         """Whether too little was seen of a place yet to tell whether something lies there."""
-        return self._places[spot].empty is None and self._top(spot) is None
+        return self._places[spot].empty is None and not self.lies_at(spot)
 
     def _is_quiet(self) -> bool:
         """Whether no arm reaches over the field, nothing moves at the places for cards, and all of them are explained."""

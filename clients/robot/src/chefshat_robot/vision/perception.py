@@ -72,7 +72,7 @@ class Perception:
         """Answers a doubt and returns the events that were waiting for it; see `Decider.answer`."""
         about = self._decider.look_of_doubt(number)
         events = self._decider.answer(number, reading)
-        if about is not None and reading is False and not self._decider.lies_at(about[0]) and self._shows(about):
+        if about is not None and reading is False and not self._decider.lies_at(about[0]) and self._decider.shows(*about):
             self._reader.learn_empty(about[0])
         if self._recorder is not None:
             self._recorder.answered(number, reading)
@@ -93,10 +93,6 @@ class Perception:
             for event in events:
                 self._recorder.reported(event)
         return events
-
-    def _shows(self, about: tuple[int, int]) -> bool:
-        """Whether a place has a look now."""
-        return self.sighting is not None and bool(self.sighting.places) and self.sighting.places[about[0]].look == about[1]
 
     def _with_picture(self, doubt: Doubt) -> Doubt:
         about = self._decider.look_of_doubt(doubt.number)

@@ -342,7 +342,7 @@ class Reader:
         if spot.empty is None:
             if spot.still < EMPTY_FRAMES:
                 return SeenPlace(spot.still, spot.look, None, read)
-            if difference(spot.average, spot.average.mean()) > PLAIN:
+            if float(np.abs(spot.average - spot.average.mean()).mean()) > PLAIN:
                 return SeenPlace(spot.still, spot.look, False, read)
             self.learn_empty(number)
             return SeenPlace(spot.still, spot.look, True, read)
@@ -352,9 +352,9 @@ class Reader:
         return SeenPlace(spot.still, spot.look, empty, read)
 
 
-def difference(one: NDArray[np.float32], other: NDArray[np.float32] | np.float32) -> float:
-    """The mean difference of two looks, or of a look and a brightness, relative to the local brightness."""
-    return float(np.abs(one - other).mean())
+def difference(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
+    """The mean difference of two looks, relative to the local brightness."""
+    return float(cv2.norm(one, other, cv2.NORM_L1)) / one.size
 
 
 def _relative(grey: Picture) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
