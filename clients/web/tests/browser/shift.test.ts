@@ -160,7 +160,8 @@ test("a game resumes after a server crash", async () => {
     if (already !== 2) return;
     const before = await seen(page);
     await server.restart();
-    await page.getByText("The server restarted; the game continues").waitFor();
+    // It is a line of the log and, until the next one, of what is read out.
+    await page.getByText("The server restarted; the game continues").first().waitFor();
     await page.locator("[data-decision]").waitFor();
     expect((await seen(page)).hand).toEqual(before.hand);
     restarts += 1;
