@@ -1,6 +1,7 @@
 //! Repeats requests whose response was lost, whose room or tournament is just changing servers, or
-//! whose server is stopping, until it is back. They change nothing, or their id tells the server that they are the same. `GetServerInfo` is not
-//! repeated: it tells at once whether the server answers. The Python SDK repeats the same calls.
+//! whose server is stopping, until it is back. They change nothing, or their id tells the server that
+//! they are the same. `GetServerInfo` is not repeated: it tells at once whether the server answers.
+//! The Python SDK repeats the same calls.
 
 use std::time::Duration;
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use chefshat_proto::v1::room_service_client::RoomServiceClient;
 use chefshat_proto::v1::{self, game_event::Kind, seat_update::Update};
 use chefshat_server::store::{FailingStore, MemoryStore};
 use chefshat_tests::{
@@ -77,11 +78,13 @@ async fn a_running_game_gets_its_grace_and_no_new_rooms_are_created() {
     {
         tokio::task::yield_now().await;
     }
-    let refused = client
+    // The SDK would repeat the call until the server is back.
+    let refused = RoomServiceClient::new(server.channel().await)
         .create_room(v1::CreateRoomRequest::default())
         .await
         .expect_err("no new rooms");
-    assert_eq!(refused.reason(), Some("SHUTTING_DOWN"));
+    let info = refused.get_details_error_info().expect("error info");
+    assert_eq!(info.reason, "SHUTTING_DOWN");
     let status = health
         .check(HealthCheckRequest::default())
         .await
