@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::process::Command;
+use std::sync::Mutex;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -90,29 +91,31 @@ impl Steps {
         }
     }
 
-    /// Runs lanes side by side, since many steps wait more than they compute. A failure ends its
-    /// lane and no other.
-    pub(crate) fn beside(&mut self, lanes: Vec<Lane<'_>>) -> Result<(), Failure> {
-        let ended = thread::scope(|scope| {
-            let started: Vec<_> = lanes
-                .into_iter()
-                .map(|lane| {
-                    scope.spawn(move || {
+    /// Runs lanes side by side, at most so many at a time, in their order, since many steps wait more
+    /// than they compute. A failure ends its lane and no other.
+    pub(crate) fn beside(&mut self, most: usize, lanes: Vec<Lane<'_>>) -> Result<(), Failure> {
+        let waiting = Mutex::new(lanes.into_iter().enumerate());
+        let ended = Mutex::new(Vec::new());
+        let next = || waiting.lock().expect("lanes do not panic").next();
+        thread::scope(|scope| {
+            for _ in 0..most {
+                scope.spawn(|| {
+                    while let Some((number, lane)) = next() {
                         let mut steps = Steps {
                             in_lane: true,
                             ..Steps::default()
                         };
                         let result = lane(&mut steps);
-                        (steps, result)
-                    })
-                })
-                .collect();
-            let join =
-                |lane: thread::ScopedJoinHandle<'_, _>| lane.join().expect("lanes do not panic");
-            started.into_iter().map(join).collect::<Vec<_>>()
+                        let mut ended = ended.lock().expect("nothing panics under this lock");
+                        ended.push((number, steps, result));
+                    }
+                });
+            }
         });
+        let mut ended = ended.into_inner().expect("lanes do not panic");
+        ended.sort_by_key(|(number, ..)| *number);
         let mut results = Vec::new();
-        for (steps, result) in ended {
+        for (_, steps, result) in ended {
             self.done.extend(steps.done);
             results.push(result);
         }
@@ -265,7 +268,7 @@ mod tests {
             }),
             Box::new(move |steps| program(steps, "second", "exit 0")),
         ];
-        let failure = steps.beside(lanes).unwrap_err();
+        let failure = steps.beside(2, lanes).unwrap_err();
         let failure = failure.to_string();
         assert!(failure.starts_with("first failed: `sh -c "), "{failure}");
         let summary = steps.summary();

@@ -120,72 +120,75 @@ pub(crate) fn run(
     let needs_page = has_web && (wants(Part::Rust) || wants(Part::Web) || deployment);
 
     // Downloads wait while Cargo computes.
-    steps.beside(vec![
-        // Libraries, programs and tests together: otherwise hundreds of crates would be built twice,
-        // with the features of the server and with those of its tests.
-        Box::new(|steps| {
-            let what: &[&str] = match lint {
-                true => &["--all-targets"],
-                false => &["--lib", "--bins", "--tests", "--examples"],
-            };
-            let mut build = cargo_command(places, lint);
-            build.args(["build", "--workspace", "--features", OPTIONAL_FEATURES]);
-            steps.program("build", build.args(what))
-        }),
-        Box::new(|steps| {
-            if needs_python {
-                steps.run("set up Python", || setup::python_packages(places))?;
-            }
-            if lint && has_python {
-                lint::python(places, steps)?;
-            }
-            if wants(Part::Python) && has_python {
-                for which in VERSIONS {
-                    let set_up = || setup::versions(places, which);
-                    steps.run(&format!("set up the {which} versions"), set_up)?;
+    steps.beside(
+        4,
+        vec![
+            // Libraries, programs and tests together: otherwise hundreds of crates would be built twice,
+            // with the features of the server and with those of its tests.
+            Box::new(|steps| {
+                let what: &[&str] = match lint {
+                    true => &["--all-targets"],
+                    false => &["--lib", "--bins", "--tests", "--examples"],
+                };
+                let mut build = cargo_command(places, lint);
+                build.args(["build", "--workspace", "--features", OPTIONAL_FEATURES]);
+                steps.program("build", build.args(what))
+            }),
+            Box::new(|steps| {
+                if needs_python {
+                    steps.run("set up Python", || setup::python_packages(places))?;
                 }
-            }
-            Ok(())
-        }),
-        Box::new(|steps| {
-            if needs_node {
-                steps.run("set up Node", || setup::node_package(places))?;
-            }
-            if needs_page {
-                web::run(places, steps)?;
-            }
-            if lint && has_web {
-                web::check(places, steps)?;
-            }
-            Ok(())
-        }),
-        Box::new(|steps| {
-            let mut wanted = Vec::new();
-            if wants(Part::Rust) {
-                wanted.extend(setup::FOR_RUST);
-            }
-            if deployment {
-                wanted.extend(setup::FOR_DEPLOYMENT);
-            }
-            if wants(Part::Web) || deployment {
-                wanted.push(setup::CHROMIUM);
-            }
-            // What is still missing afterwards is reported where it is needed.
-            if let Err(failure) = setup::debian_programs(&wanted) {
-                println!("{failure}");
-            }
-            if wants(Part::Rust) {
-                steps.run("build the agent in C++", || setup::cpp_agent(places))?;
-            }
-            if lint {
-                lint::documents(places, steps)?;
-            }
-            if slow {
-                lint::licences(places, steps)?;
-            }
-            Ok(())
-        }),
-    ])?;
+                if lint && has_python {
+                    lint::python(places, steps)?;
+                }
+                if wants(Part::Python) && has_python {
+                    for which in VERSIONS {
+                        let set_up = || setup::versions(places, which);
+                        steps.run(&format!("set up the {which} versions"), set_up)?;
+                    }
+                }
+                Ok(())
+            }),
+            Box::new(|steps| {
+                if needs_node {
+                    steps.run("set up Node", || setup::node_package(places))?;
+                }
+                if needs_page {
+                    web::run(places, steps)?;
+                }
+                if lint && has_web {
+                    web::check(places, steps)?;
+                }
+                Ok(())
+            }),
+            Box::new(|steps| {
+                let mut wanted = Vec::new();
+                if wants(Part::Rust) {
+                    wanted.extend(setup::FOR_RUST);
+                }
+                if deployment {
+                    wanted.extend(setup::FOR_DEPLOYMENT);
+                }
+                if wants(Part::Web) || deployment {
+                    wanted.push(setup::CHROMIUM);
+                }
+                // What is still missing afterwards is reported where it is needed.
+                if let Err(failure) = setup::debian_programs(&wanted) {
+                    println!("{failure}");
+                }
+                if wants(Part::Rust) {
+                    steps.run("build the agent in C++", || setup::cpp_agent(places))?;
+                }
+                if lint {
+                    lint::documents(places, steps)?;
+                }
+                if slow {
+                    lint::licences(places, steps)?;
+                }
+                Ok(())
+            }),
+        ],
+    )?;
 
     let mut lanes: Vec<Lane<'_>> = Vec::new();
     if wants(Part::Rust) {
@@ -221,19 +224,35 @@ pub(crate) fn run(
     } else if needs_python {
         steps.run("install the native module", || setup::native_module(places))?;
     }
+    if wants(Part::Python) {
+        for package in places.python_packages() {
+            // The longest suite has the most processes.
+            let options: &[&str] = match package {
+                CLIENTS => &["--numprocesses=2", "--dist=loadfile"],
+                DEPLOYMENT => continue,
+                _ => &[],
+            };
+            lanes.push(Box::new(move |steps| {
+                let (name, mut pytest) = pytest(places, package, options);
+                steps.program(&name, &mut pytest)
+            }));
+        }
+    }
+    if wants(Part::Web) {
+        match has_web {
+            true => {
+                lanes.push(Box::new(|steps| web::test_in_browser(places, steps)));
+                lanes.push(Box::new(|steps| web::test(places, steps)));
+            }
+            false => steps.skip("vitest, browser tests", NO_WEB_PACKAGE),
+        }
+    }
+    if deployment {
+        lanes.push(Box::new(|steps| test_deployment(places, steps, slow)));
+    }
     if wants(Part::Python) && has_python {
         lanes.push(Box::new(|steps| {
             let mut outcomes = Vec::new();
-            for package in places.python_packages() {
-                // The longest suite has the most processes.
-                let options: &[&str] = match package {
-                    CLIENTS => &["--numprocesses=2", "--dist=loadfile"],
-                    DEPLOYMENT => continue,
-                    _ => &[],
-                };
-                let (name, mut pytest) = pytest(places, package, options);
-                outcomes.push(steps.program(&name, &mut pytest));
-            }
             for which in VERSIONS {
                 let (name, mut pytest) = pytest_with(places, which);
                 outcomes.push(steps.program(&name, &mut pytest));
@@ -246,30 +265,17 @@ pub(crate) fn run(
             Failure::of_any(outcomes)
         }));
     }
-    let mut others = Vec::<Lane<'_>>::new();
     if wants(Part::Node) {
         match has_node {
-            true => others.push(Box::new(|steps| {
+            true => lanes.push(Box::new(|steps| {
                 let mut node = with_environment(places, Command::new("node"));
                 steps.program("node --test", node.arg("--test").current_dir(places.node()))
             })),
             false => steps.skip("node --test", NO_NODE_PACKAGE),
         }
     }
-    if wants(Part::Web) {
-        match has_web {
-            true => others.push(Box::new(|steps| web::test(places, steps))),
-            false => steps.skip("vitest, browser tests", NO_WEB_PACKAGE),
-        }
-    }
-    if deployment {
-        others.push(Box::new(|steps| test_deployment(places, steps, slow)));
-    }
-    lanes.push(Box::new(|steps| {
-        Failure::of_any(others.into_iter().map(|tests| tests(steps)))
-    }));
-    // A failure stops only what depends on it, so that one run shows all of them.
-    steps.beside(lanes)
+    // The longest first. A failure stops only what depends on it, so that one run shows all of them.
+    steps.beside(LANES, lanes)
 }
 
 /// The tests of docker/ and of what the documents tell to type.
@@ -288,6 +294,10 @@ fn test_deployment(places: &Places, steps: &mut Steps, slow: bool) -> Result<(),
     }
     Ok(())
 }
+
+/// How many suites run at a time: most wait for servers and clocks, and two processors have
+/// something to compute until the last one ends.
+const LANES: usize = 4;
 
 /// The ends of the ranges of versions that the Python SDK works with.
 const VERSIONS: [&str; 2] = ["oldest", "newest"];

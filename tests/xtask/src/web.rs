@@ -29,17 +29,20 @@ pub(crate) fn check(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.program("tsc, biome", npm(places).args(["run", "check"]))
 }
 
-/// The page's tests without a browser, then the browser tests, which start the server.
+/// The page's tests without a browser.
 pub(crate) fn test(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
-    let vitest = steps.program("vitest", npm(places).args(["run", "test"]));
-    let browser = match setup::chromium() {
+    steps.program("vitest", npm(places).args(["run", "test"]))
+}
+
+/// The browser tests, which start the server.
+pub(crate) fn test_in_browser(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
+    match setup::chromium() {
         Ok(()) => steps.program("browser tests", npm(places).args(["run", "test:browser"])),
         Err(failure) => {
             steps.skip("browser tests", &failure.to_string());
             Ok(())
         }
-    };
-    Failure::of_any([vitest, browser])
+    }
 }
 
 fn npm(places: &Places) -> Command {
