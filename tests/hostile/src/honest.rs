@@ -2,6 +2,7 @@
 //! after another with a deadline. They answer at once, so a decision that is late is late by the
 //! server's fault, and the time from an answer to the room's next decision is the server's.
 
+use std::collections::BTreeMap;
 use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::Relaxed};
@@ -74,8 +75,8 @@ pub(crate) struct Noticed {
     pub(crate) games: u64,
     /// Games that ended without one.
     pub(crate) lost_games: u64,
-    /// Calls and connections that were refused or took too long.
-    pub(crate) not_served: u64,
+    /// Calls and connections that were refused or took too long, by what the client was told.
+    pub(crate) not_served: BTreeMap<String, u64>,
 }
 
 impl Noticed {
@@ -87,7 +88,7 @@ impl Noticed {
             missed: 0,
             games: 0,
             lost_games: 0,
-            not_served: 0,
+            not_served: BTreeMap::new(),
         }
     }
 
@@ -97,7 +98,9 @@ impl Noticed {
         self.missed += other.missed;
         self.games += other.games;
         self.lost_games += other.lost_games;
-        self.not_served += other.not_served;
+        for (problem, count) in &other.not_served {
+            *self.not_served.entry(problem.clone()).or_default() += count;
+        }
     }
 
     /// A percentile of the latencies, milliseconds.
@@ -180,8 +183,8 @@ impl Shared {
             match self.open().await {
                 Ok(tickets) => self.play(tickets).await,
                 Err(problem) => {
-                    *lock(&self.last_problem) = problem;
-                    lock(&self.noticed).not_served += 1;
+                    *lock(&self.last_problem) = problem.clone();
+                    *(lock(&self.noticed).not_served.entry(problem)).or_default() += 1;
                     tokio::time::sleep(AGAIN_AFTER).await;
                 }
             }

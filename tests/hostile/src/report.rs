@@ -66,8 +66,8 @@ pub(crate) struct Row {
     lost_games: u64,
     /// Whether the last honest game ended after the attack.
     last_game_ended: bool,
-    /// Calls and connections of the honest room that were refused or too slow.
-    not_served: u64,
+    /// Calls and connections of the honest room that were refused or too slow, by what it was told.
+    not_served: BTreeMap<String, u64>,
     others: Served,
     memory_before_mib: f64,
     memory_peak_mib: f64,
@@ -100,7 +100,10 @@ impl Row {
             last,
         } = phases;
         let all = [Some(&quiet), Some(&attacked), last.as_ref()];
-        let sum = |of: fn(&Noticed) -> u64| all.into_iter().flatten().map(of).sum();
+        let mut whole = Noticed::new();
+        all.into_iter()
+            .flatten()
+            .for_each(|noticed| whole.add(noticed));
         let [before, peak, after] = burden.memory;
         let mib = |bytes| round(bytes as f64 / MIB);
         let rate = |of: &Noticed, time: Duration| of.latencies.len() as f64 / time.as_secs_f64();
@@ -116,11 +119,11 @@ impl Row {
             p99_ratio: round(p99 / quiet_p99),
             quiet_rate: round(rate(&quiet, quiet_time)),
             rate: round(rate(&attacked, attack_time)),
-            missed: sum(|noticed| noticed.missed),
-            games: sum(|noticed| noticed.games),
-            lost_games: sum(|noticed| noticed.lost_games),
+            missed: whole.missed,
+            games: whole.games,
+            lost_games: whole.lost_games,
             last_game_ended: last.is_some(),
-            not_served: sum(|noticed| noticed.not_served),
+            not_served: whole.not_served,
             others,
             memory_before_mib: mib(before),
             memory_peak_mib: mib(peak),
@@ -187,7 +190,9 @@ impl Row {
             self.quiet_rate,
             self.rate,
             self.missed,
-            self.not_served + self.lost_games + u64::from(!self.last_game_ended),
+            self.not_served.values().sum::<u64>()
+                + self.lost_games
+                + u64::from(!self.last_game_ended),
             self.others.served,
             self.others.tried,
             self.memory_before_mib,

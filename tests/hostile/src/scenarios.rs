@@ -1,6 +1,7 @@
 //! Scenarios that are no attacks: many idle connections, spectators that do not read, and rooms
 //! that start and end for a long time. Each has a server of its own.
 
+use std::collections::BTreeMap;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::Path;
 use std::sync::Arc;
@@ -316,7 +317,7 @@ struct SoakReport {
     games: u64,
     lost_games: u64,
     missed: u64,
-    not_served: u64,
+    not_served: BTreeMap<String, u64>,
     /// Rooms that the server lists at the end.
     listed_rooms: usize,
     /// The line through the memory after the server has settled.
