@@ -1,6 +1,7 @@
 """The files of a release, tried by the commands of docs/releases.md as they are written, but for those of Docker.
 
-The archive, the package and the wheels are each installed on a system that has nothing else.
+The archive, the package and the wheels are each installed on a system that has nothing else. Programs for another processor are
+emulated.
 
 `cargo xtask dist --try` runs this, and names the folder of the release in CHEFSHAT_DIST. It needs root, debootstrap and buildah.
 """
@@ -24,6 +25,8 @@ from images import ROOT, Images, debian, end, require, run, until
 DIST = Path(os.environ.get("CHEFSHAT_DIST", ""))
 VERSION = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
 PAGE = (ROOT / "docs/releases.md").read_text()
+#: Runs programs for aarch64.
+EMULATOR = "qemu-aarch64-static"
 #: How long a command may take, seconds.
 PATIENCE_S = 1800.0
 
@@ -124,16 +127,34 @@ def test_the_program_of_the_archive_plays(system: System) -> None:
     assert {file.name for file in (folder / "completions").iterdir()} == {"chefshat", "_chefshat", "chefshat.fish"}
 
 
+@pytest.mark.parametrize("page_bytes", [4096, 65536])
+def test_the_programs_for_another_processor_play(tmp_path: Path, page_bytes: int) -> None:
+    name = f"chefshat-{VERSION}-aarch64-linux"
+    shutil.unpack_archive(DIST / f"{name}.tar.gz", tmp_path)
+    require(EMULATOR)
+
+    def emulated(program: str, *arguments: str) -> str:
+        command = [EMULATOR, "-p", str(page_bytes), tmp_path / name / program, *arguments]
+        return subprocess.run(command, capture_output=True, check=True, text=True, timeout=PATIENCE_S).stdout
+
+    assert "place" in emulated("chefshat", "demo")
+    assert json.loads(emulated("chefshat-lab", "simulate", "--games", "20", "--json"))
+    contents = subprocess.run(
+        ["dpkg-deb", "--field", DIST / f"chefshat_{VERSION}_arm64.deb", "Architecture"], capture_output=True, check=True, text=True
+    )
+    assert contents.stdout == "arm64\n"
+
+
 def test_everything_that_runs_has_the_licences_of_what_it_contains(tmp_path: Path) -> None:
     listed = {"tokio 1", "preact 11", "Atkinson Hyperlegible Next", "pyo3 0", "Apache License"}
-    name = f"chefshat-{VERSION}-x86_64-linux"
-    shutil.unpack_archive(DIST / f"{name}.tar.gz", tmp_path)
-    notices = (tmp_path / name / "NOTICES.txt").read_text()
-    assert {words for words in listed if words in notices} == listed
-    contents = subprocess.run(
-        ["dpkg-deb", "--contents", DIST / f"chefshat_{VERSION}_amd64.deb"], capture_output=True, check=True, text=True
-    )
-    assert "/usr/share/doc/chefshat/NOTICES.txt" in contents.stdout
+    for processor, debian_processor in [("x86_64", "amd64"), ("aarch64", "arm64")]:
+        name = f"chefshat-{VERSION}-{processor}-linux"
+        shutil.unpack_archive(DIST / f"{name}.tar.gz", tmp_path)
+        notices = (tmp_path / name / "NOTICES.txt").read_text()
+        assert {words for words in listed if words in notices} == listed
+        package = DIST / f"chefshat_{VERSION}_{debian_processor}.deb"
+        contents = subprocess.run(["dpkg-deb", "--contents", package], capture_output=True, check=True, text=True)
+        assert "/usr/share/doc/chefshat/NOTICES.txt" in contents.stdout
     for wheel in [*DIST.glob("chefshat_native-*.whl"), *DIST.glob("chefshat_server-*.whl")]:
         shutil.unpack_archive(wheel, tmp_path / wheel.stem, "zip")
         (file,) = (tmp_path / wheel.stem).glob("*.dist-info/licenses/NOTICES.txt")
@@ -168,7 +189,8 @@ def test_the_debian_package_has_a_service(system: System) -> None:
 
 
 def test_the_wheels_work_without_a_network(python_system: System, tmp_path: Path) -> None:
-    wheels = sorted(DIST.glob("*.whl"))
+    assert len(list(DIST.glob("*.whl"))) == 6
+    wheels = sorted(wheel for wheel in DIST.glob("*.whl") if not wheel.name.endswith("_aarch64.whl"))
     assert len(wheels) == 4
     house = tmp_path / "house"
     sdk = next(wheel for wheel in wheels if wheel.name.startswith("chefshat-"))

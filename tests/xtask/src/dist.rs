@@ -1,5 +1,5 @@
 //! `cargo xtask dist`: everything of a release, in the folder `target/artefacts`, from the commit that is
-//! checked out: the static binary as an archive, a Debian package and an image, the wheels, the
+//! checked out: the static programs as archives, Debian packages and an image, the wheels, the
 //! crates, the protocol, the book, the source, what they contain, checksums and a signature.
 //! docs/releases.md says what is for whom. The tests of `tests/deployment` try them on bare systems.
 
@@ -21,11 +21,19 @@ const PROGRAMS: [&str; 2] = ["chefshat", "chefshat-lab"];
 
 /// The version of everything.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// Where the binary runs: on every Linux of this processor, without libraries.
-const TARGET: &str = "x86_64-unknown-linux-musl";
-/// The same in the names of files, and Debian's word for the processor.
-const PLATFORM: &str = "x86_64-linux";
-const DEBIAN: &str = "amd64";
+/// Where the programs run: on every Linux of these processors, without libraries.
+const PLATFORMS: [Platform; 2] = [
+    Platform {
+        target: "x86_64-unknown-linux-musl",
+        name: "x86_64-linux",
+        debian: "amd64",
+    },
+    Platform {
+        target: "aarch64-unknown-linux-musl",
+        name: "aarch64-linux",
+        debian: "arm64",
+    },
+];
 /// The crates that others build on.
 const CRATES: [&str; 3] = ["chefshat-proto", "chefshat-engine", "chefshat-client"];
 /// Shells with completion scripts, and where Debian keeps them.
@@ -36,6 +44,31 @@ const COMPLETIONS: [(&str, &str); 3] = [
 ];
 /// What a signature is for: part of what is signed.
 const NAMESPACE: &str = "chefshat-release";
+
+/// A processor for which the programs are built.
+struct Platform {
+    /// Rust's word for it.
+    target: &'static str,
+    /// In the names of files.
+    name: &'static str,
+    /// Debian's word for it.
+    debian: &'static str,
+}
+
+impl Platform {
+    /// That of this machine, on which the program can say what it has.
+    fn own() -> Result<&'static Self, Failure> {
+        let arch = std::env::consts::ARCH;
+        let own = |platform: &&Self| platform.name.starts_with(arch);
+        (PLATFORMS.iter().find(own))
+            .ok_or_else(|| Failure::new(format!("no release is made on {arch}")))
+    }
+
+    /// Its part of the release's names.
+    fn archive(&self) -> String {
+        format!("chefshat-{VERSION}-{}", self.name)
+    }
+}
 
 /// Makes the release; `key`: a file with the SSH key that signs the checksums.
 pub(crate) fn run(
@@ -53,10 +86,13 @@ pub(crate) fn run(
             .try_for_each(|folder| emptied(folder))
     })?;
 
-    steps.run("set up the target", || setup::target(TARGET))?;
+    for platform in &PLATFORMS {
+        let target = platform.target;
+        steps.run(&format!("set up {target}"), || setup::target(target))?;
+    }
     book::run(places, steps)?;
     // With the page, which the binary contains.
-    wheels::run(places, steps, "dist", false)?;
+    wheels::run(places, steps, &wheels::PROCESSORS, "dist", false)?;
     steps.run("copy the wheels", || {
         wheels::built(&places.wheels())?
             .iter()
@@ -68,14 +104,28 @@ pub(crate) fn run(
         dist: &dist,
         stage: &stage,
         date: read(git(places).args(["log", "-1", "--format=%ct"]))?,
+        own: Platform::own()?,
     };
-    steps.run("licences of what it contains", || release.notices())?;
-    steps.program("static binary", &mut release.static_binary())?;
-    steps.run("check that it is static and names no folder", || {
-        release.check_static()
-    })?;
-    steps.run("archive of the binary", || release.binary_archive())?;
-    steps.run("Debian package", || release.debian())?;
+    for platform in &PLATFORMS {
+        let target = platform.target;
+        let mut build = release.static_programs(platform);
+        steps.program(&format!("static programs, {target}"), &mut build)?;
+        steps.run("check that they are static and name no folder", || {
+            release.check_static(platform)
+        })?;
+    }
+    for platform in &PLATFORMS {
+        let name = platform.name;
+        steps.run(&format!("licences of what {name} contains"), || {
+            release.notices(platform)
+        })?;
+        steps.run(&format!("archive of the programs, {name}"), || {
+            release.programs_archive(platform)
+        })?;
+        steps.run(&format!("Debian package, {name}"), || {
+            release.debian(platform)
+        })?;
+    }
     steps.program("package crates", &mut release.package_crates())?;
     steps.run("copy the crates", || release.copy_crates())?;
     steps.run("protocol and book", || release.protocol_and_book())?;
@@ -89,6 +139,9 @@ pub(crate) fn run(
     steps.run("checksums", || release.sign(key))?;
     if try_them {
         steps.run("set up Python", || setup::python_packages(places))?;
+        steps.run("set up an emulator", || {
+            setup::debian_programs(&[setup::EMULATOR])
+        })?;
         let mut trying = python_command(places, DEPLOYMENT, "pytest");
         trying.env("CHEFSHAT_DIST", &dist);
         if let Some(key) = key {
@@ -110,13 +163,19 @@ struct Release<'a> {
     stage: &'a Path,
     /// The time of the commit, seconds since 1970: that of all files in archives.
     date: String,
+    /// The platform of this machine.
+    own: &'static Platform,
 }
 
 impl Release<'_> {
-    fn static_binary(&self) -> Command {
-        let mut build = published(self.places, tool(self.places, "cargo-zigbuild", ""));
+    fn static_programs(&self, platform: &Platform) -> Command {
+        let mut build = published(
+            self.places,
+            tool(self.places, "cargo-zigbuild", ""),
+            platform.target,
+        );
         build.args(["zigbuild", "--locked", "--profile", "dist"]);
-        build.args(["--target", TARGET]);
+        build.args(["--target", platform.target]);
         for program in PROGRAMS {
             build.args(["--package", program, "--bin", program]);
             build.args(["--features", &format!("{program}/dist")]);
@@ -124,32 +183,30 @@ impl Release<'_> {
         build
     }
 
+    /// The program that runs here.
     fn binary(&self) -> PathBuf {
-        self.program(PROGRAMS[0])
+        self.program(self.own, PROGRAMS[0])
     }
 
-    fn program(&self, name: &str) -> PathBuf {
-        self.places.target.join(TARGET).join("dist").join(name)
+    fn program(&self, platform: &Platform, name: &str) -> PathBuf {
+        let built = self.places.target.join(platform.target);
+        built.join("dist").join(name)
     }
 
-    fn check_static(&self) -> Result<(), Failure> {
+    fn check_static(&self, platform: &Platform) -> Result<(), Failure> {
         PROGRAMS
             .iter()
-            .try_for_each(|name| self.check_program(name))
+            .try_for_each(|name| self.check_program(&self.program(platform, name)))
     }
 
-    fn check_program(&self, name: &str) -> Result<(), Failure> {
-        let binary = self.program(name);
-        let headers = read(
-            Command::new("readelf")
-                .arg("--program-headers")
-                .arg(&binary),
-        )?;
+    fn check_program(&self, binary: &Path) -> Result<(), Failure> {
+        let mut readelf = Command::new("readelf");
+        let headers = read(readelf.arg("--program-headers").arg(binary))?;
         let shown = binary.display();
         if headers.contains("INTERP") {
             return Err(Failure::new(format!("{shown} needs libraries")));
         }
-        let bytes = fs::read(&binary).map_err(|error| at(&binary, &error))?;
+        let bytes = fs::read(binary).map_err(|error| at(binary, &error))?;
         let root = format!("{}/server/", self.places.root.display());
         match bytes.windows(root.len()).any(|it| it == root.as_bytes()) {
             true => Err(Failure::new(format!("{shown} names the folder {root}"))),
@@ -157,22 +214,28 @@ impl Release<'_> {
         }
     }
 
-    fn notices(&self) -> Result<(), Failure> {
-        write(&self.stage.join(NOTICES), &notices(self.places, TARGET)?)
+    /// Where the licences of what a platform's programs contain are.
+    fn notices_of(&self, platform: &Platform) -> PathBuf {
+        self.stage.join("notices").join(platform.name).join(NOTICES)
     }
 
-    /// The binary with its manual pages, completions and unit, to unpack anywhere.
-    fn binary_archive(&self) -> Result<(), Failure> {
-        let name = format!("chefshat-{VERSION}-{PLATFORM}");
+    fn notices(&self, platform: &Platform) -> Result<(), Failure> {
+        let text = notices(self.places, platform.target)?;
+        write(&self.notices_of(platform), &text)
+    }
+
+    /// The programs with their manual pages, completions and units, to unpack anywhere.
+    fn programs_archive(&self, platform: &Platform) -> Result<(), Failure> {
+        let name = platform.archive();
         let folder = self.stage.join(&name);
         for program in PROGRAMS {
-            copy(&self.program(program), &folder.join(program))?;
+            copy(&self.program(platform, program), &folder.join(program))?;
         }
         for document in ["docker/archive/README.md", "CHANGELOG.md", "LICENSE"] {
             let from = self.places.root.join(document);
             copy(&from, &folder.join(file_name(&from)))?;
         }
-        copy(&self.stage.join(NOTICES), &folder.join(NOTICES))?;
+        copy(&self.notices_of(platform), &folder.join(NOTICES))?;
         for unit in ["chefshat.service", "chefshat.socket"] {
             let from = self.places.root.join("docker/systemd").join(unit);
             copy(&from, &folder.join("systemd").join(unit))?;
@@ -193,9 +256,9 @@ impl Release<'_> {
     }
 
     /// The same as a Debian package, with the user of the unit and its configuration.
-    fn debian(&self) -> Result<(), Failure> {
-        let root = self.stage.join("debian");
-        let unpacked = self.stage.join(format!("chefshat-{VERSION}-{PLATFORM}"));
+    fn debian(&self, platform: &Platform) -> Result<(), Failure> {
+        let root = self.stage.join("debian").join(platform.debian);
+        let unpacked = self.stage.join(platform.archive());
         let scripts = self.places.root.join("docker/debian");
         for program in PROGRAMS {
             copy(&unpacked.join(program), &root.join("usr/bin").join(program))?;
@@ -246,9 +309,10 @@ impl Release<'_> {
         let control = control.replace("@VERSION@", VERSION);
         write(
             &root.join("DEBIAN/control"),
-            &control.replace("@ARCHITECTURE@", DEBIAN),
+            &control.replace("@ARCHITECTURE@", platform.debian),
         )?;
-        let package = self.dist.join(format!("chefshat_{VERSION}_{DEBIAN}.deb"));
+        let package = format!("chefshat_{VERSION}_{}.deb", platform.debian);
+        let package = self.dist.join(package);
         let mut build = Command::new("dpkg-deb");
         build.args(["--build", "--root-owner-group", "-Zxz"]);
         build
@@ -325,7 +389,8 @@ impl Release<'_> {
             .arg("--manifest-path");
         cyclonedx
             .arg(&manifest)
-            .args(["--format", "json", "--quiet", "--target", TARGET]);
+            .args(["--format", "json", "--quiet", "--target"])
+            .arg(self.own.target);
         cyclonedx.args(["--override-filename", "contents"]);
         cyclonedx.env("SOURCE_DATE_EPOCH", &self.date);
         run_command(&mut cyclonedx)?;
@@ -360,9 +425,9 @@ impl Release<'_> {
         )?;
         let programs = self.stage.join("programs");
         for program in PROGRAMS {
-            copy(&self.program(program), &programs.join(program))?;
+            copy(&self.program(self.own, program), &programs.join(program))?;
         }
-        copy(&self.stage.join(NOTICES), &programs.join(NOTICES))?;
+        copy(&self.notices_of(self.own), &programs.join(NOTICES))?;
         self.base_image("binary", &programs.display().to_string(), "/")?;
         let root = self.places.root.display();
         let name = format!("localhost/chefshat:{VERSION}");

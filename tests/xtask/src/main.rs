@@ -96,7 +96,9 @@ fn main() -> ExitCode {
         Task::Lint => lint::run(&places, &mut steps),
         Task::Book => book::run(&places, &mut steps),
         Task::Web => web::run(&places, &mut steps),
-        Task::Wheels { profile, try_them } => wheels::run(&places, &mut steps, &profile, try_them),
+        Task::Wheels { profile, try_them } => {
+            wheels::run(&places, &mut steps, &wheels::OWN, &profile, try_them)
+        }
         Task::Dist { key, try_them } => dist::run(&places, &mut steps, key.as_deref(), try_them),
     });
     print!("{}", steps.summary());

@@ -53,6 +53,9 @@ pub(crate) const FOR_DEPLOYMENT: [Program; 5] = [
     ("/usr/sbin/debootstrap", "debootstrap"),
 ];
 
+/// What runs programs for aarch64.
+pub(crate) const EMULATOR: Program = ("qemu-aarch64-static", "qemu-user-static");
+
 /// The browser.
 pub(crate) const CHROMIUM: Program = ("chromium", "chromium");
 

@@ -260,7 +260,7 @@ pub(crate) fn run(
             if slow {
                 let (name, mut pytest) = pytest(places, CLIENTS, &["-m", "slow"]);
                 outcomes.push(steps.program(&name, &mut pytest));
-                outcomes.push(wheels::run(places, steps, "release", true));
+                outcomes.push(wheels::run(places, steps, &wheels::OWN, "release", true));
             }
             Failure::of_any(outcomes)
         }));

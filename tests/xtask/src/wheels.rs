@@ -16,18 +16,23 @@ use crate::web;
 /// The oldest systems on which the wheels with programs run: glibc 2.17, those of numpy's wheels.
 const PLATFORM: &str = "manylinux_2_17";
 
-/// What programs in wheels are built for.
-const HOST: &str = "x86_64-unknown-linux-gnu";
+/// The processors for which a release has wheels.
+pub(crate) const PROCESSORS: [&str; 2] = ["x86_64", "aarch64"];
+
+/// That of this machine, on which its wheels can be tried.
+pub(crate) const OWN: [&str; 1] = [std::env::consts::ARCH];
 
 /// The packages built by maturin, from Rust.
 const BUILT_FROM_RUST: [&str; 2] = ["clients/python/native", "clients/python/server"];
 /// The packages in Python alone.
 const PURE: [&str; 2] = ["clients/python", "clients/robot"];
 
-/// Builds the page and all wheels with one of Cargo's profiles; then optionally tries them.
+/// Builds the page and all wheels for these processors with one of Cargo's profiles; then optionally
+/// tries them.
 pub(crate) fn run(
     places: &Places,
     steps: &mut Steps,
+    processors: &[&str],
     profile: &str,
     try_them: bool,
 ) -> Result<(), Failure> {
@@ -40,14 +45,17 @@ pub(crate) fn run(
         }
         Ok(())
     })?;
-    for package in BUILT_FROM_RUST {
-        let mut maturin = published(places, tool(places, "maturin", package));
-        maturin
-            .args(["build", "--profile", profile, "--out"])
-            .arg(&wheels);
-        // Zig links against the old glibc, and maturin refuses what needs a newer one.
-        maturin.args(["--zig", "--compatibility", PLATFORM]);
-        steps.program(&format!("wheel of {package}"), &mut maturin)?;
+    for processor in processors {
+        let target = target(processor);
+        steps.run(&format!("set up {target}"), || setup::target(&target))?;
+        for package in BUILT_FROM_RUST {
+            let mut maturin = published(places, tool(places, "maturin", package), &target);
+            maturin.args(["build", "--profile", profile, "--target", &target]);
+            maturin.arg("--out").arg(&wheels);
+            // Zig links against the old glibc, and maturin refuses what needs a newer one.
+            maturin.args(["--zig", "--compatibility", PLATFORM]);
+            steps.program(&format!("wheel of {package}, {processor}"), &mut maturin)?;
+        }
     }
     for package in PURE {
         let mut hatchling = tool(places, "hatchling", package);
@@ -55,10 +63,16 @@ pub(crate) fn run(
         steps.program(&format!("wheel of {package}"), &mut hatchling)?;
     }
     steps.run("licences of what they contain", || {
-        let notices = notices(places, HOST)?;
-        let built = built(&wheels)?;
-        let mut binary = built.iter().filter(|wheel| !is_pure(wheel));
-        binary.try_for_each(|wheel| add_notices(places, wheel, &notices))
+        for processor in processors {
+            let notices = notices(places, &target(processor))?;
+            let ending = format!("_{processor}.whl");
+            for wheel in built(&wheels)? {
+                if wheel.to_string_lossy().ends_with(&ending) {
+                    add_notices(places, &wheel, &notices)?;
+                }
+            }
+        }
+        Ok(())
     })?;
     steps.run("auditwheel", || {
         built(&wheels)?
@@ -147,6 +161,11 @@ fn audit(places: &Places, wheel: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
+/// What programs in wheels are built for: Linux with glibc.
+fn target(processor: &str) -> String {
+    format!("{processor}-unknown-linux-gnu")
+}
+
 fn is_pure(wheel: &Path) -> bool {
     wheel.to_string_lossy().ends_with("-none-any.whl")
 }
@@ -163,9 +182,14 @@ pub(crate) fn built(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(wheels)
 }
 
-/// The environment of a build whose program others run: it names its commit, and no folder of this
-/// machine.
-pub(crate) fn published(places: &Places, mut build: Command) -> Command {
+/// The environment of a build whose program others run on a target: it names its commit, and no folder
+/// of this machine.
+pub(crate) fn published(places: &Places, mut build: Command, target: &str) -> Command {
+    if target.starts_with("aarch64") {
+        // Kernels of this processor have pages of 4, 16 or 64 KiB. The allocator is built for the
+        // largest, as base-2 logarithm, and works with all.
+        build.env("JEMALLOC_SYS_WITH_LG_PAGE", "16");
+    }
     if let Ok(commit) = read(git(places).args(["log", "-1", "--format=%h %cs"])) {
         build.env("CHEFSHAT_COMMIT", commit);
     }
