@@ -185,10 +185,8 @@ def test_what_lies_there_from_the_first_frame_was_found() -> None:
 
 def test_cards_laid_beside_cards_that_were_found_are_another_event() -> None:
     table = Table()
-    table.put(0, cards=NINES[:1])
-    table.put(1, cards=NINES[1:2])
-    table.change(2, None, empty=True)
-    table.wait(3)
+    table.put(0, 1, cards=NINES[:2])
+    table.wait()
     table.put(2, cards=NINES[2:])
     table.wait()
     found, laid_later = table.said()
@@ -196,6 +194,48 @@ def test_cards_laid_beside_cards_that_were_found_are_another_event() -> None:
     assert isinstance(laid_later, Laid)
     assert (found.cards, found.found) == (NINES[:2], True)
     assert (laid_later.cards, laid_later.found) == (NINES[2:], False)
+
+
+@pytest.mark.parametrize("first_read", [True, False])
+def test_a_play_in_the_middle_of_which_perception_begins_is_found_as_a_whole(first_read: bool) -> None:
+    table = Table()
+    table.reaching = True
+    table.put(0, cards=NINES[:1] if first_read else None)
+    table.change(1, None, empty=True)
+    table.change(2, None, empty=True)
+    table.wait(STILL_FRAMES + 1)
+    table.put(2, cards=NINES[2:])
+    table.wait(STILL_FRAMES + 1)
+    table.put(1, cards=NINES[1:2])
+    table.wait()
+    table.read(0, NINES[0])
+    table.wait()
+    table.reaching = False
+    table.wait()
+    (found,) = table.said()
+    assert isinstance(found, Laid)
+    assert (found.cards, found.found) == (NINES, True)
+
+
+def test_a_play_laid_beneath_an_arm_that_never_leaves_is_whole() -> None:
+    table = Table()
+    table.reaching = True
+    for spot in range(4):
+        table.change(spot, None, empty=True)
+    table.wait()
+    table.put(0, 1, cards=NINES[:2])
+    table.wait()
+    table.put(0, 1, 2, cards=FOURS)
+    table.wait()
+    table.sweep(0, 1, 2)
+    table.reaching = False
+    table.wait()
+    first, second, cleared = table.said()
+    assert isinstance(first, Laid)
+    assert isinstance(second, Laid)
+    assert (first.cards, first.found) == (NINES[:2], True)
+    assert (second.cards, second.found) == (FOURS, False)
+    assert isinstance(cleared, Cleared)
 
 
 def test_cards_that_are_swept_away_while_perception_begins_were_found() -> None:

@@ -146,11 +146,15 @@ class Rehearsal:
                 await self._answer(state, state.questions[0])
             return None
         if self._mistake is not None:
-            act, self._mistake = self._mistake, None
-            if state.HasField("violation"):
+            act, noticed = self._mistake, self._laid != _left(state, self._mistake.seat)
+            if not (state.HasField("violation") or noticed or start >= self._again):
+                return None
+            self._mistake = self._laid = None
+            if state.HasField("violation") or not noticed:
+                # The table refuses it; or it says nothing for long, and the person thinks again.
                 self._lying.remove(act)
                 return [TakeBack(start, act.seat, act.places)]
-            # It was not noticed as a violation: the cards stay where they are.
+            # It counts: the cards stay where they are.
             self._play(act.seat, list(act.cards))
         wanted = next(iter(state.to_lay), None)
         pizza = self._pizza_of(state)
@@ -202,6 +206,7 @@ class Rehearsal:
             wrong = [card for card in self.hands[seat] if required.highest_face < card.face <= FACES]
             if wrong:
                 self.violations += 1
+                self._laid = _left(state, seat)
                 self._mistake = self._lay(start, seat, [self._rng.choice(wrong)], face_down=False)
                 return [self._mistake]
         if plays and (not required.may_pass or self._rng.random() < 0.85):
@@ -309,7 +314,7 @@ class Rehearsal:
         place = question.text.rpartition("at place ")[2].rstrip("?")
         if place.isdigit():
             there = [card for act in self._lying for card, at in zip(act.cards, act.places, strict=True) if at == int(place)]
-            lies = face_name(there[-1].face) if there else "No new card"
+            lies = face_name(there[-1].face) if there and not self._counts(state) else "No new card"
             return options.index(lies) if lies in options else None
         if question.text.endswith("is it a new play?"):
             return 1 if self._counts(state) else 0

@@ -14,7 +14,9 @@ The decider sees no pictures, so that a recording of sightings gives the same ev
   if only some are, when none of the others can be read as new cards come. If others can still be read after `TAKEN_SECONDS` in
   which nothing moved, cards were taken back: before that, more strokes may sweep the rest away. Cards on others were taken back
   when a tag is read that they covered.
-- What lies at a place from the first frame, until something moves there, was **found**: it may have lain there for long.
+- What lies at a place from the first frame, until something moves there, was **found**: it may have lain there for long. A hand
+  that is laying cards as perception begins has laid some of them before: until the field is at rest for the first time, what is new
+  at an empty place belongs to what was found.
 """
 
 from __future__ import annotations
@@ -117,14 +119,14 @@ class _Riddle:
         since: When it was first seen, in s.
         seen: When it was last seen, in s.
         options: The cards it may show, the likeliest first.
-        found: Whether what it shows was found.
+        found: Whether what it shows was found; None if it belongs to the play that is open.
     """
 
     look: int
     since: float
     seen: float
     options: tuple[Card, ...]
-    found: bool
+    found: bool | None
 
 
 @dataclass
@@ -150,7 +152,14 @@ class _Spot:
     gone_since: float | None = None
     """Since when it looks empty although cards lay there, in s."""
     watched: bool = False
-    """Whether it was seen empty, or something moved over what was found there: what is new there was not found."""
+    """Whether it was empty in a field at rest, or something moved over what was found there: what is new there was not found."""
+    vacant: bool = False
+    """Whether it was seen empty: before it is watched, what is new there is of the play that is open, or else was found."""
+
+    @property
+    def found(self) -> bool | None:
+        """Whether what is new there was found; None if it belongs to the play that is open."""
+        return None if self.vacant and not self.watched else not self.watched
 
 
 @dataclass
@@ -226,6 +235,8 @@ class Decider:
         self._time = 0.0
         self._moved = 0.0
         self._reaching = False
+        # Whether the field has been at rest.
+        self._rested = False
         # The sides over which something reached in the latest frames.
         self._reached: deque[tuple[int, ...]] = deque(maxlen=REMEMBERED)
         self._places: tuple[SeenPlace, ...] = ()
@@ -293,6 +304,7 @@ class Decider:
             self._notice_gone(events)
             self._raise_doubts(events)
         self._flush(events)
+        self._rested = self._rested or self._is_quiet()
         return events
 
     def answer(self, number: int, reading: Card | bool | None) -> list[Observed]:
@@ -455,7 +467,9 @@ class Decider:
         elif play is not None and play.found and not spot.watched:
             # Of what was found, the play is what lies on top.
             play.cards = {other: at for other, at in play.cards.items() if at != track.spot}
-        elif spot.covered is not None or (play is not None and (play.found == spot.watched or track.spot in play.cards.values())):
+        elif spot.covered is not None or (
+            play is not None and (spot.found not in (None, play.found) or track.spot in play.cards.values())
+        ):
             self._close_play(events)
             play = None
         if play is None:
@@ -510,7 +524,9 @@ class Decider:
         for number, (spot, seen) in enumerate(zip(self._spots, self._places, strict=True)):
             if seen.still < STILL_FRAMES or self._is_unclear(number):
                 continue
-            spot.watched = spot.watched or bool(seen.empty)
+            if seen.empty:
+                spot.vacant = True
+                spot.watched = spot.watched or self._rested or number >= _FIRST_PASS
             occupied = self.lies_at(number)
             if not occupied and seen.empty:
                 spot.explained = seen.look
@@ -545,7 +561,7 @@ class Decider:
         tracks = sorted((track for track in self._tracks.values() if track.spot == number), key=lambda track: -track.readings)
         options = tuple(card for track in tracks if track.piece not in self._known and (card := track.piece.card) is not None)
         spot = self._spots[number]
-        return _Riddle(self._places[number].look, spot.since, spot.seen, options, not spot.watched)
+        return _Riddle(self._places[number].look, spot.since, spot.seen, options, spot.found)
 
     def _raise_doubt(self, number: int, riddle: _Riddle, events: list[Observed], play: _Play | None) -> None:
         """Asks about a look of a place, whose card belongs to a play; or to one of its own, in the order of the times."""
@@ -553,11 +569,11 @@ class Decider:
         spot.covered = None
         if (
             play is None
-            or play.found != riddle.found
+            or riddle.found not in (None, play.found)
             or riddle.since < play.since - TOGETHER_SECONDS
             or number in play.cards.values()
         ):
-            play = _Play(riddle.since, found=riddle.found)
+            play = _Play(riddle.since, found=riddle.found is not False)
             self._queue.insert(sum(entry.since <= riddle.since for entry in self._queue), play)
         play.doubts.add(self._next_doubt)
         play.closed = True

@@ -32,7 +32,8 @@ class Laid:
         places: The place of each card, 1..11, in the same order.
         side: The side of the field from which an arm reached in as they were laid: 0 the bottom, where seat 0 sits, then clockwise.
             None if the picture shows none, or several.
-        found: Whether they may have lain there before perception began: nothing else was seen at their places until then.
+        found: Whether some of them may have lain there before perception began: the field had not been at rest, or nothing else was
+            seen at their places until then.
     """
 
     frame: int
