@@ -18,7 +18,7 @@ from chefshat_robot.deck import FACES
 from chefshat_robot.drivers.driver import Say
 from chefshat_robot.rehearsal import Rehearsal
 from chefshat_robot.robot import play_seat
-from chefshat_robot.synthetic import DIFFICULTIES, SyntheticTable
+from chefshat_robot.synthetic import DIFFICULTIES, Act, LayCards, SyntheticTable, TakeBack
 from chefshat_robot.vision import Frame, Perception
 from chefshat_robot.words import Words
 from tests.robots import ScriptedRobot
@@ -89,3 +89,27 @@ def test_people_a_robot_and_a_remote_agent_play_a_game_at_a_synthetic_table(serv
     work = [["verify"], ["export", "--out", str(tmp_path / "dataset")], ["render", "--out", str(tmp_path / "game.svg")]]
     for arguments in work:
         subprocess.run([os.environ[BINARY], *arguments, str(file)], check=True)
+
+
+def test_a_mistake_that_nobody_notices_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The table says nothing about a card that may not be played: the person takes it up again, and it was not played."""
+    table = SyntheticTable([], DIFFICULTIES["easy"], seed=2)
+    rehearsal = Rehearsal(table, aio.Client("http://127.0.0.1:1"), "ticket", seed=2, mistakes=1.0)
+    acts: list[Act] = []
+    monkeypatch.setattr(table, "perform", acts.append)
+    state = pb.TableState(version=1, stage=pb.TABLE_STAGE_TURN, seat=0)
+    state.seats.extend([pb.TableSeat(at_table=True)] * 4)
+    state.observation.shift, state.observation.pizza = 1, 2
+    state.observation.cards_left = bytes([17] * 4)
+    state.play_requirement.lowest_face, state.play_requirement.highest_face, state.play_requirement.fewest_cards = 1, 1, 1
+
+    async def steps() -> None:
+        for time in (0.0, 8.0, 20.0):
+            await rehearsal.step(state, time)
+
+    asyncio.run(steps())
+    laid, taken = acts
+    assert isinstance(laid, LayCards)
+    assert isinstance(taken, TakeBack)
+    assert (laid.seat, laid.places) == (taken.seat, taken.places)
+    assert not rehearsal.plays
