@@ -214,7 +214,8 @@ mod tests {
 
     #[test]
     fn a_game_is_counted_until_it_cannot_write_any_more() {
-        let space = Space::new(Path::new("."));
+        let folder = tempfile::tempdir().expect("a folder");
+        let space = Space::new(folder.path());
         let (one, other) = (space.game(), space.game());
         assert_eq!(space.games.load(Ordering::Relaxed), 2);
         drop(one);
@@ -225,7 +226,8 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_full_disk_is_waited_for_until_the_server_stops() {
-        let space = Space::new(Path::new("."));
+        let folder = tempfile::tempdir().expect("a folder");
+        let space = Space::new(folder.path());
         let since = Instant::now();
         assert!(space.wait(since).await);
         assert!(space.is_full() && !space.has_some());
