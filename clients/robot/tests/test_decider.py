@@ -217,6 +217,25 @@ def test_a_play_in_the_middle_of_which_perception_begins_is_found_as_a_whole(fir
     assert (found.cards, found.found) == (NINES, True)
 
 
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
+def test_the_play_after_the_one_that_was_found_is_not_mixed_with_it(order: tuple[int, ...]) -> None:
+    table = Table()
+    table.reaching = True
+    table.put(0, 1, cards=NINES[:2])
+    table.change(2, None, empty=True)
+    table.wait()
+    for spot in order:
+        table.put(spot, cards=FOURS[spot : spot + 1])
+        table.wait(STILL_FRAMES + 3)
+    table.reaching = False
+    table.wait()
+    found, played = table.said()
+    assert isinstance(found, Laid)
+    assert isinstance(played, Laid)
+    assert (found.cards, found.found) == (NINES[:2], True)
+    assert (played.cards, played.found) == (FOURS, False)
+
+
 def test_a_play_laid_beneath_an_arm_that_never_leaves_is_whole() -> None:
     table = Table()
     table.reaching = True
@@ -252,6 +271,26 @@ def test_cards_that_are_swept_away_while_perception_begins_were_found() -> None:
     assert isinstance(found, Laid)
     assert (found.cards, found.found) == (NINES[2:], True)
     assert isinstance(cleared, Cleared)
+
+
+def test_a_play_laid_by_the_arm_that_swept_the_field_as_perception_began_is_whole() -> None:
+    table = Table()
+    table.reaching = True
+    for spot in range(2):
+        table.change(spot, None, empty=True)
+    table.put(2, cards=NINES[2:])
+    table.wait()
+    table.sweep(2)
+    table.wait()
+    table.put(0, 1, 2, cards=FOURS)
+    table.wait()
+    table.reaching = False
+    table.wait()
+    found, cleared, played = table.said()
+    assert isinstance(found, Laid)
+    assert isinstance(cleared, Cleared)
+    assert isinstance(played, Laid)
+    assert (played.cards, played.found) == (FOURS, False)
 
 
 def test_nobody_waited_for_anything_while_the_camera_was_away() -> None:

@@ -91,10 +91,18 @@ def test_people_a_robot_and_a_remote_agent_play_a_game_at_a_synthetic_table(serv
         subprocess.run([os.environ[BINARY], *arguments, str(file)], check=True)
 
 
-def test_a_mistake_that_nobody_notices_is_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The table says nothing about a card that may not be played: the person takes it up again, and it was not played."""
+class Nobody:
+    """Has nothing to report."""
+
+    async def report(self, table_ticket: str, report: pb.TableReport, *, report_id: str = "") -> pb.ReportResponse:
+        raise AssertionError(f"{table_ticket}, {report_id}: {report}")
+
+
+@pytest.mark.parametrize("table_says", ["nothing", "violation", "play"])
+def test_a_mistake_is_taken_back_unless_the_table_counts_it(table_says: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that nobody notices is taken back too, after a while."""
     table = SyntheticTable([], DIFFICULTIES["easy"], seed=2)
-    rehearsal = Rehearsal(table, aio.Client("http://127.0.0.1:1"), "ticket", seed=2, mistakes=1.0)
+    rehearsal = Rehearsal(table, Nobody(), "ticket", seed=2, mistakes=1.0)
     acts: list[Act] = []
     monkeypatch.setattr(table, "perform", acts.append)
     state = pb.TableState(version=1, stage=pb.TABLE_STAGE_TURN, seat=0)
@@ -103,13 +111,27 @@ def test_a_mistake_that_nobody_notices_is_taken_back(monkeypatch: pytest.MonkeyP
     state.observation.cards_left = bytes([17] * 4)
     state.play_requirement.lowest_face, state.play_requirement.highest_face, state.play_requirement.fewest_cards = 1, 1, 1
 
-    async def steps() -> None:
-        for time in (0.0, 8.0, 20.0):
-            await rehearsal.step(state, time)
+    def step(time: float) -> list[Act]:
+        before = len(acts)
+        asyncio.run(rehearsal.step(state, time))
+        return acts[before:]
 
-    asyncio.run(steps())
-    laid, taken = acts
+    (laid,) = step(1.0)
     assert isinstance(laid, LayCards)
-    assert isinstance(taken, TakeBack)
-    assert (laid.seat, laid.places) == (taken.seat, taken.places)
-    assert not rehearsal.plays
+    match table_says:
+        case "nothing":
+            assert step(8.0) == []
+        case "violation":
+            state.violation.text = "That pizza already shows 2s."
+        case "play":
+            state.observation.cards_left, state.seat, state.version = bytes([16, 17, 17, 17]), 1, 2
+            state.seats[1].at_table = False
+    done = step(14.0)
+    if table_says == "play":
+        assert done == []
+        assert rehearsal.plays == [(0, list(laid.cards))]
+    else:
+        (taken,) = done
+        assert isinstance(taken, TakeBack)
+        assert (laid.seat, laid.places) == (taken.seat, taken.places)
+        assert not rehearsal.plays

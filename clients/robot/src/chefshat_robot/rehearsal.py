@@ -146,11 +146,11 @@ class Rehearsal:
                 await self._answer(state, state.questions[0])
             return None
         if self._mistake is not None:
-            act, noticed = self._mistake, self._laid != _left(state, self._mistake.seat)
-            if not (state.HasField("violation") or noticed or start >= self._again):
+            act, counts = self._mistake, self._counts_mistake(state)
+            if not (state.HasField("violation") or counts or start >= self._again):
                 return None
             self._mistake = self._laid = None
-            if state.HasField("violation") or not noticed:
+            if not counts:
                 # The table refuses it; or it says nothing for long, and the person thinks again.
                 self._lying.remove(act)
                 return [TakeBack(start, act.seat, act.places)]
@@ -313,8 +313,9 @@ class Rehearsal:
         options = list(question.options)
         place = question.text.rpartition("at place ")[2].rstrip("?")
         if place.isdigit():
-            there = [card for act in self._lying for card, at in zip(act.cards, act.places, strict=True) if at == int(place)]
-            lies = face_name(there[-1].face) if there and not self._counts(state) else "No new card"
+            last = dict(zip(self._lying[-1].places, self._lying[-1].cards, strict=True)) if self._lying else {}
+            new = None if self._counts(state) else last.get(int(place))
+            lies = face_name(new.face) if new is not None else "No new card"
             return options.index(lies) if lies in options else None
         if question.text.endswith("is it a new play?"):
             return 1 if self._counts(state) else 0
@@ -338,11 +339,16 @@ class Rehearsal:
         if not self._lying:
             return True
         if self._mistake is not None:
-            return state.HasField("violation")
+            return state.HasField("violation") or self._counts_mistake(state)
         seat = self._lying[-1].seat
         if not state.seats[seat].at_table:
             return self._carried_out not in state.to_lay
         return state.observation.cards_left[seat] == len(self.hands[seat])
+
+    def _counts_mistake(self, state: pb.TableState) -> bool:
+        """Whether the table took the mistake of a person for a play."""
+        assert self._mistake is not None, "somebody has just made one"
+        return not state.HasField("violation") and self._laid != _left(state, self._mistake.seat)
 
     async def _report(self, **kind: object) -> None:
         report = pb.TableReport(source=pb.REPORT_SOURCE_ATTENDANT, **kind)  # type: ignore[arg-type]

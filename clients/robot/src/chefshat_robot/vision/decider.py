@@ -119,7 +119,7 @@ class _Riddle:
         since: When it was first seen, in s.
         seen: When it was last seen, in s.
         options: The cards it may show, the likeliest first.
-        found: Whether what it shows was found; None if it belongs to the play that is open.
+        found: Whether what it shows was found; None if it may be of the play that is open.
     """
 
     look: int
@@ -152,13 +152,14 @@ class _Spot:
     gone_since: float | None = None
     """Since when it looks empty although cards lay there, in s."""
     watched: bool = False
-    """Whether it was empty in a field at rest, or something moved over what was found there: what is new there was not found."""
+    """Whether it was empty when the field was at rest or cleared, or something moved over what lay there: what is new there was not
+    found. A place for a pass card need only have been empty."""
     vacant: bool = False
-    """Whether it was seen empty: before it is watched, what is new there is of the play that is open, or else was found."""
+    """Whether it was seen empty."""
 
     @property
     def found(self) -> bool | None:
-        """Whether what is new there was found; None if it belongs to the play that is open."""
+        """Whether what is new there was found; None if it may be of the open play: it was vacant, and is not watched yet."""
         return None if self.vacant and not self.watched else not self.watched
 
 
@@ -235,7 +236,7 @@ class Decider:
         self._time = 0.0
         self._moved = 0.0
         self._reaching = False
-        # Whether the field has been at rest.
+        # Whether the field has been at rest, or cleared.
         self._rested = False
         # The sides over which something reached in the latest frames.
         self._reached: deque[tuple[int, ...]] = deque(maxlen=REMEMBERED)
@@ -304,7 +305,8 @@ class Decider:
             self._notice_gone(events)
             self._raise_doubts(events)
         self._flush(events)
-        self._rested = self._rested or self._is_quiet()
+        if not self._rested and self._is_quiet():
+            self._watch()
         return events
 
     def answer(self, number: int, reading: Card | bool | None) -> list[Observed]:
@@ -461,23 +463,42 @@ class Decider:
             self._doubts[spot.doubt].play.cards[card] = track.spot
             self._explained(track.spot, events)
             return
-        play = self._open_play()
+        play, found = self._open_play(), spot.found is not False
         if spot.covered is not None and play is not None and spot.covered.since < play.since - TOGETHER_SECONDS:
             self._raise_doubt(track.spot, spot.covered, events, play)
-        elif play is not None and play.found and not spot.watched:
+        elif play is not None and play.found and spot.found:
             # Of what was found, the play is what lies on top.
             play.cards = {other: at for other, at in play.cards.items() if at != track.spot}
         elif spot.covered is not None or (
-            play is not None and (spot.found not in (None, play.found) or track.spot in play.cards.values())
+            play is not None and (not self._may_join(play, spot.found, card) or track.spot in play.cards.values())
         ):
             self._close_play(events)
-            play = None
+            # What is laid at a vacant place after another play was not found.
+            play, found = None, bool(spot.found)
         if play is None:
-            play = _Play(self._time, found=not spot.watched)
+            play = _Play(self._time, found=found)
             self._queue.append(play)
         play.cards[card] = track.spot
         play.sides.add(self._side_of(track.spot))
         self._explained(track.spot, events)
+
+    def _may_join(self, play: _Play, found: bool | None, card: Card | None) -> bool:
+        """Whether what is new may be of an open play, by whether it was found; the card is None if it cannot be read."""
+        if found is not None:
+            return found == play.found
+        if not play.found:
+            return True
+        # A hand that was laying cards as perception began lays more of that face; or it lays the next play beside them.
+        if card is None:
+            return not any(self._spots[at].watched for at in play.cards.values())
+        faces = {other.face for other in play.cards if not other.is_joker}
+        return card.is_joker or not faces or card.face in faces
+
+    def _watch(self) -> None:
+        """The field is at rest, or cleared: what is new at a vacant place from now on was not found."""
+        self._rested = True
+        for spot in self._spots:
+            spot.watched = spot.watched or spot.vacant
 
     def _side_of(self, spot: int) -> int | None:
         """The side from which the card on top of a place was laid; None if nothing reached in then, or over several sides."""
@@ -569,7 +590,7 @@ class Decider:
         spot.covered = None
         if (
             play is None
-            or riddle.found not in (None, play.found)
+            or not self._may_join(play, riddle.found, None)
             or riddle.since < play.since - TOGETHER_SECONDS
             or number in play.cards.values()
         ):
@@ -649,6 +670,7 @@ class Decider:
         self._close_play(events)
         self._remove([known.spot for piece, known in self._known.items() if piece.kind is PieceKind.CARD], events)
         self._queue.append(_Gone(self._time))
+        self._watch()
 
     def _remove(self, spots: list[int], events: list[Observed]) -> dict[Card, int]:
         """Forgets the cards of some places and returns them."""
