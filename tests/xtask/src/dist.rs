@@ -57,15 +57,15 @@ struct Platform {
 
 impl Platform {
     /// That of this machine, on which the program can say what it has.
-    fn own() -> Result<&'static Self, Failure> {
+    fn host() -> Result<&'static Self, Failure> {
         let arch = std::env::consts::ARCH;
-        let own = |platform: &&Self| platform.name.starts_with(arch);
-        (PLATFORMS.iter().find(own))
+        let host = |platform: &&Self| platform.name.starts_with(arch);
+        (PLATFORMS.iter().find(host))
             .ok_or_else(|| Failure::new(format!("no release is made on {arch}")))
     }
 
-    /// Its part of the release's names.
-    fn archive(&self) -> String {
+    /// The name of its archive.
+    fn archive_name(&self) -> String {
         format!("chefshat-{VERSION}-{}", self.name)
     }
 }
@@ -104,7 +104,7 @@ pub(crate) fn run(
         dist: &dist,
         stage: &stage,
         date: read(git(places).args(["log", "-1", "--format=%ct"]))?,
-        own: Platform::own()?,
+        host: Platform::host()?,
     };
     for platform in &PLATFORMS {
         let target = platform.target;
@@ -164,16 +164,12 @@ struct Release<'a> {
     /// The time of the commit, seconds since 1970: that of all files in archives.
     date: String,
     /// The platform of this machine.
-    own: &'static Platform,
+    host: &'static Platform,
 }
 
 impl Release<'_> {
     fn static_programs(&self, platform: &Platform) -> Command {
-        let mut build = published(
-            self.places,
-            tool(self.places, "cargo-zigbuild", ""),
-            platform.target,
-        );
+        let mut build = published(self.places, tool(self.places, "cargo-zigbuild", ""));
         build.args(["zigbuild", "--locked", "--profile", "dist"]);
         build.args(["--target", platform.target]);
         for program in PROGRAMS {
@@ -185,7 +181,7 @@ impl Release<'_> {
 
     /// The program that runs here.
     fn binary(&self) -> PathBuf {
-        self.program(self.own, PROGRAMS[0])
+        self.program(self.host, PROGRAMS[0])
     }
 
     fn program(&self, platform: &Platform, name: &str) -> PathBuf {
@@ -226,7 +222,7 @@ impl Release<'_> {
 
     /// The programs with their manual pages, completions and units, to unpack anywhere.
     fn programs_archive(&self, platform: &Platform) -> Result<(), Failure> {
-        let name = platform.archive();
+        let name = platform.archive_name();
         let folder = self.stage.join(&name);
         for program in PROGRAMS {
             copy(&self.program(platform, program), &folder.join(program))?;
@@ -258,7 +254,7 @@ impl Release<'_> {
     /// The same as a Debian package, with the user of the unit and its configuration.
     fn debian(&self, platform: &Platform) -> Result<(), Failure> {
         let root = self.stage.join("debian").join(platform.debian);
-        let unpacked = self.stage.join(platform.archive());
+        let unpacked = self.stage.join(platform.archive_name());
         let scripts = self.places.root.join("docker/debian");
         for program in PROGRAMS {
             copy(&unpacked.join(program), &root.join("usr/bin").join(program))?;
@@ -390,7 +386,7 @@ impl Release<'_> {
         cyclonedx
             .arg(&manifest)
             .args(["--format", "json", "--quiet", "--target"])
-            .arg(self.own.target);
+            .arg(self.host.target);
         cyclonedx.args(["--override-filename", "contents"]);
         cyclonedx.env("SOURCE_DATE_EPOCH", &self.date);
         run_command(&mut cyclonedx)?;
@@ -425,9 +421,9 @@ impl Release<'_> {
         )?;
         let programs = self.stage.join("programs");
         for program in PROGRAMS {
-            copy(&self.program(self.own, program), &programs.join(program))?;
+            copy(&self.program(self.host, program), &programs.join(program))?;
         }
-        copy(&self.notices_of(self.own), &programs.join(NOTICES))?;
+        copy(&self.notices_of(self.host), &programs.join(NOTICES))?;
         self.base_image("binary", &programs.display().to_string(), "/")?;
         let root = self.places.root.display();
         let name = format!("localhost/chefshat:{VERSION}");

@@ -97,7 +97,7 @@ fn main() -> ExitCode {
         Task::Book => book::run(&places, &mut steps),
         Task::Web => web::run(&places, &mut steps),
         Task::Wheels { profile, try_them } => {
-            wheels::run(&places, &mut steps, &wheels::OWN, &profile, try_them)
+            wheels::run(&places, &mut steps, &wheels::HOST, &profile, try_them)
         }
         Task::Dist { key, try_them } => dist::run(&places, &mut steps, key.as_deref(), try_them),
     });

@@ -91,8 +91,8 @@ impl Steps {
         }
     }
 
-    /// Runs lanes side by side, at most so many at a time, in their order, since many steps wait more
-    /// than they compute. A failure ends its lane and no other.
+    /// Runs lanes in their order, at most `most` at a time, since many steps wait more than they
+    /// compute. A failure ends its lane and no other.
     pub(crate) fn beside(&mut self, most: usize, lanes: Vec<Lane<'_>>) -> Result<(), Failure> {
         let waiting = Mutex::new(lanes.into_iter().enumerate());
         let ended = Mutex::new(Vec::new());

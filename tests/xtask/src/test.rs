@@ -233,8 +233,14 @@ pub(crate) fn run(
                 _ => &[],
             };
             lanes.push(Box::new(move |steps| {
-                let (name, mut pytest) = pytest(places, package, options);
-                steps.program(&name, &mut pytest)
+                let mut runs = vec![pytest(places, package, options)];
+                if slow && package == CLIENTS {
+                    runs.push(pytest(places, package, &["-m", "slow"]));
+                }
+                Failure::of_any(
+                    runs.iter_mut()
+                        .map(|(name, pytest)| steps.program(name, pytest)),
+                )
             }));
         }
     }
@@ -252,17 +258,10 @@ pub(crate) fn run(
     }
     if wants(Part::Python) && has_python {
         lanes.push(Box::new(|steps| {
-            let mut outcomes = Vec::new();
-            for which in VERSIONS {
+            Failure::of_any(VERSIONS.map(|which| {
                 let (name, mut pytest) = pytest_with(places, which);
-                outcomes.push(steps.program(&name, &mut pytest));
-            }
-            if slow {
-                let (name, mut pytest) = pytest(places, CLIENTS, &["-m", "slow"]);
-                outcomes.push(steps.program(&name, &mut pytest));
-                outcomes.push(wheels::run(places, steps, &wheels::OWN, "release", true));
-            }
-            Failure::of_any(outcomes)
+                steps.program(&name, &mut pytest)
+            }))
         }));
     }
     if wants(Part::Node) {
@@ -275,7 +274,12 @@ pub(crate) fn run(
         }
     }
     // The longest first. A failure stops only what depends on it, so that one run shows all of them.
-    steps.beside(LANES, lanes)
+    let mut outcomes = vec![steps.beside(LANES, lanes)];
+    if slow && wants(Part::Python) && has_python {
+        // Builds the page again, in the folder of its tests.
+        outcomes.push(wheels::run(places, steps, &wheels::HOST, "release", true));
+    }
+    Failure::of_any(outcomes)
 }
 
 /// The tests of docker/ and of what the documents tell to type.

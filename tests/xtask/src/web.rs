@@ -29,9 +29,10 @@ pub(crate) fn check(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.program("tsc, biome", npm(places).args(["run", "check"]))
 }
 
-/// The page's tests without a browser.
+/// The page's tests without a browser. The protocol's code is not generated again: the browser tests
+/// beside them use it.
 pub(crate) fn test(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
-    steps.program("vitest", npm(places).args(["run", "test"]))
+    steps.program("vitest", npm(places).args(["exec", "--", "vitest", "run"]))
 }
 
 /// The browser tests, which start the server.

@@ -20,7 +20,7 @@ const PLATFORM: &str = "manylinux_2_17";
 pub(crate) const PROCESSORS: [&str; 2] = ["x86_64", "aarch64"];
 
 /// That of this machine, on which its wheels can be tried.
-pub(crate) const OWN: [&str; 1] = [std::env::consts::ARCH];
+pub(crate) const HOST: [&str; 1] = [std::env::consts::ARCH];
 
 /// The packages built by maturin, from Rust.
 const BUILT_FROM_RUST: [&str; 2] = ["clients/python/native", "clients/python/server"];
@@ -49,7 +49,7 @@ pub(crate) fn run(
         let target = target(processor);
         steps.run(&format!("set up {target}"), || setup::target(&target))?;
         for package in BUILT_FROM_RUST {
-            let mut maturin = published(places, tool(places, "maturin", package), &target);
+            let mut maturin = published(places, tool(places, "maturin", package));
             maturin.args(["build", "--profile", profile, "--target", &target]);
             maturin.arg("--out").arg(&wheels);
             // Zig links against the old glibc, and maturin refuses what needs a newer one.
@@ -182,14 +182,9 @@ pub(crate) fn built(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(wheels)
 }
 
-/// The environment of a build whose program others run on a target: it names its commit, and no folder
-/// of this machine.
-pub(crate) fn published(places: &Places, mut build: Command, target: &str) -> Command {
-    if target.starts_with("aarch64") {
-        // Kernels of this processor have pages of 4, 16 or 64 KiB. The allocator is built for the
-        // largest, as base-2 logarithm, and works with all.
-        build.env("JEMALLOC_SYS_WITH_LG_PAGE", "16");
-    }
+/// The environment of a build whose program others run: it names its commit, and no folder of this
+/// machine.
+pub(crate) fn published(places: &Places, mut build: Command) -> Command {
     if let Ok(commit) = read(git(places).args(["log", "-1", "--format=%h %cs"])) {
         build.env("CHEFSHAT_COMMIT", commit);
     }
