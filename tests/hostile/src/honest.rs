@@ -29,6 +29,8 @@ pub(crate) const SHORT: u32 = 2;
 pub(crate) const LONG: u32 = 1_000;
 /// How long a call or a new connection may take before the room counts it as not served.
 const CALL_LIMIT: Duration = Duration::from_secs(5);
+/// The reason of what took longer.
+const TOO_SLOW: &str = "TOO_SLOW";
 /// Pause after a call that was not served.
 const AGAIN_AFTER: Duration = Duration::from_millis(100);
 /// Longest latency that is distinguished, microseconds.
@@ -75,7 +77,7 @@ pub(crate) struct Noticed {
     pub(crate) games: u64,
     /// Games that ended without one.
     pub(crate) lost_games: u64,
-    /// Calls and connections that were refused or took too long, by what the client was told.
+    /// Calls and connections that were refused or took too long, by reason.
     pub(crate) not_served: BTreeMap<String, u64>,
 }
 
@@ -182,9 +184,9 @@ impl Shared {
         while !self.leaving.load(Relaxed) {
             match self.open().await {
                 Ok(tickets) => self.play(tickets).await,
-                Err(problem) => {
-                    *lock(&self.last_problem) = problem.clone();
-                    *(lock(&self.noticed).not_served.entry(problem)).or_default() += 1;
+                Err(Problem { reason, words }) => {
+                    *lock(&self.last_problem) = words;
+                    *(lock(&self.noticed).not_served.entry(reason)).or_default() += 1;
                     tokio::time::sleep(AGAIN_AFTER).await;
                 }
             }
@@ -192,7 +194,7 @@ impl Shared {
     }
 
     /// Creates a room and takes its seats, each over a new connection.
-    async fn open(&self) -> Result<Vec<(Client, String)>, String> {
+    async fn open(&self) -> Result<Vec<(Client, String)>, Problem> {
         let host = self.connect().await?;
         let request = v1::CreateRoomRequest {
             name: "honest".into(),
@@ -225,13 +227,8 @@ impl Shared {
         Ok(tickets)
     }
 
-    async fn connect(&self) -> Result<Client, String> {
-        let connecting = tokio::time::timeout(CALL_LIMIT, self.access.connect());
-        match connecting.await {
-            Ok(Ok(client)) => Ok(client),
-            Ok(Err(error)) => Err(error.to_string()),
-            Err(_) => Err("a connection took too long".into()),
-        }
+    async fn connect(&self) -> Result<Client, Problem> {
+        served(self.access.connect()).await
     }
 
     async fn play(self: &Arc<Self>, tickets: Vec<(Client, String)>) {
@@ -274,11 +271,24 @@ pub(crate) async fn channel(
 }
 
 /// The result of a call, unless it takes too long.
-async fn served<T>(call: impl Future<Output = Result<T, Error>>) -> Result<T, String> {
+async fn served<T>(call: impl Future<Output = Result<T, Error>>) -> Result<T, Problem> {
     match tokio::time::timeout(CALL_LIMIT, call).await {
-        Ok(result) => result.map_err(|error| error.to_string()),
-        Err(_) => Err("a call took too long".into()),
+        Ok(result) => result.map_err(|error| Problem {
+            reason: (error.reason()).map_or_else(|| error.code().to_string(), str::to_owned),
+            words: error.to_string(),
+        }),
+        Err(_) => Err(Problem {
+            reason: TOO_SLOW.to_owned(),
+            words: "a call or connection took too long".to_owned(),
+        }),
     }
+}
+
+/// Why a call or connection was not served.
+struct Problem {
+    /// The reason of the server, or what the client calls it.
+    reason: String,
+    words: String,
 }
 
 /// An agent that answers after a short while and measures how fast the server is.

@@ -66,7 +66,7 @@ pub(crate) struct Row {
     lost_games: u64,
     /// Whether the last honest game ended after the attack.
     last_game_ended: bool,
-    /// Calls and connections of the honest room that were refused or too slow, by what it was told.
+    /// Calls and connections of the honest room that were refused or too slow, by reason.
     not_served: BTreeMap<String, u64>,
     others: Served,
     memory_before_mib: f64,
