@@ -27,6 +27,9 @@ pub(crate) enum LoadError {
     /// Some scenarios, each with its error; the others are reported.
     #[error("not measured to the end: {0}")]
     Scenarios(String),
+    /// A command that servers are to be started with is missing.
+    #[error("{0:?} cannot be started: install it")]
+    Lacks(String),
     /// Something exceeded its time limit.
     #[error("{0} did not come to an end")]
     Stuck(&'static str),

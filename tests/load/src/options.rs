@@ -104,6 +104,10 @@ pub(crate) struct Load {
     /// Also measure the server of another build of this program, in turns with this one.
     #[arg(long, value_name = "PROGRAM", conflicts_with_all = ["server", "restart"])]
     pub(crate) against: Option<PathBuf>,
+    /// Count each server's instructions, under callgrind. Times are then those of an emulated
+    /// processor.
+    #[arg(long, conflicts_with_all = ["server", "under", "scale", "restart", "vector"])]
+    pub(crate) instructions: bool,
     /// Start each server with this command, which must replace itself with the server, for example
     /// "valgrind --tool=callgrind".
     #[arg(long, value_name = "COMMAND", conflicts_with = "server")]

@@ -35,6 +35,8 @@ pub(crate) struct Plan {
     pub(crate) decisions: Option<u64>,
     /// Seed of the agents.
     pub(crate) seed: u64,
+    /// Whether the server runs under callgrind, and its instructions are counted.
+    pub(crate) instructions: bool,
 }
 
 /// The result of a window.
@@ -46,6 +48,8 @@ pub(crate) struct Window {
     pub(crate) elapsed: Duration,
     /// CPU time of the server's process, unless it runs elsewhere.
     pub(crate) server_cpu: Option<Duration>,
+    /// Instructions of the server's process, if they are counted.
+    pub(crate) server_instructions: Option<u64>,
     /// CPU time of this process.
     pub(crate) client_cpu: Duration,
     /// Memory of the server when the window opened, all seats attached and playing, bytes.
@@ -136,7 +140,7 @@ impl Pulse {
             .map(gauge::resident_bytes)
             .transpose()
             .map_err(LoadError::io("reading the server's memory"))?;
-        let before = Reading::take(self, server)?;
+        let before = Reading::take(self, plan, server)?;
         self.open.store(true, Relaxed);
         let end = before.at + plan.window;
         match plan.decisions {
@@ -147,7 +151,7 @@ impl Pulse {
                 }
             }
         }
-        let after = Reading::take(self, server)?;
+        let after = Reading::take(self, plan, server)?;
         self.open.store(false, Relaxed);
         Ok(Window {
             decisions: after.decisions - before.decisions,
@@ -155,6 +159,10 @@ impl Pulse {
             server_cpu: after
                 .server_cpu
                 .zip(before.server_cpu)
+                .map(|(after, before)| after.saturating_sub(before)),
+            server_instructions: after
+                .server_instructions
+                .zip(before.server_instructions)
                 .map(|(after, before)| after.saturating_sub(before)),
             client_cpu: after.client_cpu.saturating_sub(before.client_cpu),
             playing_bytes,
@@ -171,14 +179,19 @@ struct Reading {
     at: Instant,
     decisions: u64,
     server_cpu: Option<Duration>,
+    server_instructions: Option<u64>,
     client_cpu: Duration,
 }
 
 impl Reading {
-    fn take(pulse: &Pulse, server: Option<u32>) -> Result<Self, LoadError> {
+    fn take(pulse: &Pulse, plan: &Plan, server: Option<u32>) -> Result<Self, LoadError> {
         let cpu = |pid| gauge::cpu_time(pid).map_err(LoadError::io("reading CPU times"));
+        let counted = server.filter(|_| plan.instructions);
+        let instructions =
+            |pid| gauge::instructions(pid).map_err(LoadError::io("counting instructions"));
         Ok(Self {
             server_cpu: server.map(cpu).transpose()?,
+            server_instructions: counted.map(instructions).transpose()?,
             client_cpu: cpu(std::process::id())?,
             decisions: pulse.decisions(),
             at: Instant::now(),

@@ -57,6 +57,7 @@ struct Figures {
     other: Option<Side>,
     throughput_ratio: Option<Spread>,
     server_cpu_ratio: Option<Spread>,
+    server_instructions_ratio: Option<Spread>,
     /// The server of the other build, if there is one.
     other_build: Option<OtherBuild>,
     memory_per_seat_kib: Option<f64>,
@@ -79,6 +80,8 @@ struct OtherBuild {
 struct Side {
     decisions_per_second: f64,
     server_cpu_us_per_decision: Option<f64>,
+    /// If they are counted.
+    server_instructions_per_decision: Option<f64>,
     client_cpu_us_per_decision: f64,
     /// From sending an answer until the room's next decision arrives on any stream.
     response_time_us: Quantiles,
@@ -204,6 +207,7 @@ impl Figures {
             decision_time_us: Quantiles::of(&outcome.server_us, 1.0),
             throughput_ratio: ratio(this, per_second),
             server_cpu_ratio: ratio(this, server_cpu_us),
+            server_instructions_ratio: ratio(this, server_instructions),
             other_build: (!other_build.is_empty()).then(|| OtherBuild {
                 server: Side::new(&other_build, &outcome.other_build_ns),
                 throughput_ratio: ratio(that, per_second),
@@ -271,12 +275,24 @@ impl Figures {
                 cpu.to_string(),
             ]);
         }
+        let per_decision = |side: &Side| side.server_instructions_per_decision;
+        let instructions = match (
+            per_decision(&self.server),
+            self.other.as_ref().and_then(per_decision),
+            self.server_instructions_ratio,
+        ) {
+            (Some(server), Some(other), Some(ratio)) => format!(
+                "instructions per decision: server {server:.0}, {} {other:.0}, ratio {ratio}\n",
+                self.beside
+            ),
+            _ => String::new(),
+        };
         let memory = self.memory_per_seat_kib.map_or_else(String::new, |kib| {
             format!("; {kib:.0} KiB of memory per seat")
         });
         format!(
             "{}, {} rounds\n{table}\ndecision time by the server's clock: p50 {:.0} µs, p99 {:.0} µs{memory}\n\
-             bytes per decision: {:.0} to the server, {:.0} from it in {:.2} messages; checked: {} games, {} decisions\n",
+             {instructions}bytes per decision: {:.0} to the server, {:.0} from it in {:.2} messages; checked: {} games, {} decisions\n",
             self.name,
             self.rounds,
             self.decision_time_us.p50,
@@ -295,6 +311,9 @@ impl Side {
         Self {
             decisions_per_second: median(windows.iter().map(rate)).unwrap_or_default(),
             server_cpu_us_per_decision: median(windows.iter().filter_map(server_cpu_us)),
+            server_instructions_per_decision: median(
+                windows.iter().filter_map(server_instructions),
+            ),
             client_cpu_us_per_decision: median(windows.iter().map(client_cpu_us))
                 .unwrap_or_default(),
             response_time_us: Quantiles::of(response_ns, 1_000.0),
@@ -459,6 +478,10 @@ fn rate(window: &Window) -> f64 {
 fn server_cpu_us(window: &Window) -> Option<f64> {
     let cpu = window.server_cpu?;
     Some(cpu.as_secs_f64() * 1e6 / window.decisions as f64)
+}
+
+fn server_instructions(window: &Window) -> Option<f64> {
+    Some(window.server_instructions? as f64 / window.decisions as f64)
 }
 
 fn client_cpu_us(window: &Window) -> f64 {

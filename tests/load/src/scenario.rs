@@ -210,6 +210,7 @@ pub(crate) async fn run(load: &Load, scenario: Scenario) -> (Outcome, Option<Loa
         window: load.seconds,
         decisions: load.decisions,
         seed: load.seed,
+        instructions: load.instructions,
     };
     if load.smoke {
         plan.warmup = Duration::from_millis(50);

@@ -2,7 +2,7 @@
 //! CPU time and memory of both sides are counted separately. A child prints its address on standard
 //! output and ends when its standard input closes, so it never outlives the run.
 
-use std::io::Write as _;
+use std::io::{self, Write as _};
 use std::net::SocketAddr;
 use std::path::Path;
 use std::process::Stdio;
@@ -20,13 +20,16 @@ use crate::error::LoadError;
 use crate::options::{Load, Place, Serve};
 
 /// How long a child may take to listen.
-const START_LIMIT: Duration = Duration::from_secs(30);
+const START_LIMIT: Duration = Duration::from_secs(60);
 
 /// How long a child may take to end.
 const STOP_LIMIT: Duration = Duration::from_secs(10);
 
 /// Rooms are dropped soon after their game: a run plays more games than people play in a day.
 const RETENTION: Duration = Duration::from_secs(1);
+
+/// Counts the instructions of a server, which takes a hundred times as long.
+const CALLGRIND: &str = "valgrind --quiet --tool=callgrind --callgrind-out-file=/dev/null";
 
 /// What a child process serves.
 #[derive(Debug, Clone, Copy)]
@@ -94,7 +97,10 @@ impl<'a> Launcher<'a> {
     pub(crate) fn new(load: &'a Load) -> Self {
         Self {
             program: None,
-            under: load.under.as_deref(),
+            under: match load.instructions {
+                true => Some(CALLGRIND),
+                false => load.under.as_deref(),
+            },
             place: load.place,
         }
     }
@@ -141,7 +147,10 @@ impl<'a> Launcher<'a> {
             .stdout(Stdio::piped())
             .kill_on_drop(true)
             .spawn()
-            .map_err(LoadError::io("starting a server"))?;
+            .map_err(|error| match (error.kind(), self.under) {
+                (io::ErrorKind::NotFound, Some(under)) => LoadError::Lacks(under.to_owned()),
+                _ => LoadError::io("starting a server")(error),
+            })?;
         let out = child.stdout.take().expect("standard output is piped");
         let mut line = String::new();
         let mut reader = BufReader::new(out);
