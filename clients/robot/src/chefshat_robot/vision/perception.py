@@ -21,7 +21,8 @@ KEPT_LOOKS = 5
 class Perception:
     """Watches the table through one camera.
 
-    Start it while the field is empty if you can. Cards that lie there already are reported as found (`Laid.found`).
+    Start it while the field is empty if you can, and no arm reaches over it. Cards that lie there already are reported as found
+    (`Laid.found`), with those that are laid beside them before the field is at rest.
 
     Args:
         camera: The intrinsics of the camera; None: a lens without distortion is assumed.
