@@ -139,8 +139,9 @@ def test_the_programs_for_another_processor_play(tmp_path: Path, page_bytes: int
     shutil.unpack_archive(wheel, tmp_path / "wheel", "zip")
 
     def emulated(program: Path, *arguments: str) -> str:
-        command = [EMULATOR, "-p", str(page_bytes), program, *arguments]
-        return subprocess.run(command, capture_output=True, check=True, text=True, timeout=PATIENCE_S).stdout
+        command = [EMULATOR, "-p", str(page_bytes), str(program), *arguments]
+        done = subprocess.run(command, capture_output=True, check=True, text=True, timeout=PATIENCE_S)
+        return done.stdout
 
     assert "place" in emulated(tmp_path / name / "chefshat", "demo")
     assert json.loads(emulated(tmp_path / name / "chefshat-lab", "simulate", "--games", "20", "--json"))
