@@ -68,7 +68,10 @@ impl Options {
     /// The binary of the server.
     pub(crate) fn server(&self) -> Result<PathBuf, HostileError> {
         let path = match &self.server {
-            Some(path) => path.clone(),
+            // Those on small disks are started in another folder.
+            Some(path) => {
+                std::path::absolute(path).map_err(HostileError::io("finding the server"))?
+            }
             None => std::env::current_exe()
                 .map_err(HostileError::io("finding this program"))?
                 .with_file_name("chefshat"),
