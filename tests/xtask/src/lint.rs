@@ -24,35 +24,32 @@ const CLIPPY_ARGUMENTS: [&str; 2] = ["-D", "warnings"];
 /// Runs all checks, cheapest first.
 pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     sources(places, steps)?;
-    steps.beside(
-        2,
-        vec![
-            Box::new(|steps| {
-                let what = ["clippy", "--workspace", "--all-targets"];
-                let features = ["--features", OPTIONAL_FEATURES, "--"];
-                let mut clippy = in_root(places, cargo());
-                clippy.args(what).args(features).args(CLIPPY_ARGUMENTS);
-                steps.program("cargo clippy", &mut clippy)
-            }),
-            Box::new(|steps| {
-                documents(places, steps)?;
-                licences(places, steps)?;
-                if places.python_packages().is_empty() {
-                    steps.skip("ruff, mypy", NO_PYTHON_PACKAGE);
-                } else {
-                    steps.run("set up Python", || setup::python_packages(places))?;
-                    python(places, steps)?;
-                }
-                if places.has_web_package() {
-                    steps.run("set up web", || setup::web_package(places))?;
-                    web::check(places, steps)
-                } else {
-                    steps.skip("tsc, biome", NO_WEB_PACKAGE);
-                    Ok(())
-                }
-            }),
-        ],
-    )
+    steps.beside(vec![
+        Box::new(|steps| {
+            let what = ["clippy", "--workspace", "--all-targets"];
+            let features = ["--features", OPTIONAL_FEATURES, "--"];
+            let mut clippy = in_root(places, cargo());
+            clippy.args(what).args(features).args(CLIPPY_ARGUMENTS);
+            steps.program("cargo clippy", &mut clippy)
+        }),
+        Box::new(|steps| {
+            documents(places, steps)?;
+            licences(places, steps)?;
+            if places.python_packages().is_empty() {
+                steps.skip("ruff, mypy", NO_PYTHON_PACKAGE);
+            } else {
+                steps.run("set up Python", || setup::python_packages(places))?;
+                python(places, steps)?;
+            }
+            if places.has_web_package() {
+                steps.run("set up web", || setup::web_package(places))?;
+                web::check(places, steps)
+            } else {
+                steps.skip("tsc, biome", NO_WEB_PACKAGE);
+                Ok(())
+            }
+        }),
+    ])
 }
 
 /// Makes Cargo build with Clippy in place of the compiler for the crates of the workspace: one build

@@ -29,6 +29,10 @@ struct Step {
     computed: Option<Duration>,
 }
 
+/// How many lanes run at a time: most wait for downloads, servers and clocks, and two processors have
+/// something to compute until the last one ends.
+const LANES: usize = 4;
+
 /// Steps that run beside those of other lanes.
 pub(crate) type Lane<'a> = Box<dyn FnOnce(&mut Steps) -> Result<(), Failure> + Send + 'a>;
 
@@ -91,14 +95,13 @@ impl Steps {
         }
     }
 
-    /// Runs lanes in their order, at most `most` at a time, since many steps wait more than they
-    /// compute. A failure ends its lane and no other.
-    pub(crate) fn beside(&mut self, most: usize, lanes: Vec<Lane<'_>>) -> Result<(), Failure> {
+    /// Runs lanes in their order, at most `LANES` at a time. A failure ends its lane and no other.
+    pub(crate) fn beside(&mut self, lanes: Vec<Lane<'_>>) -> Result<(), Failure> {
         let waiting = Mutex::new(lanes.into_iter().enumerate());
         let ended = Mutex::new(Vec::new());
         let next = || waiting.lock().expect("lanes do not panic").next();
         thread::scope(|scope| {
-            for _ in 0..most {
+            for _ in 0..LANES {
                 scope.spawn(|| {
                     while let Some((number, lane)) = next() {
                         let mut steps = Steps {
@@ -268,7 +271,7 @@ mod tests {
             }),
             Box::new(move |steps| program(steps, "second", "exit 0")),
         ];
-        let failure = steps.beside(2, lanes).unwrap_err();
+        let failure = steps.beside(lanes).unwrap_err();
         let failure = failure.to_string();
         assert!(failure.starts_with("first failed: `sh -c "), "{failure}");
         let summary = steps.summary();

@@ -120,75 +120,72 @@ pub(crate) fn run(
     let needs_page = has_web && (wants(Part::Rust) || wants(Part::Web) || deployment);
 
     // Downloads wait while Cargo computes.
-    steps.beside(
-        4,
-        vec![
-            // Libraries, programs and tests together: otherwise hundreds of crates would be built twice,
-            // with the features of the server and with those of its tests.
-            Box::new(|steps| {
-                let what: &[&str] = match lint {
-                    true => &["--all-targets"],
-                    false => &["--lib", "--bins", "--tests", "--examples"],
-                };
-                let mut build = cargo_command(places, lint);
-                build.args(["build", "--workspace", "--features", OPTIONAL_FEATURES]);
-                steps.program("build", build.args(what))
-            }),
-            Box::new(|steps| {
-                if needs_python {
-                    steps.run("set up Python", || setup::python_packages(places))?;
+    steps.beside(vec![
+        // Libraries, programs and tests together: otherwise hundreds of crates would be built twice,
+        // with the features of the server and with those of its tests.
+        Box::new(|steps| {
+            let what: &[&str] = match lint {
+                true => &["--all-targets"],
+                false => &["--lib", "--bins", "--tests", "--examples"],
+            };
+            let mut build = cargo_command(places, lint);
+            build.args(["build", "--workspace", "--features", OPTIONAL_FEATURES]);
+            steps.program("build", build.args(what))
+        }),
+        Box::new(|steps| {
+            if needs_python {
+                steps.run("set up Python", || setup::python_packages(places))?;
+            }
+            if lint && has_python {
+                lint::python(places, steps)?;
+            }
+            if wants(Part::Python) && has_python {
+                for which in VERSIONS {
+                    let set_up = || setup::versions(places, which);
+                    steps.run(&format!("set up the {which} versions"), set_up)?;
                 }
-                if lint && has_python {
-                    lint::python(places, steps)?;
-                }
-                if wants(Part::Python) && has_python {
-                    for which in VERSIONS {
-                        let set_up = || setup::versions(places, which);
-                        steps.run(&format!("set up the {which} versions"), set_up)?;
-                    }
-                }
-                Ok(())
-            }),
-            Box::new(|steps| {
-                if needs_node {
-                    steps.run("set up Node", || setup::node_package(places))?;
-                }
-                if needs_page {
-                    web::run(places, steps)?;
-                }
-                if lint && has_web {
-                    web::check(places, steps)?;
-                }
-                Ok(())
-            }),
-            Box::new(|steps| {
-                let mut wanted = Vec::new();
-                if wants(Part::Rust) {
-                    wanted.extend(setup::FOR_RUST);
-                }
-                if deployment {
-                    wanted.extend(setup::FOR_DEPLOYMENT);
-                }
-                if wants(Part::Web) || deployment {
-                    wanted.push(setup::CHROMIUM);
-                }
-                // What is still missing afterwards is reported where it is needed.
-                if let Err(failure) = setup::debian_programs(&wanted) {
-                    println!("{failure}");
-                }
-                if wants(Part::Rust) {
-                    steps.run("build the agent in C++", || setup::cpp_agent(places))?;
-                }
-                if lint {
-                    lint::documents(places, steps)?;
-                }
-                if slow {
-                    lint::licences(places, steps)?;
-                }
-                Ok(())
-            }),
-        ],
-    )?;
+            }
+            Ok(())
+        }),
+        Box::new(|steps| {
+            if needs_node {
+                steps.run("set up Node", || setup::node_package(places))?;
+            }
+            if needs_page {
+                web::run(places, steps)?;
+            }
+            if lint && has_web {
+                web::check(places, steps)?;
+            }
+            Ok(())
+        }),
+        Box::new(|steps| {
+            let mut wanted = Vec::new();
+            if wants(Part::Rust) {
+                wanted.extend(setup::FOR_RUST);
+            }
+            if deployment {
+                wanted.extend(setup::FOR_DEPLOYMENT);
+            }
+            if wants(Part::Web) || deployment {
+                wanted.push(setup::CHROMIUM);
+            }
+            // What is still missing afterwards is reported where it is needed.
+            if let Err(failure) = setup::debian_programs(&wanted) {
+                println!("{failure}");
+            }
+            if wants(Part::Rust) {
+                steps.run("build the agent in C++", || setup::cpp_agent(places))?;
+            }
+            if lint {
+                lint::documents(places, steps)?;
+            }
+            if slow {
+                lint::licences(places, steps)?;
+            }
+            Ok(())
+        }),
+    ])?;
 
     let mut lanes: Vec<Lane<'_>> = Vec::new();
     if wants(Part::Rust) {
@@ -274,7 +271,7 @@ pub(crate) fn run(
         }
     }
     // The longest first. A failure stops only what depends on it, so that one run shows all of them.
-    let mut outcomes = vec![steps.beside(LANES, lanes)];
+    let mut outcomes = vec![steps.beside(lanes)];
     if slow && wants(Part::Python) && has_python {
         // Builds the page again, in the folder of its tests.
         outcomes.push(wheels::run(places, steps, &wheels::HOST, "release", true));
@@ -298,10 +295,6 @@ fn test_deployment(places: &Places, steps: &mut Steps, slow: bool) -> Result<(),
     }
     Ok(())
 }
-
-/// How many suites run at a time: most wait for servers and clocks, and two processors have
-/// something to compute until the last one ends.
-const LANES: usize = 4;
 
 /// The ends of the ranges of versions that the Python SDK works with.
 const VERSIONS: [&str; 2] = ["oldest", "newest"];
