@@ -10006,8 +10006,7 @@ pub mod study_service_client {
         }
         /// Creates a study without participants. INVALID_ARGUMENT (SETTINGS_REFUSED names the field,
         /// REQUEST_ID_REFUSED); ALREADY_EXISTS (REQUEST_ID_USED); RESOURCE_EXHAUSTED (TOO_MANY_STUDIES,
-        /// DISK_NEARLY_FULL); FAILED_PRECONDITION (STUDIES_NOT_HOSTED on a server whose store has no
-        /// studies); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+        /// DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
         pub async fn create_study(
             &mut self,
             request: impl tonic::IntoRequest<super::CreateStudyRequest>,
@@ -10326,8 +10325,7 @@ pub mod study_service_server {
     pub trait StudyService: std::marker::Send + std::marker::Sync + 'static {
         /// Creates a study without participants. INVALID_ARGUMENT (SETTINGS_REFUSED names the field,
         /// REQUEST_ID_REFUSED); ALREADY_EXISTS (REQUEST_ID_USED); RESOURCE_EXHAUSTED (TOO_MANY_STUDIES,
-        /// DISK_NEARLY_FULL); FAILED_PRECONDITION (STUDIES_NOT_HOSTED on a server whose store has no
-        /// studies); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+        /// DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
         async fn create_study(
             &self,
             request: tonic::Request<super::CreateStudyRequest>,

@@ -13,6 +13,7 @@ pub mod forwarded;
 pub mod grpc;
 pub mod handshakes;
 pub mod host;
+pub mod journaled;
 pub mod limits;
 pub mod metrics;
 pub mod outbox;

@@ -7,7 +7,7 @@ macro_rules! long_tasks {
     ($($(#[$doc:meta])* $name:ident,)*) => {
         /// A task that lives long.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-        pub(crate) enum LongTask {
+        pub enum LongTask {
             $($(#[$doc])* $name,)*
         }
 

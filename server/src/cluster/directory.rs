@@ -9,7 +9,6 @@ use futures::future::{BoxFuture, ready};
 
 use crate::limits::Key;
 use crate::store::cluster::Kind;
-use crate::store::tournaments::StoredTournament;
 use crate::store::{ResumableGame, StoreError};
 use chefshat_room::ids::{Id, normal_code};
 
@@ -85,14 +84,6 @@ pub trait Directory: Send + Sync + 'static {
 
     /// The room of a game that is over, if its end is still shown.
     fn ended_room(&self, _room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
-        ready(Ok(None)).boxed()
-    }
-
-    /// A tournament that is over.
-    fn ended_tournament(
-        &self,
-        _tournament: Id,
-    ) -> BoxFuture<'_, Result<Option<StoredTournament>, StoreError>> {
         ready(Ok(None)).boxed()
     }
 

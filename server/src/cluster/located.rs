@@ -14,7 +14,6 @@ use super::directory::{Directory, FoundBy, Location, Peer};
 use super::lease::NodeLease;
 use crate::limits::{Key, Places, Shares};
 use crate::store::cluster::{self, ClusterStore, NodeId};
-use crate::store::tournaments::StoredTournament;
 use crate::store::{ResumableGame, StoreError};
 use chefshat_room::ids::Id;
 
@@ -125,13 +124,6 @@ impl StoreDirectory {
 impl Directory for StoreDirectory {
     fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
         self.store.ended_room(room)
-    }
-
-    fn ended_tournament(
-        &self,
-        tournament: Id,
-    ) -> BoxFuture<'_, Result<Option<StoredTournament>, StoreError>> {
-        self.store.tournament(tournament)
     }
 
     fn locate<'a>(&'a self, found_by: &'a FoundBy, caller: Key) -> BoxFuture<'a, Location> {

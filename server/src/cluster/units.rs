@@ -8,6 +8,7 @@ use tracing::{info, warn};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
 use crate::store::cluster::{ClusterStore, Epoch};
+use crate::store::units::UnitKind;
 use crate::studies::Studies;
 use crate::tournaments::Tournaments;
 use chefshat_room::ids::Id;
@@ -133,11 +134,12 @@ impl Units {
             return Ok(Resumed::Nothing);
         };
         let games = self.rooms.resume_all(loaded.games).await;
-        if let Some(tournament) = loaded.tournament {
-            self.tournaments.resume(tournament).await;
-        }
-        let has_study = loaded.study.is_some_and(|study| self.studies.resume(study));
-        let is_resumed = games > 0 || has_study || self.tournaments.get(unit).is_some();
+        let has_unit = match loaded.stored {
+            Some((UnitKind::Tournament, stored)) => self.tournaments.resume(unit, stored).await,
+            Some((UnitKind::Study, stored)) => self.studies.resume(unit, stored).await,
+            None => false,
+        };
+        let is_resumed = games > 0 || has_unit;
         info!(%unit, epoch = epoch.0, games, is_resumed, "taken over");
         Ok(match is_resumed {
             true => Resumed::Runs,

@@ -14,6 +14,7 @@ use tonic_types::{ErrorDetails, StatusExt as _};
 use crate::access::Caller;
 use crate::cluster::Elsewhere;
 use crate::convert;
+use crate::journaled::CreateProblem;
 use crate::limits::{NotStored, Refused};
 use crate::outbox::StreamEnd;
 use crate::room::{ReportRefusal, RoomGone, SpectateError};
@@ -435,6 +436,25 @@ impl From<CreateError> for Refusal {
                 store_failed()
             }
         })
+    }
+}
+
+/// A tournament or study was not created. `settings`: the status for a setting that is refused.
+pub fn not_created<P: std::error::Error>(
+    problem: CreateProblem<P>,
+    settings: impl FnOnce(P) -> Status,
+) -> Status {
+    let message = problem.to_string();
+    match problem {
+        CreateProblem::Settings(problem) => settings(problem),
+        CreateProblem::Refused(refused) => Refusal::from(refused).into(),
+        CreateProblem::RequestIdUsed(_) => request_id_used(&message),
+        CreateProblem::ShuttingDown(_) => shutting_down(),
+        CreateProblem::DiskNearlyFull => disk_nearly_full(&message),
+        CreateProblem::Store(error) => {
+            tracing::error!(%error, "creating a tournament or study failed");
+            store_failed()
+        }
     }
 }
 

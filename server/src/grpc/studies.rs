@@ -25,10 +25,7 @@ use super::forward::Gateway;
 use super::limits::charged;
 use super::lists;
 use super::reach::Reach;
-use super::status::{
-    Refusal, disk_nearly_full, field, read_failed, request_id, request_id_used, shutting_down,
-    status, store_failed,
-};
+use super::status::{Refusal, field, not_created, read_failed, request_id, shutting_down, status};
 use crate::access::{Caller, Role};
 use crate::cluster::FoundBy;
 use crate::config::{
@@ -38,6 +35,7 @@ use crate::config::{
 use crate::convert;
 use crate::limits::{COST_OF_TOURNAMENT, CallLimits, Key, Places, Refused};
 use crate::metrics::StreamKind;
+use crate::store::StoreError;
 use crate::studies::{
     CreateProblem, ExportError, ExportedFile, NotAdded, Stopped, Studies, StudyHandle,
 };
@@ -134,7 +132,14 @@ impl StudyService for StudyCalls {
             self.here(Studies::created_id(request), key).await?;
         }
         let created = self.studies.create(settings, request_key, key).await;
-        let (handle, owner) = created.map_err(create_refused)?;
+        if let (Err(CreateProblem::Store(StoreError::Taken(_))), Some(request)) =
+            (&created, request_key)
+        {
+            // Another node has created it meanwhile.
+            self.here(Studies::created_id(request), key).await?;
+        }
+        let refused = |problem| not_created(problem, settings_refused);
+        let (handle, owner) = created.map_err(refused)?;
         Ok(Response::new(v1::CreateStudyResponse {
             study: Some(handle.describe()),
             owner_token: owner.to_text(),
@@ -173,8 +178,9 @@ impl StudyService for StudyCalls {
         }
         let studies = self
             .studies
-            .newest()
+            .earlier(None)
             .into_iter()
+            .map(|(_, handle)| handle)
             .filter(|handle| is_operator || tokens.iter().any(|token| handle.is_owner(token)));
         let mut studies: Vec<v1::Study> = studies.map(|handle| handle.describe()).collect();
         if let Some(gateway) = gateway {
@@ -405,7 +411,7 @@ async fn follow(
     let mut sent: BTreeMap<u32, v1::StudyParticipant> = BTreeMap::new();
     loop {
         changes.mark_unchanged();
-        let over = handle.is_over();
+        let over = handle.is_complete();
         let study = handle.describe();
         let participants = handle.participants(studies.rooms());
         let changed: Vec<_> = (participants.into_iter())
@@ -472,27 +478,7 @@ fn stopped(_: Stopped) -> Status {
     shutting_down()
 }
 
-fn create_refused(problem: CreateProblem) -> Status {
-    match problem {
-        CreateProblem::Settings(problem) => settings_refused(&problem),
-        CreateProblem::NotHosted => status(
-            Code::FailedPrecondition,
-            "STUDIES_NOT_HOSTED",
-            problem.to_string(),
-            [],
-        ),
-        CreateProblem::Refused(refused) => Refusal::from(refused).into(),
-        CreateProblem::RequestIdUsed => request_id_used(&problem.to_string()),
-        CreateProblem::ShuttingDown => shutting_down(),
-        CreateProblem::DiskNearlyFull => disk_nearly_full(&problem.to_string()),
-        CreateProblem::Store(error) => {
-            tracing::error!(%error, "creating a study failed");
-            store_failed()
-        }
-    }
-}
-
-fn settings_refused(problem: &SettingsProblem) -> Status {
+fn settings_refused(problem: SettingsProblem) -> Status {
     status(
         Code::InvalidArgument,
         "SETTINGS_REFUSED",

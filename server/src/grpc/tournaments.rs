@@ -11,7 +11,7 @@ use chefshat_proto::v1::{
     tournament_service_server::TournamentService,
 };
 use chefshat_record::convert::FieldProblem;
-use chefshat_tournament::{BeginProblem, JoinProblem, State};
+use chefshat_tournament::{BeginProblem, JoinProblem, SettingsProblem, State};
 use futures::Stream;
 use prost::Message as _;
 use tokio::sync::{Semaphore, mpsc};
@@ -29,8 +29,8 @@ use super::new_room::{supported_policy, too_long};
 use super::pages;
 use super::recorded::Recorded;
 use super::status::{
-    Refusal, disk_nearly_full, field, name_fingerprint, request_id, request_id_used, shutting_down,
-    status, store_failed,
+    Refusal, field, name_fingerprint, not_created, request_id, request_id_used, shutting_down,
+    status,
 };
 use crate::access::Caller;
 use crate::config::{
@@ -257,7 +257,7 @@ impl TournamentService for TournamentCalls {
             // Another node has created it meanwhile.
             reach.check_not_created_elsewhere(request_key, key).await?;
         }
-        let (handle, owner) = created.map_err(create_refused)?;
+        let (handle, owner) = created.map_err(|problem| not_created(problem, settings_refused))?;
         Ok(Response::new(v1::CreateTournamentResponse {
             tournament: Some(handle.describe()),
             join_code: handle.join_code().to_owned(),
@@ -598,26 +598,8 @@ fn refused_within(outer: &'static str, problem: &FieldProblem) -> Status {
     refused(&FieldProblem::new(outer, problem.to_string()))
 }
 
-fn create_refused(problem: CreateProblem) -> Status {
-    match problem {
-        CreateProblem::Settings(problem) => {
-            refused(&FieldProblem::new(problem.field, problem.problem))
-        }
-        CreateProblem::TooMany(limit) => status(
-            Code::ResourceExhausted,
-            "TOO_MANY_TOURNAMENTS",
-            problem.to_string(),
-            [("max_tournaments", &limit.to_string())],
-        ),
-        CreateProblem::Refused(refused) => Refusal::from(refused).into(),
-        CreateProblem::RequestIdUsed => request_id_used(&problem.to_string()),
-        CreateProblem::ShuttingDown => shutting_down(),
-        CreateProblem::DiskNearlyFull => disk_nearly_full(&problem.to_string()),
-        CreateProblem::Store(error) => {
-            tracing::error!(%error, "creating a tournament failed");
-            store_failed()
-        }
-    }
+fn settings_refused(problem: SettingsProblem) -> Status {
+    refused(&FieldProblem::new(problem.field, problem.problem))
 }
 
 fn kind_not_admitted() -> Status {

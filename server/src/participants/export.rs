@@ -15,7 +15,8 @@ use tokio::sync::mpsc;
 use super::data::{DataError, ParticipantData, blocking};
 use super::files::{Skipped, records_with};
 use crate::convert;
-use crate::store::tournaments::TournamentEntry;
+use crate::store::tournaments::{StoredTournament, TournamentEntry};
+use crate::store::units::UnitKind;
 use crate::store::{Part, StoreError};
 
 /// Page size of the list of records.
@@ -72,7 +73,16 @@ impl ParticipantData {
         let files = self.export_files(who, known, &mut sheet).await?;
         skipped.named.extend(files.named);
         skipped.other.extend(files.other);
-        for tournament in self.store.tournaments(usize::MAX).await? {
+        for id in self.store.units(UnitKind::Tournament, usize::MAX).await? {
+            let unit = self.store.unit(UnitKind::Tournament.id(id)).await?;
+            let Some(unit) = unit else { continue };
+            let tournament = match StoredTournament::decode(id, &unit) {
+                Ok(tournament) => tournament,
+                Err(problem) => {
+                    skipped.named.push(problem.to_string());
+                    continue;
+                }
+            };
             let mut lines = Vec::new();
             for entry in &tournament.entries {
                 if let TournamentEntry::Change(

@@ -15,6 +15,7 @@ use crate::convert;
 use crate::samples::Samples;
 use crate::store::StoreError;
 use crate::store::studies::StoredStudy;
+use crate::store::units::UnitKind;
 
 impl ParticipantData {
     /// Whether a participant of this name has a game of a study that is not over.
@@ -52,7 +53,7 @@ impl ParticipantData {
             // A server completes what is interrupted between these two.
             let id = stored.header.id;
             let forgotten = vec![number];
-            self.store.rewrite_study(id, changes, forgotten).await?;
+            StoredStudy::rewrite(self.store.as_ref(), id, &changes, forgotten).await?;
             let samples = Arc::new(Samples::new(self.data_dir.clone()));
             samples.delete(games.clone()).await?;
             self.store.delete(games).await?;
@@ -153,8 +154,8 @@ impl ParticipantData {
         unreadable: &mut Vec<String>,
     ) -> Result<Vec<(StoredStudy, u32)>, StoreError> {
         let mut found = Vec::new();
-        for id in self.store.studies().await? {
-            let stored = match self.store.study(id).await {
+        for id in self.store.units(UnitKind::Study, usize::MAX).await? {
+            let stored = match StoredStudy::read(self.store.as_ref(), id).await {
                 Err(StoreError::Unreadable(problem)) => {
                     unreadable.push(problem);
                     continue;

@@ -11,8 +11,7 @@ pub use chefshat_cluster::{Epoch, NodeId};
 use futures::future::BoxFuture;
 use futures::{FutureExt as _, TryFutureExt as _};
 
-use super::studies::StoredStudy;
-use super::tournaments::StoredTournament;
+use super::units::{StoredUnit, UnitKind};
 use super::{ResumableGame, Store, StoreError};
 use chefshat_room::ids::Id;
 
@@ -93,10 +92,8 @@ pub struct Location {
 /// A unit as its owner resumes it.
 #[derive(Default)]
 pub struct Unit {
-    /// The tournament, if the unit is one.
-    pub tournament: Option<StoredTournament>,
-    /// The study, if the unit is one.
-    pub study: Option<StoredStudy>,
+    /// The tournament or study, if the unit is one.
+    pub stored: Option<(UnitKind, StoredUnit)>,
     /// Its durable rooms that are not over, and those that are but have not been removed yet,
     /// oldest first. A game that cannot be read is logged and left unchanged. The last entry of a
     /// game that has been claimed says that the server was restarted.
@@ -175,9 +172,6 @@ pub trait ClusterStore: Store {
 
     /// The room of a durable game that is over, to show its end, if it has not been removed yet.
     fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>>;
-
-    /// Everything stored about a tournament, without becoming its owner.
-    fn tournament(&self, id: Id) -> BoxFuture<'_, Result<Option<StoredTournament>, StoreError>>;
 
     /// The nodes that have a lease.
     fn alive(&self) -> BoxFuture<'_, Result<Vec<(NodeId, NodeInfo)>, StoreError>>;

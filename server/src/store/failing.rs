@@ -10,7 +10,7 @@ use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 use tokio::sync::{Semaphore, watch};
 
-use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use super::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
 use super::{
     ForgetError, Forgotten, Journal, Keep, Listed, MemoryStore, Part, ResumableGame, Store,
     StoreError, StoredGame,
@@ -51,8 +51,8 @@ pub enum Read {
     Game,
     /// A part of the list of games.
     List,
-    /// Tournaments with their journals.
-    Tournaments,
+    /// The ids of tournaments or studies.
+    Units,
 }
 
 impl FailingStore {
@@ -170,35 +170,35 @@ impl Store for FailingStore {
         self.inner.mark_record_written(game)
     }
 
-    fn create_tournament(
-        &self,
-        header: Arc<TournamentHeader>,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.inner.create_tournament(header, entries)
-    }
-
-    fn append_tournament(
-        &self,
-        tournament: Id,
-        row: u64,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
-            let permit = self.tournament_commits.acquire().await;
-            permit.expect("the semaphore is never closed").forget();
-            let appended = self.inner.append_tournament(tournament, row, entries);
-            appended.await
+            if matches!(
+                (unit.kind, &write),
+                (UnitKind::Tournament, UnitWrite::Append(_))
+            ) {
+                let permit = self.tournament_commits.acquire().await;
+                permit.expect("the semaphore is never closed").forget();
+            }
+            self.inner.write_unit(unit, write).await
         }
         .boxed()
     }
 
-    fn tournaments(
+    fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+        self.inner.unit(unit)
+    }
+
+    fn units(
         &self,
+        kind: UnitKind,
         newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
-        self.count(Read::Tournaments);
-        self.inner.tournaments(newest_over)
+    ) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        self.count(Read::Units);
+        self.inner.units(kind, newest_over)
+    }
+
+    fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
+        self.inner.traces(study)
     }
 
     fn failed(&self) -> BoxFuture<'static, StoreError> {

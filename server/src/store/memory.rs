@@ -1,18 +1,16 @@
 //! Stores games in memory until the process ends.
 
-use std::collections::{BTreeMap, BTreeSet, btree_map};
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use chefshat_proto::v1;
 use chefshat_record::pseudonym::{Pseudonym, Redactions};
-use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending, ready};
 
 use super::ephemeral::{Reservations, Reserved};
 use super::forget::forget_stored;
-use super::studies::{StoredStudy, StoredTraces, StudyHeader};
-use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use super::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
 use super::{
     ForgetError, Forgotten, Journal, Keep, Listed, Part, ResumableGame, Store, StoreError,
     StoredGame, matches_filter,
@@ -31,11 +29,10 @@ pub const MAX_FINISHED_ENTRIES: usize = 10_000_000;
 #[derive(Debug, Default)]
 pub struct MemoryStore {
     finished: Arc<Mutex<Finished>>,
-    studies: Mutex<BTreeMap<Id, StudyInMemory>>,
+    /// Those that are not over.
+    units: Mutex<BTreeMap<UnitId, UnitInMemory>>,
     /// The ids of running games.
     reserved: Reservations,
-    /// Tournaments that are not over.
-    tournaments: Mutex<BTreeSet<Id>>,
     outlives_server: bool,
 }
 
@@ -53,9 +50,9 @@ impl MemoryStore {
     fn is_needed(&self, game: &StoredGame) -> bool {
         match game {
             StoredGame::Hosted(header, ..) => {
-                let unit = header.unit();
-                lock_studies(&self.studies).contains_key(&unit)
-                    || lock_tournaments(&self.tournaments).contains(&unit)
+                let units = lock(&self.units);
+                let needs = |kind: UnitKind| units.contains_key(&kind.id(header.unit()));
+                needs(UnitKind::Study) || needs(UnitKind::Tournament)
             }
             StoredGame::Imported(_) => false,
         }
@@ -63,11 +60,41 @@ impl MemoryStore {
 }
 
 #[derive(Debug)]
-struct StudyInMemory {
-    header: Arc<StudyHeader>,
-    changes: Vec<StudyChange>,
-    rows: u64,
+struct UnitInMemory {
+    stored: StoredUnit,
     traces: Vec<StoredTraces>,
+}
+
+/// Writes something for a unit. One that is over is dropped.
+fn write_in(
+    units: &mut BTreeMap<UnitId, UnitInMemory>,
+    unit: UnitId,
+    write: UnitWrite,
+) -> Result<(), StoreError> {
+    let known = units.get_mut(&unit);
+    match (write, known) {
+        (UnitWrite::Create { .. }, Some(_)) => return Err(StoreError::Taken(unit.id)),
+        (UnitWrite::Create { header, first, .. }, None) => {
+            if !first.as_ref().is_some_and(|row| row.over) {
+                let rows = first.into_iter().map(|row| row.entries).collect();
+                let stored = StoredUnit::new(header, rows);
+                let traces = Vec::new();
+                units.insert(unit, UnitInMemory { stored, traces });
+            }
+        }
+        (UnitWrite::Append(row), Some(known)) => match row.over {
+            true => drop(units.remove(&unit)),
+            false => known.stored.rows.push(row.entries),
+        },
+        (UnitWrite::Rewrite { entries, forgotten }, Some(known)) => {
+            known.stored.rows = vec![entries];
+            (known.traces).retain(|traces| !forgotten.contains(&traces.number));
+        }
+        (UnitWrite::Traces(traces), Some(known)) => known.traces.push(traces),
+        (UnitWrite::Delete, _) => drop(units.remove(&unit)),
+        (_, None) => {}
+    }
+    Ok(())
 }
 
 #[derive(Debug, Default)]
@@ -272,120 +299,31 @@ impl Store for MemoryStore {
         ready(Ok(())).boxed()
     }
 
-    fn create_tournament(
-        &self,
-        header: Arc<TournamentHeader>,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        if !entries.iter().any(TournamentEntry::is_end) {
-            lock_tournaments(&self.tournaments).insert(header.id);
-        }
-        ready(Ok(())).boxed()
+    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
+        let written = write_in(&mut lock(&self.units), unit, write);
+        ready(written).boxed()
     }
 
-    fn append_tournament(
-        &self,
-        tournament: Id,
-        _row: u64,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        if entries.iter().any(TournamentEntry::is_end) {
-            lock_tournaments(&self.tournaments).remove(&tournament);
-        }
-        ready(Ok(())).boxed()
-    }
-
-    fn tournaments(
-        &self,
-        _newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
-        ready(Ok(Vec::new())).boxed()
-    }
-
-    fn hosts_studies(&self) -> bool {
-        true
-    }
-
-    fn create_study(&self, header: Arc<StudyHeader>) -> BoxFuture<'_, Result<(), StoreError>> {
-        let id = header.id;
-        let created = match lock_studies(&self.studies).entry(id) {
-            btree_map::Entry::Occupied(_) => Err(StoreError::Taken(id)),
-            btree_map::Entry::Vacant(place) => {
-                place.insert(StudyInMemory {
-                    header,
-                    changes: Vec::new(),
-                    rows: 0,
-                    traces: Vec::new(),
-                });
-                Ok(())
-            }
-        };
-        ready(created).boxed()
-    }
-
-    fn append_study(
-        &self,
-        study: Id,
-        row: u64,
-        mut changes: Vec<StudyChange>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        if let Some(study) = lock_studies(&self.studies).get_mut(&study) {
-            study.changes.append(&mut changes);
-            study.rows = row + 1;
-        }
-        ready(Ok(())).boxed()
-    }
-
-    fn rewrite_study(
-        &self,
-        study: Id,
-        changes: Vec<StudyChange>,
-        forgotten: Vec<u32>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        if let Some(study) = lock_studies(&self.studies).get_mut(&study) {
-            (study.changes, study.rows) = (changes, 1);
-            study
-                .traces
-                .retain(|traces| !forgotten.contains(&traces.number));
-        }
-        ready(Ok(())).boxed()
-    }
-
-    fn delete_study(&self, study: Id) -> BoxFuture<'_, Result<(), StoreError>> {
-        lock_studies(&self.studies).remove(&study);
-        ready(Ok(())).boxed()
-    }
-
-    fn studies(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
-        let studies = lock_studies(&self.studies);
-        ready(Ok(studies.keys().copied().collect())).boxed()
-    }
-
-    fn study(&self, study: Id) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {
-        let studies = lock_studies(&self.studies);
-        let stored = studies.get(&study).map(|study| StoredStudy {
-            header: StudyHeader::clone(&study.header),
-            changes: study.changes.clone(),
-            rows: study.rows,
-        });
+    fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+        let stored = lock(&self.units).get(&unit).map(|it| it.stored.clone());
         ready(Ok(stored)).boxed()
     }
 
-    fn append_traces(
+    /// None of them is over.
+    fn units(
         &self,
-        study: Id,
-        traces: StoredTraces,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        if let Some(study) = lock_studies(&self.studies).get_mut(&study) {
-            study.traces.push(traces);
-        }
-        ready(Ok(())).boxed()
+        kind: UnitKind,
+        _newest_over: usize,
+    ) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        let units = lock(&self.units);
+        let ids = (units.keys()).filter(|unit| unit.kind == kind);
+        ready(Ok(ids.map(|unit| unit.id).collect())).boxed()
     }
 
     fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
-        let studies = lock_studies(&self.studies);
-        let traces = studies.get(&study).map(|study| study.traces.clone());
-        ready(Ok(traces.unwrap_or_default())).boxed()
+        let units = lock(&self.units);
+        let study = units.get(&UnitKind::Study.id(study));
+        ready(Ok(study.map_or_else(Vec::new, |it| it.traces.clone()))).boxed()
     }
 
     fn failed(&self) -> BoxFuture<'static, StoreError> {
@@ -457,22 +395,6 @@ fn listed<'a>(
         .collect()
 }
 
-fn lock(finished: &Mutex<Finished>) -> MutexGuard<'_, Finished> {
-    finished
-        .lock()
-        .expect("no code that holds this lock can panic")
-}
-
-fn lock_studies(
-    studies: &Mutex<BTreeMap<Id, StudyInMemory>>,
-) -> MutexGuard<'_, BTreeMap<Id, StudyInMemory>> {
-    studies
-        .lock()
-        .expect("no code that holds this lock can panic")
-}
-
-fn lock_tournaments(tournaments: &Mutex<BTreeSet<Id>>) -> MutexGuard<'_, BTreeSet<Id>> {
-    tournaments
-        .lock()
-        .expect("no code that holds this lock can panic")
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    (mutex.lock()).expect("no code that holds this lock can panic")
 }

@@ -12,14 +12,14 @@ mod postgres;
 mod sqlite;
 pub mod studies;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 pub mod tournaments;
+pub mod units;
 
 use std::sync::Arc;
 
 use chefshat_proto::v1;
 use chefshat_record::pseudonym::{Pseudonym, Redactions};
-use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 use prost::Message as _;
@@ -36,8 +36,7 @@ pub use sqlite::{
 use crate::metrics::StoreMetrics;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader, TournamentGame};
-use studies::{StoredStudy, StoredTraces, StudyHeader};
-use tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
 
 /// Why a store failed, with advice.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -285,85 +284,25 @@ pub trait Store: Send + Sync + 'static {
     fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>>;
     /// Marks the record of a game as written to a file.
     fn mark_record_written(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// Creates a tournament with its first entries, row 0, in one commit.
-    fn create_tournament(
+    /// Writes something for a tournament or study, in one commit. What is added to one that was
+    /// deleted has no effect.
+    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// A tournament or study, or `None`.
+    fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>>;
+    /// The ids of the tournaments or studies that are not over, and of the `newest_over` newest ones
+    /// that are; oldest first.
+    fn units(
         &self,
-        header: Arc<TournamentHeader>,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// Adds row `row` (from 1) to the journal of a tournament.
-    fn append_tournament(
-        &self,
-        tournament: Id,
-        row: u64,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>>;
-    /// The tournaments that are not over, and the `newest_over` newest ones that are; oldest first.
-    /// One that cannot be read is logged and left unchanged.
-    fn tournaments(
-        &self,
+        kind: UnitKind,
         newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>>;
-    /// Whether it stores studies. If not, their methods fail.
-    fn hosts_studies(&self) -> bool {
-        false
-    }
-    /// Creates a study.
-    fn create_study(&self, _header: Arc<StudyHeader>) -> BoxFuture<'_, Result<(), StoreError>> {
-        ready(Err(no_studies())).boxed()
-    }
-    /// Adds row `row` (from 0) to the journal of a study.
-    fn append_study(
-        &self,
-        _study: Id,
-        _row: u64,
-        _changes: Vec<StudyChange>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        ready(Err(no_studies())).boxed()
-    }
-    /// Replaces the journal of a study by one row, and deletes the interface traces of these
-    /// participants, in one commit.
-    fn rewrite_study(
-        &self,
-        _study: Id,
-        _changes: Vec<StudyChange>,
-        _forgotten: Vec<u32>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        ready(Err(no_studies())).boxed()
-    }
-    /// Deletes a study with its journal and interface traces, if there is one. Its games are
-    /// deleted as games.
-    fn delete_study(&self, _study: Id) -> BoxFuture<'_, Result<(), StoreError>> {
-        ready(Err(no_studies())).boxed()
-    }
-    /// A study, or `None`.
-    fn study(&self, _study: Id) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {
-        ready(Err(no_studies())).boxed()
-    }
-    /// The ids of all studies, oldest first.
-    fn studies(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
-        ready(Ok(Vec::new())).boxed()
-    }
-    /// Adds interface traces to those of a participant's game.
-    fn append_traces(
-        &self,
-        _study: Id,
-        _traces: StoredTraces,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        ready(Err(no_studies())).boxed()
-    }
-    /// The interface traces of a study, in the order in which they were added.
-    fn traces(&self, _study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
-        ready(Err(no_studies())).boxed()
-    }
+    ) -> BoxFuture<'_, Result<Vec<Id>, StoreError>>;
+    /// The interface traces of a study, in the order in which they were added. One that cannot be
+    /// read is logged and left out.
+    fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>>;
     /// Waits until the store fails for good.
     fn failed(&self) -> BoxFuture<'static, StoreError>;
     /// Closes the store; it must not be used afterwards.
     fn close(&self) -> BoxFuture<'_, ()>;
-}
-
-fn no_studies() -> StoreError {
-    StoreError::Failed("this store has no studies".to_owned())
 }
 
 impl std::fmt::Debug for dyn Store {

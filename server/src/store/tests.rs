@@ -5,6 +5,7 @@ mod lists;
 mod retained;
 mod studies;
 mod tournaments;
+mod units;
 
 use chefshat_engine::{RULES_VERSION, RuleSetSpec, SeedPlan};
 use chefshat_room::ids::SecretHash;
@@ -13,6 +14,7 @@ use chefshat_room::policy::{Durability, Policy};
 use futures::FutureExt as _;
 
 use super::*;
+pub(crate) use units::TypedUnits;
 
 /// Runs a check with a new store of each kind.
 async fn with_each_store(check: impl AsyncFn(&dyn Store)) {

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use chefshat_study::{ItemAnswer, Participant, Study};
 
+use crate::clock::TimeOfDay;
 use crate::limits::{Held, Key, Places, Refused};
 use chefshat_room::ids::Id;
 
@@ -15,6 +16,16 @@ use chefshat_room::ids::Id;
 pub(super) const RETRY_STUDIES: Duration = Duration::from_secs(3_600);
 /// Bytes that the answers of a questionnaire take besides their content.
 const OVERHEAD_OF_ANSWERS: usize = 256;
+
+/// What all studies of a server share.
+#[derive(Debug)]
+pub struct Budgets {
+    pub(super) now: TimeOfDay,
+    /// The memory of their settings, in KiB.
+    pub(super) memory: Arc<Places>,
+    /// The memory of their participants and answers, in bytes.
+    pub(super) data: Arc<Places>,
+}
 
 /// The memory that one study has taken, until it is dropped.
 #[derive(Debug)]

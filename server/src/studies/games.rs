@@ -10,7 +10,7 @@ use chefshat_study::{Outcome, PlayedGame};
 use tokio::time::Instant;
 use tracing::warn;
 
-use super::task::Task;
+use super::task::StudyTask;
 use crate::config::TOURNAMENT_RETRY;
 use crate::convert::PARTICIPANT_KIND;
 use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
@@ -19,15 +19,15 @@ use crate::tasks::short;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Fill, GameStart, SeatedParticipant, StudyGame};
 
-impl Task {
+impl StudyTask {
     /// Assigns rooms to the games of participants who are there and have none.
     pub(super) fn place_due_games(&mut self) {
         for number in std::mem::take(&mut self.touched) {
-            if !self.state.is_connected(number) {
+            if !self.unit.state.is_connected(number) {
                 continue;
             }
             let (room, game) = (Id::random(), Id::random());
-            if let Some(change) = self.state.place(number, room.0, game.0) {
+            if let Some(change) = self.unit.state.place(number, room.0, game.0) {
                 self.fold(change);
             }
         }
@@ -39,7 +39,7 @@ impl Task {
     pub(super) async fn read_ended_games(&mut self) -> Result<(), StoreError> {
         let playing: Vec<u32> = self.playing.iter().copied().collect();
         for number in playing {
-            let participant = self.state.participant(number);
+            let participant = self.unit.state.participant(number);
             let Some(game) = participant.and_then(|it| it.games.last()).cloned() else {
                 continue;
             };
@@ -50,7 +50,7 @@ impl Task {
                 continue;
             }
             let room = Id(game.placed.room);
-            if self.rooms.is_over(room) == Some(false) || self.rooms.is_suspended(room) {
+            if self.unit.rooms.is_over(room) == Some(false) || self.unit.rooms.is_suspended(room) {
                 continue;
             }
             match self.outcome(&game).await? {
@@ -65,7 +65,7 @@ impl Task {
 
     fn end_game(&mut self, number: u32, game: &PlayedGame, outcome: Outcome) {
         let id = game.placed.game;
-        if let Some(change) = (self.state).game_ended(number, id, outcome, (self.now)()) {
+        if let Some(change) = (self.unit.state).game_ended(number, id, outcome, (self.now)()) {
             self.fold(change);
         }
         self.closing.remove(&Id(game.placed.room));
@@ -73,7 +73,12 @@ impl Task {
 
     /// The outcome of a game whose room is over or gone; `None` if it has no room yet.
     async fn outcome(&self, game: &PlayedGame) -> Result<Option<Outcome>, StoreError> {
-        let stored = self.rooms.store().finished(Id(game.placed.game)).await?;
+        let stored = self
+            .unit
+            .rooms
+            .store()
+            .finished(Id(game.placed.game))
+            .await?;
         if let Some(StoredGame::Hosted(_, entries, _)) = stored {
             let was_aborted = (entries.iter()).any(|it| matches!(it.change, Change::Aborted(_)));
             return Ok(Some(match was_aborted {
@@ -82,31 +87,30 @@ impl Task {
             }));
         }
         // A game that was aborted before it began has no record.
-        let had_room = self.rooms.get(Id(game.placed.room)).is_some();
+        let had_room = self.unit.rooms.get(Id(game.placed.room)).is_some();
         Ok(had_room.then_some(Outcome::Aborted))
     }
 
-    /// Creates the rooms of placed games. Returns whether there were any.
-    pub(super) async fn make_rooms(&mut self) -> Result<bool, StoreError> {
+    /// Creates the rooms of placed games.
+    pub(super) async fn make_rooms(&mut self) -> Result<(), StoreError> {
         if self.without_room.is_empty() || self.retry.is_some_and(|retry| Instant::now() < retry) {
-            return Ok(false);
+            return Ok(());
         }
         self.retry = None;
-        let mut any = false;
         for number in self.without_room.clone() {
             let Some(new) = self.new_room(number) else {
                 continue;
             };
-            match self.rooms.create(new).await {
+            match self.unit.rooms.create(new).await {
                 Ok(_) => {
                     self.without_room.remove(&number);
-                    self.handle.notify(number);
-                    any = true;
+                    self.unit.handle.notify_participant(number);
+                    self.unit.has_changed = true;
                 }
                 // The game was aborted before it began, and then the server was restarted; or its
                 // id is taken by another one.
                 Err(CreateError::Store(StoreError::Taken(_))) => {
-                    let participant = self.state.participant(number);
+                    let participant = self.unit.state.participant(number);
                     if let Some(game) = participant.and_then(|it| it.games.last()).cloned() {
                         self.end_game(number, &game, Outcome::Aborted);
                     }
@@ -116,24 +120,24 @@ impl Task {
                 Err(CreateError::ShuttingDown) => self.retry = Some(retry()),
                 Err(error) => {
                     if self.retry.replace(retry()).is_none() {
-                        warn!(study = %self.handle.id(), %error, "games of a study wait for rooms");
+                        warn!(study = %self.unit.handle.id(), %error, "games of a study wait for rooms");
                     }
                 }
             }
         }
-        Ok(any)
+        Ok(())
     }
 
     /// Closes the rooms of participants who have left.
     pub(super) fn close_rooms(&mut self) {
         for number in &self.playing {
-            let participant = self.state.participant(*number);
+            let participant = self.unit.state.participant(*number);
             let Some(game) = participant.and_then(|it| it.games.last()) else {
                 continue;
             };
             let room = Id(game.placed.room);
             if !self.is_active(*number)
-                && let Some(handle) = self.rooms.get(room)
+                && let Some(handle) = self.unit.rooms.get(room)
                 && self.closing.insert(room)
             {
                 tokio::spawn(short("one message", async move {
@@ -145,11 +149,11 @@ impl Task {
 
     /// The settings of the room of a participant's game.
     fn new_room(&self, number: u32) -> Option<NewRoom> {
-        let participant = self.state.participant(number)?;
+        let participant = self.unit.state.participant(number)?;
         let placed = &participant.games.last()?.placed;
-        let settings = self.state.settings();
+        let settings = self.unit.state.settings();
         let condition = &settings.conditions[placed.condition];
-        let plan = &self.handle.plan.conditions[placed.condition];
+        let plan = &self.unit.handle.plan.conditions[placed.condition];
         let small = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         let room = Id(placed.room);
         let seat = placed.seat;
@@ -168,7 +172,7 @@ impl Task {
             name: participant.pseudonym.clone(),
             name_fingerprint: String::new(),
             kind: PARTICIPANT_KIND,
-            ticket: self.handle.ticket_of(room).hash(),
+            ticket: self.unit.handle.ticket_of(room).hash(),
         };
         let seeds = match condition.seeds.is_empty() {
             true => &settings.seeds,
@@ -194,12 +198,12 @@ impl Task {
             game_seed: placed.seed_index.map(|index| seeds[index]),
             physical: false,
             request: None,
-            charged: self.handle.charged,
+            charged: self.unit.handle.charged,
             creator: None,
             seating: Some(Seating {
                 part_of: PartOf::Study(Arc::new(StudyGame {
-                    study: self.handle.id(),
-                    name: self.handle.plan.name.clone(),
+                    study: self.unit.handle.id(),
+                    name: self.unit.handle.plan.name.clone(),
                     condition: condition.id.clone(),
                     levels: condition.levels.clone(),
                     number,
@@ -212,7 +216,7 @@ impl Task {
                     attempt: placed.attempt,
                     labels: plan.labels,
                 })),
-                owner: self.handle.room_owner(room),
+                owner: self.unit.handle.room_owner(room),
                 game_id: Id(placed.game),
                 participants: BTreeMap::from([(seat, seated)]),
                 server_seed: None,

@@ -8,16 +8,17 @@ use chefshat_proto::v1;
 use chefshat_study::{
     At, Change, Content, ItemAnswer, ParticipantLink, Refusal, SessionSecret, Study,
 };
-use tokio::sync::{Mutex as AsyncMutex, mpsc, oneshot, watch};
-use tokio_util::sync::CancellationToken;
+use tokio::sync::{Mutex as AsyncMutex, watch};
 
 use super::data::StudyData;
-use super::message::{Command, Message, Stopped};
+use super::message::{Command, Message};
+use super::task::StudyTask;
 use crate::convert::{self, StudyPlan};
+use crate::journaled::{Handle, Stopped};
 use crate::limits::{Held, Key, Refused};
 use crate::rooms::Rooms;
 use crate::store::StoreError;
-use crate::store::studies::{StoredTraces, StudyHeader};
+use crate::store::units::{StoredTraces, UnitKind, UnitWrite};
 use crate::tasks::short;
 use chefshat_room::ids::{Id, SecretHash, Token};
 
@@ -57,44 +58,39 @@ pub enum NotAdded {
 }
 
 /// A study of this server.
+pub type StudyHandle = Handle<StudyTask>;
+
+/// What readers of a study share besides its state.
 #[derive(Debug)]
-pub struct StudyHandle {
-    pub(super) header: StudyHeader,
-    pub(super) plan: StudyPlan,
-    /// Who is charged for its games.
-    pub(super) charged: Key,
-    /// Its place among its creator's studies, and the memory of its settings.
-    pub(super) _places: [Held; 2],
+pub struct StudyShared {
+    /// The memory of its settings.
+    pub(super) _memory: Held,
     /// The memory of its participants and answers.
     pub(super) data: Arc<StudyData>,
-    /// The state with only committed changes.
-    pub(super) committed: Mutex<Study>,
-    pub(super) mailbox: mpsc::Sender<Message>,
-    /// Cancelled when its task ends.
-    pub(super) end: CancellationToken,
-    /// Counts changes.
-    pub(super) changes: watch::Sender<u64>,
     /// Counts the changes of each participant to whom somebody has listened.
-    pub(super) views: Mutex<BTreeMap<u32, watch::Sender<u64>>>,
+    views: Mutex<BTreeMap<u32, watch::Sender<u64>>>,
     /// Participants whose data are being deleted.
-    pub(super) deleting: Mutex<BTreeSet<u32>>,
+    deleting: Mutex<BTreeSet<u32>>,
     /// Number of interface traces by game, since the server was started. Locked while traces are
     /// added or deleted.
     pub(super) traces: AsyncMutex<BTreeMap<Id, usize>>,
-    pub(super) streams: AtomicU64,
+    streams: AtomicU64,
+}
+
+impl StudyShared {
+    pub(super) fn new(memory: Held, data: Arc<StudyData>) -> Self {
+        Self {
+            _memory: memory,
+            data,
+            views: Mutex::default(),
+            deleting: Mutex::default(),
+            traces: AsyncMutex::default(),
+            streams: AtomicU64::new(0),
+        }
+    }
 }
 
 impl StudyHandle {
-    /// Its id.
-    pub fn id(&self) -> Id {
-        self.header.id
-    }
-
-    /// Whether its task has ended: the server ends, or another node has it.
-    pub fn is_stopped(&self) -> bool {
-        self.mailbox.is_closed()
-    }
-
     /// Its settings.
     pub fn plan(&self) -> &StudyPlan {
         &self.plan
@@ -103,13 +99,6 @@ impl StudyHandle {
     /// Its settings as a message, every field set.
     pub fn settings(&self) -> &v1::StudySettings {
         &self.header.settings
-    }
-
-    /// Whether this is its owner's token.
-    pub fn is_owner(&self, token: &str) -> bool {
-        Token::parse(token).is_some_and(|token| {
-            token.room == self.header.id && self.header.owner.matches(&token.secret)
-        })
     }
 
     /// The study as a message.
@@ -210,11 +199,6 @@ impl StudyHandle {
         Token::of_request(room, &SecretHash::from_bytes(self.header.key), &[0; 32])
     }
 
-    /// The owner token of a room of this study.
-    pub(super) fn room_owner(&self, room: Id) -> Token {
-        Token::of_tournament_room(room, &self.header.owner)
-    }
-
     /// Adds participants with these pseudonyms, empty ones by number, and charges a caller for their
     /// memory. Returns the number of the first.
     ///
@@ -225,11 +209,11 @@ impl StudyHandle {
         key: Key,
         pseudonyms: Vec<String>,
     ) -> Result<Result<u32, NotAdded>, Stopped> {
-        let memory = match self.data.for_participants(key, &pseudonyms) {
+        let memory = match self.shared.data.for_participants(key, &pseudonyms) {
             Ok(memory) => memory,
             Err(refused) => return Ok(Err(refused.into())),
         };
-        let data = Arc::clone(&self.data);
+        let data = Arc::clone(&self.shared.data);
         let added = self.command(move |study, _| {
             let first = study.participants().len() + 1;
             let first = u32::try_from(first).unwrap_or(u32::MAX);
@@ -314,11 +298,11 @@ impl StudyHandle {
         + 'static,
         kept: fn(&StudyData, u32, Held),
     ) -> Result<Result<u32, NotAdded>, Stopped> {
-        let memory = match self.data.for_answers(key, &answers) {
+        let memory = match self.shared.data.for_answers(key, &answers) {
             Ok(memory) => memory,
             Err(refused) => return Ok(Err(refused.into())),
         };
-        let data = Arc::clone(&self.data);
+        let data = Arc::clone(&self.shared.data);
         let changed = self.command(move |study, now_ms| {
             let change = change(study, answers, now_ms)?;
             // Here, because the caller may go before it gets its answer.
@@ -368,7 +352,7 @@ impl StudyHandle {
         if let Err(refusal) = withdrawn.await? {
             return Ok(Err(refusal));
         }
-        let mut changes = self.changes.subscribe();
+        let mut changes = self.changes();
         while delete_data && self.lock_deleting().contains(&number) {
             tokio::select! {
                 changed = changes.changed() => changed.map_err(|_| Stopped)?,
@@ -389,11 +373,12 @@ impl StudyHandle {
         number: u32,
         replace: bool,
     ) -> Result<Result<u32, NotAdded>, Stopped> {
-        let memory = match replace.then(|| self.data.for_participants(key, &[String::new()])) {
+        let memory = match replace.then(|| self.shared.data.for_participants(key, &[String::new()]))
+        {
             Some(Err(refused)) => return Ok(Err(refused.into())),
             memory => memory.and_then(Result::ok),
         };
-        let data = Arc::clone(&self.data);
+        let data = Arc::clone(&self.shared.data);
         let removed = self.command(move |study, now_ms| {
             let mut changes = Vec::from_iter(study.remove(number, now_ms)?);
             let Some(memory) = memory else {
@@ -423,10 +408,7 @@ impl StudyHandle {
     /// The server ends or its store failed, or (inner result) somebody is in the middle of it: how
     /// many.
     pub(super) async fn delete(&self, force: bool) -> Result<Result<usize, usize>, Stopped> {
-        let (reply, answer) = oneshot::channel();
-        let sent = self.mailbox.send(Message::Delete { force, reply }).await;
-        sent.map_err(|_| Stopped)?;
-        answer.await.map_err(|_| Stopped)
+        self.ask(|reply| Message::Delete { force, reply }).await
     }
 
     /// Records interface traces of a participant's game.
@@ -444,7 +426,7 @@ impl StudyHandle {
             return Ok(Err(TraceRefusal::Invalid(problem)));
         }
         // Deletion waits for it, so that nothing is added after the data were deleted.
-        let mut counts = self.traces.lock().await;
+        let mut counts = self.shared.traces.lock().await;
         {
             let study = self.committed();
             let participant = study.participant(number).filter(|it| !it.data_deleted);
@@ -471,13 +453,15 @@ impl StudyHandle {
             game,
             traces,
         };
-        rooms.store().append_traces(self.id(), traces).await.map(Ok)
+        let unit = UnitKind::Study.id(self.id());
+        let traces = UnitWrite::Traces(traces);
+        rooms.store().write_unit(unit, traces).await.map(Ok)
     }
 
     /// Adds a stream that shows the study to a participant. While the value lives, the participant
     /// is present.
     pub async fn present(self: &Arc<Self>, number: u32, session: u32) -> Presence {
-        let stream = self.streams.fetch_add(1, Ordering::Relaxed);
+        let stream = self.shared.streams.fetch_add(1, Ordering::Relaxed);
         let message = Message::Present {
             number,
             session,
@@ -499,13 +483,8 @@ impl StudyHandle {
         sender.subscribe()
     }
 
-    /// Counts changes.
-    pub fn changes(&self) -> watch::Receiver<u64> {
-        self.changes.subscribe()
-    }
-
     /// Whether nothing can change by itself any more: it is closed, and nobody is active.
-    pub fn is_over(&self) -> bool {
+    pub fn is_complete(&self) -> bool {
         let study = self.committed();
         let is_active =
             |it: &chefshat_study::Participant| it.status == chefshat_study::Status::Active;
@@ -517,46 +496,27 @@ impl StudyHandle {
         read(&self.committed())
     }
 
-    /// Shows committed changes to readers.
-    pub(super) fn publish(&self, changes: &[Change]) {
-        let mut study = self.committed();
-        for change in changes {
-            study.fold(change);
-        }
-        drop(study);
-        for number in changes.iter().filter_map(Change::number) {
-            self.notify(number);
-        }
-    }
-
     /// Notifies the streams of a participant.
-    pub(super) fn notify(&self, number: u32) {
+    pub(super) fn notify_participant(&self, number: u32) {
         if let Some(sender) = self.lock_views().get(&number) {
             sender.send_modify(|count| *count += 1);
         }
     }
 
-    pub(super) fn committed(&self) -> MutexGuard<'_, Study> {
-        (self.committed.lock()).expect("no code that holds this lock can panic")
-    }
-
     pub(super) fn lock_deleting(&self) -> MutexGuard<'_, BTreeSet<u32>> {
-        (self.deleting.lock()).expect("no code that holds this lock can panic")
+        (self.shared.deleting.lock()).expect("no code that holds this lock can panic")
     }
 
     fn lock_views(&self) -> MutexGuard<'_, BTreeMap<u32, watch::Sender<u64>>> {
-        (self.views.lock()).expect("no code that holds this lock can panic")
+        (self.shared.views.lock()).expect("no code that holds this lock can panic")
     }
 
     async fn command(
         &self,
         command: impl FnOnce(&Study, u64) -> Result<(Vec<Change>, u32), Refusal> + Send + Sync + 'static,
     ) -> Result<Result<u32, Refusal>, Stopped> {
-        let (reply, answer) = oneshot::channel();
         let command: Command = Box::new(command);
-        let sent = self.mailbox.send(Message::Command(command, reply)).await;
-        sent.map_err(|_| Stopped)?;
-        answer.await.map_err(|_| Stopped)
+        self.ask(|reply| Message::Command(command, reply)).await
     }
 }
 

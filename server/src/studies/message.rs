@@ -10,7 +10,7 @@ pub(super) type Command =
     Box<dyn FnOnce(&Study, u64) -> Result<(Vec<Change>, u32), Refusal> + Send + Sync>;
 
 /// A message to the task of a study.
-pub(super) enum Message {
+pub enum Message {
     /// Executes a command; answers once its changes are committed.
     Command(Command, oneshot::Sender<Result<u32, Refusal>>),
     /// Deletes the study; answers with the number of its games once all is deleted. Refused with
@@ -38,7 +38,3 @@ pub(super) enum Message {
         stream: u64,
     },
 }
-
-/// The server ends, and the study with it.
-#[derive(Debug, Clone, Copy)]
-pub struct Stopped;

@@ -1,49 +1,46 @@
-//! The task of one study: receives messages, lets the core decide what follows, commits it, and only
-//! then acts on it. `games` acts on games and their rooms.
+//! The task of one study: what its changes bring about. `games` acts on games and their rooms.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_study::{Change, Refusal, Status, Study};
+use chefshat_study::{Change, Refusal, SettingsProblem, Status, Study};
 use tokio::sync::{mpsc, oneshot};
-use tokio::time::{Instant, sleep_until};
-use tokio_util::sync::CancellationToken;
-use tracing::{error, info, warn};
+use tokio::time::Instant;
+use tracing::info;
 
-use super::handle::StudyHandle;
+use super::data::{Budgets, RETRY_STUDIES, StudyData};
+use super::handle::StudyShared;
 use super::message::{Command, Message};
+use super::{StudyPlan, memory_of, restored};
 use crate::clock::TimeOfDay;
-use crate::cluster::News;
-use crate::rooms::Rooms;
+use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
+use crate::journaled::{Folded, Journaled, Unit, UnitHeader};
+use crate::limits::{Key, Refused};
 use crate::store::StoreError;
-use chefshat_room::ids::Id;
+use crate::store::studies::{StoredStudy, StudyHeader, changes_to_bytes};
+use crate::store::units::{StoredUnit, UnitKind, UnitWrite};
+use crate::tasks::LongTask;
+use chefshat_room::ids::{Id, SecretHash};
 
-/// Messages that are processed before their consequences are computed.
-const MESSAGES_AT_A_TIME: usize = 64;
+impl UnitHeader for StudyHeader {
+    fn id(&self) -> Id {
+        self.id
+    }
 
-/// Stops the studies of a server.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Stop {
-    /// Cancelled when no more games are begun or counted.
-    pub(super) no_more_games: CancellationToken,
-    /// Cancelled when the tasks of studies end.
-    pub(super) end: CancellationToken,
+    fn owner(&self) -> &SecretHash {
+        &self.owner
+    }
+
+    fn created_at_ms(&self) -> u64 {
+        self.created_at_ms
+    }
 }
 
-/// Runs a study until the server ends.
-pub(super) struct Task {
-    pub(super) handle: Arc<StudyHandle>,
-    pub(super) rooms: Arc<Rooms>,
+/// Runs a study.
+pub struct StudyTask {
+    pub(super) unit: Unit<Self>,
     pub(super) now: TimeOfDay,
-    /// The state with pending changes; the handle's copy follows when they are committed.
-    pub(super) state: Study,
-    /// Number of committed rows.
-    pub(super) rows: u64,
-    /// Changes of the next commit.
-    pending: Vec<Change>,
-    /// Answers that wait for a commit.
-    replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
     /// Streams of participants.
     streams: BTreeMap<u32, u64>,
     /// Participants for whom a game may be due.
@@ -56,148 +53,125 @@ pub(super) struct Task {
     pub(super) closing: BTreeSet<Id>,
     /// When rooms whose creation failed are tried again.
     pub(super) retry: Option<Instant>,
-    /// Whether something visible has changed that is not committed.
-    has_changed: bool,
     /// Those who wait for the deletion of the study, once that is requested.
     deletion: Vec<oneshot::Sender<Result<usize, usize>>>,
 }
 
-impl Task {
-    /// Creates the task of a study with this number of committed rows.
-    pub(super) fn new(
-        handle: Arc<StudyHandle>,
-        rooms: Arc<Rooms>,
-        now: TimeOfDay,
-        rows: u64,
-    ) -> Self {
-        let state = handle.committed().clone();
-        let participants = state.participants();
+impl Journaled for StudyTask {
+    type Header = StudyHeader;
+    type Plan = StudyPlan;
+    type State = Study;
+    type Entry = Change;
+    type Message = Message;
+    type Shared = StudyShared;
+    type Common = Budgets;
+    type SettingsProblem = SettingsProblem;
+
+    const KIND: UnitKind = UnitKind::Study;
+    const NAMES: &'static str = "studies";
+    const TASK: LongTask = LongTask::Study;
+    const CREATION: &'static str = "one study";
+    const MAILBOX: usize = STUDY_MAILBOX;
+    const MOST: usize = MAX_STUDIES;
+
+    fn header_to_bytes(header: &StudyHeader) -> Vec<u8> {
+        header.to_bytes()
+    }
+
+    fn row_to_bytes(changes: &[Change]) -> Vec<u8> {
+        changes_to_bytes(changes)
+    }
+
+    fn fold(id: Id, stored: &StoredUnit) -> Result<Folded<Self>, String> {
+        let stored = StoredStudy::decode(id, stored).map_err(|problem| problem.to_string())?;
+        let (plan, state) = restored(&stored).map_err(|problem| problem.to_string())?;
+        Ok(Folded {
+            header: stored.header,
+            plan,
+            state,
+            rows: stored.rows,
+        })
+    }
+
+    fn share(common: &Budgets, folded: &Folded<Self>) -> StudyShared {
+        let memory = memory_of(&folded.header.settings).div_ceil(1024);
+        let memory = (common.memory).take_many_anyway(Self::key_of(folded.header.id), memory);
+        let data = StudyData::of(&folded.state, folded.header.id, &common.data);
+        StudyShared::new(memory, Arc::new(data))
+    }
+
+    fn key_of(id: Id) -> Key {
+        Key::Study(id)
+    }
+
+    fn too_many(limit: u64) -> Refused {
+        Refused {
+            reason: "TOO_MANY_STUDIES",
+            what: "too many studies",
+            limit,
+            retry_after: RETRY_STUDIES,
+        }
+    }
+
+    fn apply(state: &mut Study, change: &Change) {
+        state.fold(change);
+    }
+
+    /// Its participants' data can still be deleted.
+    fn is_over(_: &Study) -> bool {
+        false
+    }
+
+    fn new(unit: Unit<Self>, common: &Budgets) -> Self {
+        let participants = unit.state.participants();
         let playing = participants
             .iter()
             .filter(|(_, it)| it.games.last().is_some_and(|game| game.ended.is_none()));
         let playing = playing.map(|(number, _)| *number).collect();
         // A server that ended in the middle of a deletion completes it.
         let deleted = participants.iter().filter(|(_, it)| it.data_deleted);
-        *handle.lock_deleting() = deleted.map(|(number, _)| *number).collect();
+        *unit.handle.lock_deleting() = deleted.map(|(number, _)| *number).collect();
         Self {
-            handle,
-            rooms,
-            now,
-            rows,
-            pending: Vec::new(),
-            replies: Vec::new(),
+            unit,
+            now: common.now,
             streams: BTreeMap::new(),
             touched: BTreeSet::new(),
             playing,
             without_room: BTreeSet::new(),
             closing: BTreeSet::new(),
             retry: None,
-            has_changed: false,
             deletion: Vec::new(),
-            state,
         }
     }
 
-    /// Runs the study until it is deleted, the server ends or its store fails.
-    pub(super) async fn run(mut self, mut inbox: mpsc::Receiver<Message>, stop: Stop) {
-        let rooms = Arc::clone(&self.rooms);
-        let mut messages = Vec::new();
-        loop {
-            let changed = rooms.changed();
-            tokio::pin!(changed);
-            // From here on no end of a game is missed.
-            changed.as_mut().enable();
-            // What is deleted need not be committed before: on a full disk, the deletion that frees
-            // space would wait for space.
-            match self.delete_study(&mut inbox).await {
-                Ok(false) => {}
-                Ok(true) => return,
-                Err(error) => return self.fail(&error),
-            }
-            if let Err(error) = self.settle(stop.no_more_games.is_cancelled()).await {
-                return self.fail(&error);
-            }
-            match self.delete_study(&mut inbox).await {
-                Ok(false) => {}
-                Ok(true) => return,
-                Err(error) => return self.fail(&error),
-            }
-            // Nothing that is due is done any more.
-            let wake = self
-                .wake_at()
-                .filter(|_| !stop.no_more_games.is_cancelled());
-            let alarm = sleep_until(wake.unwrap_or_else(Instant::now));
-            tokio::select! {
-                () = stop.end.cancelled() => return,
-                received = inbox.recv_many(&mut messages, MESSAGES_AT_A_TIME) => {
-                    if received == 0 {
-                        return;
-                    }
-                    messages.drain(..).for_each(|message| self.receive(message));
-                }
-                () = changed => {}
-                () = alarm, if wake.is_some() => {}
-            }
-        }
+    fn unit(&self) -> &Unit<Self> {
+        &self.unit
     }
 
-    fn fail(&self, error: &StoreError) {
-        let study = self.handle.id();
-        match (error, self.rooms.lease()) {
-            (StoreError::Fenced(_), _) => info!(%study, %error, "the study stops here"),
-            (_, Some(_)) => warn!(%study, %error, "the study stops until it is resumed"),
-            (_, None) => error!(%study, %error, "the store failed; the study stops"),
-        }
-        if let Some(lease) = self.rooms.lease()
-            && !self.handle.end.is_cancelled()
-        {
-            lease.report(study, News::Stopped);
-        }
+    fn unit_mut(&mut self) -> &mut Unit<Self> {
+        &mut self.unit
     }
 
-    /// The result of a write, once this server may publish it.
-    async fn published<T>(
-        &self,
-        written: impl Future<Output = Result<T, StoreError>>,
-    ) -> Result<T, StoreError> {
-        let handle = &self.handle;
-        match self.rooms.lease() {
-            Some(lease) => lease.published(handle.id(), &handle.end, written).await,
-            None => written.await,
-        }
-    }
-
-    fn wake_at(&self) -> Option<Instant> {
-        let by_core = self.state.wake_at().map(|at_ms| {
-            let wait = at_ms.saturating_sub((self.now)());
-            Instant::now() + Duration::from_millis(wait)
-        });
-        by_core.into_iter().chain(self.retry).min()
-    }
-
-    fn receive(&mut self, message: Message) {
+    async fn receive(&mut self, message: Message) -> Result<(), StoreError> {
         match message {
             Message::Command(command, reply) => {
                 let executed = self.execute(command);
-                self.replies.push(Box::new(move || {
-                    // The caller may have gone.
-                    let _ = reply.send(executed);
-                }));
+                self.unit.reply(reply, executed);
             }
             Message::Delete { force, reply } => {
-                let participants = self.state.participants().iter();
+                let participants = self.unit.state.participants().iter();
                 let active = participants.filter(|(_, it)| it.status == Status::Active);
                 let active: Vec<u32> = active.map(|(number, _)| *number).collect();
                 if !active.is_empty() && !force {
                     // The caller may have gone.
                     let _ = reply.send(Err(active.len()));
-                    return;
+                    return Ok(());
                 }
                 let at_ms = (self.now)();
                 for number in active {
                     self.fold(Change::Removed { number, at_ms });
                 }
-                if let Some(change) = self.state.close() {
+                if let Some(change) = self.unit.state.close() {
                     self.fold(change);
                 }
                 self.deletion.push(reply);
@@ -207,7 +181,7 @@ impl Task {
                 session,
                 stream,
             } => {
-                let newest = self.state.participant(number).map(|it| it.session);
+                let newest = self.unit.state.participant(number).map(|it| it.session);
                 if newest == Some(session) {
                     self.streams.insert(number, stream);
                     self.set_connected(number, true);
@@ -220,28 +194,147 @@ impl Task {
                 }
             }
         }
+        Ok(())
     }
 
+    async fn follow(&mut self) -> Result<(), StoreError> {
+        self.read_ended_games().await?;
+        let now_ms = (self.now)();
+        while let Some(change) = self.unit.state.next(now_ms) {
+            self.fold(change);
+        }
+        self.place_due_games();
+        Ok(())
+    }
+
+    fn announce(&mut self, changes: &[Change]) {
+        for number in changes.iter().filter_map(Change::number) {
+            self.unit.handle.notify_participant(number);
+        }
+    }
+
+    async fn act(&mut self) -> Result<(), StoreError> {
+        self.make_rooms().await?;
+        self.close_rooms();
+        Ok(())
+    }
+
+    /// Deletes the data of participants who want it, once their games are over: of all of them
+    /// together, because each time the whole journal is read and written.
+    async fn delete(&mut self) -> Result<(), StoreError> {
+        let mut due = self.unit.handle.lock_deleting().clone();
+        due.retain(|number| !self.playing.contains(number));
+        if due.is_empty() {
+            return Ok(());
+        }
+        let handle = Arc::clone(&self.unit.handle);
+        let mut counts = handle.shared.traces.lock().await;
+        let store = self.unit.rooms.store();
+        let Some(stored) = StoredStudy::read(store.as_ref(), handle.id()).await? else {
+            return Ok(());
+        };
+        let mut changes = stored.changes;
+        let mut is_changed = false;
+        for change in &mut changes {
+            for number in &due {
+                is_changed |= change.forget(*number);
+            }
+        }
+        // Everybody has a pseudonym to forget, so an unchanged journal was written before, by a
+        // server that ended before its games were deleted. Traces were deleted with it.
+        if is_changed {
+            let forgotten = due.iter().copied().collect();
+            StoredStudy::rewrite(store.as_ref(), handle.id(), &changes, forgotten).await?;
+            self.unit.rows = 1;
+        }
+        let played = due
+            .iter()
+            .filter_map(|number| self.unit.state.participant(*number));
+        let games: Vec<_> = played.flat_map(|it| &it.games).collect();
+        let ids: Vec<Id> = games.iter().map(|game| Id(game.placed.game)).collect();
+        for game in &ids {
+            counts.remove(game);
+        }
+        for game in &games {
+            self.unit.rooms.forget(Id(game.placed.room));
+        }
+        let count = ids.len();
+        self.unit.rooms.delete_games(ids).await?;
+        for number in &due {
+            handle.shared.data.forget_answers(*number);
+        }
+        handle.lock_deleting().retain(|it| !due.contains(it));
+        if is_changed {
+            info!(study = %handle.id(), participants = due.len(), games = count, "the data of participants were deleted");
+        }
+        self.unit.has_changed = true;
+        Ok(())
+    }
+
+    /// Deletes the study if that was requested and no game runs any more. Returns whether it did.
+    async fn conclude(&mut self, inbox: &mut mpsc::Receiver<Message>) -> Result<bool, StoreError> {
+        if self.deletion.is_empty() || !self.playing.is_empty() {
+            return Ok(false);
+        }
+        let participants = self.unit.state.participants().values();
+        let played: Vec<_> = participants.flat_map(|it| &it.games).collect();
+        for game in &played {
+            self.unit.rooms.forget(Id(game.placed.room));
+        }
+        let games: Vec<Id> = played.iter().map(|game| Id(game.placed.game)).collect();
+        let count = games.len();
+        let store = self.unit.rooms.store();
+        // The games first: a repetition completes what was interrupted in between.
+        self.unit.rooms.delete_games(games).await?;
+        let unit = Self::KIND.id(self.unit.handle.id());
+        store.write_unit(unit, UnitWrite::Delete).await?;
+        info!(study = %self.unit.handle.id(), games = count, "a study was deleted");
+        // Those who asked while it was deleted get the same answer.
+        inbox.close();
+        while let Ok(message) = inbox.try_recv() {
+            if let Message::Delete { reply, .. } = message {
+                self.deletion.push(reply);
+            }
+        }
+        self.unit.send_replies();
+        for reply in self.deletion.drain(..) {
+            // The caller may have gone.
+            let _ = reply.send(Ok(count));
+        }
+        Ok(true)
+    }
+
+    fn wake_at(&self) -> Option<Instant> {
+        let by_core = self.unit.state.wake_at().map(|at_ms| {
+            let wait = at_ms.saturating_sub((self.now)());
+            Instant::now() + Duration::from_millis(wait)
+        });
+        by_core.into_iter().chain(self.retry).min()
+    }
+}
+
+impl StudyTask {
     fn execute(&mut self, command: Command) -> Result<u32, Refusal> {
         if !self.deletion.is_empty() {
             return Err(Refusal::Closed);
         }
-        let (changes, number) = command(&self.state, (self.now)())?;
+        let (changes, number) = command(&self.unit.state, (self.now)())?;
         changes.into_iter().for_each(|change| self.fold(change));
         Ok(number)
     }
 
     fn set_connected(&mut self, number: u32, connected: bool) {
         let now_ms = (self.now)();
-        self.state.set_connected(number, connected, now_ms);
-        (self.handle.committed()).set_connected(number, connected, now_ms);
+        self.unit.state.set_connected(number, connected, now_ms);
+        (self.unit.handle.committed()).set_connected(number, connected, now_ms);
         self.touched.insert(number);
-        self.has_changed = true;
+        self.unit.has_changed = true;
     }
 
     /// Applies a change and adds it to the next commit.
     pub(super) fn fold(&mut self, change: Change) {
-        self.state.fold(&change);
+        self.unit.push(change.clone());
+        self.touched.extend(change.number());
         match &change {
             Change::Placed { number, .. } => {
                 self.playing.insert(*number);
@@ -255,153 +348,23 @@ impl Task {
                 // The stream of the earlier session ends.
                 self.streams.remove(number);
                 let now_ms = (self.now)();
-                self.state.set_connected(*number, false, now_ms);
-                (self.handle.committed()).set_connected(*number, false, now_ms);
+                self.unit.state.set_connected(*number, false, now_ms);
+                (self.unit.handle.committed()).set_connected(*number, false, now_ms);
             }
             Change::Withdrew {
                 number,
                 delete_data: true,
                 ..
             } => {
-                self.handle.lock_deleting().insert(*number);
+                self.unit.handle.lock_deleting().insert(*number);
             }
             _ => {}
         }
-        self.touched.extend(change.number());
-        self.pending.push(change);
-    }
-
-    /// Computes what follows, commits it and acts on it, until nothing follows.
-    async fn settle(&mut self, no_more_games: bool) -> Result<(), StoreError> {
-        loop {
-            if !no_more_games {
-                self.read_ended_games().await?;
-                let now_ms = (self.now)();
-                while let Some(change) = self.state.next(now_ms) {
-                    self.fold(change);
-                }
-                self.place_due_games();
-            }
-            let has_pending = !self.pending.is_empty();
-            if has_pending {
-                let changes = std::mem::take(&mut self.pending);
-                let id = self.handle.id();
-                let store = self.rooms.store();
-                self.published(store.append_study(id, self.rows, changes.clone()))
-                    .await?;
-                self.rows += 1;
-                self.handle.publish(&changes);
-            }
-            self.replies.drain(..).for_each(|reply| reply());
-            let mut made = false;
-            if !no_more_games {
-                made = self.make_rooms().await?;
-                self.close_rooms();
-            }
-            let deleted = self.delete_data().await?;
-            if std::mem::take(&mut self.has_changed) || has_pending || made || deleted {
-                self.handle.changes.send_modify(|count| *count += 1);
-            }
-            if !has_pending && self.pending.is_empty() {
-                return Ok(());
-            }
-        }
-    }
-
-    /// Deletes the data of participants who want it, once their games are over: of all of them
-    /// together, because each time the whole journal is read and written. Returns whether there were
-    /// any.
-    async fn delete_data(&mut self) -> Result<bool, StoreError> {
-        // A commit comes first: the journal is read from the store.
-        if !self.pending.is_empty() {
-            return Ok(false);
-        }
-        let mut due = self.handle.lock_deleting().clone();
-        due.retain(|number| !self.playing.contains(number));
-        if due.is_empty() {
-            return Ok(false);
-        }
-        let handle = Arc::clone(&self.handle);
-        let mut counts = handle.traces.lock().await;
-        let store = self.rooms.store();
-        let Some(stored) = store.study(handle.id()).await? else {
-            return Ok(false);
-        };
-        let mut changes = stored.changes;
-        let mut is_changed = false;
-        for change in &mut changes {
-            for number in &due {
-                is_changed |= change.forget(*number);
-            }
-        }
-        // Everybody has a pseudonym to forget, so an unchanged journal was written before, by a
-        // server that ended before its games were deleted. Traces were deleted with it.
-        if is_changed {
-            let forgotten = due.iter().copied().collect();
-            store.rewrite_study(handle.id(), changes, forgotten).await?;
-            self.rows = 1;
-        }
-        let played = due
-            .iter()
-            .filter_map(|number| self.state.participant(*number));
-        let games: Vec<_> = played.flat_map(|it| &it.games).collect();
-        let ids: Vec<Id> = games.iter().map(|game| Id(game.placed.game)).collect();
-        for game in &ids {
-            counts.remove(game);
-        }
-        for game in &games {
-            self.rooms.forget(Id(game.placed.room));
-        }
-        let count = ids.len();
-        self.rooms.delete_games(ids).await?;
-        for number in &due {
-            handle.data.forget_answers(*number);
-        }
-        handle.lock_deleting().retain(|it| !due.contains(it));
-        if is_changed {
-            info!(study = %handle.id(), participants = due.len(), games = count, "the data of participants were deleted");
-        }
-        Ok(true)
-    }
-
-    /// Deletes the study if that was requested and no game runs any more. Returns whether it did.
-    async fn delete_study(
-        &mut self,
-        inbox: &mut mpsc::Receiver<Message>,
-    ) -> Result<bool, StoreError> {
-        if self.deletion.is_empty() || !self.playing.is_empty() {
-            return Ok(false);
-        }
-        let participants = self.state.participants().values();
-        let played: Vec<_> = participants.flat_map(|it| &it.games).collect();
-        for game in &played {
-            self.rooms.forget(Id(game.placed.room));
-        }
-        let games: Vec<Id> = played.iter().map(|game| Id(game.placed.game)).collect();
-        let count = games.len();
-        let store = self.rooms.store();
-        // The games first: a repetition completes what was interrupted in between.
-        self.rooms.delete_games(games).await?;
-        store.delete_study(self.handle.id()).await?;
-        info!(study = %self.handle.id(), games = count, "a study was deleted");
-        // Those who asked while it was deleted get the same answer.
-        inbox.close();
-        while let Ok(message) = inbox.try_recv() {
-            if let Message::Delete { reply, .. } = message {
-                self.deletion.push(reply);
-            }
-        }
-        self.replies.drain(..).for_each(|reply| reply());
-        for reply in self.deletion.drain(..) {
-            // The caller may have gone.
-            let _ = reply.send(Ok(count));
-        }
-        Ok(true)
     }
 
     /// Whether a participant is in the middle of the study.
     pub(super) fn is_active(&self, number: u32) -> bool {
-        let participant = self.state.participant(number);
+        let participant = self.unit.state.participant(number);
         participant.is_some_and(|it| it.status == Status::Active)
     }
 }

@@ -7,9 +7,10 @@ use chefshat_study::{At, ParticipantLink, Status};
 use tokio::time::advance;
 
 use super::*;
-use crate::config::ServerConfig;
+use crate::config::{MAX_STUDIES, ServerConfig};
+use crate::store::tests::TypedUnits as _;
 use crate::store::{MemoryStore, Store};
-use crate::tasks::polls;
+use crate::tasks::{LongTask, polls};
 
 /// How long a participant may be away.
 const LIMIT: Duration = Duration::from_secs(60);
@@ -199,9 +200,9 @@ async fn a_study_is_deleted_once_nobody_is_in_the_middle_of_it() {
     assert!(lab.store.study(id).await.expect("readable").is_none());
     assert_eq!(lab.store.studies().await, Ok(Vec::new()));
     assert!(studies.get(Studies::full_id(link.study())).is_none());
-    assert!(studies.newest().is_empty());
+    assert!(studies.earlier(None).is_empty());
     assert!(study.open(1).await.is_err(), "its task has ended");
-    assert!(study.is_over());
+    assert!(study.is_complete());
 }
 
 #[tokio::test(start_paused = true)]
@@ -219,7 +220,7 @@ async fn studies_count_after_a_restart_too() {
     let lab = Lab::new().await;
     let studies = server(&lab.store);
     studies.restore().await.expect("readable");
-    assert_eq!(studies.newest().len(), 1);
+    assert_eq!(studies.earlier(None).len(), 1);
     let mut created = 1;
     // Two callers, because none may have all places.
     for caller in [Key::Local, Key::Resumed] {
@@ -234,8 +235,8 @@ async fn studies_count_after_a_restart_too() {
     let one_more = lab.studies.create(settings(), None, Key::Local).await;
     one_more.expect("this server has one");
     studies.restore().await.expect("readable");
-    assert_eq!(studies.newest().len(), MAX_STUDIES + 1);
-    let newest = Arc::clone(&studies.newest()[0]);
+    assert_eq!(studies.earlier(None).len(), MAX_STUDIES + 1);
+    let newest = Arc::clone(&studies.earlier(None)[0].1);
     let deleted = studies.delete(newest, true).await;
     assert_eq!(deleted.expect("it runs"), Ok((0, 0)));
     let refused = studies.create(settings(), None, Key::Local).await;
@@ -388,7 +389,7 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
     assert_eq!(added.expect("it runs"), Ok(1));
     assert_eq!(study.open(1).await.expect("it runs"), Ok(1));
     let address = |last| Key::Address([192, 0, 2, last].into());
-    let before = studies.data.taken();
+    let before = studies.common.data.taken();
     let answer = |item| chefshat_study::ItemAnswer {
         item,
         value: chefshat_study::Answer::Text("x".repeat(10_000)),
@@ -418,7 +419,7 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
         matches!(refused, Ok(Err(NotAdded::Study(_)))),
         "{refused:?}"
     );
-    assert_eq!(studies.data.taken(), before);
+    assert_eq!(studies.common.data.taken(), before);
 
     // What is saved replaces what was saved before, and goes when it is answered.
     let save = async |count: usize| {
@@ -429,7 +430,7 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
         };
         let saved = study.save(address(1), at, answers[..count].to_vec()).await;
         assert_eq!(saved.expect("it runs"), Ok(0));
-        studies.data.taken() - before
+        studies.common.data.taken() - before
     };
     let few = save(1).await;
     assert!((10_000..11_000).contains(&few), "{few}");
@@ -439,7 +440,7 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
     // A caller stores its share; others store theirs.
     let share = MAX_STUDY_DATA / 10;
     while answer(address(1), &study).await.is_ok() {}
-    let taken = studies.data.taken() - before;
+    let taken = studies.common.data.taken() - before;
     assert!((share - 2_000_000..=share).contains(&taken), "{taken}");
     let refused = answer(address(1), &study).await;
     assert!(
@@ -447,14 +448,17 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
         "{refused:?}"
     );
     assert_eq!(answer(address(2), &study).await, Ok(0));
-    let stored = studies.data.taken();
+    let stored = studies.common.data.taken();
 
     // A restart counts them, and loads them even if there are too many.
     studies.end();
     let resumed = server(store);
-    let full = resumed.data.take_many_anyway(Key::Local, MAX_STUDY_DATA);
+    let full = resumed
+        .common
+        .data
+        .take_many_anyway(Key::Local, MAX_STUDY_DATA);
     resumed.restore().await.expect("readable");
-    let counted = resumed.data.taken() - MAX_STUDY_DATA;
+    let counted = resumed.common.data.taken() - MAX_STUDY_DATA;
     // With the names that participants got.
     assert!((stored..stored + 100).contains(&counted), "{counted}");
     drop(full);
@@ -463,9 +467,9 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
     while answer(address(callers), &study).await.is_ok() || callers < 20 {
         callers += 1;
     }
-    assert!(resumed.data.taken() <= MAX_STUDY_DATA);
-    let free = MAX_STUDY_DATA - resumed.data.taken();
-    let others = resumed.data.take_many_anyway(Key::Local, free);
+    assert!(resumed.common.data.taken() <= MAX_STUDY_DATA);
+    let free = MAX_STUDY_DATA - resumed.common.data.taken();
+    let others = resumed.common.data.take_many_anyway(Key::Local, free);
     let one_more = study.add(address(200), vec![String::new()]).await;
     assert!(
         matches!(&one_more, Ok(Err(NotAdded::Memory(it))) if it.reason == "TOO_MANY_PARTICIPANTS"),
@@ -479,10 +483,14 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
     // What is deleted is free again.
     let withdrawn = study.withdraw(1, true).await;
     assert_eq!(withdrawn.expect("it runs"), Ok(()));
-    assert!(resumed.data.taken() < share, "{}", resumed.data.taken());
+    assert!(
+        resumed.common.data.taken() < share,
+        "{}",
+        resumed.common.data.taken()
+    );
     let deleted = resumed.delete(study, true).await;
     deleted.expect("it runs").expect("nobody is in it");
-    let left = resumed.data.taken();
+    let left = resumed.common.data.taken();
     let participants = 2 * 2 * size_of::<chefshat_study::Participant>() + 4 * "P01".len();
     assert_eq!(left, participants, "those of the other study");
 }

@@ -5,9 +5,10 @@ use chefshat_agents::NamedAgent;
 use chefshat_tournament::{ByHandProblem, Entrant, Leaving, State};
 
 use super::handle::{TournamentHandle, TournamentState};
-use super::message::{ByHand, ByHandRefusal, Call, Message, Newcomer, Stopped, Who};
-use super::task::Task;
+use super::message::{ByHand, ByHandRefusal, Call, Message, Newcomer, Who};
+use super::task::TournamentTask;
 use crate::config::MAX_EARLY_WITHDRAWALS_OF_CALLER;
+use crate::journaled::Stopped;
 use crate::limits::Key;
 use crate::store::tournaments::TournamentEntry;
 use chefshat_room::ids::{SecretHash, Token};
@@ -79,7 +80,7 @@ fn connects(entrant: &Entrant) -> bool {
     entrant.built_in.is_none() && !entrant.at_table
 }
 
-impl Task {
+impl TournamentTask {
     /// Makes a change by hand. Returns the ticket of a new participant who connects.
     pub(super) fn change_by_hand(&mut self, what: ByHand) -> Result<Option<Token>, ByHandRefusal> {
         match what {
@@ -87,16 +88,16 @@ impl Task {
             ByHand::Remove { participant } => self.leave(participant, Leaving::Removed)?,
             ByHand::Replace { participant, by } => return self.replace(participant, &by),
             ByHand::SetPaused(paused) => {
-                let change = self.state.core.set_paused(paused)?;
+                let change = self.unit.state.core.set_paused(paused)?;
                 self.fold_all(change.into_iter().collect());
             }
             ByHand::Postpone { game, by } => {
                 let by = by.map(|ticket| self.ticket_holder(&ticket)).transpose()?;
-                let change = self.state.core.postpone(game, by)?;
+                let change = self.unit.state.core.postpone(game, by)?;
                 self.fold(change);
             }
             ByHand::Recall { game } => {
-                let change = self.state.core.recall(game)?;
+                let change = self.unit.state.core.recall(game)?;
                 self.fold(change);
             }
         }
@@ -105,7 +106,7 @@ impl Task {
 
     /// The participant who has this ticket now.
     fn ticket_holder(&self, ticket: &SecretHash) -> Result<usize, ByHandRefusal> {
-        (self.state.participant_of(ticket)).ok_or(ByHandRefusal::TicketUnknown)
+        (self.unit.state.participant_of(ticket)).ok_or(ByHandRefusal::TicketUnknown)
     }
 
     fn withdraw(&mut self, who: Who, charged: Key) -> Result<(), ByHandRefusal> {
@@ -113,7 +114,7 @@ impl Task {
             Who::Number(participant) => return self.leave(participant, Leaving::ByOrganiser),
             Who::Ticket(ticket) => self.ticket_holder(&ticket)?,
         };
-        if self.state.core.state() != State::Open {
+        if self.unit.state.core.state() != State::Open {
             return self.leave(participant, Leaving::Itself);
         }
         let times = self.left_early.get(&charged).copied().unwrap_or_default();
@@ -127,7 +128,7 @@ impl Task {
 
     /// A participant leaves; nothing changes if it has left.
     fn leave(&mut self, participant: usize, leaving: Leaving) -> Result<(), ByHandRefusal> {
-        if let Some(change) = self.state.core.withdraw(participant, leaving)? {
+        if let Some(change) = self.unit.state.core.withdraw(participant, leaving)? {
             self.fold(change);
             self.dismiss(participant);
         }
@@ -139,11 +140,11 @@ impl Task {
         participant: usize,
         by: &Newcomer,
     ) -> Result<Option<Token>, ByHandRefusal> {
-        let ticket = self.handle.ticket_with(by.request_id());
-        if let Some(answer) = self.state.replaced_before(participant, by, ticket) {
+        let ticket = self.unit.handle.ticket_with(by.request_id());
+        if let Some(answer) = self.unit.state.replaced_before(participant, by, ticket) {
             return answer;
         }
-        let core = &self.state.core;
+        let core = &self.unit.state.core;
         let former = (core.participants().get(participant)).ok_or(ByHandProblem::NoParticipant)?;
         let mut entrant = by.entrant(former);
         if let (Newcomer::BuiltIn { agent, .. }, "") = (by, entrant.name.as_str()) {
@@ -155,7 +156,7 @@ impl Task {
         self.dismiss(participant);
         if connects || by.request_id().is_some() {
             // If it does not connect, the ticket identifies repetitions of the request.
-            self.push(TournamentEntry::Ticket {
+            self.unit.push(TournamentEntry::Ticket {
                 participant,
                 ticket: ticket.hash(),
             });
@@ -165,7 +166,7 @@ impl Task {
 
     /// A free name for a built-in agent.
     fn name_of(&self, agent: NamedAgent, place: usize) -> String {
-        let core = &self.state.core;
+        let core = &self.unit.state.core;
         let numbered = (2..).map(|number| format!("{agent} {number}"));
         std::iter::once(agent.name())
             .chain(numbered)
@@ -176,9 +177,9 @@ impl Task {
     /// Ends the stream of a participant who has left, once that is committed.
     fn dismiss(&mut self, participant: usize) {
         if let Some((_, connection)) = self.connections.remove(&participant) {
-            self.replies.push(Box::new(move || {
+            self.unit.after_commit(move || {
                 connection.call(Call::Over);
-            }));
+            });
         }
         self.set_connection(participant, None);
     }

@@ -3,6 +3,7 @@
 use super::Tournaments;
 use crate::store::StoreError;
 use crate::store::cluster::Kind;
+use crate::store::units::UnitKind;
 use chefshat_room::ids::Id;
 
 impl Tournaments {
@@ -13,8 +14,8 @@ impl Tournaments {
     /// The store failed.
     pub(crate) async fn show_ended(&self, id: Id, kind: Kind) -> Result<(), StoreError> {
         // Each id has one place, so nothing is read twice at a time.
-        let place = usize::from(id.0[0]) % self.reading.len();
-        let _reading = self.reading[place].lock().await;
+        let place = usize::from(id.0[0]) % self.common.reading.len();
+        let _reading = self.common.reading[place].lock().await;
         let directory = self.rooms.directory();
         match kind {
             Kind::Room => {
@@ -26,9 +27,11 @@ impl Tournaments {
             // It is never over.
             Kind::Study => {}
             Kind::Tournament => {
-                let is_shown = self.get(id).is_some();
-                if !is_shown && let Some(stored) = directory.ended_tournament(id).await? {
-                    self.resume(stored).await;
+                let unit = UnitKind::Tournament.id(id);
+                if self.get(id).is_none()
+                    && let Some(stored) = self.rooms.store().unit(unit).await?
+                {
+                    self.resume(id, stored).await;
                 }
             }
         }

@@ -14,7 +14,7 @@ use tokio::time::Instant;
 use tracing::warn;
 
 use super::message::Call;
-use super::task::Task;
+use super::task::TournamentTask;
 use crate::config::{MAX_NAME_CHARS, TOURNAMENT_RETRY};
 use crate::convert;
 use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
@@ -24,17 +24,19 @@ use crate::tasks::short;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
 
-impl Task {
+impl TournamentTask {
     /// Assigns a room to a game. The room is created once that is committed.
     pub(super) fn place(&mut self, game: usize) {
         let (room_id, game_id) = (Id::random(), Id::random());
-        if let Some(deal) = self.state.core.games()[game].deal {
-            self.rooms.withhold(self.handle.series(deal), true);
+        if let Some(deal) = self.unit.state.core.games()[game].deal {
+            self.unit
+                .rooms
+                .withhold(self.unit.handle.series(deal), true);
         }
         self.without_room.insert(game);
         self.seen.remove(&game);
         self.retired.retain(|(other, _)| *other != game);
-        self.push(TournamentEntry::Placed {
+        self.unit.push(TournamentEntry::Placed {
             game,
             room_id,
             game_id,
@@ -43,32 +45,32 @@ impl Task {
 
     /// Reads the results of games that have ended.
     pub(super) async fn read_ended_games(&mut self) -> Result<(), StoreError> {
-        let playing: Vec<usize> = self.state.core.playing().collect();
+        let playing: Vec<usize> = self.unit.state.core.playing().collect();
         for game in playing {
             if self.without_room.contains(&game) {
                 continue;
             }
-            let placed = self.state.placed.get(&game).copied();
+            let placed = self.unit.state.placed.get(&game).copied();
             let Some((room, game_id)) = placed else {
                 self.place(game);
                 continue;
             };
-            if self.rooms.is_over(room) == Some(false) {
+            if self.unit.rooms.is_over(room) == Some(false) {
                 self.seen.insert(game);
                 continue;
             }
-            if self.rooms.lease().is_some() && self.rooms.is_suspended(room) {
+            if self.unit.rooms.lease().is_some() && self.unit.rooms.is_suspended(room) {
                 // It has stopped, and the tournament will be: this node does not own it any more.
                 continue;
             }
             match self.ended(game, room, game_id).await? {
                 Some(ended) => {
-                    let change = self.state.core.ended(game, ended);
+                    let change = self.unit.state.core.ended(game, ended);
                     self.fold_all(change.into_iter().collect());
                 }
                 // The server ended before the room was created, or together with it: nothing that
                 // counts was played.
-                None if !self.rooms.is_shutting_down() => self.place(game),
+                None if !self.unit.rooms.is_shutting_down() => self.place(game),
                 None => {}
             }
         }
@@ -79,12 +81,19 @@ impl Task {
     async fn ended(&self, game: usize, room: Id, game_id: Id) -> Result<Option<Ended>, StoreError> {
         // An imported record with this id is not the tournament's game.
         let is_ours = |game: &StoredGame| {
-            (game.tournament()).is_some_and(|game| game.tournament == self.handle.id())
+            (game.tournament()).is_some_and(|game| game.tournament == self.unit.handle.id())
         };
-        let background = self.rooms.background();
+        let background = self.unit.rooms.background();
         // Before it is read: the record of a long game takes much time and memory.
-        let slice = background.slice(self.handle.charged).await;
-        if let Some(stored) = self.rooms.store().finished(game_id).await?.filter(is_ours) {
+        let slice = background.slice(self.unit.handle.charged).await;
+        if let Some(stored) = self
+            .unit
+            .rooms
+            .store()
+            .finished(game_id)
+            .await?
+            .filter(is_ours)
+        {
             let reading = background.run(move || {
                 let lines = convert::lines_of(&stored);
                 (outcome::outcome(&lines), abort_reason(&lines))
@@ -104,7 +113,7 @@ impl Task {
                 }
             });
         }
-        let Some(handle) = self.rooms.get(room) else {
+        let Some(handle) = self.unit.rooms.get(room) else {
             return Ok(None);
         };
         let Ok(described) = handle.describe().await else {
@@ -115,7 +124,7 @@ impl Task {
             // The participants present at that time are unknown.
             _ if !self.seen.contains(&game) => None,
             _ => {
-                let seats = self.state.core.games()[game].seats.clone();
+                let seats = self.unit.state.core.games()[game].seats.clone();
                 let disconnected = described.seats.iter().zip(seats);
                 let missing = disconnected
                     .filter(|(seat, _)| !seat.connected)
@@ -135,7 +144,7 @@ impl Task {
         let without_room: Vec<usize> = self.without_room.iter().copied().collect();
         let creating = without_room.iter().map(|game| {
             let new = self.new_room(*game);
-            let rooms = &self.rooms;
+            let rooms = &self.unit.rooms;
             async move { (*game, rooms.create(new).await) }
         });
         for (game, made) in join_all(creating).await {
@@ -143,12 +152,12 @@ impl Task {
                 Ok(_) => {
                     self.without_room.remove(&game);
                     self.seen.insert(game);
-                    self.has_changed = true;
+                    self.unit.has_changed = true;
                     self.call(game);
                 }
                 // It gets new ids.
                 Err(CreateError::Store(StoreError::Taken(id))) => {
-                    warn!(tournament = %self.handle.id(), %id, "the id of a game is taken");
+                    warn!(tournament = %self.unit.handle.id(), %id, "the id of a game is taken");
                     self.place(game);
                 }
                 Err(CreateError::Store(error)) => return Err(error),
@@ -156,7 +165,7 @@ impl Task {
                 Err(CreateError::ShuttingDown) => self.retry = Some(retry()),
                 Err(error) => {
                     if self.retry.replace(retry()).is_none() {
-                        warn!(tournament = %self.handle.id(), %error, "games of a tournament wait for rooms");
+                        warn!(tournament = %self.unit.handle.id(), %error, "games of a tournament wait for rooms");
                     }
                 }
             }
@@ -167,19 +176,19 @@ impl Task {
     /// Gives up the seats of participants who have left the tournament, or whose place somebody else
     /// has taken.
     pub(super) fn retire_seats(&mut self) {
-        let core = &self.state.core;
+        let core = &self.unit.state.core;
         for number in core.playing() {
             let game = &core.games()[number];
             if game.left.is_empty() || self.without_room.contains(&number) {
                 continue;
             }
-            let Some((room, _)) = self.state.placed.get(&number) else {
+            let Some((room, _)) = self.unit.state.placed.get(&number) else {
                 continue;
             };
             for (seat, participant) in game.seats.iter().enumerate() {
                 if game.left.contains(participant)
                     && self.retired.insert((number, *participant))
-                    && let Some(room) = self.rooms.get(*room)
+                    && let Some(room) = self.unit.rooms.get(*room)
                 {
                     tokio::spawn(short("one message", async move {
                         room.retire(Seat::new(seat)).await
@@ -191,10 +200,10 @@ impl Task {
 
     /// Notifies the connected participants of a game of its room.
     fn call(&mut self, game: usize) {
-        let Some((room, _)) = self.state.placed.get(&game).copied() else {
+        let Some((room, _)) = self.unit.state.placed.get(&game).copied() else {
             return;
         };
-        let called = self.state.core.games()[game].clone();
+        let called = self.unit.state.core.games()[game].clone();
         for participant in &called.seats {
             if !called.is_played_by(*participant) {
                 continue;
@@ -208,9 +217,9 @@ impl Task {
 
     /// The settings of the room of a game.
     fn new_room(&self, number: usize) -> NewRoom {
-        let state = &self.state;
+        let state = &self.unit.state;
         let game = &state.core.games()[number];
-        let plan = &self.handle.plan;
+        let plan = &self.unit.handle.plan;
         let entrants = state.core.participants();
         let (mut participants, mut display_names) = (BTreeMap::new(), BTreeMap::new());
         let fills = game.seats.iter().enumerate();
@@ -251,6 +260,7 @@ impl Task {
         );
         let space = MAX_NAME_CHARS.saturating_sub(place.chars().count());
         let name: String = self
+            .unit
             .handle
             .header
             .settings
@@ -267,20 +277,20 @@ impl Task {
             wizards: BTreeSet::new(),
             recorded: BTreeMap::new(),
             start: GameStart::default(),
-            game_seed: self.handle.game_seed(number, game.deal),
+            game_seed: self.unit.handle.game_seed(number, game.deal),
             physical,
             request: None,
-            charged: self.handle.charged,
+            charged: self.unit.handle.charged,
             creator: None,
             seating: Some(Seating {
                 part_of: PartOf::Tournament(TournamentGame {
-                    tournament: self.handle.id(),
-                    series: game.deal.map(|deal| self.handle.series(deal)),
+                    tournament: self.unit.handle.id(),
+                    series: game.deal.map(|deal| self.unit.handle.series(deal)),
                 }),
-                owner: self.handle.room_owner(room_id),
+                owner: self.unit.handle.room_owner(room_id),
                 game_id,
                 participants,
-                server_seed: game.deal.map(|deal| self.handle.server_seed(deal)),
+                server_seed: game.deal.map(|deal| self.unit.handle.server_seed(deal)),
             }),
         }
     }

@@ -1,7 +1,6 @@
 //! The handle of one tournament: what others can read of it, and messages to its task.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Mutex, MutexGuard};
 
 use chefshat_proto::v1;
 use chefshat_record::pseudonym::Pseudonym;
@@ -9,17 +8,17 @@ use chefshat_tournament::{
     BeginProblem, Change, Entrant, GameState, JoinProblem, State, Tournament,
 };
 use sha2::{Digest as _, Sha256};
-use tokio::sync::{mpsc, oneshot, watch};
-use tokio_util::sync::CancellationToken;
+use tokio::sync::mpsc;
 
-use super::message::{Call, Connection, Entry, JoinRefusal, Message, Stopped};
+use super::message::{Call, Connection, Entry, JoinRefusal, Message};
 use super::shared::{AsOf, Shared};
+use super::task::TournamentTask;
 use crate::access::{Secrets, Standing};
-use crate::convert::{self, TournamentPlan};
-use crate::limits::Key;
+use crate::convert;
+use crate::journaled::{Handle, Stopped};
 use crate::outbox::StreamEnd;
 use crate::rooms::Rooms;
-use crate::store::tournaments::{TournamentEntry, TournamentHeader};
+use crate::store::tournaments::TournamentEntry;
 use crate::tasks::short;
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::ParticipantKind;
@@ -45,7 +44,7 @@ pub enum TableProblem {
 /// The state of a tournament. Its task has one with pending changes; the handle has one with only
 /// committed changes, for readers.
 #[derive(Debug, Clone)]
-pub(crate) struct TournamentState {
+pub struct TournamentState {
     pub(crate) core: Tournament,
     /// Hashed tickets of participants; built-in ones have none.
     pub(super) tickets: BTreeMap<usize, SecretHash>,
@@ -136,39 +135,19 @@ impl TournamentState {
 }
 
 /// A tournament of this server.
-#[derive(Debug)]
-pub struct TournamentHandle {
-    pub(super) header: TournamentHeader,
-    pub(super) plan: TournamentPlan,
-    /// Who is charged for its games.
-    pub(super) charged: Key,
-    /// The state with only committed changes.
-    pub(super) committed: Mutex<TournamentState>,
-    pub(super) mailbox: mpsc::Sender<Message>,
-    /// Cancelled when its task ends.
-    pub(super) end: CancellationToken,
-    /// Counts changes.
-    pub(super) changes: watch::Sender<u64>,
+pub type TournamentHandle = Handle<TournamentTask>;
+
+/// What readers of a tournament share besides its state: what is expensive to compute.
+#[derive(Debug, Default)]
+pub struct TournamentShared {
     pub(super) follower_update: Shared<AsOf<v1::FollowTournamentResponse>>,
     pub(super) results: Shared<AsOf<v1::GetTournamentResultsResponse>>,
 }
 
 impl TournamentHandle {
-    /// Its id.
-    pub fn id(&self) -> Id {
-        self.header.id
-    }
-
     /// Its join code.
     pub fn join_code(&self) -> &str {
         &self.header.join_code
-    }
-
-    /// Whether this is its owner's token.
-    pub fn is_owner(&self, token: &str) -> bool {
-        Token::parse(token).is_some_and(|token| {
-            token.room == self.header.id && self.header.owner.matches(&token.secret)
-        })
     }
 
     /// Renames a participant; the store must have done so. Returns whether there was one.
@@ -231,11 +210,6 @@ impl TournamentHandle {
                 Ok(self.room_owner(*room))
             }
         }
-    }
-
-    /// The owner token of a room of this tournament.
-    pub(super) fn room_owner(&self, room: Id) -> Token {
-        Token::of_tournament_room(room, &self.header.owner)
     }
 
     /// Starts it.
@@ -308,16 +282,6 @@ impl TournamentHandle {
     /// Kinds that may join; empty: all.
     pub fn admits(&self, kind: ParticipantKind) -> bool {
         self.plan.kinds.is_empty() || self.plan.kinds.contains(&kind)
-    }
-
-    /// Counts changes.
-    pub fn changes(&self) -> watch::Receiver<u64> {
-        self.changes.subscribe()
-    }
-
-    /// Whether it is finished or closed.
-    pub fn is_over(&self) -> bool {
-        self.committed().core.state().is_over()
     }
 
     /// The public view of the tournament.
@@ -408,14 +372,6 @@ impl TournamentHandle {
         }
     }
 
-    /// Shows committed entries to readers.
-    pub(super) fn publish(&self, entries: &[TournamentEntry]) {
-        let mut committed = self.committed();
-        for entry in entries {
-            committed.apply(entry);
-        }
-    }
-
     /// Withholds the records of these deals that are still to be played, and releases the others.
     pub(super) fn withhold(&self, deals: &BTreeSet<u32>, rooms: &Rooms) {
         let state = self.committed();
@@ -449,19 +405,6 @@ impl TournamentHandle {
 
     fn of_deal(&self, what: &[u8], deal: u32) -> [u8; 32] {
         hash(what, &self.header.deal_secret, &deal.to_le_bytes())
-    }
-
-    pub(super) fn committed(&self) -> MutexGuard<'_, TournamentState> {
-        (self.committed.lock()).expect("no code that holds this lock can panic")
-    }
-
-    pub(super) async fn ask<T>(
-        &self,
-        message: impl FnOnce(oneshot::Sender<T>) -> Message,
-    ) -> Result<T, Stopped> {
-        let (reply, answer) = oneshot::channel();
-        (self.mailbox.send(message(reply)).await).map_err(|_| Stopped)?;
-        answer.await.map_err(|_| Stopped)
     }
 }
 

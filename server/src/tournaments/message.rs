@@ -230,18 +230,21 @@ pub enum ByHandRefusal {
     TicketUnknown,
 }
 
-/// The tournament's task has stopped because the server ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Stopped;
-
-pub(super) enum Message {
+/// A message to the task of a tournament.
+pub enum Message {
+    /// Joins.
     Join(Entry, oneshot::Sender<Result<(usize, Token), JoinRefusal>>),
+    /// Starts it.
     Begin(oneshot::Sender<Result<(), BeginProblem>>),
+    /// Closes it.
     Close(oneshot::Sender<()>),
+    /// Changes something by hand.
     ByHand(
         ByHand,
         oneshot::Sender<Result<Option<Token>, ByHandRefusal>>,
     ),
+    /// Attaches the stream with this number to a participant who has a ticket.
     Enter(usize, SecretHash, u64, Connection),
+    /// Detaches the stream with this number from a participant.
     Left(usize, u64),
 }

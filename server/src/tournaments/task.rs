@@ -1,51 +1,53 @@
-//! The task of one tournament: receives messages, lets the core decide what follows, commits it,
-//! and only then acts on it. `games` acts on games and their rooms.
+//! The task of one tournament: what its entries bring about. `games` acts on games and their rooms.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_tournament::{Change, State, Tournament};
+use chefshat_tournament::{Change, SettingsProblem, State, Tournament};
 use tokio::sync::mpsc;
-use tokio::time::{Instant, sleep_until};
-use tokio_util::sync::CancellationToken;
-use tracing::{error, info, warn};
+use tokio::time::Instant;
+use tracing::info;
 
-use super::handle::{TournamentHandle, TournamentState};
+use super::handle::{TournamentHandle, TournamentShared, TournamentState};
 use super::message::{Call, Connection, Entry, JoinRefusal, Message};
+use super::{Common, TournamentPlan, restored};
 use crate::clock::{RoomClock, since_epoch_ms};
-use crate::cluster::News;
-use crate::config::{TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
-use crate::limits::{Held, Key};
+use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX, TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
+use crate::journaled::{Folded, Journaled, Unit, UnitHeader};
+use crate::limits::{Key, Refused};
 use crate::outbox::StreamEnd;
 use crate::rooms::Rooms;
 use crate::store::StoreError;
-use crate::store::tournaments::TournamentEntry;
+use crate::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use crate::store::units::{StoredUnit, UnitKind};
+use crate::tasks::LongTask;
 use chefshat_room::ids::{Id, SecretHash, Token};
 
-/// Messages that are processed before their consequences are computed.
-const MESSAGES_AT_A_TIME: usize = 64;
+/// When it is worth trying again to create a tournament.
+const RETRY_TOURNAMENTS: Duration = Duration::from_secs(60);
 
-/// Stops the tournaments of a server.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Stop {
-    /// Cancelled when no more games are called or counted. Participants are still seated in running
-    /// games.
-    pub(super) no_more_games: CancellationToken,
-    /// Cancelled when the tasks of tournaments end.
-    pub(super) end: CancellationToken,
+impl UnitHeader for TournamentHeader {
+    fn id(&self) -> Id {
+        self.id
+    }
+
+    fn owner(&self) -> &SecretHash {
+        &self.owner
+    }
+
+    fn created_at_ms(&self) -> u64 {
+        self.created_at_ms
+    }
+
+    fn join_code(&self) -> Option<&str> {
+        Some(&self.join_code)
+    }
 }
 
-/// Runs a tournament until the server ends.
-pub(super) struct Task {
-    pub(super) handle: Arc<TournamentHandle>,
-    pub(super) rooms: Arc<Rooms>,
-    /// The state with pending changes; the handle's copy follows when they are committed.
-    pub(super) state: TournamentState,
-    /// Number of committed rows.
-    rows: u64,
-    /// Entries of the next commit.
-    pub(super) pending: Vec<TournamentEntry>,
+/// Runs a tournament.
+pub struct TournamentTask {
+    pub(super) unit: Unit<Self>,
     /// Streams of participants, with their connection ids.
     pub(super) connections: BTreeMap<usize, (u64, Connection)>,
     /// Called games that have no room yet.
@@ -54,8 +56,6 @@ pub(super) struct Task {
     pub(super) seen: BTreeSet<usize>,
     /// Deals whose remaining games must be checked.
     deals: BTreeSet<u32>,
-    /// Whether something visible has changed that is not committed.
-    pub(super) has_changed: bool,
     /// Number of participants who withdrew before the beginning, by who is charged for it, since the
     /// server was started. Bounded by the number of such withdrawals.
     pub(super) left_early: BTreeMap<Key, u32>,
@@ -69,212 +69,132 @@ pub(super) struct Task {
     paused_at: Option<Instant>,
     /// When rooms whose creation failed are tried again.
     pub(super) retry: Option<Instant>,
-    /// Answers that wait for a commit.
-    pub(super) replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
     /// Times of the core: a pause of the process makes no participant late.
     clock: RoomClock,
-    /// Its place among its creator's tournaments.
-    _place: Option<Held>,
 }
 
-impl Task {
-    /// Creates the task of a tournament with this number of committed rows.
-    pub(super) fn new(
-        handle: Arc<TournamentHandle>,
-        rooms: Arc<Rooms>,
-        rows: u64,
-        place: Option<Held>,
-    ) -> Self {
-        let state = handle.committed().clone();
-        let start_in = (handle.plan.start_at_ms).map(|at| at.saturating_sub(since_epoch_ms()));
+impl Journaled for TournamentTask {
+    type Header = TournamentHeader;
+    type Plan = TournamentPlan;
+    type State = TournamentState;
+    type Entry = TournamentEntry;
+    type Message = Message;
+    type Shared = TournamentShared;
+    type Common = Common;
+    type SettingsProblem = SettingsProblem;
+
+    const KIND: UnitKind = UnitKind::Tournament;
+    const NAMES: &'static str = "tournaments";
+    const TASK: LongTask = LongTask::Tournament;
+    const CREATION: &'static str = "one tournament";
+    const MAILBOX: usize = TOURNAMENT_MAILBOX;
+    const MOST: usize = MAX_TOURNAMENTS;
+
+    fn header_to_bytes(header: &TournamentHeader) -> Vec<u8> {
+        header.to_bytes()
+    }
+
+    fn row_to_bytes(entries: &[TournamentEntry]) -> Vec<u8> {
+        TournamentEntry::to_bytes(entries)
+    }
+
+    fn fold(id: Id, stored: &StoredUnit) -> Result<Folded<Self>, String> {
+        let stored = StoredTournament::decode(id, stored).map_err(|problem| problem.to_string())?;
+        let (plan, state) = restored(&stored)?;
+        Ok(Folded {
+            header: stored.header,
+            plan,
+            state,
+            rows: stored.rows,
+        })
+    }
+
+    fn share(_: &Common, _: &Folded<Self>) -> TournamentShared {
+        TournamentShared::default()
+    }
+
+    /// The deals that it would withhold are unknown.
+    fn set_unreadable(id: Id, rooms: &Rooms) {
+        rooms.withhold(id, true);
+    }
+
+    fn key_of(id: Id) -> Key {
+        Key::Tournament(id)
+    }
+
+    fn too_many(limit: u64) -> Refused {
+        Refused {
+            reason: "TOO_MANY_TOURNAMENTS",
+            what: "too many tournaments that are not over; close one, or try later",
+            limit,
+            retry_after: RETRY_TOURNAMENTS,
+        }
+    }
+
+    fn apply(state: &mut TournamentState, entry: &TournamentEntry) {
+        state.apply(entry);
+    }
+
+    fn is_over(state: &TournamentState) -> bool {
+        state.core.state().is_over()
+    }
+
+    /// Withholds records that clients could request otherwise, and closes what still runs of a
+    /// tournament that is over.
+    fn enter(handle: &TournamentHandle, rooms: &Arc<Rooms>) {
+        let deals = handle.committed().deals();
+        handle.withhold(&deals, rooms);
+        if handle.is_over() {
+            handle.close_rooms(rooms);
+        }
+    }
+
+    fn new(unit: Unit<Self>, _: &Common) -> Self {
+        let start_at_ms = unit.handle.plan.start_at_ms;
+        let start_in = start_at_ms.map(|at| at.saturating_sub(since_epoch_ms()));
         let now = Instant::now();
         Self {
-            start_at: start_in.map(|time| now + Duration::from_millis(time)),
-            paused_at: state.core.is_paused().then_some(now),
-            left_early: BTreeMap::new(),
-            retired: BTreeSet::new(),
-            state,
-            handle,
-            clock: RoomClock::of_age(Duration::ZERO, rooms.process_clock()),
-            rooms,
-            rows,
-            pending: Vec::new(),
             connections: BTreeMap::new(),
             without_room: BTreeSet::new(),
             seen: BTreeSet::new(),
             deals: BTreeSet::new(),
-            has_changed: false,
-            joined_at: Instant::now(),
+            left_early: BTreeMap::new(),
+            retired: BTreeSet::new(),
+            joined_at: now,
+            start_at: start_in.map(|time| now + Duration::from_millis(time)),
+            paused_at: unit.state.core.is_paused().then_some(now),
             retry: None,
-            replies: Vec::new(),
-            _place: place,
+            clock: RoomClock::of_age(Duration::ZERO, unit.rooms.process_clock()),
+            unit,
         }
     }
 
-    /// Runs the tournament until it is over, the server ends, or its store fails.
-    pub(super) async fn run(mut self, mut inbox: mpsc::Receiver<Message>, stop: Stop) {
-        let rooms = Arc::clone(&self.rooms);
-        let mut messages = Vec::new();
-        loop {
-            let changed = rooms.changed();
-            tokio::pin!(changed);
-            // From here on no end of a game is missed.
-            changed.as_mut().enable();
-            if let Err(error) = self.settle(stop.no_more_games.is_cancelled()).await {
-                return self.fail(&error);
-            }
-            if self.handle.is_over() {
-                self.conclude(inbox).await;
-                return;
-            }
-            let wake = self
-                .wake_at()
-                .filter(|_| !stop.no_more_games.is_cancelled());
-            let alarm = sleep_until(wake.unwrap_or(self.joined_at));
-            tokio::select! {
-                () = stop.end.cancelled() => return self.end_streams(),
-                received = inbox.recv_many(&mut messages, MESSAGES_AT_A_TIME) => {
-                    if received == 0 {
-                        return;
-                    }
-                    for message in messages.drain(..) {
-                        if let Err(error) = self.receive(message).await {
-                            return self.fail(&error);
-                        }
-                    }
-                }
-                () = changed => {}
-                () = alarm, if wake.is_some() => self.expire(),
-            }
-        }
+    fn unit(&self) -> &Unit<Self> {
+        &self.unit
     }
 
-    /// Handles a failure of the store: nothing uncommitted is published. The tournament resumes from
-    /// its journal when the server is restarted, or at the node that owns it.
-    fn fail(&mut self, error: &StoreError) {
-        let tournament = self.handle.id();
-        match (error, self.rooms.lease()) {
-            (StoreError::Fenced(_), _) => info!(%tournament, %error, "the tournament stops here"),
-            (_, Some(_)) => warn!(%tournament, %error, "the tournament stops until it is resumed"),
-            (_, None) => error!(%tournament, %error, "the store failed; the tournament stops"),
-        }
-        if let Some(lease) = self.rooms.lease()
-            && !self.handle.end.is_cancelled()
-        {
-            lease.report(tournament, News::Stopped);
-        }
-        self.end_streams();
-    }
-
-    /// Ends the streams of all participants, which may reconnect, unless the whole server ends.
-    fn end_streams(&mut self) {
-        if self.rooms.lease().is_none() {
-            return;
-        }
-        for (_, connection) in std::mem::take(&mut self.connections).into_values() {
-            connection.outbox.end(StreamEnd::RoomGone);
-        }
-    }
-
-    /// The result of a write, once this server may publish it.
-    async fn published<T>(
-        &self,
-        written: impl Future<Output = Result<T, StoreError>>,
-    ) -> Result<T, StoreError> {
-        let handle = &self.handle;
-        match self.rooms.lease() {
-            Some(lease) => lease.published(handle.id(), &handle.end, written).await,
-            None => written.await,
-        }
-    }
-
-    fn wake_at(&self) -> Option<Instant> {
-        let core = self.state.core.wake_at();
-        let core = core.map(|ms| self.clock.instant(Duration::from_millis(ms)));
-        core.into_iter()
-            .chain(self.retry)
-            .chain(self.open_until())
-            .chain(self.start_at.filter(|_| self.state.core.can_begin()))
-            .chain(self.paused_until())
-            .min()
-    }
-
-    /// Whether it starts by itself now.
-    fn is_due_to_start(&self) -> bool {
-        let is_time = self.start_at.is_some_and(|at| at <= Instant::now());
-        is_time && self.state.core.can_begin()
-    }
-
-    /// When a paused tournament resumes by itself.
-    fn paused_until(&self) -> Option<Instant> {
-        let paused_at = self.paused_at.filter(|_| self.state.core.is_paused());
-        Some(paused_at? + TOURNAMENT_PAUSE)
-    }
-
-    /// When a tournament that nobody starts or joins is closed.
-    fn open_until(&self) -> Option<Instant> {
-        let is_open = self.state.core.state() == State::Open;
-        let since = self.start_at.unwrap_or(self.joined_at).max(self.joined_at);
-        is_open.then(|| since + TOURNAMENT_OPEN_TIME)
-    }
-
-    fn expire(&mut self) {
-        if (self.open_until()).is_some_and(|until| until <= Instant::now()) {
-            self.close();
-        }
-        if (self.paused_until()).is_some_and(|until| until <= Instant::now())
-            && let Ok(Some(change)) = self.state.core.set_paused(false)
-        {
-            self.fold(change);
-        }
-    }
-
-    /// Runs once the end of the tournament is committed: closes running rooms and notifies all
-    /// participants. Later messages are answered from the committed state.
-    async fn conclude(&mut self, mut inbox: mpsc::Receiver<Message>) {
-        self.handle.close_rooms(&self.rooms);
-        for (_, connection) in std::mem::take(&mut self.connections).into_values() {
-            connection.call(Call::Over);
-        }
-        inbox.close();
-        while let Some(message) = inbox.recv().await {
-            if let Message::Enter(_, _, _, connection) = message {
-                connection.call(Call::Over);
-            }
-        }
-    }
-
-    fn now_ms(&self) -> u64 {
-        u64::try_from(self.clock.now().as_millis()).unwrap_or(u64::MAX)
+    fn unit_mut(&mut self) -> &mut Unit<Self> {
+        &mut self.unit
     }
 
     async fn receive(&mut self, message: Message) -> Result<(), StoreError> {
         match message {
             Message::Join(entry, reply) => {
                 let joined = self.join(entry);
-                self.replies.push(Box::new(move || {
-                    let _ = reply.send(joined);
-                }));
+                self.unit.reply(reply, joined);
             }
             Message::Begin(reply) => {
                 let started = self.off_thread(|core| core.begin()).await?;
                 let started = started.map(|changes| self.fold_all(changes));
-                self.replies.push(Box::new(move || {
-                    // The caller may have gone.
-                    let _ = reply.send(started);
-                }));
+                self.unit.reply(reply, started);
             }
             Message::ByHand(what, reply) => {
                 let changed = self.change_by_hand(what);
-                self.replies.push(Box::new(move || {
-                    let _ = reply.send(changed);
-                }));
+                self.unit.reply(reply, changed);
             }
             Message::Close(reply) => {
                 self.close();
-                self.replies.push(Box::new(move || {
-                    let _ = reply.send(());
-                }));
+                self.unit.reply(reply, ());
             }
             Message::Enter(participant, ticket, number, connection) => {
                 self.enter(participant, &ticket, number, connection);
@@ -284,17 +204,124 @@ impl Task {
         Ok(())
     }
 
+    async fn follow(&mut self) -> Result<(), StoreError> {
+        self.expire();
+        self.read_ended_games().await?;
+        self.advance().await
+    }
+
+    /// Announces that the tournament has started or is over, and releases what is withheld no longer.
+    fn announce(&mut self, entries: &[TournamentEntry]) {
+        let handle = &self.unit.handle;
+        let (id, name) = (handle.id(), &handle.header.settings.name);
+        let webhooks = self.unit.rooms.webhooks();
+        let state = self.unit.state.core.state();
+        let has_begun = |entry| matches!(entry, &TournamentEntry::Change(Change::Begun { .. }));
+        if state != State::Closed && entries.iter().any(has_begun) {
+            let participants = self.unit.state.core.participants().len();
+            webhooks.tournament_started(id, name, participants);
+        }
+        if entries.iter().any(TournamentEntry::is_end) {
+            webhooks.tournament_ended(id, name, state == State::Finished);
+        }
+        let deals = std::mem::take(&mut self.deals);
+        handle.withhold(&deals, &self.unit.rooms);
+    }
+
+    async fn act(&mut self) -> Result<(), StoreError> {
+        self.make_rooms().await?;
+        self.retire_seats();
+        Ok(())
+    }
+
+    /// Closes running rooms and notifies all participants once the end is committed. Later messages
+    /// are answered from the committed state.
+    async fn conclude(&mut self, inbox: &mut mpsc::Receiver<Message>) -> Result<bool, StoreError> {
+        if !self.unit.handle.is_over() {
+            return Ok(false);
+        }
+        self.unit.handle.close_rooms(&self.unit.rooms);
+        for (_, connection) in std::mem::take(&mut self.connections).into_values() {
+            connection.call(Call::Over);
+        }
+        inbox.close();
+        while let Some(message) = inbox.recv().await {
+            if let Message::Enter(_, _, _, connection) = message {
+                connection.call(Call::Over);
+            }
+        }
+        Ok(true)
+    }
+
+    fn wake_at(&self) -> Option<Instant> {
+        let core = self.unit.state.core.wake_at();
+        let core = core.map(|ms| self.clock.instant(Duration::from_millis(ms)));
+        core.into_iter()
+            .chain(self.retry)
+            .chain(self.open_until())
+            .chain(self.start_at.filter(|_| self.unit.state.core.can_begin()))
+            .chain(self.paused_until())
+            .min()
+    }
+
+    /// They may reconnect, unless the whole server ends.
+    fn end_streams(&mut self) {
+        if self.unit.rooms.lease().is_none() {
+            return;
+        }
+        for (_, connection) in std::mem::take(&mut self.connections).into_values() {
+            connection.outbox.end(StreamEnd::RoomGone);
+        }
+    }
+}
+
+impl TournamentTask {
+    /// Whether it starts by itself now.
+    fn is_due_to_start(&self) -> bool {
+        let is_time = self.start_at.is_some_and(|at| at <= Instant::now());
+        is_time && self.unit.state.core.can_begin()
+    }
+
+    /// When a paused tournament resumes by itself.
+    fn paused_until(&self) -> Option<Instant> {
+        let paused_at = self.paused_at.filter(|_| self.unit.state.core.is_paused());
+        Some(paused_at? + TOURNAMENT_PAUSE)
+    }
+
+    /// When a tournament that nobody starts or joins is closed.
+    fn open_until(&self) -> Option<Instant> {
+        let is_open = self.unit.state.core.state() == State::Open;
+        let since = self.start_at.unwrap_or(self.joined_at).max(self.joined_at);
+        is_open.then(|| since + TOURNAMENT_OPEN_TIME)
+    }
+
+    /// Closes a tournament that nobody starts or joins, and resumes one that was paused for long.
+    fn expire(&mut self) {
+        if (self.open_until()).is_some_and(|until| until <= Instant::now()) {
+            self.close();
+        }
+        if (self.paused_until()).is_some_and(|until| until <= Instant::now())
+            && let Ok(Some(change)) = self.unit.state.core.set_paused(false)
+        {
+            self.fold(change);
+        }
+    }
+
+    fn now_ms(&self) -> u64 {
+        u64::try_from(self.clock.now().as_millis()).unwrap_or(u64::MAX)
+    }
+
     fn join(&mut self, entry: Entry) -> Result<(usize, Token), JoinRefusal> {
-        let token = self.handle.ticket_of(&entry);
-        if let Some(answer) = self.state.joined_before(&entry, token) {
+        let token = self.unit.handle.ticket_of(&entry);
+        if let Some(answer) = self.unit.state.joined_before(&entry, token) {
             return answer;
         }
-        let change = self.state.core.join(entry.entrant())?;
-        let participant = self.state.core.next_number();
+        let change = self.unit.state.core.join(entry.entrant())?;
+        let participant = self.unit.state.core.next_number();
         self.fold(change);
         self.joined_at = Instant::now();
         let ticket = token.hash();
-        self.push(TournamentEntry::Ticket {
+        self.unit.push(TournamentEntry::Ticket {
             participant,
             ticket,
         });
@@ -303,7 +330,7 @@ impl Task {
 
     /// Closes the tournament; the rooms of its games are closed once that is committed.
     fn close(&mut self) {
-        if let Some(change) = self.state.core.close() {
+        if let Some(change) = self.unit.state.core.close() {
             self.fold(change);
             self.without_room.clear();
         }
@@ -319,7 +346,7 @@ impl Task {
         if !connection.outbox.is_open() {
             return;
         }
-        if self.state.participant_of(ticket) != Some(participant) {
+        if self.unit.state.participant_of(ticket) != Some(participant) {
             // The ticket has ended meanwhile: somebody else may have the place.
             connection.call(Call::Over);
             return;
@@ -332,7 +359,7 @@ impl Task {
         if let Some((_, older)) = self.connections.remove(&participant) {
             older.call(Call::Superseded);
         }
-        if self.handle.is_over() || self.state.core.is_withdrawn(participant) {
+        if self.unit.handle.is_over() || self.unit.state.core.is_withdrawn(participant) {
             connection.call(Call::Over);
             return;
         }
@@ -347,9 +374,9 @@ impl Task {
     }
 
     pub(super) fn set_connection(&mut self, participant: usize, connection: Option<u64>) {
-        self.state.set_connection(participant, connection);
-        (self.handle.committed()).set_connection(participant, connection);
-        self.has_changed = true;
+        self.unit.state.set_connection(participant, connection);
+        (self.unit.handle.committed()).set_connection(participant, connection);
+        self.unit.has_changed = true;
     }
 
     fn left(&mut self, participant: usize, number: u64) {
@@ -366,7 +393,7 @@ impl Task {
 
     /// Rooms in which a participant has a seat now.
     fn rooms_of(&self, participant: usize) -> Vec<Id> {
-        let state = &self.state;
+        let state = &self.unit.state;
         let games = state.core.playing().filter(|number| {
             let game = &state.core.games()[*number];
             !self.without_room.contains(number) && game.is_played_by(participant)
@@ -387,22 +414,16 @@ impl Task {
             | Change::Counted { game, .. }
             | Change::Recalled { game }
             | Change::Voided { game } => {
-                self.deals.extend(self.state.core.games()[*game].deal);
+                self.deals.extend(self.unit.state.core.games()[*game].deal);
             }
-            Change::Finished | Change::Closed => self.deals = self.state.deals(),
+            Change::Finished | Change::Closed => self.deals = self.unit.state.deals(),
             Change::Paused => self.paused_at = Some(Instant::now()),
             _ => {}
         }
-        self.push(TournamentEntry::Change(change));
+        self.unit.push(TournamentEntry::Change(change));
         if let Some(game) = placed {
             self.place(game);
         }
-    }
-
-    /// Applies an entry and adds it to the next commit.
-    pub(super) fn push(&mut self, entry: TournamentEntry) {
-        self.state.apply(&entry);
-        self.pending.push(entry);
     }
 
     pub(super) fn fold_all(&mut self, changes: Vec<Change>) {
@@ -411,62 +432,7 @@ impl Task {
         }
     }
 
-    /// Computes and commits everything that follows now. With `no_more_games` only pending entries
-    /// are committed.
-    async fn settle(&mut self, no_more_games: bool) -> Result<(), StoreError> {
-        loop {
-            if !no_more_games {
-                self.read_ended_games().await?;
-                self.advance().await?;
-            }
-            let has_entries = !self.pending.is_empty();
-            if has_entries {
-                let entries = std::mem::take(&mut self.pending);
-                let store = self.rooms.store();
-                let id = self.handle.id();
-                let appended = store.append_tournament(id, self.rows, entries.clone());
-                self.published(appended).await?;
-                self.rows += 1;
-                let before = self.handle.committed().core.state();
-                self.handle.publish(&entries);
-                self.announce(before);
-            }
-            for reply in self.replies.drain(..) {
-                reply();
-            }
-            if has_entries {
-                let deals = std::mem::take(&mut self.deals);
-                self.handle.withhold(&deals, &self.rooms);
-            }
-            if !no_more_games {
-                self.make_rooms().await?;
-                self.retire_seats();
-            }
-            if std::mem::take(&mut self.has_changed) || has_entries {
-                self.handle.changes.send_modify(|count| *count += 1);
-            }
-            if !has_entries && self.pending.is_empty() {
-                return Ok(());
-            }
-        }
-    }
-
-    /// Announces that the tournament has started or is over, unless it was before.
-    fn announce(&self, before: State) {
-        let after = self.handle.committed().core.state();
-        let (id, name) = (self.handle.id(), &self.handle.header.settings.name);
-        let webhooks = self.rooms.webhooks();
-        if before == State::Open && matches!(after, State::Playing | State::Finished) {
-            let participants = self.handle.committed().core.participants().len();
-            webhooks.tournament_started(id, name, participants);
-        }
-        let is_over = |state| matches!(state, State::Finished | State::Closed);
-        if is_over(after) && !is_over(before) {
-            webhooks.tournament_ended(id, name, after == State::Finished);
-        }
-    }
-
-    /// Computes what follows now. A draw of a round runs on another thread.
+    /// Adds what the core says comes next. A draw of a round runs on another thread.
     async fn advance(&mut self) -> Result<(), StoreError> {
         if self.is_due_to_start() {
             let begun = self.off_thread(|core| core.begin()).await?;
@@ -474,7 +440,7 @@ impl Task {
         }
         let now_ms = self.now_ms();
         // If no game is running, a round may be due, which takes a while to draw.
-        let core = &self.state.core;
+        let core = &self.unit.state.core;
         let may_draw = match core.state() {
             State::Open => core.settings().start_when_joined.is_some(),
             State::Playing => core.playing().next().is_none(),
@@ -493,7 +459,7 @@ impl Task {
             self.fold_all(changes);
         }
         loop {
-            let next = self.state.core.next(now_ms);
+            let next = self.unit.state.core.next(now_ms);
             let Some(change) = next else { return Ok(()) };
             self.fold(change);
         }
@@ -504,16 +470,17 @@ impl Task {
         &self,
         work: impl FnOnce(Tournament) -> T + Send + 'static,
     ) -> Result<T, StoreError> {
-        let core = self.state.core.clone();
+        let core = self.unit.state.core.clone();
         let working = tokio::task::spawn_blocking(move || work(core));
         (working.await)
             .map_err(|error| StoreError::Failed(format!("drawing a round failed: {error}")))
     }
 }
 
-impl Drop for Task {
+impl Drop for TournamentTask {
     fn drop(&mut self) {
-        let state = self.handle.read(|core| core.state());
-        info!(tournament = %self.handle.id(), ?state, "the tournament's task has ended");
+        let handle = &self.unit.handle;
+        let state = handle.read(Tournament::state);
+        info!(tournament = %handle.id(), ?state, "the tournament's task has ended");
     }
 }

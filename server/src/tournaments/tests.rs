@@ -5,6 +5,7 @@ use futures::FutureExt as _;
 use super::*;
 use crate::config::ServerConfig;
 use crate::limits::Key;
+use crate::store::tests::TypedUnits as _;
 use crate::store::{SqliteStore, Store};
 use chefshat_tournament::ByHandProblem;
 
@@ -206,7 +207,7 @@ async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
     let refused = tournaments
         .create("Coppa", plan(), Some(other), Key::Local)
         .await;
-    assert!(matches!(refused, Err(CreateProblem::RequestIdUsed)));
+    assert!(matches!(refused, Err(CreateProblem::RequestIdUsed(_))));
 
     let (first, second) = tokio::join!(handle.join(ada()), handle.join(ada()));
     let joined = first.expect("the task runs").expect("joined");

@@ -25,7 +25,7 @@ impl TournamentHandle {
     ) -> Result<Arc<AsOf<v1::FollowTournamentResponse>>, ComputeError> {
         let work = self.as_of_now(permits, Self::compute_update);
         let is_current = |follower_update: &AsOf<_>| follower_update.mark == self.mark();
-        self.follower_update.get(is_current, work).await
+        self.shared.follower_update.get(is_current, work).await
     }
 
     /// The current results. Computed when a permit is available.
@@ -38,11 +38,11 @@ impl TournamentHandle {
     ) -> Result<Arc<AsOf<v1::GetTournamentResultsResponse>>, ComputeError> {
         let work = self.as_of_now(permits, Self::compute_results);
         let is_current = |results: &AsOf<_>| results.mark == self.mark();
-        self.results.get(is_current, work).await
+        self.shared.results.get(is_current, work).await
     }
 
     fn mark(&self) -> Mark {
-        let change = *self.changes.borrow();
+        let change = self.last_change();
         self.read(|core| Mark {
             change,
             state: core.state(),

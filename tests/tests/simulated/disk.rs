@@ -8,7 +8,7 @@ use std::time::Duration;
 use chefshat_proto::v1;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry, GameHeader};
-use chefshat_server::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use chefshat_server::store::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
 use chefshat_server::store::{
     Journal, Listed, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame,
 };
@@ -68,7 +68,7 @@ impl Disk {
     }
 }
 
-/// A store on a disk. Lists, imports and tournaments are not simulated.
+/// A store on a disk. Lists, imports, tournaments and studies are not simulated.
 pub(crate) struct DiskStore {
     disk: Arc<Disk>,
     rest: MemoryStore,
@@ -181,28 +181,24 @@ impl Store for DiskStore {
         self.rest.mark_record_written(game)
     }
 
-    fn create_tournament(
-        &self,
-        header: Arc<TournamentHeader>,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.rest.create_tournament(header, entries)
+    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.rest.write_unit(unit, write)
     }
 
-    fn append_tournament(
-        &self,
-        tournament: Id,
-        row: u64,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.rest.append_tournament(tournament, row, entries)
+    fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+        self.rest.unit(unit)
     }
 
-    fn tournaments(
+    fn units(
         &self,
+        kind: UnitKind,
         newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
-        self.rest.tournaments(newest_over)
+    ) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        self.rest.units(kind, newest_over)
+    }
+
+    fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
+        self.rest.traces(study)
     }
 
     fn failed(&self) -> BoxFuture<'static, StoreError> {

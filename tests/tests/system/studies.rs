@@ -21,6 +21,7 @@ use chefshat_room::ids::Id;
 use chefshat_server::access::SECRET_HEADER;
 use chefshat_server::config::ServerConfig;
 use chefshat_server::host::Host;
+use chefshat_server::store::studies::StoredStudy;
 use chefshat_server::store::{SqliteStore, Store as _};
 use chefshat_tests::{one_shift, patiently};
 use futures::future::join_all;
@@ -696,7 +697,10 @@ async fn a_study_from_its_links_to_its_data() {
     stopping.await.expect("a clean end");
     let store = SqliteStore::open(folder.path()).await.expect("a store");
     let id = Id::parse(&owner.0).expect("an id");
-    let stored = store.study(id).await.expect("readable").expect("it exists");
+    let stored = StoredStudy::read(&store, id)
+        .await
+        .expect("readable")
+        .expect("it exists");
     let stored = format!("{:?}", stored.changes);
     let traces = store.traces(id).await.expect("readable");
     for number in [1, 3] {

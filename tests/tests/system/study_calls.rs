@@ -17,6 +17,8 @@ use chefshat_server::access::{Mode, NewToken, Role, TokenFile};
 use chefshat_server::config::ServerConfig;
 use chefshat_server::host::Host;
 use chefshat_server::participants::ParticipantData;
+use chefshat_server::store::studies::StoredStudy;
+use chefshat_server::store::units::UnitKind;
 use chefshat_server::store::{SqliteStore, Store as _};
 use chefshat_tests::patiently;
 use tonic::Streaming;
@@ -177,7 +179,10 @@ async fn a_study_is_followed_until_it_is_over_and_deleted() {
     let stopping = patiently("the server to stop", host.stop());
     stopping.await.expect("a clean end");
     let store = SqliteStore::open(folder.path()).await.expect("a store");
-    assert_eq!(store.studies().await, Ok(Vec::new()));
+    assert_eq!(
+        store.units(UnitKind::Study, usize::MAX).await,
+        Ok(Vec::new())
+    );
     let game = Id::parse(&game.game_id).expect("an id");
     assert!(store.finished(game).await.expect("readable").is_none());
     store.close().await;
@@ -468,8 +473,13 @@ async fn a_participant_is_known_by_its_name_to_the_operator() {
     let stopping = patiently("the server to stop", host.stop());
     stopping.await.expect("a clean end");
     let store = SqliteStore::open(folder.path()).await.expect("a store");
-    let studies = store.studies().await.expect("readable");
-    let stored = store.study(studies[0]).await.expect("readable");
+    let studies = store
+        .units(UnitKind::Study, usize::MAX)
+        .await
+        .expect("readable");
+    let stored = StoredStudy::read(&store, studies[0])
+        .await
+        .expect("readable");
     let stored = format!("{:?}", stored.expect("it exists").changes);
     assert!(!stored.contains(&name()) && stored.contains("Pseudonym-of-Bo"));
     store.close().await;
@@ -527,8 +537,14 @@ async fn a_participant_is_deleted_from_a_study_of_a_server_that_is_stopped() {
     let (store, data) = with_data().await;
     let deleted = data.delete(&ana).await.expect("its games are over");
     assert_eq!(deleted.studies, 1);
-    let id = store.studies().await.expect("readable")[0];
-    let stored = store.study(id).await.expect("readable").expect("stored");
+    let id = store
+        .units(UnitKind::Study, usize::MAX)
+        .await
+        .expect("readable")[0];
+    let stored = StoredStudy::read(store.as_ref(), id)
+        .await
+        .expect("readable")
+        .expect("stored");
     assert!(!format!("{:?}", stored.changes).contains(&ana.name));
     assert_eq!(store.traces(id).await, Ok(Vec::new()));
     let game = Id::parse(&game.game_id).expect("an id");

@@ -18,7 +18,7 @@ use tokio::time::{Instant, sleep};
 use crate::store::cluster::{
     Beat, ClusterStore, Epoch, Kind, Location, NodeId, NodeInfo, NodeStatus, Unit,
 };
-use crate::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use crate::store::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
 use crate::store::{
     Journal, Listed, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame,
 };
@@ -26,7 +26,8 @@ use crate::store::{
 #[derive(Clone)]
 enum Row {
     Game(Vec<Entry>),
-    Tournament(Vec<TournamentEntry>),
+    /// Of a tournament.
+    Unit(Vec<u8>),
 }
 
 /// What all nodes share.
@@ -34,7 +35,8 @@ pub(crate) struct Database {
     began: Instant,
     tables: Mutex<Tables<Id, Row>>,
     games: Mutex<BTreeMap<Id, Arc<GameHeader>>>,
-    tournaments: Mutex<BTreeMap<Id, TournamentHeader>>,
+    /// The headers of tournaments.
+    tournaments: Mutex<BTreeMap<Id, Vec<u8>>>,
     nodes: Mutex<BTreeMap<NodeId, NodeInfo>>,
     drain: Mutex<Option<NodeId>>,
     /// Units that nodes have released, for all others: in a test, each of them is the next owner.
@@ -121,7 +123,7 @@ impl Database {
         let rows = tables.journal(room).iter();
         let entries = rows.flat_map(|row| match &row.entries {
             Row::Game(entries) => entries.as_slice(),
-            Row::Tournament(_) => &[],
+            Row::Unit(_) => &[],
         });
         let names = entries.filter_map(|entry| match &entry.change {
             Change::Seated { participant, .. } => Some(participant.name.clone()),
@@ -385,56 +387,52 @@ impl Store for FakeStore {
         self.database.finished.mark_record_written(game)
     }
 
-    fn create_tournament(
-        &self,
-        header: Arc<TournamentHeader>,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
+        assert_eq!(unit.kind, UnitKind::Tournament, "tests have no studies");
         async move {
             self.reached().await;
-            let row = Row::Tournament(entries);
-            let made = (self.database.tables()).create(header.id, self.node(), row);
-            created(made, header.id)?;
-            let id = header.id;
+            let id = unit.id;
             let mut epochs = self.epochs.lock().expect("no test panics here");
-            epochs.insert(id, Epoch::FIRST);
-            let mut all = (self.database.tournaments.lock()).expect("no test panics here");
-            all.insert(id, Arc::unwrap_or_clone(header));
-            Ok(())
-        }
-        .boxed()
-    }
-
-    fn append_tournament(
-        &self,
-        tournament: Id,
-        row: u64,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            self.reached().await;
-            let fenced = StoreError::Fenced(tournament);
-            let epochs = self.epochs.lock().expect("no test panics here");
-            let epoch = *epochs.get(&tournament).ok_or(fenced.clone())?;
-            let ends = entries.iter().any(TournamentEntry::is_end);
-            let mut tables = self.database.tables();
-            let written = tables.append(tournament, epoch, row, Row::Tournament(entries));
-            if written == Written::Committed && ends {
-                tables.finish(tournament, epoch, row + 1);
-            }
-            match written {
-                Written::Committed => Ok(()),
-                Written::Refused => Err(fenced),
+            match write {
+                UnitWrite::Create { header, first, .. } => {
+                    let first = first.expect("a tournament begins with a row");
+                    let row = Row::Unit(first.entries);
+                    created(self.database.tables().create(id, self.node(), row), id)?;
+                    epochs.insert(id, Epoch::FIRST);
+                    let mut all = (self.database.tournaments.lock()).expect("no test panics here");
+                    all.insert(id, header);
+                    Ok(())
+                }
+                UnitWrite::Append(row) => {
+                    let fenced = StoreError::Fenced(id);
+                    let epoch = *epochs.get(&id).ok_or(fenced.clone())?;
+                    let mut tables = self.database.tables();
+                    let entries = Row::Unit(row.entries);
+                    match tables.append(id, epoch, row.position, entries) {
+                        Written::Committed if row.over => {
+                            tables.finish(id, epoch, row.position + 1);
+                            Ok(())
+                        }
+                        Written::Committed => Ok(()),
+                        Written::Refused => Err(fenced),
+                    }
+                }
+                _ => unreachable!("a tournament is not rewritten"),
             }
         }
         .boxed()
     }
 
-    fn tournaments(
-        &self,
-        _newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
-        // None is over, and a node resumes units.
+    fn unit(&self, _: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+        async { Ok(None) }.boxed()
+    }
+
+    /// None is over, and a node resumes units.
+    fn units(&self, _: UnitKind, _: usize) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        async { Ok(Vec::new()) }.boxed()
+    }
+
+    fn traces(&self, _: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
         async { Ok(Vec::new()) }.boxed()
     }
 
@@ -570,7 +568,7 @@ impl ClusterStore for FakeStore {
             if tables.owner(unit) != Some(self.node()) || tables.epoch(unit) != Some(epoch) {
                 return Ok(None);
             }
-            let (mut games, mut tournament) = (Vec::new(), None);
+            let (mut games, mut stored) = (Vec::new(), None);
             let headers = self.database.games.lock().expect("no test panics here");
             for id in tables.open_items(unit) {
                 let journal = tables.journal(id);
@@ -578,7 +576,7 @@ impl ClusterStore for FakeStore {
                 if let Some(header) = headers.get(&id) {
                     let entries = journal.iter().flat_map(|row| match &row.entries {
                         Row::Game(entries) => entries.clone(),
-                        Row::Tournament(_) => Vec::new(),
+                        Row::Unit(_) => Vec::new(),
                     });
                     let entries: Vec<_> = entries.collect();
                     games.push(ResumableGame {
@@ -591,22 +589,15 @@ impl ClusterStore for FakeStore {
                 }
                 let mut epochs = self.epochs.lock().expect("no test panics here");
                 epochs.insert(id, epoch);
-                let entries = journal.iter().flat_map(|row| match &row.entries {
-                    Row::Tournament(entries) => entries.clone(),
-                    Row::Game(_) => Vec::new(),
+                let rows = journal.iter().filter_map(|row| match &row.entries {
+                    Row::Unit(entries) => Some(entries.clone()),
+                    Row::Game(_) => None,
                 });
                 let all = (self.database.tournaments.lock()).expect("no test panics here");
-                tournament = Some(StoredTournament {
-                    header: all[&id].clone(),
-                    entries: entries.collect(),
-                    rows,
-                });
+                let unit = StoredUnit::new(all[&id].clone(), rows.collect());
+                stored = Some((UnitKind::Tournament, unit));
             }
-            Ok(Some(Unit {
-                tournament,
-                study: None,
-                games,
-            }))
+            Ok(Some(Unit { stored, games }))
         }
         .boxed()
     }
@@ -678,7 +669,7 @@ impl ClusterStore for FakeStore {
             let rows = tables.journal(room);
             let entries = rows.iter().flat_map(|row| match &row.entries {
                 Row::Game(entries) => entries.clone(),
-                Row::Tournament(_) => Vec::new(),
+                Row::Unit(_) => Vec::new(),
             });
             let entries: Vec<_> = entries.collect();
             let count = rows.len() as u64;
@@ -690,10 +681,6 @@ impl ClusterStore for FakeStore {
             }))
         }
         .boxed()
-    }
-
-    fn tournament(&self, _: Id) -> BoxFuture<'_, Result<Option<StoredTournament>, StoreError>> {
-        async { Ok(None) }.boxed()
     }
 
     fn alive(&self) -> BoxFuture<'_, Result<Vec<(NodeId, NodeInfo)>, StoreError>> {

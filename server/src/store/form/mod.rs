@@ -21,11 +21,12 @@ pub(super) use entry::{entries_to_bytes, put_entries, read_entries};
 pub(super) use header::{header_from_bytes, header_to_bytes, stored_header, stored_unit};
 pub(super) use signature::{signature_from_bytes, signature_to_bytes};
 pub(super) use study::{
-    stored_study, stored_traces, study_changes_to_bytes, study_to_bytes, traces_to_bytes,
+    stored_traces, study_changes_from_bytes, study_changes_to_bytes, study_from_bytes,
+    study_to_bytes, traces_to_bytes,
 };
 pub(super) use tournament::{
-    stored_tournament, tournament_entries_from_bytes, tournament_entries_to_bytes,
-    tournament_from_bytes, tournament_to_bytes,
+    tournament_entries_from_bytes, tournament_entries_to_bytes, tournament_from_bytes,
+    tournament_to_bytes,
 };
 
 /// Version of the encoding. It is raised by every new kind of entry and every new field, so that nodes

@@ -6,8 +6,9 @@ use chefshat_proto::v1;
 use chefshat_study::{Answer, Change, ConsentGiven, ItemAnswer, Outcome, PlacedGame};
 use prost::Message;
 
-use super::{Unreadable, array, check_form};
-use crate::store::studies::{StoredStudy, StoredTraces, StudyHeader};
+use super::{Unreadable, array};
+use crate::store::studies::StudyHeader;
+use crate::store::units::StoredTraces;
 use chefshat_room::ids::{Id, SecretHash};
 
 #[derive(Clone, PartialEq, Message)]
@@ -191,7 +192,8 @@ pub(in crate::store) fn study_changes_to_bytes(changes: &[Change]) -> Vec<u8> {
 }
 
 /// Encodes interface traces.
-pub(in crate::store) fn traces_to_bytes(traces: Vec<v1::StudyTrace>) -> Vec<u8> {
+pub(in crate::store) fn traces_to_bytes(traces: &[v1::StudyTrace]) -> Vec<u8> {
+    let traces = traces.to_vec();
     TracesForm { traces }.encode_to_vec()
 }
 
@@ -211,37 +213,35 @@ pub(in crate::store) fn stored_traces(
     })
 }
 
-/// Decodes a study: the version of its encoding, its header, and the rows of its journal.
+/// Decodes a header.
 ///
 /// # Errors
-/// An encoding that this version does not read, or an invalid field or change.
-pub(in crate::store) fn stored_study(
-    form: i64,
-    header: &[u8],
-    rows: &[Vec<u8>],
-) -> Result<StoredStudy, Unreadable> {
-    check_form(form)?;
-    let header = HeaderForm::decode(header)?;
-    let mut changes = Vec::new();
-    for row in rows {
-        let mut bytes = row.as_slice();
-        while !bytes.is_empty() {
-            let form = ChangeForm::decode_length_delimited(&mut bytes)?;
-            let kind = (form.kind).ok_or_else(|| Unreadable::new("a change is empty"))?;
-            changes.push(change_of(kind)?);
-        }
-    }
-    Ok(StoredStudy {
-        header: StudyHeader {
-            id: Id(array(&header.id, "the study's id")?),
-            settings: header.settings.unwrap_or_default(),
-            created_at_ms: header.created_at_ms,
-            owner: SecretHash::from_bytes(array(&header.owner, "the owner's hash")?),
-            key: array(&header.key, "the study's key")?,
-        },
-        changes,
-        rows: u64::try_from(rows.len()).unwrap_or(u64::MAX),
+/// An invalid field.
+pub(in crate::store) fn study_from_bytes(bytes: &[u8]) -> Result<StudyHeader, Unreadable> {
+    let form = HeaderForm::decode(bytes)?;
+    Ok(StudyHeader {
+        id: Id(array(&form.id, "the study's id")?),
+        settings: form.settings.unwrap_or_default(),
+        created_at_ms: form.created_at_ms,
+        owner: SecretHash::from_bytes(array(&form.owner, "the owner's hash")?),
+        key: array(&form.key, "the study's key")?,
     })
+}
+
+/// Decodes changes.
+///
+/// # Errors
+/// An invalid change.
+pub(in crate::store) fn study_changes_from_bytes(
+    mut bytes: &[u8],
+) -> Result<Vec<Change>, Unreadable> {
+    let mut changes = Vec::new();
+    while !bytes.is_empty() {
+        let form = ChangeForm::decode_length_delimited(&mut bytes)?;
+        let kind = (form.kind).ok_or_else(|| Unreadable::new("a change is empty"))?;
+        changes.push(change_of(kind)?);
+    }
+    Ok(changes)
 }
 
 fn kind_of(change: &Change) -> KindForm {

@@ -5,8 +5,8 @@ use chefshat_tournament::{Change, Entrant, GameResult, SeatResult, SeatStatistic
 use prost::Message;
 
 use super::entry::{KINDS, number_of, value_of};
-use super::{Unreadable, array, check_form};
-use crate::store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use super::{Unreadable, array};
+use crate::store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_room::ids::{Id, SecretHash};
 
 #[derive(Clone, PartialEq, Message)]
@@ -258,27 +258,6 @@ pub(in crate::store) fn tournament_entries_from_bytes(
         entries.push(entry_of(kind)?);
     }
     Ok(entries)
-}
-
-/// Decodes a tournament: the version of its encoding, its header, and the rows of its journal.
-///
-/// # Errors
-/// An encoding that this version does not read, or an invalid field or entry.
-pub(in crate::store) fn stored_tournament(
-    form: i64,
-    header: &[u8],
-    rows: &[Vec<u8>],
-) -> Result<StoredTournament, Unreadable> {
-    check_form(form)?;
-    let mut entries = Vec::new();
-    for row in rows {
-        entries.extend(tournament_entries_from_bytes(row)?);
-    }
-    Ok(StoredTournament {
-        header: tournament_from_bytes(header)?,
-        entries,
-        rows: u64::try_from(rows.len()).unwrap_or(u64::MAX),
-    })
 }
 
 fn kind_of(entry: &TournamentEntry) -> KindForm {

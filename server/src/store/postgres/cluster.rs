@@ -13,14 +13,13 @@ use sqlx::{Connection as _, Row as _};
 use super::claims::{Claims, claim};
 use super::handover::{Handed, release};
 use super::owned::rooms;
-use super::reader::Reader;
-use super::values::{integer, millis, text};
+use super::values::{ROOM, integer, kind_of, millis, text};
 use super::{PostgresStore, lock};
 use crate::store::cluster::{
     Beat, ClusterStore, Epoch, Kind, Location, NodeId, NodeInfo, NodeStatus, Unit,
 };
 use crate::store::form::FORM;
-use crate::store::tournaments::StoredTournament;
+use crate::store::units::UnitKind;
 use crate::store::{ResumableGame, StoreError};
 use chefshat_room::ids::Id;
 
@@ -28,10 +27,6 @@ use chefshat_room::ids::Id;
 const FORGET_NODES_AFTER_MS: i64 = 24 * 60 * 60 * 1_000;
 /// How often a claim is tried again because the last owner has just written something.
 const CLAIM_ATTEMPTS: usize = 5;
-/// The kinds of what is owned.
-const ROOM: i16 = 0;
-const TOURNAMENT: i16 = 1;
-const STUDY: i16 = 2;
 /// The columns of `location`.
 macro_rules! locations {
     ($rest:literal) => {
@@ -74,21 +69,6 @@ impl PostgresStore {
     /// When leases expire, milliseconds after a beat.
     fn expire_after(&self) -> i64 {
         integer(self.options.lease.expire_after_ms())
-    }
-
-    /// A tournament, read over these connections.
-    async fn tournament_over(
-        &self,
-        reader: &Reader,
-        id: Id,
-    ) -> Result<Option<StoredTournament>, StoreError> {
-        let rows = reader.read(move |connection| {
-            sqlx::query("SELECT number, form, header FROM tournaments WHERE tournament_id = $1")
-                .bind(id.0.to_vec())
-                .fetch_all(connection)
-                .boxed()
-        });
-        Ok(reader.read_tournaments(rows.await?).await?.pop())
     }
 
     async fn locate_where(
@@ -287,22 +267,17 @@ impl ClusterStore for PostgresStore {
             }
             let (rooms, others): (Vec<_>, Vec<_>) =
                 (items.into_iter()).partition(|item| item.get::<i16, _>(4) == ROOM);
-            let is = |kind: i16| others.iter().any(|item| item.get::<i16, _>(4) == kind);
-            let tournament = match is(TOURNAMENT) {
-                true => self.tournament_over(&self.control, unit).await?,
-                false => None,
-            };
-            let study = match is(STUDY) {
-                true => self.control.study(unit).await?,
-                false => None,
+            let kind = others.iter().find_map(|item| kind_of(item.get(4)));
+            let stored = match kind {
+                Some(kind) => (self.control.unit(kind.id(unit)).await?).map(|it| (kind, it)),
+                None => None,
             };
             let rooms = self.control.rooms(rooms).await?;
-            if tournament.is_some() || study.is_some() {
+            if stored.is_some() {
                 lock(&self.epochs).insert(unit, at);
             }
             Ok(Some(Unit {
-                tournament,
-                study,
+                stored,
                 // At the epoch that was asked for: if another one has come since, they are fenced.
                 games: (rooms.into_iter())
                     .map(|room| self.resumable(room, at))
@@ -377,10 +352,6 @@ impl ClusterStore for PostgresStore {
             Ok(self.resumables(rows.await?).await?.pop())
         }
         .boxed()
-    }
-
-    fn tournament(&self, id: Id) -> BoxFuture<'_, Result<Option<StoredTournament>, StoreError>> {
-        self.tournament_over(&self.reader, id).boxed()
     }
 
     fn alive(&self) -> BoxFuture<'_, Result<Vec<(NodeId, NodeInfo)>, StoreError>> {
@@ -519,10 +490,10 @@ fn location(row: &PgRow) -> Result<Location, StoreError> {
     let odd = || StoreError::Failed("an id in the database does not have 16 bytes".into());
     Ok(Location {
         id: id_of(row, 0).ok_or_else(odd)?,
-        kind: match row.get::<i16, _>(1) {
-            ROOM => Kind::Room,
-            STUDY => Kind::Study,
-            _ => Kind::Tournament,
+        kind: match kind_of(row.get(1)) {
+            None => Kind::Room,
+            Some(UnitKind::Tournament) => Kind::Tournament,
+            Some(UnitKind::Study) => Kind::Study,
         },
         unit: id_of(row, 2).ok_or_else(odd)?,
         node: row

@@ -14,7 +14,7 @@ use sqlx::{Connection as _, Row as _};
 use super::ends::{End, Ended, WholeGame, finish, give_up, import, number, whole};
 use super::forget::rewrite;
 use super::retained::{divided, locked};
-use super::studies::StudyWrite;
+use super::units;
 use super::values::{Owned, integer, text};
 use super::writer::{Answers, Work, confirming};
 use crate::store::StoreError;
@@ -63,24 +63,8 @@ pub(super) enum Command {
     Delete { games: Vec<Id> },
     /// Removes a participant from games and tournaments that are over.
     Rewrite(Rewrite),
-    /// Writes something for a study.
-    Study(StudyWrite),
-    /// Creates a tournament with its first row.
-    Tournament {
-        id: Id,
-        node: i64,
-        join_code: String,
-        header: Vec<u8>,
-        entries: Vec<u8>,
-        over: bool,
-    },
-    /// Adds a row to a tournament.
-    TournamentEntries {
-        owned: Owned,
-        position: i64,
-        entries: Vec<u8>,
-        over: bool,
-    },
+    /// Writes something for a tournament or study.
+    Unit(units::Change),
 }
 
 impl Work for Command {
@@ -151,17 +135,7 @@ impl Command {
                 rewrite(connection, changes).await?;
                 return Ok(Ok(0));
             }
-            Self::Study(write) => return write.run(connection, again).await,
-            Self::Tournament { .. } => return self.create_tournament(connection, again).await,
-            Self::TournamentEntries {
-                owned,
-                position,
-                entries,
-                over,
-            } => {
-                let row = (*position, entries.as_slice(), *over);
-                return append_tournament(connection, *owned, row).await;
-            }
+            Self::Unit(change) => return change.run(connection, again).await,
         };
         Ok(match ended {
             Ended::Now { number, has_record } => {
@@ -263,69 +237,6 @@ impl Command {
             false => owned.fenced(),
         }))
     }
-
-    async fn create_tournament(
-        &self,
-        connection: &mut PgConnection,
-        again: bool,
-    ) -> sqlx::Result<Result<i64, StoreError>> {
-        let Self::Tournament {
-            id,
-            node,
-            join_code,
-            header,
-            entries,
-            over,
-        } = self
-        else {
-            unreachable!("only called for this command");
-        };
-        let row = sqlx::query(
-            "WITH owner AS (
-                 SELECT node FROM nodes WHERE node = $1
-             ), place AS (
-                 INSERT INTO owned (id, unit, kind, node, epoch, join_code, durable, form, over)
-                 SELECT $2, $2, 1, node, 1, $3, true, $4, $5 FROM owner
-                 ON CONFLICT DO NOTHING RETURNING id
-             ), tournament AS (
-                 INSERT INTO tournaments (tournament_id, form, over, header)
-                 SELECT $2, $4, $5, $6 FROM place RETURNING number
-             ), first AS (
-                 INSERT INTO tournament_entries (tournament, position, epoch, entries)
-                 SELECT number, 0, 1, $7 FROM tournament
-             )
-             SELECT EXISTS (SELECT FROM place), EXISTS (SELECT FROM owner)",
-        )
-        .bind(*node)
-        .bind(id.0.as_slice())
-        .bind(text(join_code))
-        .bind(FORM)
-        .bind(*over)
-        .bind(header.as_slice())
-        .bind(entries.as_slice())
-        .fetch_one(&mut *connection)
-        .await?;
-        let (placed, owner): (bool, bool) = (row.get(0), row.get(1));
-        if placed {
-            return Ok(Ok(0));
-        }
-        if again {
-            let own = sqlx::query(confirming!(
-                "tournament_id FROM tournaments WHERE tournament_id = $1 AND header = $2"
-            ))
-            .bind(id.0.as_slice())
-            .bind(header.as_slice())
-            .fetch_optional(connection)
-            .await?;
-            if own.is_some() {
-                return Ok(Ok(0));
-            }
-        }
-        Ok(Err(match owner {
-            true => StoreError::Taken(*id),
-            false => StoreError::Fenced(*id),
-        }))
-    }
 }
 
 /// Waits for other transactions that take ids of games outside of one another's sight, until the end
@@ -382,49 +293,4 @@ async fn delete(connection: &mut PgConnection, games: &[Id]) -> sqlx::Result<i64
     .execute(connection)
     .await
     .map(|_| 0)
-}
-
-async fn append_tournament(
-    connection: &mut PgConnection,
-    owned: Owned,
-    (position, entries, over): (i64, &[u8], bool),
-) -> sqlx::Result<Result<i64, StoreError>> {
-    let row = sqlx::query(
-        "WITH owner AS (
-             SELECT id FROM owned WHERE id = $1 AND epoch = $2 FOR UPDATE
-         ), row AS (
-             INSERT INTO tournament_entries (tournament, position, epoch, entries)
-             SELECT number, $3, $2, $4 FROM owner JOIN tournaments ON tournament_id = id
-             ON CONFLICT DO NOTHING RETURNING tournament
-         ), over_owned AS (
-             UPDATE owned SET over = true, ended_ms = clock_ms() FROM row WHERE id = $1 AND $5
-         ), over_tournament AS (
-             UPDATE tournaments SET over = true FROM row WHERE number = tournament AND $5
-         )
-         SELECT tournament FROM row",
-    )
-    .bind(owned.id.0.as_slice())
-    .bind(owned.epoch)
-    .bind(position)
-    .bind(entries)
-    .bind(over)
-    .fetch_optional(&mut *connection)
-    .await?;
-    if row.is_some() {
-        return Ok(Ok(0));
-    }
-    let own = sqlx::query(confirming!(
-        "tournament FROM tournaments JOIN tournament_entries ON tournament = number
-         WHERE tournament_id = $1 AND position = $3 AND epoch = $2 AND entries = $4"
-    ))
-    .bind(owned.id.0.as_slice())
-    .bind(owned.epoch)
-    .bind(position)
-    .bind(entries)
-    .fetch_optional(connection)
-    .await?;
-    Ok(match own {
-        Some(_) => Ok(0),
-        None => Err(owned.fenced()),
-    })
 }

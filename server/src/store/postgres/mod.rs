@@ -1,5 +1,5 @@
 //! Stores games in a PostgreSQL database that several servers may share. `open` connects, `reader`
-//! reads, `journals`, `appends`, `commands`, `ends`, `forget` and `studies` write through `writer`, `cluster`,
+//! reads, `journals`, `appends`, `commands`, `ends`, `forget` and `units` write through `writer`, `cluster`,
 //! `claims`, `handover` and `owned` are about nodes and what they own, `transfer` moves an SQLite
 //! database here, `form` (beside this folder) encodes; this file joins them into a store.
 
@@ -16,10 +16,10 @@ mod open;
 mod owned;
 mod reader;
 mod retained;
-mod studies;
 #[cfg(test)]
 pub(super) mod tests;
 mod transfer;
+mod units;
 mod values;
 mod writer;
 
@@ -31,7 +31,6 @@ use std::time::Duration;
 use chefshat_cluster::LeaseTimes;
 use chefshat_proto::v1;
 use chefshat_record::pseudonym::Pseudonym;
-use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending};
 use sqlx::postgres::{PgConnectOptions, PgPoolOptions};
@@ -46,8 +45,7 @@ pub use transfer::{TransferError, Transferred, transfer};
 use super::codec::Codec;
 use super::ephemeral::EphemeralJournal;
 use super::form;
-use super::studies::{StoredStudy, StoredTraces, StudyHeader};
-use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use super::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
 use super::{
     ForgetError, Forgotten, Journal, Keep, Listed, Part, ResumableGame, Store, StoreError,
     StoredGame,
@@ -61,8 +59,8 @@ use commands::Command;
 use handover::Handed;
 use journals::{DurableJournal, Whole};
 use reader::{Reader, StoredRoom};
-use studies::StudyWrite;
-use values::{FIRST_EPOCH, Owned, integer};
+use units::Writer;
+use values::{FIRST_EPOCH, Owned};
 use writer::{Queue, Shared};
 
 /// Writers of rows of running games: while one commits, the other takes what arrives.
@@ -188,19 +186,17 @@ impl PostgresStore {
         epoch.ok_or(StoreError::Fenced(unit))
     }
 
-    /// A tournament or study, as this node writes it.
-    fn owned(&self, unit: Id) -> Result<Owned, StoreError> {
-        Ok(Owned {
+    /// Who writes this for a tournament or study.
+    fn writer_of(&self, unit: Id, write: &UnitWrite) -> Result<Writer, StoreError> {
+        if matches!(write, UnitWrite::Create { .. }) {
+            return self.node().map(Writer::Node);
+        }
+        let epoch = self.epoch_of(unit)?;
+        Ok(Writer::Owner(Owned {
             id: unit,
             unit,
-            epoch: self.epoch_of(unit)?,
-        })
-    }
-
-    /// Writes something for a study.
-    async fn write_study(&self, write: StudyWrite) -> Result<(), StoreError> {
-        let command = Arc::new(Command::Study(write));
-        self.commands.commit(command).await.map(drop)
+            epoch,
+        }))
     }
 
     /// A room to be created: what its journals are written as.
@@ -413,138 +409,46 @@ impl Store for PostgresStore {
         .boxed()
     }
 
-    fn create_tournament(
-        &self,
-        header: Arc<TournamentHeader>,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
-            let create = Command::Tournament {
-                id: header.id,
-                node: self.node()?,
-                join_code: header.join_code.clone(),
-                header: form::tournament_to_bytes(&header),
-                entries: form::tournament_entries_to_bytes(&entries),
-                over: entries.iter().any(TournamentEntry::is_end),
-            };
-            self.commands.commit(Arc::new(create)).await?;
-            lock(&self.epochs).insert(header.id, FIRST_EPOCH);
-            Ok(())
-        }
-        .boxed()
-    }
-
-    fn append_tournament(
-        &self,
-        tournament: Id,
-        row: u64,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            let append = Command::TournamentEntries {
-                owned: self.owned(tournament)?,
-                position: integer(row),
-                entries: form::tournament_entries_to_bytes(&entries),
-                over: entries.iter().any(TournamentEntry::is_end),
-            };
-            self.commands.commit(Arc::new(append)).await.map(drop)
-        }
-        .boxed()
-    }
-
-    /// Those of this node that are not over, and the newest ones of the cluster that are.
-    fn tournaments(
-        &self,
-        newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
-        self.own_tournaments(newest_over).boxed()
-    }
-
-    fn hosts_studies(&self) -> bool {
-        true
-    }
-
-    fn create_study(&self, header: Arc<StudyHeader>) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            let create = StudyWrite::Create {
-                id: header.id,
-                node: self.node()?,
-                header: form::study_to_bytes(&header),
-            };
-            self.write_study(create).await?;
-            lock(&self.epochs).insert(header.id, FIRST_EPOCH);
-            Ok(())
-        }
-        .boxed()
-    }
-
-    fn append_study(
-        &self,
-        study: Id,
-        row: u64,
-        changes: Vec<StudyChange>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            let append = StudyWrite::Append {
-                owned: self.owned(study)?,
-                position: integer(row),
-                changes: form::study_changes_to_bytes(&changes),
-            };
-            self.write_study(append).await
-        }
-        .boxed()
-    }
-
-    fn rewrite_study(
-        &self,
-        study: Id,
-        changes: Vec<StudyChange>,
-        forgotten: Vec<u32>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            let rewrite = StudyWrite::Rewrite {
-                owned: self.owned(study)?,
-                changes: form::study_changes_to_bytes(&changes),
-                forgotten,
-            };
-            self.write_study(rewrite).await
-        }
-        .boxed()
-    }
-
-    fn delete_study(&self, study: Id) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            let owned = self.owned(study)?;
-            self.write_study(StudyWrite::Delete { owned }).await?;
-            lock(&self.epochs).remove(&study);
-            Ok(())
-        }
-        .boxed()
-    }
-
-    fn study(&self, study: Id) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {
-        self.reader.study(study).boxed()
-    }
-
-    /// Those of all nodes.
-    fn studies(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
-        self.reader.studies().boxed()
-    }
-
-    fn append_traces(
-        &self,
-        study: Id,
-        traces: StoredTraces,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            let add = StudyWrite::Traces {
-                owned: self.owned(study)?,
+            let is_new = matches!(write, UnitWrite::Create { .. });
+            let is_deletion = matches!(write, UnitWrite::Delete);
+            let change = units::Change {
+                unit,
+                by: self.writer_of(unit.id, &write)?,
                 id: Id::random(),
-                participant: traces.number,
-                game: traces.game,
-                traces: form::traces_to_bytes(traces.traces),
+                write,
             };
-            self.write_study(add).await
+            self.commands
+                .commit(Arc::new(Command::Unit(change)))
+                .await?;
+            if is_new {
+                lock(&self.epochs).insert(unit.id, FIRST_EPOCH);
+            }
+            if is_deletion {
+                lock(&self.epochs).remove(&unit.id);
+            }
+            Ok(())
+        }
+        .boxed()
+    }
+
+    fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+        self.reader.unit(unit).boxed()
+    }
+
+    /// The studies of all nodes, and the tournaments of this node that are not over with the newest
+    /// ones of the cluster that are.
+    fn units(
+        &self,
+        kind: UnitKind,
+        newest_over: usize,
+    ) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        async move {
+            match kind {
+                UnitKind::Study => self.reader.studies().await,
+                UnitKind::Tournament => self.reader.tournaments(self.node()?, newest_over).await,
+            }
         }
         .boxed()
     }

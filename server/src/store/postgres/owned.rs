@@ -1,4 +1,4 @@
-//! Reads what nodes own: rooms and tournaments as they resume.
+//! Reads what nodes own: rooms as they resume.
 
 use std::collections::HashMap;
 
@@ -8,7 +8,6 @@ use sqlx::postgres::PgRow;
 
 use super::PostgresStore;
 use super::values::integer;
-use crate::store::tournaments::StoredTournament;
 use crate::store::{ResumableGame, StoreError};
 
 /// Most ended games that are read at once.
@@ -64,30 +63,5 @@ impl PostgresStore {
                 self.resumable(room, epoch)
             })
             .collect())
-    }
-
-    /// See `Store::tournaments`.
-    pub(super) async fn own_tournaments(
-        &self,
-        newest_over: usize,
-    ) -> Result<Vec<StoredTournament>, StoreError> {
-        let node = self.node()?;
-        let rows = self.reader.read(|connection| {
-            sqlx::query(
-                "SELECT number, form, header FROM tournaments WHERE number IN (
-                     SELECT number FROM tournaments JOIN owned ON id = tournament_id
-                     WHERE node = $1 AND NOT owned.over
-                     UNION ALL
-                     SELECT * FROM (
-                         SELECT number FROM tournaments WHERE over
-                         ORDER BY number DESC LIMIT $2) newest)
-                 ORDER BY number",
-            )
-            .bind(node)
-            .bind(integer(newest_over as u64))
-            .fetch_all(connection)
-            .boxed()
-        });
-        self.reader.read_tournaments(rows.await?).await
     }
 }

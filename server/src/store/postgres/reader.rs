@@ -19,7 +19,6 @@ use super::retained::{divided, old};
 use super::values::{integer, text};
 use crate::store::codec::Codec;
 use crate::store::form::{self, Unreadable, check_form, stored_header};
-use crate::store::tournaments::StoredTournament;
 use crate::store::{Keep, Listed, Part, StoreError, StoredGame, listed};
 use crate::tasks::short;
 use chefshat_room::ids::Id;
@@ -273,33 +272,6 @@ impl Reader {
             entries.into(),
             signature.map_err(unreadable)?.map(Arc::new),
         )))
-    }
-
-    /// Tournaments in rows of number, form and header. One that cannot be read is logged.
-    pub(super) async fn read_tournaments(
-        &self,
-        tournaments: Vec<PgRow>,
-    ) -> Result<Vec<StoredTournament>, StoreError> {
-        let mut stored = Vec::with_capacity(tournaments.len());
-        for row in tournaments {
-            let number: i64 = row.get(0);
-            let parts: Vec<Vec<u8>> = (self.read(|connection| {
-                sqlx::query_scalar(
-                    "SELECT entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
-                )
-                .bind(number)
-                .fetch_all(connection)
-                .boxed()
-            }))
-            .await?;
-            match form::stored_tournament(row.get(1), row.get(2), &parts) {
-                Ok(tournament) => stored.push(tournament),
-                Err(problem) => {
-                    error!(number, %problem, "a tournament cannot be read; it is left unchanged");
-                }
-            }
-        }
-        Ok(stored)
     }
 
     /// See `Store::list`.

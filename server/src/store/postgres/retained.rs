@@ -12,6 +12,8 @@ use sqlx::postgres::{PgConnection, PgRow};
 use super::values::integer;
 use crate::store::Keep;
 use crate::store::form;
+use crate::store::tournaments::StoredTournament;
+use crate::store::units::{ROWS, StoredUnit, UnitKind};
 use chefshat_room::ids::Id;
 
 /// A finished game, with its encoding and header.
@@ -122,13 +124,16 @@ async fn needing(
             continue;
         };
         let is_readable = async {
-            let parts: Vec<Vec<u8>> = sqlx::query_scalar(
-                "SELECT entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
-            )
-            .bind(row.get::<i64, _>(0))
-            .fetch_all(&mut *connection)
-            .await?;
-            Ok::<_, sqlx::Error>(form::stored_tournament(row.get(2), row.get(3), &parts).is_ok())
+            let rows = sqlx::query_scalar(UnitKind::Tournament.sql(ROWS))
+                .bind(row.get::<i64, _>(0))
+                .fetch_all(&mut *connection)
+                .await?;
+            let stored = StoredUnit {
+                form: row.get(2),
+                header: row.get(3),
+                rows,
+            };
+            Ok::<_, sqlx::Error>(StoredTournament::decode(Id(id), &stored).is_ok())
         };
         let is_over: bool = row.get(4);
         if !is_over || !is_readable.await? {

@@ -24,7 +24,9 @@ use sqlx::postgres::PgConnection;
 
 use super::*;
 use crate::store::cluster::{ClusterStore, Epoch, Kind, NodeId, NodeInfo};
+use crate::store::tests::TypedUnits as _;
 use crate::store::tournaments::{TournamentEntry, TournamentHeader};
+use crate::store::units::UnitKind;
 
 /// A node that has just joined.
 pub(in crate::store) async fn node(database: &Database) -> PostgresStore {
@@ -185,8 +187,9 @@ async fn append(journal: &mut Box<dyn Journal>, number: u64) -> Result<(), Store
 
 /// Number of rows of a tournament's journal.
 async fn tournament_rows(store: &PostgresStore, tournament: u8) -> u64 {
-    let tournament = store.tournament(Id([tournament; 16])).await;
-    tournament.expect("readable").expect("it exists").rows
+    let unit = UnitKind::Tournament.id(Id([tournament; 16]));
+    let stored = store.unit(unit).await.expect("readable");
+    stored.expect("it exists").rows.len() as u64
 }
 
 /// The only game of a unit.

@@ -4,10 +4,35 @@ use std::borrow::Cow;
 use std::time::Duration;
 
 use crate::store::StoreError;
+use crate::store::units::UnitKind;
 use chefshat_room::ids::Id;
 
 /// The epoch of what has just been created.
 pub(super) const FIRST_EPOCH: i64 = 1;
+
+/// The number of rooms in the column `kind` of what nodes own.
+pub(super) const ROOM: i16 = 0;
+/// That of tournaments.
+const TOURNAMENT: i16 = 1;
+/// That of studies.
+const STUDY: i16 = 2;
+
+/// The number of a kind of unit.
+pub(super) fn number_of(kind: UnitKind) -> i16 {
+    match kind {
+        UnitKind::Tournament => TOURNAMENT,
+        UnitKind::Study => STUDY,
+    }
+}
+
+/// The kind of unit with a number, unless it is a room.
+pub(super) fn kind_of(number: i16) -> Option<UnitKind> {
+    match number {
+        TOURNAMENT => Some(UnitKind::Tournament),
+        STUDY => Some(UnitKind::Study),
+        _ => None,
+    }
+}
 
 /// A room or tournament, and the epoch at which its owner writes.
 #[derive(Debug, Clone, Copy)]

@@ -15,6 +15,7 @@ mod rows;
 mod space;
 #[cfg(test)]
 pub(super) mod tests;
+mod units;
 mod writer;
 
 use std::path::{Path, PathBuf};
@@ -23,7 +24,6 @@ use std::sync::{Arc, Mutex};
 
 use chefshat_proto::v1;
 use chefshat_record::pseudonym::Pseudonym;
-use chefshat_study::Change as StudyChange;
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
 use tokio::sync::{mpsc, watch};
@@ -42,8 +42,7 @@ use open::{FolderLock, IfGone};
 use super::codec::Codec;
 use super::ephemeral::{EphemeralJournal, Reservations};
 use super::form;
-use super::studies::{StoredStudy, StoredTraces, StudyHeader};
-use super::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use super::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
 use super::{
     DiskUsage, ForgetError, Forgotten, Journal, Listed, Part, ResumableGame, Store, StoreError,
     StoredGame,
@@ -337,96 +336,20 @@ impl Store for SqliteStore {
             .boxed()
     }
 
-    fn create_tournament(
-        &self,
-        header: Arc<TournamentHeader>,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        let order = WriteCommand::Tournament {
-            header: form::tournament_to_bytes(&header),
-            first: writer::TournamentRow::new(header.id, 0, &entries),
-        };
-        self.commands.send(order).boxed()
+    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
+        self.commands.send(WriteCommand::Unit(unit, write)).boxed()
     }
 
-    fn append_tournament(
-        &self,
-        tournament: Id,
-        row: u64,
-        entries: Vec<TournamentEntry>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        let row = writer::TournamentRow::new(tournament, row, &entries);
-        self.commands
-            .send(WriteCommand::TournamentEntries(row))
-            .boxed()
+    fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+        self.reader.unit(unit).boxed()
     }
 
-    fn tournaments(
+    fn units(
         &self,
+        kind: UnitKind,
         newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
-        self.reader.tournaments(newest_over).boxed()
-    }
-
-    fn hosts_studies(&self) -> bool {
-        true
-    }
-
-    fn create_study(&self, header: Arc<StudyHeader>) -> BoxFuture<'_, Result<(), StoreError>> {
-        let study = WriteCommand::Study {
-            id: header.id,
-            header: form::study_to_bytes(&header),
-        };
-        self.commands.send(study).boxed()
-    }
-
-    fn append_study(
-        &self,
-        study: Id,
-        row: u64,
-        changes: Vec<StudyChange>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        let row = study_row(study, row, &changes);
-        self.commands.send(WriteCommand::StudyChanges(row)).boxed()
-    }
-
-    fn rewrite_study(
-        &self,
-        study: Id,
-        changes: Vec<StudyChange>,
-        forgotten: Vec<u32>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        let row = study_row(study, 0, &changes);
-        let rewritten = WriteCommand::StudyRewritten { row, forgotten };
-        self.commands.send(rewritten).boxed()
-    }
-
-    fn delete_study(&self, study: Id) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.commands
-            .send(WriteCommand::StudyDeleted(study))
-            .boxed()
-    }
-
-    fn study(&self, study: Id) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {
-        self.reader.study(study).boxed()
-    }
-
-    fn studies(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
-        self.reader.studies().boxed()
-    }
-
-    fn append_traces(
-        &self,
-        study: Id,
-        traces: StoredTraces,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        let traces = WriteCommand::Traces {
-            study,
-            participant: traces.number,
-            game: traces.game,
-            traces: form::traces_to_bytes(traces.traces),
-        };
-        self.commands.send(traces).boxed()
+    ) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        self.reader.units(kind, newest_over).boxed()
     }
 
     fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
@@ -470,13 +393,5 @@ impl Store for SqliteStore {
             }
         }
         .boxed()
-    }
-}
-
-fn study_row(id: Id, position: u64, changes: &[StudyChange]) -> writer::StudyRow {
-    writer::StudyRow {
-        id,
-        position,
-        changes: form::study_changes_to_bytes(changes),
     }
 }

@@ -17,8 +17,6 @@ use super::rows::{self, Read};
 use crate::store::Keep;
 use crate::store::codec::Codec;
 use crate::store::form::{self, Unreadable, check_form, stored_header};
-use crate::store::studies::{StoredStudy, StoredTraces};
-use crate::store::tournaments::StoredTournament;
 use crate::store::{Listed, Part, ResumableGame, StoreError, StoredGame, listed};
 use chefshat_room::ids::Id;
 
@@ -171,93 +169,6 @@ impl Reader {
             .map_err(failure)
     }
 
-    /// See `Store::tournaments`.
-    pub(super) async fn tournaments(
-        &self,
-        newest_over: usize,
-    ) -> Result<Vec<StoredTournament>, StoreError> {
-        let tournaments = sqlx::query(
-            "SELECT number, form, header FROM tournaments WHERE number IN (
-                 SELECT number FROM tournaments WHERE over = 0
-                 UNION ALL
-                 SELECT * FROM (
-                     SELECT number FROM tournaments WHERE over = 1
-                     ORDER BY number DESC LIMIT $1))
-             ORDER BY number",
-        )
-        .bind(i64::try_from(newest_over).unwrap_or(i64::MAX))
-        .fetch_all(&self.pool)
-        .await
-        .map_err(failure)?;
-        let mut stored = Vec::with_capacity(tournaments.len());
-        for row in tournaments {
-            let number: i64 = row.get(0);
-            let parts: Vec<Vec<u8>> = sqlx::query_scalar(
-                "SELECT entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
-            )
-            .bind(number)
-            .fetch_all(&self.pool)
-            .await
-            .map_err(failure)?;
-            match form::stored_tournament(row.get(1), row.get(2), &parts) {
-                Ok(tournament) => stored.push(tournament),
-                Err(problem) => {
-                    error!(number, %problem, "a tournament cannot be read; it is left unchanged");
-                }
-            }
-        }
-        Ok(stored)
-    }
-
-    /// See `Store::study`.
-    pub(super) async fn study(&self, study: Id) -> Result<Option<StoredStudy>, StoreError> {
-        let row = sqlx::query("SELECT number, form, header FROM studies WHERE study_id = $1")
-            .bind(study.0.as_slice())
-            .fetch_optional(&self.pool)
-            .await
-            .map_err(failure)?;
-        let Some(row) = row else { return Ok(None) };
-        let parts: Vec<Vec<u8>> = sqlx::query_scalar(
-            "SELECT changes FROM study_changes WHERE study = $1 ORDER BY position",
-        )
-        .bind(row.get::<i64, _>(0))
-        .fetch_all(&self.pool)
-        .await
-        .map_err(failure)?;
-        let stored = form::stored_study(row.get(1), row.get(2), &parts);
-        stored
-            .map(Some)
-            .map_err(|problem| unreadable_study(study, &problem))
-    }
-
-    /// See `Store::studies`.
-    pub(super) async fn studies(&self) -> Result<Vec<Id>, StoreError> {
-        let ids: Vec<Vec<u8>> = sqlx::query_scalar("SELECT study_id FROM studies ORDER BY number")
-            .fetch_all(&self.pool)
-            .await
-            .map_err(failure)?;
-        let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
-        Ok(ids.into_iter().filter_map(id).collect())
-    }
-
-    /// See `Store::traces`.
-    pub(super) async fn traces(&self, study: Id) -> Result<Vec<StoredTraces>, StoreError> {
-        let rows = sqlx::query(
-            "SELECT participant, game_id, traces FROM study_traces
-             WHERE study = (SELECT number FROM studies WHERE study_id = $1) ORDER BY number",
-        )
-        .bind(study.0.as_slice())
-        .fetch_all(&self.pool)
-        .await
-        .map_err(failure)?;
-        let read = rows.iter().filter_map(|row| {
-            form::stored_traces(row.get(0), row.get(1), row.get(2))
-                .inspect_err(|problem| error!(%study, %problem, "traces of a game are left out"))
-                .ok()
-        });
-        Ok(read.collect())
-    }
-
     /// The journals of all running games, by game number; the inner result says why one cannot be
     /// read. Reads everything stored since the oldest of them was created.
     async fn running_journals(&self) -> Result<HashMap<i64, Result<Read, Unreadable>>, StoreError> {
@@ -386,8 +297,4 @@ impl Reader {
         let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
         Ok(ids.into_iter().filter_map(id).collect())
     }
-}
-
-fn unreadable_study(study: Id, problem: &Unreadable) -> StoreError {
-    StoreError::Unreadable(format!("study {study} cannot be read: {problem}"))
 }

@@ -8,6 +8,8 @@ use sqlx::Row as _;
 use sqlx::sqlite::SqliteConnection;
 
 use crate::store::form;
+use crate::store::tournaments::StoredTournament;
+use crate::store::units::{ROWS, StoredUnit, UnitKind};
 use chefshat_room::ids::Id;
 
 /// Which tournaments and studies need their games, as far as they were asked about.
@@ -45,6 +47,7 @@ async fn is_study(connection: &mut SqliteConnection, unit: Id) -> sqlx::Result<b
 
 /// Whether this is a tournament that is not over or cannot be read.
 async fn is_open(connection: &mut SqliteConnection, unit: Id) -> sqlx::Result<bool> {
+    let kind = UnitKind::Tournament;
     let row =
         sqlx::query("SELECT number, form, header, over FROM tournaments WHERE tournament_id = $1")
             .bind(unit.0.as_slice())
@@ -54,11 +57,14 @@ async fn is_open(connection: &mut SqliteConnection, unit: Id) -> sqlx::Result<bo
     if !row.get::<bool, _>(3) {
         return Ok(true);
     }
-    let parts: Vec<Vec<u8>> = sqlx::query_scalar(
-        "SELECT entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
-    )
-    .bind(row.get::<i64, _>(0))
-    .fetch_all(connection)
-    .await?;
-    Ok(form::stored_tournament(row.get(1), row.get(2), &parts).is_err())
+    let rows = sqlx::query_scalar(kind.sql(ROWS))
+        .bind(row.get::<i64, _>(0))
+        .fetch_all(connection)
+        .await?;
+    let stored = StoredUnit {
+        form: row.get(1),
+        header: row.get(2),
+        rows,
+    };
+    Ok(StoredTournament::decode(unit, &stored).is_err())
 }

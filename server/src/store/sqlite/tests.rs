@@ -20,6 +20,7 @@ use sqlx::{Connection as _, Executor as _};
 
 use super::{OpenError, SqliteStore};
 use crate::store::form;
+use crate::store::tests::TypedUnits as _;
 use crate::store::tournaments::{StoredTournament, TournamentEntry};
 use crate::store::{Keep, Part, Store, StoredGame};
 use crate::tournaments::restored;

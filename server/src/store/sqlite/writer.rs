@@ -20,12 +20,13 @@ use super::retained::Units;
 use super::rewriting::{empty_log, empty_log_in_place, rewrite};
 use super::rows::with_own_rows;
 use super::space::Space;
+use super::units;
 use crate::clock::since_epoch_ms;
 use crate::metrics::StoreMetrics;
 use crate::store::StoreError;
 use crate::store::forget::Rewrite;
-use crate::store::form::{self, FORM};
-use crate::store::tournaments::TournamentEntry;
+use crate::store::form::FORM;
+use crate::store::units::{UnitId, UnitWrite};
 use chefshat_room::ids::Id;
 
 /// Commands that may wait for the writer.
@@ -85,28 +86,8 @@ pub(super) enum WriteCommand {
     Prune { games: Vec<Id> },
     /// Deletes finished games.
     Delete { games: Vec<Id> },
-    /// Creates a tournament.
-    Tournament {
-        header: Vec<u8>,
-        first: TournamentRow,
-    },
-    /// Adds a row to a tournament.
-    TournamentEntries(TournamentRow),
-    /// Creates a study.
-    Study { id: Id, header: Vec<u8> },
-    /// Adds a row to a study.
-    StudyChanges(StudyRow),
-    /// Replaces the rows of a study by one and deletes the interface traces of participants.
-    StudyRewritten { row: StudyRow, forgotten: Vec<u32> },
-    /// Deletes a study.
-    StudyDeleted(Id),
-    /// Adds interface traces.
-    Traces {
-        study: Id,
-        participant: u32,
-        game: Id,
-        traces: Vec<u8>,
-    },
+    /// Writes something for a tournament or study.
+    Unit(UnitId, UnitWrite),
     /// Removes a participant from games and tournaments that are over.
     Rewrite(Box<Rewrite>),
     /// No command follows.
@@ -118,13 +99,17 @@ impl WriteCommand {
     fn is_deletion(&self) -> bool {
         matches!(
             self,
-            Self::Delete { .. } | Self::Prune { .. } | Self::StudyDeleted(_)
+            Self::Delete { .. } | Self::Prune { .. } | Self::Unit(_, UnitWrite::Delete)
         )
     }
 
     /// Whether what it overwrites must not stay in the log.
     fn forgets(&self) -> bool {
-        self.is_deletion() || matches!(self, Self::Rewrite(_) | Self::StudyRewritten { .. })
+        let rewrites = matches!(
+            self,
+            Self::Rewrite(_) | Self::Unit(_, UnitWrite::Rewrite { .. })
+        );
+        self.is_deletion() || rewrites
     }
 }
 
@@ -138,35 +123,6 @@ pub(super) struct Row {
     /// The number of the game's previous row.
     pub(super) previous: Option<i64>,
     pub(super) entries: Vec<u8>,
-}
-
-/// A row of a tournament's journal.
-pub(super) struct TournamentRow {
-    id: Id,
-    /// Its number in its tournament, from 0.
-    position: i64,
-    entries: Vec<u8>,
-    /// Whether it ends the tournament.
-    over: bool,
-}
-
-impl TournamentRow {
-    pub(super) fn new(id: Id, row: u64, entries: &[TournamentEntry]) -> Self {
-        Self {
-            id,
-            position: i64::try_from(row).unwrap_or(i64::MAX),
-            entries: form::tournament_entries_to_bytes(entries),
-            over: entries.iter().any(TournamentEntry::is_end),
-        }
-    }
-}
-
-/// A row of a study's journal.
-pub(super) struct StudyRow {
-    pub(super) id: Id,
-    /// Its number in its study, from 0.
-    pub(super) position: u64,
-    pub(super) changes: Vec<u8>,
 }
 
 /// A command and the sender of its result.
@@ -436,59 +392,10 @@ async fn write(
                     taken.insert(index, *game_id);
                 }
             }
-            WriteCommand::Tournament { header, first } => {
-                let added = sqlx::query(
-                    "INSERT INTO tournaments (tournament_id, form, header) VALUES ($1, $2, $3)
-                     ON CONFLICT (tournament_id) DO NOTHING",
-                )
-                .bind(first.id.0.as_slice())
-                .bind(FORM)
-                .bind(header.as_slice())
-                .execute(&mut *connection)
-                .await?;
-                if added.rows_affected() > 0 {
-                    move_tournament(connection, first).await?;
-                } else {
-                    taken.insert(index, first.id);
+            WriteCommand::Unit(unit, change) => {
+                if !units::write(connection, *unit, change).await? {
+                    taken.insert(index, unit.id);
                 }
-            }
-            WriteCommand::TournamentEntries(row) => move_tournament(connection, row).await?,
-            WriteCommand::Study { id, header } => {
-                let added = sqlx::query(
-                    "INSERT INTO studies (study_id, form, header) VALUES ($1, $2, $3)
-                     ON CONFLICT (study_id) DO NOTHING",
-                )
-                .bind(id.0.as_slice())
-                .bind(FORM)
-                .bind(header.as_slice())
-                .execute(&mut *connection)
-                .await?;
-                if added.rows_affected() == 0 {
-                    taken.insert(index, *id);
-                }
-            }
-            WriteCommand::StudyChanges(row) => change_study(connection, row).await?,
-            WriteCommand::StudyRewritten { row, forgotten } => {
-                forget_in_study(connection, row.id, forgotten).await?;
-                change_study(connection, row).await?;
-            }
-            WriteCommand::StudyDeleted(study) => delete_study(connection, *study).await?,
-            WriteCommand::Traces {
-                study,
-                participant,
-                game,
-                traces,
-            } => {
-                sqlx::query(
-                    "INSERT INTO study_traces (study, participant, game_id, traces)
-                     SELECT number, $2, $3, $4 FROM studies WHERE study_id = $1",
-                )
-                .bind(study.0.as_slice())
-                .bind(*participant)
-                .bind(game.0.as_slice())
-                .bind(traces.as_slice())
-                .execute(&mut *connection)
-                .await?;
             }
             WriteCommand::Prune { games } => prune(connection, games).await?,
             WriteCommand::Delete { games } => {
@@ -607,81 +514,6 @@ async fn create(
     .execute(connection)
     .await
     .map(|created| created.rows_affected() > 0)
-}
-
-async fn move_tournament(
-    connection: &mut SqliteConnection,
-    row: &TournamentRow,
-) -> sqlx::Result<()> {
-    sqlx::query(
-        "INSERT INTO tournament_entries (tournament, position, entries)
-         VALUES ((SELECT number FROM tournaments WHERE tournament_id = $1), $2, $3)",
-    )
-    .bind(row.id.0.as_slice())
-    .bind(row.position)
-    .bind(row.entries.as_slice())
-    .execute(&mut *connection)
-    .await?;
-    if row.over {
-        sqlx::query("UPDATE tournaments SET over = 1 WHERE tournament_id = $1")
-            .bind(row.id.0.as_slice())
-            .execute(&mut *connection)
-            .await?;
-    }
-    Ok(())
-}
-
-async fn change_study(connection: &mut SqliteConnection, row: &StudyRow) -> sqlx::Result<()> {
-    sqlx::query(
-        "INSERT INTO study_changes (study, position, changes)
-         SELECT number, $2, $3 FROM studies WHERE study_id = $1",
-    )
-    .bind(row.id.0.as_slice())
-    .bind(i64::try_from(row.position).unwrap_or(i64::MAX))
-    .bind(row.changes.as_slice())
-    .execute(connection)
-    .await
-    .map(drop)
-}
-
-/// Deletes a study. What is still added to it afterwards has no effect.
-async fn delete_study(connection: &mut SqliteConnection, study: Id) -> sqlx::Result<()> {
-    for text in [
-        "DELETE FROM study_traces WHERE study = (SELECT number FROM studies WHERE study_id = $1)",
-        "DELETE FROM study_changes WHERE study = (SELECT number FROM studies WHERE study_id = $1)",
-        "DELETE FROM studies WHERE study_id = $1",
-    ] {
-        sqlx::query(text)
-            .bind(study.0.as_slice())
-            .execute(&mut *connection)
-            .await?;
-    }
-    Ok(())
-}
-
-/// Deletes the journal of a study, which is written again, and the interface traces of participants.
-async fn forget_in_study(
-    connection: &mut SqliteConnection,
-    study: Id,
-    participants: &[u32],
-) -> sqlx::Result<()> {
-    sqlx::query(
-        "DELETE FROM study_changes WHERE study = (SELECT number FROM studies WHERE study_id = $1)",
-    )
-    .bind(study.0.as_slice())
-    .execute(&mut *connection)
-    .await?;
-    for participant in participants {
-        sqlx::query(
-            "DELETE FROM study_traces
-             WHERE study = (SELECT number FROM studies WHERE study_id = $1) AND participant = $2",
-        )
-        .bind(study.0.as_slice())
-        .bind(participant)
-        .execute(&mut *connection)
-        .await?;
-    }
-    Ok(())
 }
 
 /// Writes the end and the search fields of a game, and adds it to the list of finished games.

@@ -1,8 +1,5 @@
 //! How often public views of a tournament are computed, and how large they can become.
 
-use std::collections::BTreeMap;
-use std::sync::Mutex;
-
 use chefshat_agents::AgentKind;
 use chefshat_engine::MAX_SEATS;
 use chefshat_tournament::{
@@ -10,13 +7,14 @@ use chefshat_tournament::{
     ParticipantKind, SeatStatistics,
 };
 use prost::Message as _;
-use tokio::sync::{mpsc, watch};
+use tokio_util::sync::CancellationToken;
 
 use super::*;
 use crate::config::MAX_NAME_CHARS;
+use crate::journaled::{Folded, New};
 use crate::limits::Key;
-use crate::tournaments::handle::TournamentState;
-use crate::tournaments::shared::Shared;
+use crate::store::tournaments::TournamentHeader;
+use crate::tournaments::handle::{TournamentShared, TournamentState};
 use chefshat_room::ids::{Id, Token};
 
 /// Default message limit of gRPC clients, bytes.
@@ -57,9 +55,8 @@ impl TournamentHandle {
             }));
         }
         let id = Id::random();
-        Arc::new(Self {
-            end: tokio_util::sync::CancellationToken::new(),
-            header: crate::store::tournaments::TournamentHeader {
+        let folded = Folded {
+            header: TournamentHeader {
                 id,
                 settings: convert::settings_to_proto(&"🍕".repeat(MAX_NAME_CHARS), &plan),
                 created_at_ms: 1,
@@ -68,18 +65,12 @@ impl TournamentHandle {
                 deal_secret: [2; 32],
             },
             plan,
-            charged: Key::Local,
-            committed: Mutex::new(TournamentState {
-                core,
-                tickets: BTreeMap::new(),
-                placed: BTreeMap::new(),
-                connected: BTreeMap::new(),
-            }),
-            mailbox: mpsc::channel(1).0,
-            changes: watch::Sender::new(0),
-            follower_update: Shared::default(),
-            results: Shared::default(),
-        })
+            state: TournamentState::new(core),
+            rows: 1,
+        };
+        let shared = TournamentShared::default();
+        let (handle, _) = Self::new(New { folded, shared }, Key::Local, CancellationToken::new());
+        handle
     }
 
     fn started(self: Arc<Self>) -> Arc<Self> {
@@ -135,7 +126,7 @@ async fn views_are_computed_once_for_each_change() {
     assert!(Arc::ptr_eq(&follower_update, &same));
     let same = handle.results(&permits).await.expect("computed");
     assert!(Arc::ptr_eq(&results, &same));
-    handle.changes.send_modify(|count| *count += 1);
+    handle.notify();
     let other = handle.follower_update(&permits).await.expect("computed");
     assert!(!Arc::ptr_eq(&follower_update, &other));
     // A client that learned of the start before the change was counted sees no earlier state.

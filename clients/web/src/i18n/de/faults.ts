@@ -108,7 +108,6 @@ export const faults: Texts["faults"] = {
     STUDY_CLOSED: "Diese Studie ist geschlossen. Danke für dein Interesse.",
     STUDY_RUNNING: "Einige sind mitten in dieser Studie. Warte, bis sie fertig sind, oder entferne sie.",
     STUDY_UNKNOWN: "Diese Studie gibt es nicht, oder der Schlüssel gehört nicht zu ihr.",
-    STUDIES_NOT_HOSTED: "Dieser Server kann keine Studien durchführen.",
     TOO_MANY_STUDIES: "Auf diesem Server können keine Studien mehr erstellt werden.",
     TOO_MANY_SESSIONS: "Diese Studie wurde in kurzer Zeit zu oft geöffnet. Versuche es gleich noch einmal.",
     TOO_MANY_PARTICIPANTS: "Zu dieser Studie können keine Teilnehmer mehr hinzugefügt werden.",

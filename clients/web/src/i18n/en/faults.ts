@@ -101,7 +101,6 @@ export const faults = {
     STUDY_CLOSED: "This study is closed. Thank you for your interest.",
     STUDY_RUNNING: "Participants are in the middle of this study. Wait for them, or remove them.",
     STUDY_UNKNOWN: "This study does not exist, or the owner token does not belong to it.",
-    STUDIES_NOT_HOSTED: "This server cannot hold studies.",
     TOO_MANY_STUDIES: "No more studies can be created on this server.",
     TOO_MANY_SESSIONS: "This study was opened too often in a short time. Try again in a moment.",
     TOO_MANY_PARTICIPANTS: "No more participants can be added to this study.",

@@ -105,7 +105,6 @@ export const faults: Texts["faults"] = {
     STUDY_CLOSED: "Este estudio está cerrado. Gracias por tu interés.",
     STUDY_RUNNING: "Hay participantes en mitad de este estudio. Espera a que terminen o quítalos.",
     STUDY_UNKNOWN: "Este estudio no existe, o la clave no le pertenece.",
-    STUDIES_NOT_HOSTED: "Este servidor no puede alojar estudios.",
     TOO_MANY_STUDIES: "En este servidor no se pueden crear más estudios.",
     TOO_MANY_SESSIONS: "Este estudio se ha abierto demasiadas veces en poco tiempo. Inténtalo de nuevo en un momento.",
     TOO_MANY_PARTICIPANTS: "No se pueden añadir más participantes a este estudio.",

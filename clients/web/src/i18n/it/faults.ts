@@ -101,7 +101,6 @@ export const faults: Texts["faults"] = {
     STUDY_CLOSED: "Questo studio è chiuso. Grazie per l’interesse.",
     STUDY_RUNNING: "Ci sono partecipanti a metà dello studio. Aspetta che finiscano, oppure rimuovili.",
     STUDY_UNKNOWN: "Questo studio non esiste, o la chiave non gli appartiene.",
-    STUDIES_NOT_HOSTED: "Questo server non può ospitare studi.",
     TOO_MANY_STUDIES: "Su questo server non si possono creare altri studi.",
     TOO_MANY_SESSIONS: "Questo studio è stato aperto troppo spesso in poco tempo. Riprova fra un momento.",
     TOO_MANY_PARTICIPANTS: "Non si possono aggiungere altri partecipanti a questo studio.",

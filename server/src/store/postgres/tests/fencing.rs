@@ -222,7 +222,8 @@ async fn a_tournament_changes_hands_with_all_its_rooms() {
 
     let found = pair.second.load(unit, SECOND).await.expect("readable");
     let found = found.expect("it is owned");
-    assert_eq!(found.tournament.expect("a tournament").rows, 1);
+    let (kind, stored) = found.stored.expect("a tournament");
+    assert_eq!((kind, stored.rows.len()), (UnitKind::Tournament, 1));
     let games: Vec<_> = (found.games.iter())
         .map(|game| (game.concluded, numbers(&game.entries)))
         .collect();

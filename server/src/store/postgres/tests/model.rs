@@ -6,6 +6,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
 use super::*;
+use crate::store::postgres::values::integer;
 
 /// Nodes that take part.
 const NODES: usize = 3;

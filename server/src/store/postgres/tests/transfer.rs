@@ -6,6 +6,7 @@ use chefshat_record::replay;
 
 use super::*;
 use crate::convert;
+use crate::store::tournaments::StoredTournament;
 use crate::store::{DATABASE_FILE, SqliteStore};
 use crate::tournaments::restored;
 use chefshat_room::Core;
@@ -82,13 +83,14 @@ async fn a_database_of_an_earlier_version_moves_with_everything_in_it() {
     }
     let mut resumed = Vec::new();
     let mut resumed_tournaments = Vec::new();
-    for (unit, epoch) in store.orphans(99).await.expect("readable") {
-        let epoch = store.claim(unit, epoch).await.expect("it answers");
+    for (id, epoch) in store.orphans(99).await.expect("readable") {
+        let epoch = store.claim(id, epoch).await.expect("it answers");
         let epoch = epoch.expect("nobody owns it");
-        let unit = store.load(unit, epoch).await.expect("readable");
+        let unit = store.load(id, epoch).await.expect("readable");
         let unit = unit.expect("it is owned");
         resumed.extend(unit.games);
-        resumed_tournaments.extend(unit.tournament);
+        let stored = (unit.stored).map(|(_, it)| StoredTournament::decode(id, &it));
+        resumed_tournaments.extend(stored.transpose().expect("readable"));
     }
     let by_id = |game: &ResumableGame| game.header.game_id;
     resumed.sort_by_key(by_id);

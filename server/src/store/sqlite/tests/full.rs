@@ -10,6 +10,7 @@ use crate::store::StoreError;
 use crate::store::sqlite::open::{self, IfGone};
 use crate::store::sqlite::space::Space;
 use crate::store::sqlite::writer::{self, Pending, WriteCommand};
+use crate::store::units::{UnitKind, UnitWrite};
 
 /// Longest time that a test waits for a commit.
 const LIMIT: Duration = Duration::from_secs(20);
@@ -57,19 +58,21 @@ async fn deletions_go_first_while_the_disk_is_full() {
     for game in [1, 2] {
         committed(send(&commands, imported(game)).await).await;
     }
-    let study = WriteCommand::Study {
-        id: Id([9; 16]),
+    let study = UnitKind::Study.id(Id([9; 16]));
+    let create = UnitWrite::Create {
+        join_code: None,
         header: Vec::new(),
+        first: None,
     };
-    committed(send(&commands, study).await).await;
+    committed(send(&commands, WriteCommand::Unit(study, create)).await).await;
 
     let mut third = send(&commands, imported(3)).await;
     while !space.is_full() {
         tokio::time::sleep(Duration::from_millis(10)).await;
     }
     let mut fourth = send(&commands, imported(4)).await;
-    let study = send(&commands, WriteCommand::StudyDeleted(Id([9; 16]))).await;
-    committed(study).await;
+    let delete = WriteCommand::Unit(study, UnitWrite::Delete);
+    committed(send(&commands, delete).await).await;
     assert!(third.try_recv().is_err() && fourth.try_recv().is_err());
     let games = vec![Id([1; 16]), Id([2; 16])];
     committed(send(&commands, WriteCommand::Prune { games }).await).await;

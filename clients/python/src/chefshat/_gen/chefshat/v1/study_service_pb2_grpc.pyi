@@ -38,8 +38,7 @@ class StudyServiceStub:
     CreateStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.CreateStudyRequest, _study_service_pb2.CreateStudyResponse]
     """Creates a study without participants. INVALID_ARGUMENT (SETTINGS_REFUSED names the field,
     REQUEST_ID_REFUSED); ALREADY_EXISTS (REQUEST_ID_USED); RESOURCE_EXHAUSTED (TOO_MANY_STUDIES,
-    DISK_NEARLY_FULL); FAILED_PRECONDITION (STUDIES_NOT_HOSTED on a server whose store has no
-    studies); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+    DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
     """
     GetStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.GetStudyRequest, _study_service_pb2.GetStudyResponse]
     """Returns a study. NOT_FOUND (STUDY_UNKNOWN)."""
@@ -100,8 +99,7 @@ class StudyServiceAsyncStub(StudyServiceStub):
     CreateStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.CreateStudyRequest, _study_service_pb2.CreateStudyResponse]  # type: ignore[assignment]
     """Creates a study without participants. INVALID_ARGUMENT (SETTINGS_REFUSED names the field,
     REQUEST_ID_REFUSED); ALREADY_EXISTS (REQUEST_ID_USED); RESOURCE_EXHAUSTED (TOO_MANY_STUDIES,
-    DISK_NEARLY_FULL); FAILED_PRECONDITION (STUDIES_NOT_HOSTED on a server whose store has no
-    studies); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+    DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
     """
     GetStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.GetStudyRequest, _study_service_pb2.GetStudyResponse]  # type: ignore[assignment]
     """Returns a study. NOT_FOUND (STUDY_UNKNOWN)."""
@@ -165,8 +163,7 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_study_service_pb2.CreateStudyResponse, _abc.Awaitable[_study_service_pb2.CreateStudyResponse]]:
         """Creates a study without participants. INVALID_ARGUMENT (SETTINGS_REFUSED names the field,
         REQUEST_ID_REFUSED); ALREADY_EXISTS (REQUEST_ID_USED); RESOURCE_EXHAUSTED (TOO_MANY_STUDIES,
-        DISK_NEARLY_FULL); FAILED_PRECONDITION (STUDIES_NOT_HOSTED on a server whose store has no
-        studies); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+        DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
         """
 
     @_abc_1.abstractmethod
