@@ -1,6 +1,7 @@
 //! A study on three nodes, of which the one that owns it is killed while its participants play.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use chefshat_client::{Backoff, Client, Connection, PlayOptions, RandomAgent};
@@ -66,6 +67,27 @@ async fn settled<T, F: Future<Output = Result<T, Status>>>(call: impl Fn() -> F)
     patiently("an answer", trying).await
 }
 
+/// As [`settled`], for a step that is taken once: `None` if the answer was lost with the node that had
+/// committed it.
+async fn taken<T, F: Future<Output = Result<T, Status>>>(call: impl Fn() -> F) -> Option<T> {
+    let is_lost = AtomicBool::new(false);
+    let attempt = || async {
+        match call().await {
+            Err(status) if status.code() == Code::Unavailable => {
+                is_lost.store(true, Ordering::Relaxed);
+                Err(status)
+            }
+            Err(status)
+                if status.code() == Code::FailedPrecondition && is_lost.load(Ordering::Relaxed) =>
+            {
+                Ok(None)
+            }
+            answer => answer.map(Some),
+        }
+    };
+    settled(attempt).await
+}
+
 /// Opens a link. Returns the session and what is shown.
 async fn open(
     service: &ParticipationServiceClient<Connection>,
@@ -117,12 +139,12 @@ async fn take_part(url: String, link: String) {
         },
         ..PlayOptions::default()
     };
-    let (session, mut view) = open(&service, &link).await;
+    let (mut session, mut view) = open(&service, &link).await;
     loop {
         let step = view.step;
-        view = match view.content.expect("content") {
+        let next = match view.content.expect("content") {
             Content::Consent(_) => {
-                let given = settled(|| {
+                let given = taken(|| {
                     let mut service = service.clone();
                     let session = session.clone();
                     async move {
@@ -131,7 +153,7 @@ async fn take_part(url: String, link: String) {
                             .await
                     }
                 });
-                given.await.into_inner().view.expect("a view")
+                (given.await).map(|given| given.into_inner().view)
             }
             Content::Game(_) => {
                 let playable = |content: &Content| matches!(content, Content::Game(game) if !game.ticket.is_empty());
@@ -144,13 +166,13 @@ async fn take_part(url: String, link: String) {
                 assert!(outcome.expect("it ends").standing().is_some(), "aborted");
                 let ended = |content: &Content| matches!(content, Content::Game(it) if it.ended);
                 until(&service, &session, ended).await;
-                let continued = settled(|| {
+                let continued = taken(|| {
                     let mut service = service.clone();
                     let session = session.clone();
                     let request = v1::ContinueStudyRequest { session, step };
                     async move { service.continue_study(request).await }
                 });
-                continued.await.into_inner().view.expect("a view")
+                (continued.await).map(|continued| continued.into_inner().view)
             }
             Content::End(end) => {
                 assert_eq!(end.reason(), v1::StudyEndReason::Completed);
@@ -158,6 +180,11 @@ async fn take_part(url: String, link: String) {
             }
             other => panic!("unexpected: {other:?}"),
         };
+        match next {
+            Some(next) => view = next.expect("a view"),
+            // A page shows what follows in the same way.
+            None => (session, view) = open(&service, &link).await,
+        }
     }
 }
 
