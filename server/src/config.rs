@@ -52,10 +52,6 @@ pub const VECTOR_IDLE_TIMEOUT: Duration = Duration::from_secs(3_600);
 pub const VECTOR_SEND_TIMEOUT: Duration = Duration::from_secs(60);
 /// Time of a hint.
 pub const HINT_TIME: Duration = Duration::from_millis(400);
-/// The largest budget of a search of a built-in agent in a room, as time.
-pub const MAX_SEARCH_BUDGET: Duration = Duration::from_secs(1);
-/// The largest budget of a search of a built-in agent in a room, as rollouts.
-pub const MAX_SEARCH_ROLLOUTS: u64 = 5_000;
 /// Most analyses at a time, those waiting for a thread included.
 pub const MAX_ANALYSES: usize = 64;
 /// Most rollouts of an analysis.
@@ -85,8 +81,6 @@ pub const IMPORT_TIMEOUT: Duration = Duration::from_secs(120);
 pub const IMPORT_IDLE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Most uploads of records at a time.
 pub const MAX_IMPORTS: usize = 2;
-/// Most records that are assembled or replayed at a time, for each purpose.
-pub const MAX_CONCURRENT_RECORDS: usize = 2;
 /// Most records that are sent at a time.
 pub const MAX_RECORDS_SENT: usize = 8;
 /// How long a client may take to receive one message of a record.
@@ -162,10 +156,6 @@ pub fn longest_shutdown(grace: Duration) -> Duration {
     grace.max(HAND_OVER_LIMIT) + END_LIMIT + 2 * DRAIN_LIMIT + CLOSE_LIMIT
 }
 
-/// Longest name of a room or participant, characters.
-pub const MAX_NAME_CHARS: usize = 64;
-/// Most Shifts of a hosted game, and highest target in points.
-pub const MAX_HOSTED_SHIFTS: u32 = Limits::OF_SERVER.recorded_shifts;
 /// Interval of heartbeats on an idle stream, unless its client asks for another.
 pub const HEARTBEAT: Duration = Duration::from_secs(15);
 

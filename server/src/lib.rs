@@ -3,23 +3,16 @@
 //! command line is `chefshat`, in `server/cli` and `server/lab`.
 
 pub mod access;
-pub mod clock;
 pub mod cluster;
 pub mod config;
 pub mod connections;
-pub mod convert;
-pub mod file_watch;
 pub mod forwarded;
 pub mod grpc;
 pub mod handshakes;
 pub mod host;
 pub mod journaled;
 pub mod limits;
-pub mod metrics;
-pub mod outbox;
 pub mod participants;
-pub mod post;
-pub mod proxies;
 pub mod record_writer;
 pub mod retention;
 pub mod room;
@@ -30,10 +23,11 @@ pub mod serve;
 pub mod signing;
 pub mod store;
 pub mod studies;
-mod tasks;
-mod threads;
 pub mod tls;
 pub mod tournaments;
 pub mod web;
 pub mod webhooks;
-pub mod wire;
+
+pub use chefshat_base::{clock, file_watch, metrics, post, proxies, tasks, threads};
+
+pub use chefshat_wire::{convert, encoded as wire, outbox};

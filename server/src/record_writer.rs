@@ -7,7 +7,6 @@ use tokio::sync::{OwnedRwLockWriteGuard, RwLock};
 use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
-use crate::convert;
 use crate::limits::{Background, Key};
 use crate::store::{Store, StoredGame};
 use crate::tasks::short;
@@ -86,7 +85,7 @@ impl RecordWriter {
         let writing = self.background.run(move || {
             let path = chefshat_record::jsonl::path_of(&data_dir, &game.to_string());
             let written = chefshat_record::jsonl::write_private(&path, |write| {
-                convert::each_line_of(&stored, |line| write(&line));
+                stored.each_line(|line| write(&line));
             });
             written.map(|()| path)
         });

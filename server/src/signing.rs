@@ -13,9 +13,9 @@ use futures::future::Either;
 use tokio::sync::Semaphore;
 use tracing::error;
 
-use crate::config::MAX_CONCURRENT_RECORDS;
 use crate::convert;
 use crate::limits::{Background, Key};
+use crate::store::MAX_CONCURRENT_RECORDS;
 use crate::store::{Journal, StoreError};
 use chefshat_room::journal::GameHeader;
 

@@ -124,26 +124,26 @@ fn messages(out: &Path, descriptors: FileDescriptorSet) -> Generated {
 /// (`wire`), and both sides of the streams between nodes.
 #[test]
 fn the_code_of_the_server_is_that_of_its_files() {
-    check("../server/generated", |out| {
+    check("../server/wire/generated", |out| {
         let files = ["v1/play_service", "v1/spectator_service", "peer/v1/peer"]
             .map(|service| format!("chefshat/{service}.proto"));
         let descriptors = protox::compile(files, ["."])?;
         fs::write(out.join("peer.bin"), descriptors.encode_to_vec())?;
         builder(out)
             .client_mod_attribute("chefshat.v1", "#[cfg(any())]")
-            .codec_path("crate::wire::SmallBuffers")
+            .codec_path("crate::encoded::SmallBuffers")
             .btree_map(".")
             .extern_path(".chefshat.v1", "::chefshat_proto::v1")
-            .extern_path(".chefshat.v1.PlayResponse", "crate::wire::Updates")
+            .extern_path(".chefshat.v1.PlayResponse", "crate::encoded::Updates")
             .extern_path(
                 ".chefshat.v1.PlayServiceWatchResponse",
-                "crate::wire::Updates",
+                "crate::encoded::Updates",
             )
             .extern_path(
                 ".chefshat.v1.SpectatorServiceWatchResponse",
-                "crate::wire::Updates",
+                "crate::encoded::Updates",
             )
-            .extern_path(".chefshat.peer.v1.PlayResponse", "crate::wire::Updates")
+            .extern_path(".chefshat.peer.v1.PlayResponse", "crate::encoded::Updates")
             .compile_fds(descriptors)?;
         Ok(())
     });

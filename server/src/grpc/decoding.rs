@@ -500,7 +500,7 @@ mod tests {
 
     /// The fields of messages between nodes that are lists, texts or messages.
     fn of_nodes() -> BTreeMap<String, Vec<(u32, bool, bool)>> {
-        let bytes: &[u8] = include_bytes!("../../generated/peer.bin");
+        let bytes: &[u8] = include_bytes!("../../wire/generated/peer.bin");
         let set = prost_types::FileDescriptorSet::decode(bytes).expect("descriptors");
         let file = (set.file.iter()).find(|file| file.package() == "chefshat.peer.v1");
         let messages = &file.expect("the file").message_type;

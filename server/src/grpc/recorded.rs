@@ -14,10 +14,10 @@ use super::reach::{Reach, Sight};
 use super::status::{self, is_elsewhere, is_refusal, owner_unreachable, status};
 use crate::access::{Caller, Refusal, Role};
 use crate::cluster::{FoundBy, Peer};
-use crate::config::{MAX_CONCURRENT_RECORDS, MAX_PEER_MESSAGE_BYTES};
-use crate::convert::lines_of;
+use crate::config::MAX_PEER_MESSAGE_BYTES;
 use crate::limits::{Held, Key, Places};
 use crate::rooms::Rooms;
+use crate::store::MAX_CONCURRENT_RECORDS;
 use crate::store::StoreError;
 use crate::threads::{Priority, Threads};
 use chefshat_room::ids::Id;
@@ -131,7 +131,7 @@ impl Recorded {
         if (stored.tournament()).is_some_and(|game| self.rooms().is_withheld(game)) {
             return Err(series_open());
         }
-        let working = move || work(lines_of(&stored).into_owned(), sight);
+        let working = move || work(stored.lines().into_owned(), sight);
         self.in_background(place, working).await
     }
 

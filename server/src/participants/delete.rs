@@ -12,7 +12,6 @@ use chefshat_room::ids::Id;
 
 use super::data::{DataError, ParticipantData, blocking};
 use super::files::{Candidate, Skipped, records_with};
-use crate::convert;
 use crate::store::{ForgetError, StoreError};
 
 /// Prefix of a pseudonym.
@@ -179,7 +178,7 @@ impl ParticipantData {
         let Some(stored) = self.store.finished(game).await? else {
             return Ok(None);
         };
-        let stored = blocking(move || convert::lines_of(&stored).into_owned()).await?;
+        let stored = blocking(move || stored.lines().into_owned()).await?;
         let pseudonym = pseudonym_of(who, lines, &stored).map(str::to_owned);
         Ok(pseudonym.map(|pseudonym| (pseudonym, stored)))
     }

@@ -14,7 +14,6 @@ use tokio::sync::mpsc;
 
 use super::data::{DataError, ParticipantData, blocking};
 use super::files::{Skipped, records_with};
-use crate::convert;
 use crate::store::tournaments::{StoredTournament, TournamentEntry};
 use crate::store::units::UnitKind;
 use crate::store::{Part, StoreError};
@@ -148,9 +147,7 @@ impl ParticipantData {
                 if let Some(stored) = stored {
                     let seats = seats_of(&summary, who).map(|seat| seat.seat).collect();
                     let who = who.clone();
-                    let reading = blocking(move || {
-                        lines_of_game(&summary, &convert::lines_of(&stored), &who)
-                    });
+                    let reading = blocking(move || lines_of_game(&summary, &stored.lines(), &who));
                     sheet.send(reading.await?).await?;
                     self.export_samples(game.to_string(), seats, sheet).await?;
                 }

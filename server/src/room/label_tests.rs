@@ -13,7 +13,6 @@ use chefshat_room::policy::Policy;
 use chefshat_room::testing::{OPEN, Table, ms, study_game};
 use prost::Message as _;
 
-use super::subscriber::snapshot;
 use crate::convert;
 
 /// A game that has started, of the participant Ana, the robot Carla and two agents, one of them
@@ -83,7 +82,7 @@ fn labels_hold_in_rooms_snapshots_and_events_for_every_viewer() {
         let mut sent = vec![room.encode_to_vec()];
         let seats = (0..4).map(|seat| Viewer::Seat(Seat::new(seat)));
         for viewer in seats.chain([Viewer::Spectator, Viewer::Everything]) {
-            let snapshot = snapshot(&table.core, viewer);
+            let snapshot = convert::snapshot(&table.core, viewer);
             let started = snapshot.game_started.as_ref().expect("it has started");
             assert_eq!(names(&started.seats), expected, "{viewer:?}");
             sent.push(snapshot.encode_to_vec());

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use chefshat_engine::{Event, Seat, Viewer};
 use chefshat_proto::v1::{self, seat_update::Update};
-use chefshat_record::convert::{observation_to_proto, seat_number};
+use chefshat_record::convert::seat_number;
 use chefshat_room::ids::Token;
 use chefshat_room::log::RoomEvent;
 use chefshat_room::{Awaited, ConnectionId, Core};
@@ -164,7 +164,7 @@ impl Subscriber {
         let mut spectator = Self::new(position, outbox, on_space, role);
         spectator.pending.add_room(&convert::describe(core));
         if with_snapshot {
-            let snapshot = snapshot(core, Viewer::Spectator);
+            let snapshot = convert::snapshot(core, Viewer::Spectator);
             spectator.pending.add_snapshot(&snapshot);
         }
         spectator.flush();
@@ -230,7 +230,7 @@ impl Subscriber {
             room_id: header.room_id.to_string(),
             game_id: header.game_id.to_string(),
             seat: seat_number(seat),
-            next_sequence: next_sequence(core),
+            next_sequence: convert::next_sequence(core),
             tournament_id: match &ticket {
                 Some(_) => convert::tournament_id(header),
                 None => String::new(),
@@ -240,7 +240,7 @@ impl Subscriber {
         self.pending.add(handle, Update::Attached(attached));
         if options.snapshot {
             self.position = core.log().len();
-            let snapshot = snapshot(core, Viewer::Seat(seat));
+            let snapshot = convert::snapshot(core, Viewer::Seat(seat));
             self.pending
                 .add(handle, Update::Snapshot(Box::new(snapshot)));
         }
@@ -553,21 +553,6 @@ impl PublicEvents {
         own.extend_from_slice(self.events.range(shared, to));
         Cow::Owned(own)
     }
-}
-
-/// The state of the game, for a viewer.
-pub fn snapshot(core: &Core, viewer: Viewer) -> v1::Snapshot {
-    v1::Snapshot {
-        game_started: core.game().map(|_| convert::game_started(core)),
-        observation: core
-            .observe(viewer)
-            .map(|observation| observation_to_proto(&observation)),
-        next_sequence: next_sequence(core),
-    }
-}
-
-fn next_sequence(core: &Core) -> u64 {
-    u64::try_from(core.log().len()).unwrap_or(u64::MAX) + 1
 }
 
 /// The current view of spectators: all hands after the game, or if the room allows it. Where it

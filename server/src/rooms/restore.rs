@@ -175,7 +175,7 @@ async fn read(
     let stored = (store.finished(game).await)
         .map_err(|error| error.to_string())?
         .ok_or("the record does not exist")?;
-    let reading = move || convert::recorded_player(&convert::lines_of(&stored), seat);
+    let reading = move || convert::recorded_player(&stored.lines(), seat);
     tokio::task::spawn_blocking(reading)
         .await
         .map_err(|error| error.to_string())?

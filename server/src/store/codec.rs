@@ -5,8 +5,10 @@ use std::sync::Arc;
 
 use tokio::sync::Semaphore;
 
-use crate::config::MAX_CONCURRENT_RECORDS;
 use crate::store::StoreError;
+
+/// Most records that are assembled or replayed at a time, for each purpose.
+pub const MAX_CONCURRENT_RECORDS: usize = 2;
 
 /// Most lines or entries that are processed in place: moving them to another thread would take
 /// longer.

@@ -14,7 +14,6 @@ use prost::Message as _;
 use super::form::{self, Unreadable};
 use super::tournaments::TournamentEntry;
 use super::{ForgetError, Forgotten, StoredGame};
-use crate::convert;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry, Fill, GameHeader, StudyGame};
 
@@ -152,7 +151,7 @@ fn key_of<'w>(who: &'w Pseudonym, stored: &StoredGame) -> Option<&'w SigningKey>
         StoredGame::Hosted(.., None) | StoredGame::Imported(_) => false,
     };
     let key = who.key.as_deref().filter(may_have)?;
-    key.has_signed(&convert::lines_of(stored)).then_some(key)
+    key.has_signed(&stored.lines()).then_some(key)
 }
 
 /// The signature of a game without the participant.
@@ -162,7 +161,7 @@ fn signature_of(
     entries: Arc<[Entry]>,
 ) -> v1::RecordSignature {
     let left = StoredGame::Hosted(header, entries, None);
-    key.sign_each(|add| convert::each_line_of(&left, |line| add(&line)))
+    key.sign_each(|add| left.each_line(|line| add(&line)))
 }
 
 /// Removes a participant from a game in memory that is over. If it changes, it is signed again by who

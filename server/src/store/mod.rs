@@ -16,14 +16,16 @@ pub(crate) mod tests;
 pub mod tournaments;
 pub mod units;
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
-use chefshat_proto::v1;
+use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::pseudonym::{Pseudonym, Redactions};
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 use prost::Message as _;
 
+pub use codec::MAX_CONCURRENT_RECORDS;
 pub use failing::{FailingStore, Read};
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
 pub use postgres::{
@@ -33,6 +35,7 @@ pub use sqlite::{
     DATABASE_FILE, DatabaseCopy, LOCK_FILE, OpenError, SqliteStore, check_copy, copy_database,
 };
 
+use crate::convert;
 use crate::metrics::StoreMetrics;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader, TournamentGame};
@@ -70,6 +73,35 @@ pub enum StoredGame {
 }
 
 impl StoredGame {
+    /// All lines of its record.
+    pub fn lines(&self) -> Cow<'_, [v1::RecordLine]> {
+        match self {
+            Self::Hosted(..) => {
+                let mut lines = Vec::new();
+                self.each_line(|line| lines.push(line.into_owned()));
+                Cow::Owned(lines)
+            }
+            Self::Imported(lines) => Cow::Borrowed(lines),
+        }
+    }
+
+    /// Passes the same lines on one by one: those of a long game take far more memory than its
+    /// journal.
+    pub fn each_line<'a>(&'a self, mut take: impl FnMut(Cow<'a, v1::RecordLine>)) {
+        match self {
+            Self::Hosted(header, journal, signature) => {
+                convert::each_record_line(header, journal, |mut line| {
+                    if let Some(Line::Footer(footer)) = &mut line.line {
+                        footer.signature = signature.as_deref().cloned();
+                        footer.participant_removed = header.participant_removed;
+                    }
+                    take(Cow::Owned(line));
+                });
+            }
+            Self::Imported(lines) => lines.iter().for_each(|line| take(Cow::Borrowed(line))),
+        }
+    }
+
     /// Its tournament, if it belongs to one of this server's.
     pub fn tournament(&self) -> Option<TournamentGame> {
         match self {

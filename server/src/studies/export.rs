@@ -365,9 +365,7 @@ pub(super) async fn record_of(
     if !is_own {
         return Ok(None);
     }
-    let reading = rooms
-        .background()
-        .run(move || convert::lines_of(&stored).into_owned());
+    let reading = rooms.background().run(move || stored.lines().into_owned());
     let lines = reading.await;
     (lines.map(Some))
         .ok_or_else(|| StoreError::Unreadable(format!("the record of game {game} cannot be made")))

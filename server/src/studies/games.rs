@@ -183,7 +183,7 @@ impl StudyTask {
             name: settings
                 .title
                 .chars()
-                .take(crate::config::MAX_NAME_CHARS)
+                .take(crate::convert::MAX_NAME_CHARS)
                 .collect(),
             rules: match placed.practice {
                 true => plan.practice_rules,

@@ -15,8 +15,8 @@ use tracing::warn;
 
 use super::message::Call;
 use super::task::TournamentTask;
-use crate::config::{MAX_NAME_CHARS, TOURNAMENT_RETRY};
-use crate::convert;
+use crate::config::TOURNAMENT_RETRY;
+use crate::convert::MAX_NAME_CHARS;
 use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
 use crate::store::tournaments::TournamentEntry;
 use crate::store::{StoreError, StoredGame};
@@ -95,7 +95,7 @@ impl TournamentTask {
             .filter(is_ours)
         {
             let reading = background.run(move || {
-                let lines = convert::lines_of(&stored);
+                let lines = stored.lines();
                 (outcome::outcome(&lines), abort_reason(&lines))
             });
             let (outcome, reason) = (reading.await)

@@ -63,9 +63,27 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "chefshat-record",
         ],
     ),
+    ("chefshat-base", &["chefshat-room"]),
+    (
+        "chefshat-wire",
+        &[
+            "chefshat-base",
+            "chefshat-engine",
+            "chefshat-proto",
+            "chefshat-agents",
+            "chefshat-referee",
+            "chefshat-tournament",
+            "chefshat-record",
+            "chefshat-room",
+            "chefshat-vector",
+            "chefshat-study",
+        ],
+    ),
     (
         "chefshat-server",
         &[
+            "chefshat-base",
+            "chefshat-wire",
             "chefshat-engine",
             "chefshat-proto",
             "chefshat-agents",

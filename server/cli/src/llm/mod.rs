@@ -106,7 +106,7 @@ impl LlmArgs {
         let model = self.model.as_deref().unwrap_or(NAME);
         let name = model.rsplit('/').next().unwrap_or(model);
         name.chars()
-            .take(chefshat_server::config::MAX_NAME_CHARS)
+            .take(chefshat_server::convert::MAX_NAME_CHARS)
             .collect()
     }
 

@@ -10,7 +10,7 @@ use prost::Message as _;
 use tokio_util::sync::CancellationToken;
 
 use super::*;
-use crate::config::MAX_NAME_CHARS;
+use crate::convert::MAX_NAME_CHARS;
 use crate::journaled::{Folded, New};
 use crate::limits::Key;
 use crate::store::tournaments::TournamentHeader;

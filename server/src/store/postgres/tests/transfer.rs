@@ -5,7 +5,6 @@ use std::path::Path;
 use chefshat_record::replay;
 
 use super::*;
-use crate::convert;
 use crate::store::tournaments::StoredTournament;
 use crate::store::{DATABASE_FILE, SqliteStore};
 use crate::tournaments::restored;
@@ -77,7 +76,7 @@ async fn a_database_of_an_earlier_version_moves_with_everything_in_it() {
     for (_, summary) in listed.expect("readable") {
         let id = Id::parse(&summary.as_ref().expect("readable").game_id).expect("an id");
         let stored = store.finished(id).await.expect("readable");
-        let lines = convert::lines_of(&stored.expect("it is listed")).into_owned();
+        let lines = stored.expect("it is listed").lines().into_owned();
         let replayed = replay::replay(&lines);
         replayed.unwrap_or_else(|error| panic!("{id}: {error}"));
     }

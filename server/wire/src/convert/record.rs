@@ -1,6 +1,5 @@
 //! Builds the record of a finished game by folding its journal: every decision and event, in order.
 
-use std::borrow::Cow;
 use std::sync::Arc;
 
 use chefshat_engine::Viewer;
@@ -15,7 +14,6 @@ use super::marker::last_marker;
 use super::physical_record::physical_record_lines;
 use super::room::state_to_proto;
 use super::summary::{elapsed_ms, record_header};
-use crate::store::StoredGame;
 use chefshat_record::convert::decision_kind;
 use chefshat_room::Core;
 use chefshat_room::journal::{Change, Decided, Entry, GameHeader};
@@ -108,34 +106,6 @@ fn by_wizard(header: &GameHeader, line: &mut Line) {
     let is_wizard = usize::try_from(seat).is_ok_and(|seat| header.wizards.contains(&seat));
     if let Some(expression) = expression.as_mut().filter(|_| is_wizard) {
         expression.set_source(v1::ExpressionSource::Wizard);
-    }
-}
-
-/// All lines of the record of a stored game.
-pub fn lines_of(stored: &StoredGame) -> Cow<'_, [v1::RecordLine]> {
-    match stored {
-        StoredGame::Hosted(..) => {
-            let mut lines = Vec::new();
-            each_line_of(stored, |line| lines.push(line.into_owned()));
-            Cow::Owned(lines)
-        }
-        StoredGame::Imported(lines) => Cow::Borrowed(lines),
-    }
-}
-
-/// Passes the same lines on one by one.
-pub fn each_line_of<'a>(stored: &'a StoredGame, mut take: impl FnMut(Cow<'a, v1::RecordLine>)) {
-    match stored {
-        StoredGame::Hosted(header, journal, signature) => {
-            each_record_line(header, journal, |mut line| {
-                if let Some(Line::Footer(footer)) = &mut line.line {
-                    footer.signature = signature.as_deref().cloned();
-                    footer.participant_removed = header.participant_removed;
-                }
-                take(Cow::Owned(line));
-            });
-        }
-        StoredGame::Imported(lines) => lines.iter().for_each(|line| take(Cow::Borrowed(line))),
     }
 }
 

@@ -27,27 +27,29 @@ mod summary;
 mod table;
 mod tournament;
 
-pub use agent::{agent_from_proto, check_budget, check_real_cards};
+pub use agent::{
+    MAX_SEARCH_BUDGET, MAX_SEARCH_ROLLOUTS, agent_from_proto, check_budget, check_real_cards,
+};
 pub use decision::{answer_from_proto, answer_result, express_refused, expression_from_proto};
 pub use event::{event_to_proto, game_started};
 pub use kind::{kind_from_proto, kind_to_proto};
 pub use marker::marker_to_proto;
-pub use name::{checked_name, name_fingerprint};
+pub use name::{MAX_NAME_CHARS, checked_name, name_fingerprint};
 pub use players::recorded_player;
 pub use policy::{
     millis, policy_from_proto, policy_to_proto, requested_policy, set_default_clock_of_models,
 };
 pub use ratings::{leaderboard, rating_to_proto};
-pub use record::{each_line_of, each_record_line, lines_of, record_lines};
+pub use record::{each_record_line, record_lines};
 pub use room::{
     awaited_to_proto, describe, describe_at, display_names_from_proto, fills_from_proto,
-    participants, seats_to_proto, tournament_id, wizards_from_proto,
+    next_sequence, participants, seats_to_proto, snapshot, tournament_id, wizards_from_proto,
 };
 pub use standings::{confidence_to_proto, standings_to_proto};
 pub use start::{start_from_proto, start_to_proto};
 pub use study::{
-    ConditionPlan, PARTICIPANT_KIND, StudyPlan, complete_settings, participant_state,
-    study_participant, study_plan, study_to_proto,
+    ConditionPlan, MAX_HOSTED_SHIFTS, PARTICIPANT_KIND, StudyPlan, complete_settings,
+    participant_state, study_participant, study_plan, study_to_proto,
 };
 pub use study_view::{answers_from_proto, answers_to_proto, study_view};
 pub use summary::summary;

@@ -1,9 +1,14 @@
 //! The built-in agents of rooms and tournaments by name, with the bounds of their searches.
 
+use std::time::Duration;
+
 use chefshat_agents::{AgentNameError, Budget, NamedAgent};
 use chefshat_record::convert::FieldProblem;
 
-use crate::config::{MAX_SEARCH_BUDGET, MAX_SEARCH_ROLLOUTS};
+/// The largest budget of a search of a built-in agent in a room, as time.
+pub const MAX_SEARCH_BUDGET: Duration = Duration::from_secs(1);
+/// The largest budget of a search of a built-in agent in a room, as rollouts.
+pub const MAX_SEARCH_ROLLOUTS: u64 = 5_000;
 
 /// The built-in agent with this name; `None` for the empty name. Its budget is not checked: what is
 /// stored stays readable if the bounds of requests change.

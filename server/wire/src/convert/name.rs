@@ -5,7 +5,8 @@ use std::ops::RangeInclusive;
 use chefshat_record::convert::FieldProblem;
 use sha2::{Digest as _, Sha256};
 
-use crate::config::MAX_NAME_CHARS;
+/// Longest name of a room or participant, characters.
+pub const MAX_NAME_CHARS: usize = 64;
 
 /// Checks a name and trims it.
 ///

@@ -114,7 +114,7 @@ pub mod analysis_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = crate::wire::SmallBuffers::default();
+            let codec = crate::encoded::SmallBuffers::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.AnalysisService/Evaluate",
             );
@@ -139,7 +139,7 @@ pub mod analysis_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = crate::wire::SmallBuffers::default();
+            let codec = crate::encoded::SmallBuffers::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.AnalysisService/LegalActions",
             );
@@ -301,7 +301,7 @@ pub mod analysis_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = EvaluateSvc(inner);
-                        let codec = crate::wire::SmallBuffers::default();
+                        let codec = crate::encoded::SmallBuffers::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -349,7 +349,7 @@ pub mod analysis_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = LegalActionsSvc(inner);
-                        let codec = crate::wire::SmallBuffers::default();
+                        let codec = crate::encoded::SmallBuffers::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -510,7 +510,7 @@ pub mod play_service_client {
                 Message = ::chefshat_proto::v1::PlayRequest,
             >,
         ) -> std::result::Result<
-            tonic::Response<tonic::codec::Streaming<crate::wire::Updates>>,
+            tonic::Response<tonic::codec::Streaming<crate::encoded::Updates>>,
             tonic::Status,
         > {
             self.inner
@@ -521,7 +521,7 @@ pub mod play_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = crate::wire::SmallBuffers::default();
+            let codec = crate::encoded::SmallBuffers::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.PlayService/Play",
             );
@@ -540,7 +540,7 @@ pub mod play_service_client {
                 ::chefshat_proto::v1::PlayServiceWatchRequest,
             >,
         ) -> std::result::Result<
-            tonic::Response<tonic::codec::Streaming<crate::wire::Updates>>,
+            tonic::Response<tonic::codec::Streaming<crate::encoded::Updates>>,
             tonic::Status,
         > {
             self.inner
@@ -551,7 +551,7 @@ pub mod play_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = crate::wire::SmallBuffers::default();
+            let codec = crate::encoded::SmallBuffers::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.PlayService/Watch",
             );
@@ -579,7 +579,7 @@ pub mod play_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = crate::wire::SmallBuffers::default();
+            let codec = crate::encoded::SmallBuffers::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.PlayService/Act",
             );
@@ -605,7 +605,7 @@ pub mod play_service_server {
     pub trait PlayService: std::marker::Send + std::marker::Sync + 'static {
         /// Server streaming response type for the Play method.
         type PlayStream: tonic::codegen::tokio_stream::Stream<
-                Item = std::result::Result<crate::wire::Updates, tonic::Status>,
+                Item = std::result::Result<crate::encoded::Updates, tonic::Status>,
             >
             + std::marker::Send
             + 'static;
@@ -622,7 +622,7 @@ pub mod play_service_server {
         ) -> std::result::Result<tonic::Response<Self::PlayStream>, tonic::Status>;
         /// Server streaming response type for the Watch method.
         type WatchStream: tonic::codegen::tokio_stream::Stream<
-                Item = std::result::Result<crate::wire::Updates, tonic::Status>,
+                Item = std::result::Result<crate::encoded::Updates, tonic::Status>,
             >
             + std::marker::Send
             + 'static;
@@ -730,7 +730,7 @@ pub mod play_service_server {
                         T: PlayService,
                     > tonic::server::StreamingService<::chefshat_proto::v1::PlayRequest>
                     for PlaySvc<T> {
-                        type Response = crate::wire::Updates;
+                        type Response = crate::encoded::Updates;
                         type ResponseStream = T::PlayStream;
                         type Future = BoxFuture<
                             tonic::Response<Self::ResponseStream>,
@@ -756,7 +756,7 @@ pub mod play_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = PlaySvc(inner);
-                        let codec = crate::wire::SmallBuffers::default();
+                        let codec = crate::encoded::SmallBuffers::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -779,7 +779,7 @@ pub mod play_service_server {
                     > tonic::server::ServerStreamingService<
                         ::chefshat_proto::v1::PlayServiceWatchRequest,
                     > for WatchSvc<T> {
-                        type Response = crate::wire::Updates;
+                        type Response = crate::encoded::Updates;
                         type ResponseStream = T::WatchStream;
                         type Future = BoxFuture<
                             tonic::Response<Self::ResponseStream>,
@@ -805,7 +805,7 @@ pub mod play_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = WatchSvc(inner);
-                        let codec = crate::wire::SmallBuffers::default();
+                        let codec = crate::encoded::SmallBuffers::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -850,7 +850,7 @@ pub mod play_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ActSvc(inner);
-                        let codec = crate::wire::SmallBuffers::default();
+                        let codec = crate::encoded::SmallBuffers::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -1011,7 +1011,7 @@ pub mod spectator_service_client {
                 ::chefshat_proto::v1::SpectatorServiceWatchRequest,
             >,
         ) -> std::result::Result<
-            tonic::Response<tonic::codec::Streaming<crate::wire::Updates>>,
+            tonic::Response<tonic::codec::Streaming<crate::encoded::Updates>>,
             tonic::Status,
         > {
             self.inner
@@ -1022,7 +1022,7 @@ pub mod spectator_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = crate::wire::SmallBuffers::default();
+            let codec = crate::encoded::SmallBuffers::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.SpectatorService/Watch",
             );
@@ -1048,7 +1048,7 @@ pub mod spectator_service_server {
     pub trait SpectatorService: std::marker::Send + std::marker::Sync + 'static {
         /// Server streaming response type for the Watch method.
         type WatchStream: tonic::codegen::tokio_stream::Stream<
-                Item = std::result::Result<crate::wire::Updates, tonic::Status>,
+                Item = std::result::Result<crate::encoded::Updates, tonic::Status>,
             >
             + std::marker::Send
             + 'static;
@@ -1149,7 +1149,7 @@ pub mod spectator_service_server {
                     > tonic::server::ServerStreamingService<
                         ::chefshat_proto::v1::SpectatorServiceWatchRequest,
                     > for WatchSvc<T> {
-                        type Response = crate::wire::Updates;
+                        type Response = crate::encoded::Updates;
                         type ResponseStream = T::WatchStream;
                         type Future = BoxFuture<
                             tonic::Response<Self::ResponseStream>,
@@ -1175,7 +1175,7 @@ pub mod spectator_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = WatchSvc(inner);
-                        let codec = crate::wire::SmallBuffers::default();
+                        let codec = crate::encoded::SmallBuffers::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,

@@ -13,8 +13,9 @@ use smallvec::SmallVec;
 use tokio::sync::Notify;
 use tokio::time::Instant;
 
-use crate::clock::RoomClock;
-use crate::wire::Updates;
+use crate::encoded::Updates;
+use chefshat_base::clock::RoomClock;
+use chefshat_base::metrics::Queue;
 
 /// Capacity of an outbox, counted in updates and events.
 pub const OUTBOX_CAPACITY: usize = 8_192;
@@ -136,6 +137,13 @@ struct Waiting {
     abandoned: bool,
 }
 
+impl Queue for Outbox {
+    /// The queued updates and events.
+    fn depth(&self) -> usize {
+        self.lock().weight
+    }
+}
+
 impl Outbox {
     /// Creates an empty outbox and its stream.
     pub fn new() -> (Arc<Self>, OutboxStream) {
@@ -252,11 +260,6 @@ impl Outbox {
             }
             gone.await;
         }
-    }
-
-    /// The queued updates and events.
-    pub fn depth(&self) -> usize {
-        self.lock().weight
     }
 
     /// Whether updates still reach the client: it has not gone, and its stream has not been ended.

@@ -403,7 +403,7 @@ fn start_delimited(bytes: &mut Vec<u8>, field: u32, length: usize) {
 
 #[cfg(test)]
 mod tests {
-    use crate::wire::*;
+    use crate::encoded::*;
 
     fn event(sequence: u64) -> v1::GameEvent {
         v1::GameEvent {

@@ -506,7 +506,7 @@ mod tests {
         let lines = record_of(&mixed);
         let path = concat!(
             env!("CARGO_MANIFEST_DIR"),
-            "/../tests/fixtures/physical.jsonl"
+            "/../../tests/fixtures/physical.jsonl"
         );
         let folder = tempfile::tempdir().expect("a folder");
         let made = folder.path().join("physical.jsonl");

@@ -11,10 +11,10 @@ macro_rules! long_tasks {
             $($(#[$doc])* $name,)*
         }
 
-        #[cfg(test)]
+        #[cfg(any(test, feature = "testing"))]
         impl LongTask {
             /// All of them.
-            pub(crate) const ALL: &[Self] = &[$(Self::$name,)*];
+            pub const ALL: &[Self] = &[$(Self::$name,)*];
         }
     };
 }
@@ -71,21 +71,21 @@ long_tasks! {
 }
 
 /// Names a task that is about to be spawned.
-#[cfg(not(test))]
-pub(crate) fn named<F: Future>(_: LongTask, future: F) -> F {
+#[cfg(not(any(test, feature = "testing")))]
+pub fn named<F: Future>(_: LongTask, future: F) -> F {
     future
 }
 
 /// Marks a task that is about to be spawned and ends by itself. `_does`: what it does.
-#[cfg(not(test))]
-pub(crate) fn short<F: Future>(_does: &'static str, future: F) -> F {
+#[cfg(not(any(test, feature = "testing")))]
+pub fn short<F: Future>(_does: &'static str, future: F) -> F {
     future
 }
 
-#[cfg(test)]
-pub(crate) use counting::{named, polls, short, short_polls};
+#[cfg(any(test, feature = "testing"))]
+pub use counting::{named, polls, short, short_polls};
 
-#[cfg(test)]
+#[cfg(any(test, feature = "testing"))]
 mod counting {
     use std::cell::{Cell, RefCell};
     use std::collections::BTreeMap;
@@ -116,15 +116,12 @@ mod counting {
 
     /// Names a task that is about to be spawned, and counts its polls. If it spins, the process of
     /// the tests ends: the clock of its test would stand still for ever.
-    pub(crate) fn named<F: Future>(task: LongTask, future: F) -> impl Future<Output = F::Output> {
+    pub fn named<F: Future>(task: LongTask, future: F) -> impl Future<Output = F::Output> {
         counted(Task::Long(task), future)
     }
 
     /// The same of a task that ends by itself.
-    pub(crate) fn short<F: Future>(
-        does: &'static str,
-        future: F,
-    ) -> impl Future<Output = F::Output> {
+    pub fn short<F: Future>(does: &'static str, future: F) -> impl Future<Output = F::Output> {
         counted(Task::Short(does), future)
     }
 
@@ -172,7 +169,7 @@ mod counting {
     }
 
     /// How often the tasks of this test that live long have been polled.
-    pub(crate) fn polls() -> BTreeMap<LongTask, u64> {
+    pub fn polls() -> BTreeMap<LongTask, u64> {
         let of = |(task, polls): (&Task, &u64)| match task {
             Task::Long(task) => Some((*task, *polls)),
             Task::Short(_) => None,
@@ -181,11 +178,12 @@ mod counting {
     }
 
     /// How often the others have been polled.
-    pub(crate) fn short_polls() -> u64 {
+    pub fn short_polls() -> u64 {
         let is_short = |(task, _): &(&Task, &u64)| matches!(task, Task::Short(_));
         POLLS.with_borrow(|polls| polls.iter().filter(is_short).map(|(_, polls)| polls).sum())
     }
 
+    #[cfg(test)]
     #[tokio::test(start_paused = true)]
     async fn a_task_that_never_sleeps_is_noticed() {
         MAY_SPIN.set(Some(Task::Short("one record")));
@@ -220,13 +218,20 @@ mod tests {
     /// The other calls, by file, and why they need no name.
     const OTHERS: [(&str, &str, &str); 3] = [
         (
-            "host.rs",
+            "base/src/threads.rs",
+            "move || {",
+            "work for a pool of threads",
+        ),
+        (
+            "src/host.rs",
             "serve(listener, config, store, stopped)),",
             "the server itself",
         ),
-        ("threads.rs", "move || {", "work for a pool of threads"),
-        ("web/preview.rs", ");", "another process"),
+        ("src/web/preview.rs", ");", "another process"),
     ];
+
+    /// Where tasks are spawned.
+    const PARTS: [&str; 3] = ["base/src", "wire/src", "src"];
 
     fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
         for entry in std::fs::read_dir(folder).expect("it exists") {
@@ -259,15 +264,17 @@ mod tests {
 
     #[test]
     fn every_task_that_is_spawned_has_a_name_or_ends_by_itself() {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let mut files = Vec::new();
-        sources(&root, &mut files);
+        for part in PARTS {
+            sources(&root.join(part), &mut files);
+        }
         let mut found = Vec::new();
         for path in files {
             let name = path.strip_prefix(&root).expect("below it");
             let name = name.display().to_string();
             let is_test =
-                name.contains("tests") || name.starts_with("serve/fuzz") || name == "tasks.rs";
+                name.contains("tests") || name == "src/serve/fuzz.rs" || name.ends_with("tasks.rs");
             let source = std::fs::read_to_string(&path).expect("readable");
             // Functions that spawn, and their calls.
             let source = ["fn spawn(", "self.spawn(", " task::spawn("]

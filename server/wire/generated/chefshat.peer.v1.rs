@@ -165,7 +165,7 @@ pub mod peer_service_client {
             &mut self,
             request: impl tonic::IntoStreamingRequest<Message = super::PlayRequest>,
         ) -> std::result::Result<
-            tonic::Response<tonic::codec::Streaming<crate::wire::Updates>>,
+            tonic::Response<tonic::codec::Streaming<crate::encoded::Updates>>,
             tonic::Status,
         > {
             self.inner
@@ -176,7 +176,7 @@ pub mod peer_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = crate::wire::SmallBuffers::default();
+            let codec = crate::encoded::SmallBuffers::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.peer.v1.PeerService/Play",
             );
@@ -199,7 +199,7 @@ pub mod peer_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = crate::wire::SmallBuffers::default();
+            let codec = crate::encoded::SmallBuffers::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.peer.v1.PeerService/Share",
             );
@@ -225,7 +225,7 @@ pub mod peer_service_server {
     pub trait PeerService: std::marker::Send + std::marker::Sync + 'static {
         /// Server streaming response type for the Play method.
         type PlayStream: tonic::codegen::tokio_stream::Stream<
-                Item = std::result::Result<crate::wire::Updates, tonic::Status>,
+                Item = std::result::Result<crate::encoded::Updates, tonic::Status>,
             >
             + std::marker::Send
             + 'static;
@@ -328,7 +328,7 @@ pub mod peer_service_server {
                         T: PeerService,
                     > tonic::server::StreamingService<super::PlayRequest>
                     for PlaySvc<T> {
-                        type Response = crate::wire::Updates;
+                        type Response = crate::encoded::Updates;
                         type ResponseStream = T::PlayStream;
                         type Future = BoxFuture<
                             tonic::Response<Self::ResponseStream>,
@@ -352,7 +352,7 @@ pub mod peer_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = PlaySvc(inner);
-                        let codec = crate::wire::SmallBuffers::default();
+                        let codec = crate::encoded::SmallBuffers::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -399,7 +399,7 @@ pub mod peer_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ShareSvc(inner);
-                        let codec = crate::wire::SmallBuffers::default();
+                        let codec = crate::encoded::SmallBuffers::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,

@@ -157,7 +157,7 @@ impl World {
             .filter(|open| see == Viewer::Seat(open.decision.seat));
         if let Some(open) = own {
             let mut written = Vec::new();
-            crate::wire::encode_decision(core, open, self.table.now, true, &mut written);
+            crate::encoded::encode_decision(core, open, self.table.now, true, &mut written);
             messages.push(written);
         }
         let awaited = core.awaited_in_public();

@@ -213,7 +213,7 @@ impl RoomClock {
     }
 
     /// The clock of its process.
-    #[cfg(test)]
+    #[cfg(any(test, feature = "testing"))]
     pub fn process(&self) -> &Arc<ProcessClock> {
         &self.process
     }

@@ -55,7 +55,7 @@ fn sent_to(table: &Table, viewer: Seat, see: Viewer) -> Vec<Vec<u8>> {
         .filter(|open| open.decision.seat == viewer)
     {
         let mut written = Vec::new();
-        crate::wire::encode_decision(&table.core, open, table.now, true, &mut written);
+        crate::encoded::encode_decision(&table.core, open, table.now, true, &mut written);
         messages.push(written);
     }
     messages
@@ -261,10 +261,7 @@ fn shown_of(table: &Table) -> Shown {
         ),
     ];
     for see in [Viewer::Seat(own), Viewer::Spectator, Viewer::Everything] {
-        shown.push((
-            "a snapshot",
-            crate::room::subscriber::snapshot(core, see).encode_to_vec(),
-        ));
+        shown.push(("a snapshot", convert::snapshot(core, see).encode_to_vec()));
         let messages = sent_to(table, own, see).into_iter();
         shown.extend(messages.map(|message| ("a message", message)));
     }
@@ -578,7 +575,7 @@ fn a_directly_encoded_decision_equals_the_encoded_message() {
             for with_mask in [true, false] {
                 let message = decision_request(&table.core, &open, table.now, with_mask);
                 let mut written = Vec::new();
-                crate::wire::encode_decision(
+                crate::encoded::encode_decision(
                     &table.core,
                     &open,
                     table.now,

@@ -9,7 +9,7 @@ use tracing::error;
 /// How much the threads of a pool give way to those that rooms run on. No pool is their equal: what
 /// it computes would delay decisions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Priority {
+pub enum Priority {
     /// Searches in rooms: participants and spectators wait for what they find. TLS handshakes.
     Searches,
     /// Analyses and batches of games: a client waits, but nobody else.
@@ -21,7 +21,7 @@ pub(crate) enum Priority {
 impl Priority {
     /// How much a thread gives way, in the units of `nice`: the last one is the most there is.
     #[cfg(target_os = "linux")]
-    pub(crate) fn niceness(self) -> i32 {
+    pub fn niceness(self) -> i32 {
         match self {
             Self::Searches => 5,
             Self::Batches => 10,
@@ -32,14 +32,14 @@ impl Priority {
 
 /// A pool of threads. Work starts in the order in which it comes.
 #[derive(Debug)]
-pub(crate) struct Threads(ThreadPool);
+pub struct Threads(ThreadPool);
 
 impl Threads {
     /// Starts this number of threads (0: one for each core), named after `name`.
     ///
     /// # Errors
     /// The operating system cannot start the threads.
-    pub(crate) fn new(
+    pub fn new(
         name: &'static str,
         number: usize,
         priority: Priority,
@@ -53,13 +53,13 @@ impl Threads {
     }
 
     /// The number of threads.
-    pub(crate) fn number(&self) -> usize {
+    pub fn number(&self) -> usize {
         self.0.current_num_threads()
     }
 
     /// Runs work on a thread; `None` if it panicked. If nobody waits any more, the work completes
     /// and its result is dropped.
-    pub(crate) async fn run<T: Send + 'static>(
+    pub async fn run<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Option<T> {
@@ -73,7 +73,7 @@ impl Threads {
 }
 
 /// Runs work; `None` if it panics, which ends only this work because rooms share the process.
-pub(crate) fn caught<T>(work: impl FnOnce() -> T) -> Option<T> {
+pub fn caught<T>(work: impl FnOnce() -> T) -> Option<T> {
     // The state of the work is dropped, so it is never seen half done.
     let done = catch_unwind(AssertUnwindSafe(work));
     if done.is_err() {

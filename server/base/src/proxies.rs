@@ -9,7 +9,7 @@ use http::HeaderMap;
 pub use ipnet::IpNet;
 
 /// The header in which proxies list the addresses they forward for, the nearest last.
-pub(crate) const FORWARDED_FOR: &str = "x-forwarded-for";
+pub const FORWARDED_FOR: &str = "x-forwarded-for";
 
 /// Where a proxy connects from that is trusted to name its clients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +42,7 @@ impl TrustedProxies {
 
     /// The client for which trusted proxies forward: the last address that is not theirs. Stops at
     /// what is no address: only what trusted proxies wrote counts.
-    pub(crate) fn client(&self, headers: &HeaderMap) -> Option<IpAddr> {
+    pub fn client(&self, headers: &HeaderMap) -> Option<IpAddr> {
         let lines = headers.get_all(FORWARDED_FOR).iter().rev();
         let mut nearest = None;
         for entry in lines.flat_map(|line| line.as_bytes().rsplit(|&byte| byte == b',')) {

@@ -1,0 +1,9 @@
+//! What all parts of the server use and that knows neither rooms nor the protocol: clocks, threads, named tasks, watched files, proxies, posting, metrics.
+
+pub mod clock;
+pub mod file_watch;
+pub mod metrics;
+pub mod post;
+pub mod proxies;
+pub mod tasks;
+pub mod threads;
