@@ -17,11 +17,9 @@ pub mod record_writer;
 pub mod retention;
 pub mod room;
 pub mod rooms;
-mod samples;
 pub mod scrape;
 pub mod serve;
 pub mod signing;
-pub mod store;
 pub mod studies;
 pub mod tls;
 pub mod tournaments;
@@ -30,4 +28,6 @@ pub mod webhooks;
 
 pub use chefshat_base::{clock, file_watch, metrics, post, proxies, tasks, threads};
 
+pub use chefshat_store as store;
+pub use chefshat_store::samples;
 pub use chefshat_wire::{convert, encoded as wire, outbox};

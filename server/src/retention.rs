@@ -186,3 +186,73 @@ fn size_of(folder: &Path) -> (u64, u64) {
             (bytes + about.len(), files + 1)
         })
 }
+
+#[cfg(test)]
+mod tests {
+    use chefshat_record::samples;
+    use chefshat_room::journal::{GameHeader, TournamentGame};
+    use chefshat_room::policy::Durability;
+    use tokio_util::task::TaskTracker;
+
+    use super::*;
+    use crate::config::ServerConfig;
+    use crate::store::testing::{TypedUnits as _, cup, header, summary};
+    use crate::store::{MemoryStore, Store};
+
+    /// What the store keeps, keeps its files, also if it was to be deleted; and what a server that ended
+    /// in between has left is deleted by the next run.
+    #[tokio::test]
+    async fn only_the_files_of_deleted_games_are_deleted() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store: Arc<dyn Store> = Arc::new(MemoryStore::default());
+        let created = store.create_tournament(Arc::new(cup(7)), Vec::new()).await;
+        created.expect("committed");
+        for (game, tournament) in [(1, Some(Id([7; 16]))), (2, None), (3, None)] {
+            let header = Arc::new(GameHeader {
+                tournament: tournament.map(|tournament| TournamentGame {
+                    tournament,
+                    series: None,
+                }),
+                ..GameHeader::clone(&header(game, Durability::Durable))
+            });
+            let created = store.create(Arc::clone(&header), Vec::new()).await;
+            let mut journal = created.expect("a new game");
+            let finished = journal.finish(Some(summary(&header)), None).await;
+            finished.expect("committed");
+            let written = store.mark_record_written(header.game_id).await;
+            written.expect("committed");
+        }
+        let config = ServerConfig {
+            data_dir: Some(folder.path().to_path_buf()),
+            ..ServerConfig::default()
+        };
+        let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new()).expect("threads");
+        let id = |game: u8| Id([game; 16]).to_string();
+        let files = |game: u8| {
+            [
+                jsonl::path_of(folder.path(), &id(game)),
+                samples::path_of(folder.path(), &id(game), 0),
+            ]
+        };
+        for path in (1..=4).flat_map(files) {
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("created");
+            std::fs::write(path, "{}").expect("written");
+        }
+        let left = |game: u8| files(game).iter().filter(|path| path.exists()).count();
+        let retention = Retention::new(rooms);
+        let deleted = retention.delete(vec![Id([1; 16]), Id([2; 16])]).await;
+        assert_eq!(deleted, Ok(1));
+        assert_eq!([1, 2, 3, 4].map(left), [2, 0, 2, 2]);
+
+        let newest = Keep {
+            newest: Some(1),
+            ..Keep::default()
+        };
+        let pruning = folder.path().join("pruning");
+        assert!(!pruning.exists());
+        std::fs::write(&pruning, format!("{}\n{}", id(1), id(4))).expect("written");
+        retention.prune(newest).await.expect("deleted");
+        assert_eq!([1, 2, 3, 4].map(left), [2, 0, 2, 0]);
+        assert!(!pruning.exists());
+    }
+}

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::*;
-use crate::store::{FailingStore, MemoryStore, ResumableGame};
+use crate::store::testing::FailingStore;
+use crate::store::{MemoryStore, ResumableGame};
 use chefshat_room::ids::{SecretHash, Token};
 use chefshat_room::journal::{
     AbortReason, Change, Entry, Fill, ParticipantKind, SeatedParticipant,

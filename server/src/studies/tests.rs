@@ -8,7 +8,7 @@ use tokio::time::advance;
 
 use super::*;
 use crate::config::{MAX_STUDIES, ServerConfig};
-use crate::store::tests::TypedUnits as _;
+use crate::store::testing::TypedUnits as _;
 use crate::store::{MemoryStore, Store};
 use crate::tasks::{LongTask, polls};
 

@@ -5,7 +5,7 @@ use futures::FutureExt as _;
 use super::*;
 use crate::config::ServerConfig;
 use crate::limits::Key;
-use crate::store::tests::TypedUnits as _;
+use crate::store::testing::TypedUnits as _;
 use crate::store::{SqliteStore, Store};
 use chefshat_tournament::ByHandProblem;
 
@@ -81,7 +81,7 @@ fn entrant(name: &str) -> Entry {
 
 #[tokio::test]
 async fn readers_see_only_committed_changes() {
-    let store = Arc::new(crate::store::FailingStore::after(u64::MAX));
+    let store = Arc::new(crate::store::testing::FailingStore::after(u64::MAX));
     let commits = Arc::clone(&store.tournament_commits);
     let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
     let tournaments = Tournaments::new(rooms, TaskTracker::new());

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use chefshat_proto::v1::room_service_client::RoomServiceClient;
 use chefshat_proto::v1::{self, game_event::Kind, seat_update::Update};
-use chefshat_server::store::{FailingStore, MemoryStore};
+use chefshat_server::store::MemoryStore;
+use chefshat_server::store::testing::FailingStore;
 use chefshat_tests::{
     TestServer, attach_all, first_legal, narrow_spectator, one_shift, patiently, play_on, play_out,
     room_of_four,

@@ -31,7 +31,8 @@ use chefshat_server::access::{
 };
 use chefshat_server::config::ServerConfig;
 use chefshat_server::host::Host;
-use chefshat_server::store::{FailingStore, Read, SqliteStore, Store};
+use chefshat_server::store::testing::{FailingStore, Read};
+use chefshat_server::store::{SqliteStore, Store};
 use chefshat_tests::{one_shift, patiently, random_agents, room_of_four};
 use prost::Message as _;
 use prost_types::field_descriptor_proto::Type;

@@ -80,10 +80,25 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "chefshat-store",
+        &[
+            "chefshat-base",
+            "chefshat-wire",
+            "chefshat-engine",
+            "chefshat-proto",
+            "chefshat-tournament",
+            "chefshat-record",
+            "chefshat-room",
+            "chefshat-cluster",
+            "chefshat-study",
+        ],
+    ),
+    (
         "chefshat-server",
         &[
             "chefshat-base",
             "chefshat-wire",
+            "chefshat-store",
             "chefshat-engine",
             "chefshat-proto",
             "chefshat-agents",

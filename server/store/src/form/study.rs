@@ -1,0 +1,435 @@
+//! Headers, journals and interface traces of studies.
+
+use std::sync::Arc;
+
+use chefshat_proto::v1;
+use chefshat_study::{Answer, Change, ConsentGiven, ItemAnswer, Outcome, PlacedGame};
+use prost::Message;
+
+use super::{Unreadable, array};
+use crate::studies::StudyHeader;
+use crate::units::StoredTraces;
+use chefshat_room::ids::{Id, SecretHash};
+
+#[derive(Clone, PartialEq, Message)]
+struct HeaderForm {
+    #[prost(bytes = "vec", tag = "1")]
+    id: Vec<u8>,
+    #[prost(message, optional, tag = "2")]
+    settings: Option<v1::StudySettings>,
+    #[prost(uint64, tag = "3")]
+    created_at_ms: u64,
+    #[prost(bytes = "vec", tag = "4")]
+    owner: Vec<u8>,
+    #[prost(bytes = "vec", tag = "5")]
+    key: Vec<u8>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct ChangeForm {
+    #[prost(oneof = "KindForm", tags = "1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12")]
+    kind: Option<KindForm>,
+}
+
+#[derive(Clone, PartialEq, prost::Oneof)]
+enum KindForm {
+    #[prost(message, tag = "1")]
+    Added(AddedForm),
+    #[prost(message, tag = "2")]
+    Opened(OpenedForm),
+    #[prost(message, tag = "3")]
+    Consented(ConsentForm),
+    #[prost(message, tag = "4")]
+    Answered(AnsweredForm),
+    #[prost(message, tag = "5")]
+    Placed(PlacedForm),
+    #[prost(message, tag = "6")]
+    GameEnded(MarkForm),
+    #[prost(message, tag = "7")]
+    Continued(MarkForm),
+    #[prost(message, tag = "8")]
+    DroppedOut(MarkForm),
+    #[prost(message, tag = "9")]
+    Withdrew(MarkForm),
+    #[prost(message, tag = "10")]
+    Removed(MarkForm),
+    #[prost(bool, tag = "11")]
+    Closed(bool),
+    #[prost(message, tag = "12")]
+    Saved(AnsweredForm),
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct AddedForm {
+    #[prost(uint32, tag = "1")]
+    number: u32,
+    #[prost(string, tag = "2")]
+    pseudonym: String,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct OpenedForm {
+    #[prost(uint32, tag = "1")]
+    number: u32,
+    #[prost(uint32, optional, tag = "2")]
+    slot: Option<u32>,
+    #[prost(uint64, tag = "3")]
+    at_ms: u64,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct ConsentForm {
+    #[prost(uint32, tag = "1")]
+    number: u32,
+    #[prost(bytes = "vec", tag = "2")]
+    text_sha256: Vec<u8>,
+    #[prost(string, tag = "3")]
+    version: String,
+    #[prost(string, tag = "4")]
+    language: String,
+    #[prost(uint64, tag = "5")]
+    at_ms: u64,
+    #[prost(uint32, optional, tag = "6")]
+    slot: Option<u32>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct AnsweredForm {
+    #[prost(uint32, tag = "1")]
+    number: u32,
+    #[prost(message, repeated, tag = "2")]
+    answers: Vec<AnswerForm>,
+    #[prost(uint64, tag = "3")]
+    at_ms: u64,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct AnswerForm {
+    #[prost(uint32, tag = "1")]
+    item: u32,
+    #[prost(oneof = "ValueForm", tags = "2, 3, 4")]
+    value: Option<ValueForm>,
+    #[prost(uint32, optional, tag = "5")]
+    answered_after_ms: Option<u32>,
+}
+
+#[derive(Clone, PartialEq, prost::Oneof)]
+enum ValueForm {
+    #[prost(sint32, tag = "2")]
+    Number(i32),
+    #[prost(message, tag = "3")]
+    Options(OptionsForm),
+    #[prost(string, tag = "4")]
+    Text(String),
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct OptionsForm {
+    #[prost(uint32, repeated, tag = "1")]
+    options: Vec<u32>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct PlacedForm {
+    #[prost(uint32, tag = "1")]
+    number: u32,
+    #[prost(uint32, tag = "2")]
+    step: u32,
+    #[prost(uint32, tag = "3")]
+    condition: u32,
+    #[prost(bool, tag = "4")]
+    practice: bool,
+    #[prost(uint32, optional, tag = "5")]
+    seed_index: Option<u32>,
+    #[prost(uint32, tag = "6")]
+    seat: u32,
+    #[prost(uint32, tag = "7")]
+    attempt: u32,
+    #[prost(bytes = "vec", tag = "8")]
+    room: Vec<u8>,
+    #[prost(bytes = "vec", tag = "9")]
+    game: Vec<u8>,
+}
+
+/// A participant, a time, and what is particular to the change: whether the game finished, whether
+/// the step is over, or whether data are deleted.
+#[derive(Clone, PartialEq, Message)]
+struct MarkForm {
+    #[prost(uint32, tag = "1")]
+    number: u32,
+    #[prost(uint64, tag = "2")]
+    at_ms: u64,
+    #[prost(bool, tag = "3")]
+    flag: bool,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct TracesForm {
+    #[prost(message, repeated, tag = "1")]
+    traces: Vec<v1::StudyTrace>,
+}
+
+/// Encodes a header.
+pub(crate) fn study_to_bytes(header: &StudyHeader) -> Vec<u8> {
+    HeaderForm {
+        id: header.id.0.to_vec(),
+        settings: Some(header.settings.clone()),
+        created_at_ms: header.created_at_ms,
+        owner: header.owner.bytes().to_vec(),
+        key: header.key.to_vec(),
+    }
+    .encode_to_vec()
+}
+
+/// Encodes changes.
+pub(crate) fn study_changes_to_bytes(changes: &[Change]) -> Vec<u8> {
+    let mut out = Vec::new();
+    for change in changes {
+        let kind = Some(kind_of(change));
+        (ChangeForm { kind }.encode_length_delimited(&mut out)).expect("a vector grows as needed");
+    }
+    out
+}
+
+/// Encodes interface traces.
+pub(crate) fn traces_to_bytes(traces: &[v1::StudyTrace]) -> Vec<u8> {
+    let traces = traces.to_vec();
+    TracesForm { traces }.encode_to_vec()
+}
+
+/// Decodes interface traces of a game.
+///
+/// # Errors
+/// An invalid field.
+pub(crate) fn stored_traces(
+    number: u32,
+    game: &[u8],
+    bytes: &[u8],
+) -> Result<StoredTraces, Unreadable> {
+    Ok(StoredTraces {
+        number,
+        game: Id(array(game, "the game's id")?),
+        traces: TracesForm::decode(bytes)?.traces,
+    })
+}
+
+/// Decodes a header.
+///
+/// # Errors
+/// An invalid field.
+pub(crate) fn study_from_bytes(bytes: &[u8]) -> Result<StudyHeader, Unreadable> {
+    let form = HeaderForm::decode(bytes)?;
+    Ok(StudyHeader {
+        id: Id(array(&form.id, "the study's id")?),
+        settings: form.settings.unwrap_or_default(),
+        created_at_ms: form.created_at_ms,
+        owner: SecretHash::from_bytes(array(&form.owner, "the owner's hash")?),
+        key: array(&form.key, "the study's key")?,
+    })
+}
+
+/// Decodes changes.
+///
+/// # Errors
+/// An invalid change.
+pub(crate) fn study_changes_from_bytes(mut bytes: &[u8]) -> Result<Vec<Change>, Unreadable> {
+    let mut changes = Vec::new();
+    while !bytes.is_empty() {
+        let form = ChangeForm::decode_length_delimited(&mut bytes)?;
+        let kind = (form.kind).ok_or_else(|| Unreadable::new("a change is empty"))?;
+        changes.push(change_of(kind)?);
+    }
+    Ok(changes)
+}
+
+fn kind_of(change: &Change) -> KindForm {
+    let mark = |number: &u32, at_ms: &u64, flag: bool| MarkForm {
+        number: *number,
+        at_ms: *at_ms,
+        flag,
+    };
+    match change {
+        Change::Added { number, pseudonym } => KindForm::Added(AddedForm {
+            number: *number,
+            pseudonym: pseudonym.clone(),
+        }),
+        Change::Opened {
+            number,
+            slot,
+            at_ms,
+        } => KindForm::Opened(OpenedForm {
+            number: *number,
+            slot: *slot,
+            at_ms: *at_ms,
+        }),
+        Change::Consented {
+            number,
+            slot,
+            consent,
+        } => KindForm::Consented(ConsentForm {
+            slot: *slot,
+            number: *number,
+            text_sha256: consent.text_sha256.to_vec(),
+            version: consent.version.clone(),
+            language: consent.language.clone(),
+            at_ms: consent.at_ms,
+        }),
+        Change::Answered {
+            number,
+            answers,
+            at_ms,
+        } => KindForm::Answered(AnsweredForm {
+            number: *number,
+            answers: answers.iter().map(answer_to_form).collect(),
+            at_ms: *at_ms,
+        }),
+        Change::Saved { number, answers } => KindForm::Saved(AnsweredForm {
+            number: *number,
+            answers: answers.iter().map(answer_to_form).collect(),
+            at_ms: 0,
+        }),
+        Change::Placed { number, game } => KindForm::Placed(PlacedForm {
+            number: *number,
+            step: small(game.step),
+            condition: small(game.condition),
+            practice: game.practice,
+            seed_index: game.seed_index.map(small),
+            seat: small(game.seat),
+            attempt: game.attempt,
+            room: game.room.to_vec(),
+            game: game.game.to_vec(),
+        }),
+        Change::GameEnded {
+            number,
+            outcome,
+            at_ms,
+        } => KindForm::GameEnded(mark(number, at_ms, *outcome == Outcome::Finished)),
+        Change::Continued {
+            number,
+            step_over,
+            at_ms,
+        } => KindForm::Continued(mark(number, at_ms, *step_over)),
+        Change::DroppedOut { number, at_ms } => KindForm::DroppedOut(mark(number, at_ms, false)),
+        Change::Withdrew {
+            number,
+            delete_data,
+            at_ms,
+        } => KindForm::Withdrew(mark(number, at_ms, *delete_data)),
+        Change::Removed { number, at_ms } => KindForm::Removed(mark(number, at_ms, false)),
+        Change::Closed => KindForm::Closed(true),
+    }
+}
+
+fn change_of(kind: KindForm) -> Result<Change, Unreadable> {
+    Ok(match kind {
+        KindForm::Added(form) => Change::Added {
+            number: form.number,
+            pseudonym: form.pseudonym,
+        },
+        KindForm::Opened(form) => Change::Opened {
+            number: form.number,
+            slot: form.slot,
+            at_ms: form.at_ms,
+        },
+        KindForm::Consented(form) => Change::Consented {
+            number: form.number,
+            slot: form.slot,
+            consent: ConsentGiven {
+                text_sha256: array(&form.text_sha256, "the hash of a consent")?,
+                version: form.version,
+                language: form.language,
+                at_ms: form.at_ms,
+            },
+        },
+        KindForm::Answered(form) => Change::Answered {
+            number: form.number,
+            answers: answers_from_form(form.answers)?,
+            at_ms: form.at_ms,
+        },
+        KindForm::Saved(form) => Change::Saved {
+            number: form.number,
+            answers: answers_from_form(form.answers)?,
+        },
+        KindForm::Placed(form) => Change::Placed {
+            number: form.number,
+            game: PlacedGame {
+                step: wide(form.step),
+                condition: wide(form.condition),
+                practice: form.practice,
+                seed_index: form.seed_index.map(wide),
+                seat: wide(form.seat),
+                attempt: form.attempt,
+                room: array(&form.room, "a room's id")?,
+                game: array(&form.game, "a game's id")?,
+            },
+        },
+        KindForm::GameEnded(form) => Change::GameEnded {
+            number: form.number,
+            outcome: match form.flag {
+                true => Outcome::Finished,
+                false => Outcome::Aborted,
+            },
+            at_ms: form.at_ms,
+        },
+        KindForm::Continued(form) => Change::Continued {
+            number: form.number,
+            step_over: form.flag,
+            at_ms: form.at_ms,
+        },
+        KindForm::DroppedOut(form) => Change::DroppedOut {
+            number: form.number,
+            at_ms: form.at_ms,
+        },
+        KindForm::Withdrew(form) => Change::Withdrew {
+            number: form.number,
+            delete_data: form.flag,
+            at_ms: form.at_ms,
+        },
+        KindForm::Removed(form) => Change::Removed {
+            number: form.number,
+            at_ms: form.at_ms,
+        },
+        KindForm::Closed(_) => Change::Closed,
+    })
+}
+
+fn answer_to_form(answer: &ItemAnswer) -> AnswerForm {
+    AnswerForm {
+        item: small(answer.item),
+        value: Some(match &answer.value {
+            Answer::Number(number) => ValueForm::Number(*number),
+            Answer::Options(options) => ValueForm::Options(OptionsForm {
+                options: options.iter().copied().map(small).collect(),
+            }),
+            Answer::Text(text) => ValueForm::Text(text.clone()),
+        }),
+        answered_after_ms: answer.answered_after_ms,
+    }
+}
+
+fn answers_from_form(forms: Vec<AnswerForm>) -> Result<Arc<[ItemAnswer]>, Unreadable> {
+    forms.into_iter().map(answer_from_form).collect()
+}
+
+fn answer_from_form(form: AnswerForm) -> Result<ItemAnswer, Unreadable> {
+    let value = (form.value).ok_or_else(|| Unreadable::new("an answer is empty"))?;
+    Ok(ItemAnswer {
+        item: wide(form.item),
+        value: match value {
+            ValueForm::Number(number) => Answer::Number(number),
+            ValueForm::Options(form) => {
+                Answer::Options(form.options.into_iter().map(wide).collect())
+            }
+            ValueForm::Text(text) => Answer::Text(text),
+        },
+        answered_after_ms: form.answered_after_ms,
+    })
+}
+
+fn small(number: usize) -> u32 {
+    u32::try_from(number).unwrap_or(u32::MAX)
+}
+
+fn wide(number: u32) -> usize {
+    usize::try_from(number).unwrap_or(usize::MAX)
+}

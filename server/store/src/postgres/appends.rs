@@ -1,0 +1,88 @@
+//! Appends to the journals of running games: one statement for all that wait. The position in the
+//! journal is the fence: a takeover writes an entry at the next position, and only one of two rows
+//! can stand there.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+
+use futures::FutureExt as _;
+use futures::future::BoxFuture;
+use sqlx::postgres::PgConnection;
+
+use super::writer::{Answers, Work, confirming};
+use crate::StoreError;
+use chefshat_room::ids::Id;
+
+/// A row of a journal.
+#[derive(Debug)]
+pub(super) struct Row {
+    pub(super) room: Id,
+    pub(super) unit: Id,
+    pub(super) epoch: i64,
+    /// The number of the game.
+    pub(super) game: i64,
+    /// From 0. Only one row of a game may be on its way at a time.
+    pub(super) position: i64,
+    pub(super) entries: Vec<u8>,
+}
+
+impl Work for Row {
+    type Answer = ();
+    const MOST: usize = 1_024;
+
+    fn commit<'a>(
+        connection: &'a mut PgConnection,
+        rows: &'a [Arc<Self>],
+        _again: bool,
+    ) -> BoxFuture<'a, sqlx::Result<Answers<Self>>> {
+        append(connection, rows).boxed()
+    }
+}
+
+async fn append(connection: &mut PgConnection, rows: &[Arc<Row>]) -> sqlx::Result<Answers<Row>> {
+    let inserted: Vec<(i64, i64)> = sqlx::query_as(
+        "INSERT INTO journal (game, position, epoch, entries)
+         SELECT new.game, new.position, new.epoch, new.entries
+         FROM unnest($1::bytea[], $2::bigint[], $3::bigint[], $4::bigint[], $5::bytea[])
+              AS new (room, epoch, game, position, entries)
+         JOIN owned ON owned.id = new.room AND owned.epoch = new.epoch AND NOT owned.over
+         ON CONFLICT DO NOTHING
+         RETURNING game, position",
+    )
+    .bind(all(rows, |row| row.room.0.as_slice()))
+    .bind(all(rows, |row| row.epoch))
+    .bind(all(rows, |row| row.game))
+    .bind(all(rows, |row| row.position))
+    .bind(all(rows, |row| row.entries.as_slice()))
+    .fetch_all(&mut *connection)
+    .await?;
+    let inserted: HashSet<(i64, i64)> = inserted.into_iter().collect();
+    let mut answers = Vec::with_capacity(rows.len());
+    for row in rows {
+        let kept = inserted.contains(&(row.game, row.position)) || stands(connection, row).await?;
+        answers.push(match kept {
+            true => Ok(()),
+            false => Err(StoreError::Fenced(row.unit)),
+        });
+    }
+    Ok(answers)
+}
+
+/// Whether a row that was not inserted stands there already, because an earlier attempt without an
+/// answer inserted it.
+async fn stands(connection: &mut PgConnection, row: &Row) -> sqlx::Result<bool> {
+    let stands = sqlx::query(confirming!(
+        "game FROM journal WHERE game = $1 AND position = $2 AND epoch = $3 AND entries = $4"
+    ))
+    .bind(row.game)
+    .bind(row.position)
+    .bind(row.epoch)
+    .bind(row.entries.as_slice())
+    .fetch_optional(connection)
+    .await?;
+    Ok(stands.is_some())
+}
+
+fn all<'a, T>(rows: &'a [Arc<Row>], value: impl Fn(&'a Row) -> T) -> Vec<T> {
+    rows.iter().map(|row| value(row)).collect()
+}

@@ -1,0 +1,224 @@
+//! Connects to the database and checks that its schema is one that this version can use. Creates
+//! the schema in an empty database; upgrading an existing one is left to `chefshat migrate`, since
+//! other nodes may be using it.
+
+use std::str::FromStr as _;
+use std::time::Duration;
+
+use sqlx::migrate::{Migration, MigrationType, Migrator};
+use sqlx::postgres::{PgConnectOptions, PgConnection};
+use sqlx::{ConnectOptions as _, Connection as _, SqlSafeStr as _};
+use tokio::time::timeout;
+
+use super::errors::explain;
+use crate::StoreError;
+
+/// The migrations, oldest first. They never change: sqlx refuses a database in which one ran with
+/// another text.
+const MIGRATIONS: [(i64, &str, &str); 2] = [
+    (1, "games", include_str!("migrations/0001_games.sql")),
+    (2, "studies", include_str!("migrations/0002_studies.sql")),
+];
+/// Key of the advisory lock that is held while the schema is created or upgraded: "chefshat" in ASCII.
+const SCHEMA_LOCK: i64 = 0x6368_6566_7368_6174;
+/// How long connecting may take.
+const CONNECT_LIMIT: Duration = Duration::from_secs(5);
+/// The settings of each session. Work that depends on nothing but `READ COMMITTED` and takes short;
+/// a server that stops in the middle of a transaction must not keep its locks for long.
+const SESSION: [(&str, &str); 6] = [
+    ("default_transaction_isolation", "read committed"),
+    ("statement_timeout", "10s"),
+    ("idle_in_transaction_session_timeout", "3s"),
+    ("tcp_keepalives_idle", "5"),
+    ("tcp_keepalives_interval", "2"),
+    ("tcp_keepalives_count", "3"),
+];
+
+/// Why a database cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum DatabaseError {
+    /// The address is not one.
+    #[error(
+        "{0:?} is not the address of a database: {1}; an example is postgres://user@host/chefshat"
+    )]
+    Address(String, String),
+    /// The tables are not ours.
+    #[error(
+        "the database contains tables of another program; nothing was changed: create a database for chefshat alone, for example with createdb"
+    )]
+    NotOurs,
+    /// The schema is older than this version needs.
+    #[error(
+        "the tables of the database are of an earlier version; nothing was changed: run `chefshat migrate` with this version, then start the server again"
+    )]
+    Older,
+    /// The schema is too new for this version.
+    #[error(
+        "the tables of the database are of a later version that this one cannot use; nothing was changed: use the later version"
+    )]
+    Newer,
+    /// Commits are acknowledged before they are safe.
+    #[error(
+        "the database acknowledges commits before they are safe (synchronous_commit is off): turn it on for this user, for example with ALTER ROLE"
+    )]
+    Unsafe,
+    /// Any other error.
+    #[error("{0}")]
+    Other(String),
+}
+
+impl From<sqlx::Error> for DatabaseError {
+    fn from(error: sqlx::Error) -> Self {
+        Self::Other(explain(&error))
+    }
+}
+
+impl From<DatabaseError> for StoreError {
+    fn from(error: DatabaseError) -> Self {
+        Self::Failed(error.to_string())
+    }
+}
+
+/// Reads an address: a URL as PostgreSQL's own programs take it.
+pub(super) fn address(url: &str) -> Result<PgConnectOptions, DatabaseError> {
+    let options = PgConnectOptions::from_str(url)
+        // It may contain a password.
+        .map_err(|error| DatabaseError::Address(without_password(url), error.to_string()))?;
+    Ok(options.application_name("chefshat"))
+}
+
+fn without_password(url: &str) -> String {
+    match (url.split_once("://"), url.rsplit_once('@')) {
+        (Some((scheme, _)), Some((_, host))) => format!("{scheme}://…@{host}"),
+        _ => url.to_owned(),
+    }
+}
+
+/// Sessions of nodes.
+pub(super) fn sessions(address: PgConnectOptions) -> PgConnectOptions {
+    address.options(SESSION)
+}
+
+/// Connects, in bounded time.
+pub(super) async fn connect(options: &PgConnectOptions) -> sqlx::Result<PgConnection> {
+    let connecting = timeout(CONNECT_LIMIT, PgConnection::connect_with(options));
+    connecting.await.unwrap_or_else(|_| {
+        Err(sqlx::Error::Io(std::io::Error::new(
+            std::io::ErrorKind::TimedOut,
+            "it does not answer",
+        )))
+    })
+}
+
+/// What is in a database.
+enum Schema {
+    Empty,
+    /// Tables of ours: the newest migration, and the oldest schema whose programs can use it.
+    Ours {
+        version: i64,
+        oldest: i64,
+    },
+    Foreign,
+}
+
+impl Schema {
+    /// Whether it has all that this version needs.
+    fn is_complete(&self) -> bool {
+        matches!(self, Self::Ours { version, .. } if *version >= NEWEST)
+    }
+}
+
+/// Waits until nobody else creates or upgrades the schema. The lock ends with the connection.
+pub(super) async fn lock(connection: &mut PgConnection) -> sqlx::Result<()> {
+    let locking = sqlx::query("SELECT pg_advisory_lock($1)").bind(SCHEMA_LOCK);
+    locking.execute(connection).await.map(drop)
+}
+
+async fn schema(connection: &mut PgConnection) -> sqlx::Result<Schema> {
+    let (migrations, support): (bool, bool) = sqlx::query_as(
+        "SELECT to_regclass('_sqlx_migrations') IS NOT NULL, to_regclass('schema_support') IS NOT NULL",
+    )
+    .fetch_one(&mut *connection)
+    .await?;
+    if migrations && support {
+        let (version, oldest) = sqlx::query_as(
+            "SELECT (SELECT max(version) FROM _sqlx_migrations WHERE success), (SELECT oldest FROM schema_support)",
+        )
+        .fetch_one(&mut *connection)
+        .await?;
+        return Ok(Schema::Ours { version, oldest });
+    }
+    let others: i64 = sqlx::query_scalar(
+        "SELECT count(*) FROM pg_tables WHERE schemaname = current_schema() AND tablename <> '_sqlx_migrations'",
+    )
+    .fetch_one(&mut *connection)
+    .await?;
+    Ok(match others {
+        0 => Schema::Empty,
+        _ => Schema::Foreign,
+    })
+}
+
+/// The newest schema that this version knows, which it needs.
+pub(super) const NEWEST: i64 = MIGRATIONS[MIGRATIONS.len() - 1].0;
+
+/// Checks that this version can use a database; creates the schema in an empty one.
+pub(super) async fn check(address: &PgConnectOptions) -> Result<(), DatabaseError> {
+    let mut connection = connect(address).await?;
+    let synchronous: String = sqlx::query_scalar("SHOW synchronous_commit")
+        .fetch_one(&mut connection)
+        .await?;
+    if synchronous == "off" {
+        return Err(DatabaseError::Unsafe);
+    }
+    let mut found = schema(&mut connection).await?;
+    if !found.is_complete() {
+        // Another node may be about to create it.
+        lock(&mut connection).await?;
+        found = schema(&mut connection).await?;
+    }
+    let usable = match found {
+        Schema::Empty => migrations(&mut connection).await,
+        Schema::Ours { version, .. } if version < NEWEST => Err(DatabaseError::Older),
+        Schema::Ours { oldest, .. } if oldest > NEWEST => Err(DatabaseError::Newer),
+        Schema::Ours { .. } => Ok(()),
+        Schema::Foreign => Err(DatabaseError::NotOurs),
+    };
+    // What was checked is known; how the connection ends changes nothing.
+    let _ = connection.close().await;
+    usable
+}
+
+/// Creates the schema or upgrades it to the newest that this version knows. Returns the version
+/// before (0: empty) and after.
+///
+/// # Errors
+/// The database cannot be reached, is another program's, or is newer than this version.
+pub async fn migrate(url: &str) -> Result<(i64, i64), DatabaseError> {
+    // Its statements may take long.
+    let address = address(url)?.disable_statement_logging();
+    let mut connection = connect(&address).await?;
+    lock(&mut connection).await?;
+    let before = match schema(&mut connection).await? {
+        Schema::Empty => 0,
+        Schema::Ours { version, .. } if version > NEWEST => return Err(DatabaseError::Newer),
+        Schema::Ours { version, .. } => version,
+        Schema::Foreign => return Err(DatabaseError::NotOurs),
+    };
+    migrations(&mut connection).await?;
+    // The migrations are committed.
+    let _ = connection.close().await;
+    Ok((before, NEWEST))
+}
+
+/// Runs what is missing, each migration in a transaction. The caller has the lock.
+async fn migrations(connection: &mut PgConnection) -> Result<(), DatabaseError> {
+    let all = MIGRATIONS.iter().map(|(version, name, sql)| {
+        let sql = (*sql).into_sql_str();
+        Migration::new(*version, (*name).into(), MigrationType::Simple, sql, false)
+    });
+    Migrator::with_migrations(all.collect())
+        .run(connection)
+        .await
+        .map_err(|error| DatabaseError::Other(format!("creating the tables failed: {error}")))
+}

@@ -1,0 +1,144 @@
+//! Which finished games retention leaves alone: those of studies, those of tournaments that are not
+//! over or cannot be read, and those that do not say of which they are. The header of a game says
+//! what it is part of; it is asked about in the same transaction as the game.
+
+use std::collections::BTreeSet;
+
+use futures::FutureExt as _;
+use futures::future::BoxFuture;
+use sqlx::Row as _;
+use sqlx::postgres::{PgConnection, PgRow};
+
+use super::values::integer;
+use crate::Keep;
+use crate::form;
+use crate::tournaments::StoredTournament;
+use crate::units::{ROWS, StoredUnit, UnitKind};
+use chefshat_room::ids::Id;
+
+/// A finished game, with its encoding and header.
+pub(super) struct Candidate {
+    pub(super) number: i64,
+    pub(super) game: Id,
+    /// What it is part of; the outer one is `None` if this version cannot read that.
+    unit: Option<Option<Id>>,
+}
+
+impl Candidate {
+    /// From a number, id, encoding and header.
+    fn of(row: &PgRow) -> Option<Self> {
+        Some(Self {
+            number: row.get(0),
+            game: Id(row.get::<&[u8], _>(1).try_into().ok()?),
+            unit: form::stored_unit(row.get(2), row.get(3)).ok(),
+        })
+    }
+}
+
+/// The next games, after a number, that are old enough to be deleted and that have been written to
+/// files if they are to be.
+pub(super) fn old<'c>(
+    connection: &'c mut PgConnection,
+    keep: Keep,
+    (after, count): (i64, usize),
+    record_files: bool,
+) -> BoxFuture<'c, sqlx::Result<Vec<Candidate>>> {
+    let query = sqlx::query(
+        "SELECT number, game_id, form, header FROM games
+         WHERE state <> 0 AND number > $1 AND coalesce(ended_at_ms, created_at_ms, 0) < $3
+           AND (summary IS NULL
+                OR (filed OR NOT $5)
+                   AND listed <= (SELECT listed FROM games WHERE listed IS NOT NULL
+                                  ORDER BY listed DESC LIMIT 1 OFFSET $2))
+         ORDER BY number LIMIT $4",
+    )
+    .bind(after)
+    .bind(integer(keep.newest.unwrap_or_default().max(1)))
+    .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
+    .bind(integer(count as u64))
+    .bind(record_files);
+    async move {
+        let rows = query.fetch_all(connection).await?;
+        Ok(rows.iter().filter_map(Candidate::of).collect())
+    }
+    .boxed()
+}
+
+/// Those of these games that are over, locked.
+pub(super) async fn locked(
+    connection: &mut PgConnection,
+    games: &[Id],
+) -> sqlx::Result<Vec<Candidate>> {
+    let ids: Vec<&[u8]> = games.iter().map(|id| id.0.as_slice()).collect();
+    let rows = sqlx::query(
+        "SELECT number, game_id, form, header FROM games
+         WHERE game_id = ANY ($1) AND state <> 0 ORDER BY number FOR UPDATE",
+    )
+    .bind(ids)
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.iter().filter_map(Candidate::of).collect())
+}
+
+/// Those of these games that nothing needs, and the others.
+pub(super) async fn divided(
+    connection: &mut PgConnection,
+    games: Vec<Candidate>,
+) -> sqlx::Result<(Vec<Candidate>, Vec<Candidate>)> {
+    let units: BTreeSet<Id> = games.iter().filter_map(|game| game.unit?).collect();
+    let needing = needing(connection, &units).await?;
+    let is_free = |game: &Candidate| match game.unit {
+        Some(Some(unit)) => !needing.contains(&unit),
+        Some(None) => true,
+        None => false,
+    };
+    Ok(games.into_iter().partition(is_free))
+}
+
+/// Those of these tournaments and studies that need their games.
+async fn needing(
+    connection: &mut PgConnection,
+    units: &BTreeSet<Id>,
+) -> sqlx::Result<BTreeSet<Id>> {
+    if units.is_empty() {
+        return Ok(BTreeSet::new());
+    }
+    let ids: Vec<&[u8]> = units.iter().map(|id| id.0.as_slice()).collect();
+    let studies: Vec<Vec<u8>> =
+        sqlx::query_scalar("SELECT study_id FROM studies WHERE study_id = ANY ($1)")
+            .bind(ids.clone())
+            .fetch_all(&mut *connection)
+            .await?;
+    let mut needing: BTreeSet<Id> = (studies.into_iter())
+        .filter_map(|id| id.try_into().ok().map(Id))
+        .collect();
+    let tournaments = sqlx::query(
+        "SELECT number, tournament_id, form, header, over FROM tournaments
+         WHERE tournament_id = ANY ($1)",
+    )
+    .bind(ids)
+    .fetch_all(&mut *connection)
+    .await?;
+    for row in tournaments {
+        let Ok(id) = row.get::<&[u8], _>(1).try_into() else {
+            continue;
+        };
+        let is_readable = async {
+            let rows = sqlx::query_scalar(UnitKind::Tournament.sql(ROWS))
+                .bind(row.get::<i64, _>(0))
+                .fetch_all(&mut *connection)
+                .await?;
+            let stored = StoredUnit {
+                form: row.get(2),
+                header: row.get(3),
+                rows,
+            };
+            Ok::<_, sqlx::Error>(StoredTournament::decode(Id(id), &stored).is_ok())
+        };
+        let is_over: bool = row.get(4);
+        if !is_over || !is_readable.await? {
+            needing.insert(Id(id));
+        }
+    }
+    Ok(needing)
+}

@@ -1,0 +1,201 @@
+//! What several nodes do to one PostgreSQL database. Behavior that all stores share is tested
+//! beside this folder; `model` compares ownership with its specification.
+
+mod claims;
+mod fencing;
+mod model;
+mod opening;
+mod retention;
+mod retrying;
+mod transfer;
+
+use std::sync::Arc;
+
+use chefshat_engine::{RULES_VERSION, RuleSetSpec, SeedPlan};
+use chefshat_postgres::Database;
+use chefshat_proto::v1;
+use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::journal::{
+    AbortReason, Change, Entry, Fill, GameHeader, GameStart, TournamentGame,
+};
+use chefshat_room::policy::{Durability, Policy};
+use chefshat_tournament::Change as TournamentChange;
+use sqlx::postgres::PgConnection;
+
+use super::*;
+use crate::cluster::{ClusterStore, Epoch, Kind, NodeId, NodeInfo};
+use crate::testing::TypedUnits as _;
+use crate::tournaments::{TournamentEntry, TournamentHeader};
+use crate::units::UnitKind;
+
+/// A node that has just joined.
+pub(crate) async fn node(database: &Database) -> PostgresStore {
+    node_with(database, PostgresOptions::default()).await
+}
+
+async fn node_with(database: &Database, options: PostgresOptions) -> PostgresStore {
+    let store = PostgresStore::open(database.url(), options).await;
+    let store = store.expect("an empty database, or one of ours");
+    store.join(NodeInfo::default()).await.expect("it joins");
+    store
+}
+
+/// Replaces the clock of a database by a number that the tests set.
+fn stop_clock(database: &Database) {
+    database.run(
+        "CREATE TABLE test_clock (now_ms bigint);
+         INSERT INTO test_clock VALUES (1000000);
+         CREATE OR REPLACE FUNCTION clock_ms() RETURNS bigint VOLATILE LANGUAGE sql
+             AS 'SELECT now_ms FROM test_clock'",
+    );
+}
+
+/// Lets time pass for a database with a stopped clock.
+fn advance(database: &Database, ms: u64) {
+    database.run(&format!("UPDATE test_clock SET now_ms = now_ms + {ms}"));
+}
+
+async fn connected(database: &Database) -> PgConnection {
+    let address = open::address(database.url()).expect("an address");
+    open::connect(&address).await.expect("connected")
+}
+
+async fn run(connection: &mut PgConnection, sql: &'static str) {
+    let done = sqlx::query(sql).execute(connection).await;
+    done.expect("the database does it");
+}
+
+/// Makes the database wait where this trigger is run, until the connection is dropped or unlocks 1.
+async fn hold(database: &Database, trigger: &str) -> PgConnection {
+    database.run(&format!(
+        "CREATE FUNCTION wait() RETURNS trigger LANGUAGE plpgsql AS $$
+         BEGIN
+             PERFORM pg_advisory_xact_lock(1);
+             RETURN NEW;
+         END $$;
+         CREATE {trigger} EXECUTE FUNCTION wait()"
+    ));
+    let mut holder = connected(database).await;
+    run(&mut holder, "SELECT pg_advisory_lock(1)").await;
+    holder
+}
+
+/// Waits until a session of the same database waits for something, and returns its process.
+async fn waiting(connection: &mut PgConnection, wait_event: &str) -> i32 {
+    loop {
+        let process = sqlx::query_scalar(
+            "SELECT pid FROM pg_stat_activity
+             WHERE datname = current_database() AND wait_event = $1 ORDER BY backend_start DESC",
+        );
+        let process = process.bind(wait_event).fetch_optional(&mut *connection);
+        if let Some(process) = process.await.expect("readable") {
+            return process;
+        }
+        tokio::task::yield_now().await;
+    }
+}
+
+/// A room with the id `room`, whose game has the same id.
+fn header(room: u8, tournament: Option<u8>, durability: Durability) -> Arc<GameHeader> {
+    Arc::new(GameHeader {
+        room_id: Id([room; 16]),
+        game_id: Id([room; 16]),
+        name: format!("room {room}"),
+        rules: RuleSetSpec::default().validate().expect("the standard"),
+        policy: Policy {
+            durability,
+            ..Policy::default()
+        },
+        rules_version: RULES_VERSION,
+        server_version: "0.0.1".into(),
+        participant_removed: false,
+        fills: vec![Fill::Open { reserved_for: None }; 4],
+        display_names: Default::default(),
+        wizards: std::collections::BTreeSet::new(),
+        recorded: Default::default(),
+        start: GameStart::default(),
+        seed: SeedPlan::Fixed {
+            game_seed: [room; 32],
+        },
+        created_at_ms: 1_000,
+        join_code: format!("ROOM{room}"),
+        owner: SecretHash::of(b"owner"),
+        tournament: tournament.map(|tournament| TournamentGame {
+            tournament: Id([tournament; 16]),
+            series: None,
+        }),
+        table: None,
+        study: None,
+    })
+}
+
+fn durable(room: u8) -> Arc<GameHeader> {
+    header(room, None, Durability::Durable)
+}
+
+fn cup(tournament: u8) -> Arc<TournamentHeader> {
+    Arc::new(TournamentHeader {
+        id: Id([tournament; 16]),
+        settings: v1::TournamentSettings::default(),
+        created_at_ms: 1_000,
+        join_code: format!("CUP{tournament}"),
+        owner: SecretHash::of(b"owner"),
+        deal_secret: [6; 32],
+    })
+}
+
+fn summary(room: u8) -> Box<v1::RecordSummary> {
+    Box::new(v1::RecordSummary {
+        game_id: Id([room; 16]).to_string(),
+        room_name: format!("room {room}"),
+        state: v1::RoomState::Finished.into(),
+        created_at_ms: 1_000,
+        ended_at_ms: 2_000,
+        ..v1::RecordSummary::default()
+    })
+}
+
+/// The first entries of a tournament that has begun.
+fn begun() -> Vec<TournamentEntry> {
+    vec![TournamentEntry::Change(TournamentChange::Begun {
+        rounds: 1,
+    })]
+}
+
+/// An entry that says which of a test's entries it is: the journal does not care whether it makes
+/// sense.
+fn entry(number: u64) -> Entry {
+    Entry {
+        at: Duration::from_micros(number),
+        change: Change::Aborted(AbortReason::TooLong),
+    }
+}
+
+/// The numbers of entries; 0 for "the server was restarted".
+fn numbers(entries: &[Entry]) -> Vec<u64> {
+    (entries.iter())
+        .map(|entry| match entry.change {
+            Change::ServerRestarted => 0,
+            _ => u64::try_from(entry.at.as_micros()).expect("small"),
+        })
+        .collect()
+}
+
+async fn append(journal: &mut Box<dyn Journal>, number: u64) -> Result<(), StoreError> {
+    journal.append(&mut vec![entry(number)]).await
+}
+
+/// Number of rows of a tournament's journal.
+async fn tournament_rows(store: &PostgresStore, tournament: u8) -> u64 {
+    let unit = UnitKind::Tournament.id(Id([tournament; 16]));
+    let stored = store.unit(unit).await.expect("readable");
+    stored.expect("it exists").rows.len() as u64
+}
+
+/// The only game of a unit.
+async fn resumed(store: &PostgresStore, unit: u8, epoch: Epoch) -> ResumableGame {
+    let unit = store.load(Id([unit; 16]), epoch).await.expect("readable");
+    let mut games = unit.expect("it is owned").games;
+    assert_eq!(games.len(), 1);
+    games.remove(0)
+}

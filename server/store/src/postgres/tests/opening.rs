@@ -1,0 +1,161 @@
+//! Opening a database: unusable ones are refused and left unchanged.
+
+use chefshat_postgres::Server;
+
+use super::*;
+use crate::postgres::open::NEWEST;
+
+async fn refusal(database: &Database) -> DatabaseError {
+    let opened = PostgresStore::open(database.url(), PostgresOptions::default()).await;
+    opened.err().expect("it is refused")
+}
+
+#[tokio::test]
+async fn only_an_empty_database_gets_tables_without_being_asked() {
+    let database = chefshat_postgres::database();
+    let tables = "SELECT count(*) FROM pg_tables WHERE schemaname = 'public'";
+    database.run("CREATE TABLE recipes (name text)");
+    let error = refusal(&database).await;
+    assert!(matches!(error, DatabaseError::NotOurs), "{error}");
+    let error = migrate(database.url()).await.expect_err("it is refused");
+    assert!(matches!(error, DatabaseError::NotOurs), "{error}");
+    assert_eq!(database.run(tables), "1");
+
+    database.run("DROP TABLE recipes");
+    node(&database).await.close().await;
+    node(&database).await.close().await;
+    assert_eq!(migrate(database.url()).await.ok(), Some((NEWEST, NEWEST)));
+}
+
+#[tokio::test]
+async fn a_database_of_the_version_before_studies_is_upgraded() {
+    let database = chefshat_postgres::database();
+    migrate(database.url()).await.expect("an empty database");
+    database.run("DROP TABLE studies, study_changes, study_traces; DROP INDEX owned_by_game");
+    database.run("DELETE FROM _sqlx_migrations WHERE version > 1");
+    let error = refusal(&database).await;
+    assert!(matches!(error, DatabaseError::Older), "{error}");
+    assert_eq!(migrate(database.url()).await.ok(), Some((1, NEWEST)));
+    node(&database).await.close().await;
+}
+
+#[tokio::test]
+async fn a_later_schema_is_used_if_it_only_adds() {
+    let database = chefshat_postgres::database();
+    assert_eq!(migrate(database.url()).await.ok(), Some((0, NEWEST)));
+    database.run(
+        "INSERT INTO _sqlx_migrations (version, description, success, checksum, execution_time)
+         VALUES (9999, 'of the future', true, '', 0)",
+    );
+    node(&database).await.close().await;
+    let error = migrate(database.url()).await.expect_err("it is refused");
+    assert!(matches!(error, DatabaseError::Newer), "{error}");
+    database.run("UPDATE schema_support SET oldest = 9999");
+    let error = refusal(&database).await;
+    assert!(matches!(error, DatabaseError::Newer), "{error}");
+    database.run(
+        "DELETE FROM _sqlx_migrations WHERE version > 1; UPDATE _sqlx_migrations SET version = 0",
+    );
+    let error = refusal(&database).await;
+    assert!(matches!(error, DatabaseError::Older), "{error}");
+    assert!(error.to_string().contains("chefshat migrate"), "{error}");
+}
+
+#[tokio::test]
+async fn a_database_that_acknowledges_too_early_is_refused() {
+    let database = chefshat_postgres::database();
+    let name = database.run("SELECT current_database()");
+    database.run(&format!(
+        "ALTER DATABASE {name} SET synchronous_commit = off"
+    ));
+    let error = refusal(&database).await;
+    assert!(matches!(error, DatabaseError::Unsafe), "{error}");
+}
+
+#[tokio::test]
+async fn addresses_are_refused_without_showing_a_password() {
+    for (url, advice) in [
+        ("not an address", "postgres://user@host"),
+        ("postgres://ada:secret@host:port/games", "ada"),
+        (
+            "postgres://ada:secret@127.0.0.1:1/games",
+            "cannot be reached",
+        ),
+    ] {
+        let opened = PostgresStore::open(url, PostgresOptions::default()).await;
+        let error = opened.err().expect("it is refused").to_string();
+        assert!(!error.contains("secret"), "{error}");
+        assert!(error.contains(advice) || advice == "ada", "{error}");
+    }
+}
+
+#[tokio::test]
+async fn a_node_that_has_not_joined_creates_nothing() {
+    let database = chefshat_postgres::database();
+    let opened = PostgresStore::open(database.url(), PostgresOptions::default()).await;
+    let store = opened.expect("an empty database");
+    let refused = store.create(durable(1), vec![]).await;
+    assert!(matches!(refused.err(), Some(StoreError::Failed(_))));
+    store.close().await;
+}
+
+#[tokio::test]
+async fn connections_are_encrypted_and_certificates_checked() {
+    let tls = |file: &str| {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/fixtures/tls/");
+        format!("{folder}{file}")
+    };
+    let text = |file: &str| std::fs::read_to_string(tls(file)).expect("the fixture");
+    let mut server = Server::start();
+    let database = server.database();
+    server.stop();
+    server.encrypt(&text("localhost.pem"), &text("localhost.key"));
+    server.resume();
+    let by_name = database.url().replace("127.0.0.1", "localhost");
+    let options = PostgresOptions::default;
+    let root = format!("sslrootcert={}", tls("localhost.pem"));
+    let checked = format!("{by_name}?sslmode=verify-full&{root}");
+    let store = PostgresStore::open(&checked, options()).await;
+    let store = store.expect("the certificate is trusted");
+    store.join(NodeInfo::default()).await.expect("it joins");
+    store.close().await;
+    for refused in [
+        format!("{by_name}?sslmode=disable"),
+        // Nobody trusts this certificate unless asked to.
+        format!("{by_name}?sslmode=verify-full"),
+    ] {
+        let opened = PostgresStore::open(&refused, options()).await;
+        let error = opened
+            .err()
+            .unwrap_or_else(|| panic!("{refused} was opened"));
+        assert!(matches!(error, DatabaseError::Other(_)), "{error}");
+    }
+}
+
+#[tokio::test]
+async fn who_finds_a_schema_that_another_node_is_creating_waits_for_it() {
+    let database = chefshat_postgres::database();
+    let mut creating = connected(&database).await;
+    open::lock(&mut creating).await.expect("free");
+    // As between two migrations, or in the middle of a look at the tables.
+    database.run("CREATE TABLE half_a_schema (id bigint)");
+    let address = open::address(database.url()).expect("an address");
+    let completing = async {
+        waiting(&mut creating, "advisory").await;
+        database.run("DROP TABLE half_a_schema");
+        drop(creating);
+    };
+    let (opened, ()) = futures::future::join(open::check(&address), completing).await;
+    opened.expect("an empty database");
+    assert_eq!(migrate(database.url()).await.ok(), Some((NEWEST, NEWEST)));
+}
+
+#[tokio::test]
+async fn nodes_that_start_together_on_an_empty_database_all_start() {
+    let database = chefshat_postgres::database();
+    let address = open::address(database.url()).expect("an address");
+    let opening = (0..8).map(|_| open::check(&address));
+    for opened in futures::future::join_all(opening).await {
+        opened.expect("created by one of them");
+    }
+}

@@ -1,0 +1,390 @@
+//! Moves the database of a data directory here: everything in one transaction, so that nothing or
+//! all is moved. What is not over belongs to nobody afterwards; the next node takes it over.
+
+use std::path::Path;
+
+use futures::TryStreamExt as _;
+use sqlx::postgres::PgConnection;
+use sqlx::{AssertSqlSafe, ConnectOptions as _, Connection as _};
+use tracing::error;
+
+use super::errors::failure;
+use super::open::{self, DatabaseError};
+use super::values::{FIRST_EPOCH, integer, text};
+use crate::form;
+use crate::sqlite::{
+    Contents, GameRow, JournalRow, ParticipantRow, StudyRow, TournamentRow, TracesRow,
+};
+use crate::{DATABASE_FILE, OpenError, StoreError};
+use chefshat_room::ids::Id;
+use chefshat_room::journal::GameHeader;
+
+/// Rows in one statement, and how many bytes of journals at most, nearly.
+const ROWS: usize = 1_000;
+const BYTES: usize = 4 * 1024 * 1024;
+
+/// What was moved.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Transferred {
+    /// Games that are over, imported ones included.
+    pub finished: u64,
+    /// Games that are not over.
+    pub unfinished: u64,
+    /// Tournaments.
+    pub tournaments: u64,
+    /// Studies.
+    pub studies: u64,
+    /// Unfinished games and tournaments that this version cannot read; they are moved, but do not
+    /// resume.
+    pub unreadable: u64,
+}
+
+/// Why nothing was moved.
+#[derive(Debug, thiserror::Error)]
+pub enum TransferError {
+    /// The folder has no database, or an empty file.
+    #[error("{0} has no {DATABASE_FILE}, or an empty one; name the data directory of a server")]
+    Missing(String),
+    /// The folder cannot be used.
+    #[error(transparent)]
+    Folder(#[from] OpenError),
+    /// The database cannot be used.
+    #[error(transparent)]
+    Database(#[from] DatabaseError),
+    /// The database has games already.
+    #[error(
+        "the database already has games, tournaments or studies; nothing was changed: create an empty database and name that"
+    )]
+    NotEmpty,
+    /// Reading or writing failed.
+    #[error("{0}; nothing was moved")]
+    Store(#[from] StoreError),
+}
+
+impl From<sqlx::Error> for TransferError {
+    fn from(error: sqlx::Error) -> Self {
+        Self::Store(failure(&error))
+    }
+}
+
+/// Moves the games and tournaments of a data directory into a database without any. Creates or
+/// upgrades its tables. The folder keeps everything; no server may run on it afterwards, because its
+/// unfinished games would resume twice. `progress` receives the number of moved games and of all.
+///
+/// # Errors
+/// Nothing was moved.
+pub async fn transfer(
+    data_dir: &Path,
+    url: &str,
+    mut progress: impl FnMut(u64, u64),
+) -> Result<Transferred, TransferError> {
+    let database = data_dir.join(DATABASE_FILE).metadata();
+    if !database.is_ok_and(|about| about.len() > 0) {
+        return Err(TransferError::Missing(data_dir.display().to_string()));
+    }
+    // Its statements may take long.
+    let address = open::address(url)?.disable_statement_logging();
+    let contents = Contents::open(data_dir).await?;
+    open::migrate(url).await?;
+    let mut connection = open::connect(&address).await?;
+    let mut transaction = connection.begin().await?;
+    // Nobody creates anything meanwhile.
+    sqlx::query("LOCK TABLE games, tournaments, studies, owned IN EXCLUSIVE MODE")
+        .execute(&mut *transaction)
+        .await?;
+    let empty: bool = sqlx::query_scalar(
+        "SELECT NOT EXISTS (SELECT FROM games) AND NOT EXISTS (SELECT FROM tournaments)
+                AND NOT EXISTS (SELECT FROM studies) AND NOT EXISTS (SELECT FROM owned)",
+    )
+    .fetch_one(&mut *transaction)
+    .await?;
+    if !empty {
+        return Err(TransferError::NotEmpty);
+    }
+    let mut moved = Transferred::default();
+    move_tournaments(&contents, &mut transaction, &mut moved).await?;
+    move_studies(&contents, &mut transaction, &mut moved).await?;
+    let all = contents.count().await?;
+    let mut games = contents.games();
+    let mut rows = Vec::new();
+    while let Some(game) = games.try_next().await? {
+        insert_game(&mut transaction, &game).await?;
+        if game.state == 0 {
+            moved.unfinished += 1;
+            moved.unreadable += u64::from(!own_game(&mut transaction, &game).await?);
+        } else {
+            moved.finished += 1;
+            rows.extend(contents.journal(&game).await?);
+            insert_full(&mut transaction, "journal", &mut rows).await?;
+        }
+        progress(moved.finished + moved.unfinished, all);
+    }
+    let mut running = contents.running_journals();
+    while let Some(row) = running.try_next().await? {
+        rows.push(row);
+        insert_full(&mut transaction, "journal", &mut rows).await?;
+    }
+    insert_rows(&mut transaction, "journal", &mut rows).await?;
+    let mut participants = contents.participants().try_chunks(ROWS);
+    while let Some(some) = participants.try_next().await.map_err(|it| it.1)? {
+        insert_participants(&mut transaction, &some).await?;
+    }
+    for statement in [
+        "UPDATE finished SET last = (SELECT coalesce(max(listed), 0) FROM games)",
+        "SELECT setval(pg_get_serial_sequence('games', 'number'), max(number)) FROM games HAVING count(*) > 0",
+        "SELECT setval(pg_get_serial_sequence('tournaments', 'number'), max(number)) FROM tournaments HAVING count(*) > 0",
+        "SELECT setval(pg_get_serial_sequence('studies', 'number'), max(number)) FROM studies HAVING count(*) > 0",
+    ] {
+        sqlx::query(statement).execute(&mut *transaction).await?;
+    }
+    transaction.commit().await?;
+    Ok(moved)
+}
+
+async fn move_tournaments(
+    contents: &Contents,
+    connection: &mut PgConnection,
+    moved: &mut Transferred,
+) -> Result<(), TransferError> {
+    let mut tournaments = contents.tournaments();
+    while let Some(tournament) = tournaments.try_next().await? {
+        moved.tournaments += 1;
+        moved.unreadable += u64::from(!insert_tournament(connection, &tournament).await?);
+    }
+    let mut rows = Vec::new();
+    let mut journals = contents.tournament_journals();
+    while let Some(row) = journals.try_next().await? {
+        rows.push(row);
+        insert_full(connection, "tournament_entries", &mut rows).await?;
+    }
+    insert_rows(connection, "tournament_entries", &mut rows).await
+}
+
+async fn move_studies(
+    contents: &Contents,
+    connection: &mut PgConnection,
+    moved: &mut Transferred,
+) -> Result<(), TransferError> {
+    let mut studies = contents.studies();
+    while let Some(study) = studies.try_next().await? {
+        moved.studies += 1;
+        insert_study(connection, &study).await?;
+    }
+    let mut rows = Vec::new();
+    let mut journals = contents.study_journals();
+    while let Some(row) = journals.try_next().await? {
+        rows.push(row);
+        insert_full(connection, "study_changes", &mut rows).await?;
+    }
+    insert_rows(connection, "study_changes", &mut rows).await?;
+    let mut traces = contents.traces();
+    while let Some(row) = traces.try_next().await? {
+        insert_traces(connection, &row).await?;
+    }
+    Ok(())
+}
+
+/// Inserts a study, which the next node takes over.
+async fn insert_study(
+    connection: &mut PgConnection,
+    study: &StudyRow,
+) -> Result<(), TransferError> {
+    sqlx::query(
+        "WITH study AS (
+             INSERT INTO studies (number, study_id, form, header)
+             OVERRIDING SYSTEM VALUE VALUES ($1, $2, $3, $4)
+         )
+         INSERT INTO owned (id, unit, kind, epoch, join_code, durable, form)
+         VALUES ($2, $2, 2, $5, 'study ' || encode($2, 'hex'), true, $3)",
+    )
+    .bind(study.number)
+    .bind(study.id.as_slice())
+    .bind(study.form)
+    .bind(study.header.as_slice())
+    .bind(FIRST_EPOCH)
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+async fn insert_traces(
+    connection: &mut PgConnection,
+    traces: &TracesRow,
+) -> Result<(), TransferError> {
+    sqlx::query(
+        "INSERT INTO study_traces (trace_id, study, participant, game_id, traces)
+         VALUES ($1, $2, $3, $4, $5)",
+    )
+    .bind(Id::random().0.as_slice())
+    .bind(traces.study)
+    .bind(traces.participant)
+    .bind(traces.game_id.as_slice())
+    .bind(traces.traces.as_slice())
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Inserts a tournament; `false` if it cannot be read, so that nobody resumes it.
+async fn insert_tournament(
+    connection: &mut PgConnection,
+    tournament: &TournamentRow,
+) -> Result<bool, TransferError> {
+    sqlx::query(
+        "INSERT INTO tournaments (number, tournament_id, form, over, header)
+         OVERRIDING SYSTEM VALUE VALUES ($1, $2, $3, $4, $5)",
+    )
+    .bind(tournament.number)
+    .bind(tournament.id.as_slice())
+    .bind(tournament.form)
+    .bind(tournament.over)
+    .bind(tournament.header.as_slice())
+    .execute(&mut *connection)
+    .await?;
+    let header = match form::tournament_from_bytes(&tournament.header) {
+        Ok(header) => header,
+        Err(problem) => {
+            error!(number = tournament.number, %problem, "a tournament cannot be read");
+            return Ok(false);
+        }
+    };
+    sqlx::query(
+        "INSERT INTO owned (id, unit, kind, epoch, join_code, durable, form, over, ended_ms)
+         VALUES ($1, $1, 1, $2, $3, true, $4, $5, CASE WHEN $5 THEN clock_ms() END)",
+    )
+    .bind(tournament.id.as_slice())
+    .bind(FIRST_EPOCH)
+    .bind(text(&header.join_code))
+    .bind(tournament.form)
+    .bind(tournament.over)
+    .execute(connection)
+    .await?;
+    Ok(true)
+}
+
+async fn insert_game(connection: &mut PgConnection, game: &GameRow) -> Result<(), TransferError> {
+    let header = game.header.as_deref().map(form::header_from_bytes);
+    let created_at_ms = match (game.created_at_ms, &header) {
+        (None, Some(Ok(header))) => Some(integer(header.created_at_ms)),
+        (created_at_ms, _) => created_at_ms,
+    };
+    sqlx::query(
+        "INSERT INTO games (number, game_id, form, state, ended_at_ms, filed, origin, room_name, created_at_ms, added,
+                            summary, header, listed, signature)
+         OVERRIDING SYSTEM VALUE VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14)",
+    )
+    .bind(game.number)
+    .bind(game.game_id.as_slice())
+    .bind(game.form)
+    .bind(game.state)
+    .bind(game.ended_at_ms)
+    .bind(game.filed)
+    .bind(game.origin)
+    .bind(game.room_name.as_deref().map(text))
+    .bind(created_at_ms)
+    .bind(game.added)
+    .bind(game.summary.as_deref())
+    .bind(game.header.as_deref())
+    .bind(game.listed)
+    .bind(game.signature.as_deref())
+    .execute(&mut *connection)
+    .await?;
+    if let Some(record) = game.record.as_deref() {
+        sqlx::query("INSERT INTO added_records (game, record) VALUES ($1, $2)")
+            .bind(game.number)
+            .bind(record)
+            .execute(connection)
+            .await?;
+    }
+    Ok(())
+}
+
+/// Lets the next node take over a game that is not over; `false` if it cannot be read.
+async fn own_game(connection: &mut PgConnection, game: &GameRow) -> Result<bool, TransferError> {
+    let header: GameHeader = match game.header.as_deref().map(form::header_from_bytes) {
+        Some(Ok(header)) => header,
+        Some(Err(problem)) => {
+            error!(number = game.number, %problem, "a game cannot be read");
+            return Ok(false);
+        }
+        None => return Ok(false),
+    };
+    sqlx::query(
+        "INSERT INTO owned (id, unit, kind, epoch, join_code, game_id, durable, form, rules_version)
+         VALUES ($1, $2, 0, $3, $4, $5, true, $6, $7)",
+    )
+    .bind(header.room_id.0.as_slice())
+    .bind(header.unit().0.as_slice())
+    .bind(FIRST_EPOCH)
+    .bind(text(&header.join_code))
+    .bind(game.game_id.as_slice())
+    .bind(game.form)
+    .bind(i64::from(header.rules_version))
+    .execute(connection)
+    .await?;
+    Ok(true)
+}
+
+/// Inserts rows of journals once there are many.
+async fn insert_full(
+    connection: &mut PgConnection,
+    table: &'static str,
+    rows: &mut Vec<JournalRow>,
+) -> Result<(), TransferError> {
+    let bytes: usize = rows.iter().map(|row| row.entries.len()).sum();
+    match rows.len() >= ROWS || bytes >= BYTES {
+        true => insert_rows(connection, table, rows).await,
+        false => Ok(()),
+    }
+}
+
+async fn insert_rows(
+    connection: &mut PgConnection,
+    table: &'static str,
+    rows: &mut Vec<JournalRow>,
+) -> Result<(), TransferError> {
+    // The names of our own tables. Both call the number of game or tournament differently.
+    let statement = format!(
+        "INSERT INTO {table} SELECT number, position, $1, entries
+         FROM unnest($2::bigint[], $3::bigint[], $4::bytea[]) AS new (number, position, entries)"
+    );
+    sqlx::query(AssertSqlSafe(statement))
+        .bind(FIRST_EPOCH)
+        .bind(rows.iter().map(|row| row.of).collect::<Vec<_>>())
+        .bind(rows.iter().map(|row| row.position).collect::<Vec<_>>())
+        .bind(
+            (rows.iter())
+                .map(|row| row.entries.as_slice())
+                .collect::<Vec<_>>(),
+        )
+        .execute(connection)
+        .await?;
+    rows.clear();
+    Ok(())
+}
+
+async fn insert_participants(
+    connection: &mut PgConnection,
+    rows: &[ParticipantRow],
+) -> Result<(), TransferError> {
+    sqlx::query(
+        "INSERT INTO participants (game, seat, name, agent, kind)
+         SELECT * FROM unnest($1::bigint[], $2::bigint[], $3::text[], $4::text[], $5::integer[])",
+    )
+    .bind(rows.iter().map(|row| row.game).collect::<Vec<_>>())
+    .bind(rows.iter().map(|row| row.seat).collect::<Vec<_>>())
+    .bind(
+        (rows.iter())
+            .map(|row| text(&row.name).into_owned())
+            .collect::<Vec<_>>(),
+    )
+    .bind(
+        (rows.iter())
+            .map(|row| text(&row.agent).into_owned())
+            .collect::<Vec<_>>(),
+    )
+    .bind(rows.iter().map(|row| row.kind).collect::<Vec<_>>())
+    .execute(connection)
+    .await?;
+    Ok(())
+}

@@ -1,0 +1,380 @@
+//! Tournaments and studies: what their owners write, at their epochs, and what is read of them.
+//! Everything that belongs to one locks its row in `owned`, so it and a takeover come one after the
+//! other.
+
+use futures::FutureExt as _;
+use sqlx::Row as _;
+use sqlx::postgres::{PgConnection, PgRow};
+
+use super::reader::Reader;
+use super::values::{FIRST_EPOCH, Owned, integer, number_of, text};
+use super::writer::confirming;
+use crate::StoreError;
+use crate::form::{self, FORM};
+use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitId, UnitKind, UnitRow, UnitWrite};
+use chefshat_room::ids::Id;
+
+/// Who writes for a unit.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Writer {
+    /// A node that creates it.
+    Node(i64),
+    /// Its owner.
+    Owner(Owned),
+}
+
+/// What is written for a unit.
+#[derive(Debug)]
+pub(super) struct Change {
+    pub(super) unit: UnitId,
+    pub(super) by: Writer,
+    /// Identifies interface traces, so that they are added once.
+    pub(super) id: Id,
+    pub(super) write: UnitWrite,
+}
+
+impl Change {
+    /// Writes it in a transaction; `again`: it may have been written before.
+    pub(super) async fn run(
+        &self,
+        connection: &mut PgConnection,
+        again: bool,
+    ) -> sqlx::Result<Result<i64, StoreError>> {
+        let unit = self.unit;
+        let (owned, write) = match (self.by, &self.write) {
+            (
+                Writer::Node(node),
+                UnitWrite::Create {
+                    join_code,
+                    header,
+                    first,
+                },
+            ) => {
+                let created = create(
+                    connection,
+                    unit,
+                    node,
+                    (join_code.as_deref(), header),
+                    again,
+                );
+                return match (created.await?, first) {
+                    (Ok(Created::Now), Some(row)) => {
+                        let owned = Owned {
+                            id: unit.id,
+                            unit: unit.id,
+                            epoch: FIRST_EPOCH,
+                        };
+                        append(connection, unit.kind, owned, row)
+                            .await
+                            .map(|_| Ok(0))
+                    }
+                    (Ok(_), _) => Ok(Ok(0)),
+                    (Err(error), _) => Ok(Err(error)),
+                };
+            }
+            (Writer::Owner(owned), write) => (owned, write),
+            (Writer::Node(_), _) => return Ok(Err(StoreError::Fenced(unit.id))),
+        };
+        let written = match write {
+            UnitWrite::Create { .. } => return Ok(Err(StoreError::Taken(unit.id))),
+            UnitWrite::Append(row) => append(connection, unit.kind, owned, row).await?,
+            UnitWrite::Rewrite { entries, forgotten } => {
+                rewrite(connection, unit.kind, owned, entries, forgotten).await?
+            }
+            UnitWrite::Traces(traces) => add_traces(connection, owned, self.id, traces).await?,
+            UnitWrite::Delete => delete(connection, unit.kind, owned).await?,
+        };
+        Ok(match written {
+            true => Ok(0),
+            false => Err(owned.fenced()),
+        })
+    }
+}
+
+enum Created {
+    /// By this attempt.
+    Now,
+    /// By an earlier one, with its first row.
+    Before,
+}
+
+/// Creates a unit. What stands in place of a missing join code cannot be typed as one.
+async fn create(
+    connection: &mut PgConnection,
+    unit: UnitId,
+    node: i64,
+    (join_code, header): (Option<&str>, &[u8]),
+    again: bool,
+) -> sqlx::Result<Result<Created, StoreError>> {
+    let row = sqlx::query(unit.kind.sql(
+        "WITH owner AS (
+             SELECT node FROM nodes WHERE node = $1
+         ), place AS (
+             INSERT INTO owned (id, unit, kind, node, epoch, join_code, durable, form)
+             SELECT $2, $2, $7, node, $3, coalesce($6, 'study ' || encode($2, 'hex')), true, $4 FROM owner
+             ON CONFLICT DO NOTHING RETURNING id
+         ), unit AS (
+             INSERT INTO {units} ({unit_id}, form, header) SELECT $2, $4, $5 FROM place
+         )
+         SELECT EXISTS (SELECT FROM place), EXISTS (SELECT FROM owner)",
+    ))
+    .bind(node)
+    .bind(unit.id.0.as_slice())
+    .bind(FIRST_EPOCH)
+    .bind(FORM)
+    .bind(header)
+    .bind(join_code.map(text))
+    .bind(number_of(unit.kind))
+    .fetch_one(&mut *connection)
+    .await?;
+    let (placed, owner): (bool, bool) = (row.get(0), row.get(1));
+    if placed {
+        return Ok(Ok(Created::Now));
+    }
+    if again {
+        let own = sqlx::query(unit.kind.sql(confirming!(
+            "{unit_id} FROM {units} WHERE {unit_id} = $1 AND header = $2"
+        )))
+        .bind(unit.id.0.as_slice())
+        .bind(header)
+        .fetch_optional(connection)
+        .await?;
+        if own.is_some() {
+            return Ok(Ok(Created::Before));
+        }
+    }
+    Ok(Err(match owner {
+        true => StoreError::Taken(unit.id),
+        false => StoreError::Fenced(unit.id),
+    }))
+}
+
+/// Adds a row; `false` if another node has the unit.
+async fn append(
+    connection: &mut PgConnection,
+    kind: UnitKind,
+    owned: Owned,
+    row: &UnitRow,
+) -> sqlx::Result<bool> {
+    let position = integer(row.position);
+    let added = sqlx::query(kind.sql(
+        "WITH owner AS (
+             SELECT id FROM owned WHERE id = $1 AND epoch = $2 FOR UPDATE
+         )
+         INSERT INTO {rows} ({unit}, position, epoch, {entries})
+         SELECT number, $3, $2, $4 FROM owner JOIN {units} ON {unit_id} = id
+         ON CONFLICT DO NOTHING RETURNING {unit}",
+    ))
+    .bind(owned.id.0.as_slice())
+    .bind(owned.epoch)
+    .bind(position)
+    .bind(row.entries.as_slice())
+    .fetch_optional(&mut *connection)
+    .await?;
+    if added.is_some() {
+        if row.over {
+            end(connection, owned.id).await?;
+        }
+        return Ok(true);
+    }
+    let own = sqlx::query(kind.sql(confirming!(
+        "{unit} FROM {units} JOIN {rows} ON {unit} = number
+         WHERE {unit_id} = $1 AND position = $3 AND epoch = $2 AND {entries} = $4"
+    )))
+    .bind(owned.id.0.as_slice())
+    .bind(owned.epoch)
+    .bind(position)
+    .bind(row.entries.as_slice())
+    .fetch_optional(connection)
+    .await?;
+    Ok(own.is_some())
+}
+
+/// Marks a tournament, whose row is locked, as over.
+async fn end(connection: &mut PgConnection, id: Id) -> sqlx::Result<()> {
+    for text in [
+        "UPDATE owned SET over = true, ended_ms = clock_ms() WHERE id = $1",
+        "UPDATE tournaments SET over = true WHERE tournament_id = $1",
+    ] {
+        sqlx::query(text)
+            .bind(id.0.as_slice())
+            .execute(&mut *connection)
+            .await?;
+    }
+    Ok(())
+}
+
+/// Replaces the journal; doing it again changes nothing.
+async fn rewrite(
+    connection: &mut PgConnection,
+    kind: UnitKind,
+    owned: Owned,
+    entries: &[u8],
+    forgotten: &[u32],
+) -> sqlx::Result<bool> {
+    let row = sqlx::query(kind.sql(
+        "WITH owner AS (
+             SELECT id FROM owned WHERE id = $1 AND epoch = $2 FOR UPDATE
+         ), unit AS (
+             SELECT number FROM owner JOIN {units} ON {unit_id} = id
+         ), later AS (
+             DELETE FROM {rows} USING unit WHERE {rows}.{unit} = unit.number AND position > 0
+         ), traces AS (
+             DELETE FROM study_traces USING unit
+             WHERE study_traces.study = unit.number AND participant = ANY ($3)
+         )
+         INSERT INTO {rows} ({unit}, position, epoch, {entries})
+         SELECT number, 0, $2, $4 FROM unit
+         ON CONFLICT ({unit}, position) DO UPDATE SET epoch = excluded.epoch, {entries} = excluded.{entries}
+         RETURNING {unit}",
+    ))
+    .bind(owned.id.0.as_slice())
+    .bind(owned.epoch)
+    .bind(forgotten.iter().map(|it| i64::from(*it)).collect::<Vec<_>>())
+    .bind(entries)
+    .fetch_optional(connection)
+    .await?;
+    Ok(row.is_some())
+}
+
+/// Adds interface traces; doing it again changes nothing.
+async fn add_traces(
+    connection: &mut PgConnection,
+    owned: Owned,
+    id: Id,
+    traces: &StoredTraces,
+) -> sqlx::Result<bool> {
+    sqlx::query_scalar(
+        "WITH owner AS (
+             SELECT id FROM owned WHERE id = $1 AND epoch = $2 FOR UPDATE
+         ), added AS (
+             INSERT INTO study_traces (trace_id, study, participant, game_id, traces)
+             SELECT $3, number, $4, $5, $6 FROM owner JOIN studies ON study_id = id
+             ON CONFLICT DO NOTHING
+         )
+         SELECT EXISTS (SELECT FROM owner)",
+    )
+    .bind(owned.id.0.as_slice())
+    .bind(owned.epoch)
+    .bind(id.0.as_slice())
+    .bind(i64::from(traces.number))
+    .bind(traces.game.0.as_slice())
+    .bind(form::traces_to_bytes(&traces.traces))
+    .fetch_one(connection)
+    .await
+}
+
+/// Deletes a unit; one that is gone counts as deleted.
+async fn delete(connection: &mut PgConnection, kind: UnitKind, owned: Owned) -> sqlx::Result<bool> {
+    let row = sqlx::query(kind.sql(
+        "WITH owner AS (
+             SELECT id FROM owned WHERE id = $1 AND epoch = $2 FOR UPDATE
+         ), unit AS (
+             DELETE FROM {units} USING owner WHERE {unit_id} = id RETURNING number
+         ), rows AS (
+             DELETE FROM {rows} USING unit WHERE {rows}.{unit} = unit.number
+         ), traces AS (
+             DELETE FROM study_traces USING unit WHERE study_traces.study = unit.number
+         )
+         DELETE FROM owned USING owner WHERE owned.id = owner.id RETURNING owned.id",
+    ))
+    .bind(owned.id.0.as_slice())
+    .bind(owned.epoch)
+    .fetch_optional(&mut *connection)
+    .await?;
+    if row.is_some() {
+        return Ok(true);
+    }
+    let another = sqlx::query("SELECT id FROM owned WHERE id = $1")
+        .bind(owned.id.0.as_slice())
+        .fetch_optional(connection)
+        .await?;
+    Ok(another.is_none())
+}
+
+impl Reader {
+    /// See `Store::unit`.
+    pub(super) async fn unit(&self, unit: UnitId) -> Result<Option<StoredUnit>, StoreError> {
+        let row: Option<PgRow> = (self.read(|connection| {
+            sqlx::query(unit.kind.sql(HEADER))
+                .bind(unit.id.0.to_vec())
+                .fetch_optional(connection)
+                .boxed()
+        }))
+        .await?;
+        let Some(row) = row else { return Ok(None) };
+        let number: i64 = row.get(0);
+        let rows = self.read(|connection| {
+            sqlx::query_scalar(unit.kind.sql(ROWS))
+                .bind(number)
+                .fetch_all(connection)
+                .boxed()
+        });
+        Ok(Some(StoredUnit {
+            form: row.get(1),
+            header: row.get(2),
+            rows: rows.await?,
+        }))
+    }
+
+    /// The ids of all studies, oldest first.
+    pub(super) async fn studies(&self) -> Result<Vec<Id>, StoreError> {
+        let ids = self.read(|connection| {
+            sqlx::query_scalar("SELECT study_id FROM studies ORDER BY number")
+                .fetch_all(connection)
+                .boxed()
+        });
+        Ok(ids_of(ids.await?))
+    }
+
+    /// The ids of the tournaments of a node that are not over, and of the newest ones of the cluster
+    /// that are; oldest first.
+    pub(super) async fn tournaments(
+        &self,
+        node: i64,
+        newest_over: usize,
+    ) -> Result<Vec<Id>, StoreError> {
+        let ids = self.read(|connection| {
+            sqlx::query_scalar(
+                "SELECT tournament_id FROM tournaments WHERE number IN (
+                     SELECT number FROM tournaments JOIN owned ON id = tournament_id
+                     WHERE node = $1 AND NOT owned.over
+                     UNION ALL
+                     SELECT * FROM (
+                         SELECT number FROM tournaments WHERE over
+                         ORDER BY number DESC LIMIT $2) newest)
+                 ORDER BY number",
+            )
+            .bind(node)
+            .bind(integer(newest_over as u64))
+            .fetch_all(connection)
+            .boxed()
+        });
+        Ok(ids_of(ids.await?))
+    }
+
+    /// See `Store::traces`.
+    pub(super) async fn traces(&self, study: Id) -> Result<Vec<StoredTraces>, StoreError> {
+        let rows: Vec<(i64, Vec<u8>, Vec<u8>)> = (self.read(|connection| {
+            sqlx::query_as(
+                "SELECT participant, game_id, traces
+                 FROM study_traces JOIN studies ON study = studies.number
+                 WHERE study_id = $1 ORDER BY study_traces.number",
+            )
+            .bind(study.0.to_vec())
+            .fetch_all(connection)
+            .boxed()
+        }))
+        .await?;
+        let read = |(participant, game, traces): &(i64, Vec<u8>, Vec<u8>)| {
+            let participant = u32::try_from(*participant).unwrap_or_default();
+            StoredTraces::read(study, participant, game, traces)
+        };
+        Ok(rows.iter().filter_map(read).collect())
+    }
+}
+
+fn ids_of(ids: Vec<Vec<u8>>) -> Vec<Id> {
+    let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
+    ids.into_iter().filter_map(id).collect()
+}

@@ -1,0 +1,137 @@
+//! Removing a participant from the database: reads what contains the name, and writes what changes,
+//! in one transaction of the writer. `store::forget` decides what changes.
+
+use std::path::Path;
+
+use chefshat_record::pseudonym::Pseudonym;
+use sqlx::sqlite::{SqlitePool, SqliteRow};
+use sqlx::{Connection as _, Row as _};
+
+use super::SqliteStore;
+use super::errors::{explain, failure};
+use super::open::{self, IfGone, OpenError};
+use super::reader::Reader;
+use super::rows::with_own_rows;
+use crate::forget::{GameRows, Rewrite};
+use crate::{ForgetError, StoreError};
+use chefshat_room::ids::Id;
+
+impl SqliteStore {
+    /// Rewrites the database of a data directory so that nothing of what was deleted remains in its
+    /// file. This needs as much free disk space as the database has.
+    ///
+    /// # Errors
+    /// The directory cannot be used, a server uses it, or the database failed.
+    pub async fn purge(data_dir: &Path) -> Result<(), OpenError> {
+        let mut opened = open::open(data_dir, IfGone::CreateFirst).await?;
+        opened.readers.close().await;
+        let failed = |error| OpenError::Other(data_dir.to_path_buf(), explain(&error));
+        for tidying in [
+            open::SHRINKABLE,
+            "VACUUM",
+            "PRAGMA wal_checkpoint(TRUNCATE)",
+        ] {
+            let tidied = sqlx::query(tidying).execute(&mut opened.writer).await;
+            tidied.map_err(failed)?;
+        }
+        opened.writer.close().await.map_err(failed)
+    }
+}
+
+impl Reader {
+    /// What removing a participant changes.
+    ///
+    /// # Errors
+    /// See [`ForgetError`].
+    pub(super) async fn forgetting(&self, who: &Pseudonym) -> Result<Rewrite, ForgetError> {
+        let mut rewrite = Rewrite::new(who);
+        let games: Vec<i64> = sqlx::query_scalar(
+            "SELECT number FROM games
+             WHERE number IN (SELECT game FROM participants WHERE name = $1
+                              UNION SELECT game FROM journal WHERE instr(entries, CAST($1 AS BLOB)) > 0
+                              UNION SELECT game FROM added_records WHERE instr(record, CAST($1 AS BLOB)) > 0)
+             ORDER BY number",
+        )
+        .bind(who.of.name.as_str())
+        .fetch_all(&self.pool)
+        .await
+        .map_err(failure)?;
+        for number in games {
+            if let Some(rows) = self.game_rows(number).await? {
+                let bytes: usize = rows.journal.iter().map(|(_, bytes)| bytes.len()).sum();
+                let bytes = bytes + rows.record.as_ref().map_or(0, Vec::len);
+                let redacting = self.codec.run(bytes / 64, move || rewrite.with_game(rows));
+                rewrite = redacting.await??;
+            }
+        }
+        let tournaments: Vec<i64> = sqlx::query_scalar(
+            "SELECT DISTINCT tournament FROM tournament_entries
+             WHERE instr(entries, CAST($1 AS BLOB)) > 0",
+        )
+        .bind(who.of.name.as_str())
+        .fetch_all(&self.pool)
+        .await
+        .map_err(failure)?;
+        for number in tournaments {
+            let rows: Vec<(i64, Vec<u8>)> = sqlx::query_as(
+                "SELECT position, entries FROM tournament_entries WHERE tournament = $1 ORDER BY position",
+            )
+            .bind(number)
+            .fetch_all(&self.pool)
+            .await
+            .map_err(failure)?;
+            rewrite = rewrite.with_tournament(number, rows)?;
+        }
+        Ok(rewrite)
+    }
+
+    /// The rows of a game; `None` if it was deleted.
+    async fn game_rows(&self, number: i64) -> Result<Option<GameRows>, StoreError> {
+        let row = sqlx::query(
+            "SELECT game_id, state, filed, header, summary, record, last_row, signature
+             FROM games LEFT JOIN added_records ON game = number WHERE number = $1",
+        )
+        .bind(number)
+        .fetch_optional(&self.pool)
+        .await
+        .map_err(failure)?;
+        let Some(row) = row else { return Ok(None) };
+        let id: Vec<u8> = row.get(0);
+        let id = id.try_into().map(Id).map_err(|_| {
+            StoreError::Failed(format!("game number {number} has an id that is damaged"))
+        })?;
+        Ok(Some(GameRows {
+            number,
+            id,
+            is_running: row.get::<i64, _>(1) == 0,
+            is_filed: row.get(2),
+            header: row.get(3),
+            summary: row.get(4),
+            record: row.get(5),
+            signature: row.get(7),
+            journal: journal_of(&self.pool, number, row.get(6)).await?,
+        }))
+    }
+}
+
+/// The rows of a game's journal, in order.
+async fn journal_of(
+    pool: &SqlitePool,
+    game: i64,
+    last_row: Option<i64>,
+) -> Result<Vec<(i64, Vec<u8>)>, StoreError> {
+    let rows: Vec<SqliteRow> = sqlx::query(match last_row {
+        Some(_) => with_own_rows!(
+            "row = $1 AND game = $2",
+            "SELECT row, entries FROM journal WHERE row IN (SELECT row FROM own) ORDER BY row"
+        ),
+        // The game is not over: the position of its last row is unknown.
+        None => "SELECT row, entries FROM journal WHERE $1 IS NULL AND game = $2 ORDER BY row",
+    })
+    .bind(last_row)
+    .bind(game)
+    .fetch_all(pool)
+    .await
+    .map_err(failure)?;
+    Ok(rows.iter().map(|row| (row.get(0), row.get(1))).collect())
+}

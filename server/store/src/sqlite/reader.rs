@@ -1,0 +1,300 @@
+//! Reads the database over its own connections, which cannot write and never wait for the writer.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use chefshat_proto::v1;
+use futures::TryStreamExt as _;
+use prost::Message as _;
+use sqlx::Row as _;
+use sqlx::sqlite::SqlitePool;
+use tracing::error;
+
+use super::errors::failure;
+use super::journals::{DurableJournal, WriteQueue};
+use super::retained::Units;
+use super::rows::{self, Read};
+use crate::Keep;
+use crate::codec::Codec;
+use crate::form::{self, Unreadable, check_form, stored_header};
+use crate::{Listed, Part, ResumableGame, StoreError, StoredGame, listed};
+use chefshat_room::ids::Id;
+
+/// Most ended games whose rooms are restored: the newest ones, because clients know the end of
+/// older ones.
+const MAX_ENDED: i64 = 256;
+/// Most games of which retention reads at a time whether they are needed.
+const MAX_PRUNABLE_READ: usize = 1_024;
+
+/// The query for a list of finished games, with the condition on their numbers and the order.
+macro_rules! list_query {
+    ($part:literal, $order:literal) => {
+        concat!(
+            "SELECT listed, summary, game_id FROM games
+             WHERE summary IS NOT NULL AND ",
+            $part,
+            " AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)
+               AND created_at_ms >= $5 AND ($6 = 0 OR created_at_ms < $6)
+               AND ($7 = 0 OR EXISTS (SELECT 1 FROM participants WHERE game = number AND kind = $7))
+               AND ($8 = '' OR number IN (SELECT game FROM participants WHERE (name = $8 AND agent = '') OR agent = $8))
+               AND NOT ($9 AND added)
+             ORDER BY ",
+            $order,
+            " LIMIT $10"
+        )
+    };
+}
+
+/// Reads stored games.
+pub(super) struct Reader {
+    pub(super) pool: SqlitePool,
+    pub(super) codec: Codec,
+}
+
+impl Reader {
+    /// See `Store::resumable_games`.
+    pub(super) async fn resumable_games(
+        &self,
+        ended_since_ms: u64,
+        commands: &WriteQueue,
+    ) -> Result<Vec<ResumableGame>, StoreError> {
+        let games = sqlx::query(
+            "SELECT number, form, header, state, last_row FROM games WHERE number IN (
+                 SELECT number FROM games WHERE state = 0
+                 UNION ALL
+                 SELECT * FROM (
+                     SELECT number FROM games WHERE ended_at_ms >= $1 AND header IS NOT NULL
+                     ORDER BY ended_at_ms DESC LIMIT $2))
+             ORDER BY number",
+        )
+        .bind(i64::try_from(ended_since_ms).unwrap_or(i64::MAX))
+        .bind(MAX_ENDED)
+        .fetch_all(&self.pool)
+        .await
+        .map_err(failure)?;
+        let mut running_journals = self.running_journals().await?;
+        let mut left = Vec::with_capacity(games.len());
+        for row in games {
+            let number: i64 = row.get(0);
+            let concluded = row.get::<i64, _>(3) != 0;
+            let header = check_form(row.get(1)).and_then(|()| stored_header(row.get(2)));
+            let read = match concluded {
+                true => self.journal(number, row.get(4)).await?,
+                false => running_journals
+                    .remove(&number)
+                    .unwrap_or(Ok(Read::default())),
+            };
+            match header.and_then(|header| Ok((header, read?))) {
+                Ok((header, read)) => left.push(ResumableGame {
+                    journal: Box::new(DurableJournal {
+                        number,
+                        position: read.rows,
+                        last_row: read.last_row,
+                        running: (!concluded).then(|| commands.space.game()),
+                        queue: commands.clone(),
+                        readers: self.pool.clone(),
+                        codec: self.codec.clone(),
+                    }),
+                    entries: read.entries,
+                    concluded,
+                    header,
+                }),
+                Err(problem) => {
+                    error!(number, %problem, "a game cannot be read; it is left unchanged");
+                }
+            }
+        }
+        Ok(left)
+    }
+
+    /// See `Store::summary`.
+    pub(super) async fn summary(&self, game: Id) -> Result<Option<v1::RecordSummary>, StoreError> {
+        let summary: Option<Vec<u8>> = sqlx::query_scalar(
+            "SELECT summary FROM games WHERE game_id = $1 AND summary IS NOT NULL",
+        )
+        .bind(game.0.as_slice())
+        .fetch_optional(&self.pool)
+        .await
+        .map_err(failure)?;
+        let decoded = summary.map(|bytes| v1::RecordSummary::decode(bytes.as_slice()));
+        decoded.transpose().map_err(|error| {
+            StoreError::Unreadable(format!(
+                "the summary of game {game} cannot be read: {error}"
+            ))
+        })
+    }
+
+    /// See `Store::finished`.
+    pub(super) async fn finished(&self, game: Id) -> Result<Option<StoredGame>, StoreError> {
+        let row = sqlx::query(
+            "SELECT number, form, header, record, last_row, signature
+             FROM games LEFT JOIN added_records ON game = number
+             WHERE game_id = $1 AND summary IS NOT NULL",
+        )
+        .bind(game.0.as_slice())
+        .fetch_optional(&self.pool)
+        .await
+        .map_err(failure)?;
+        let Some(row) = row else { return Ok(None) };
+        let unreadable = |problem: Unreadable| {
+            StoreError::Unreadable(format!("game {game} cannot be read: {problem}"))
+        };
+        check_form(row.get(1)).map_err(unreadable)?;
+        let record: Option<Vec<u8>> = row.get(3);
+        if let Some(record) = record {
+            let decoding = self
+                .codec
+                .run(record.len() / 64, move || form::lines_from_bytes(&record));
+            let lines = decoding.await?.map_err(unreadable)?;
+            return Ok(Some(StoredGame::Imported(lines.into())));
+        }
+        let header = stored_header(row.get(2)).map_err(unreadable)?;
+        let journal = self.journal(row.get(0), row.get(4)).await?;
+        let journal = journal.map_err(unreadable)?;
+        let signature: Option<&[u8]> = row.get(5);
+        let signature = signature.map(form::signature_from_bytes).transpose();
+        Ok(Some(StoredGame::Hosted(
+            Arc::new(header),
+            journal.entries.into(),
+            signature.map_err(unreadable)?.map(Arc::new),
+        )))
+    }
+
+    /// Whether a game with this id is stored, over or not.
+    pub(super) async fn has_game(&self, game: Id) -> Result<bool, StoreError> {
+        sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM games WHERE game_id = $1)")
+            .bind(game.0.as_slice())
+            .fetch_one(&self.pool)
+            .await
+            .map_err(failure)
+    }
+
+    /// The journals of all running games, by game number; the inner result says why one cannot be
+    /// read. Reads everything stored since the oldest of them was created.
+    async fn running_journals(&self) -> Result<HashMap<i64, Result<Read, Unreadable>>, StoreError> {
+        let mut rows = sqlx::query(
+            "SELECT row, position, entries, game FROM journal
+             WHERE row >= (SELECT min(first_row) FROM games WHERE state = 0)
+               AND game IN (SELECT number FROM games WHERE state = 0)
+             ORDER BY row",
+        )
+        .fetch(&self.pool);
+        let mut journals = HashMap::new();
+        while let Some(row) = rows.try_next().await.map_err(failure)? {
+            let journal = journals.entry(row.get(3)).or_insert(Ok(Read::default()));
+            if let Ok(read) = journal
+                && let Err(problem) = read.add(&row)
+            {
+                *journal = Err(problem);
+            }
+        }
+        Ok(journals)
+    }
+
+    async fn journal(
+        &self,
+        number: i64,
+        last_row: Option<i64>,
+    ) -> Result<Result<Read, Unreadable>, StoreError> {
+        rows::journal(&self.pool, &self.codec, number, last_row).await
+    }
+
+    /// See `Store::list`.
+    pub(super) async fn list(
+        &self,
+        filter: &v1::RecordFilter,
+        part: Part,
+        count: usize,
+    ) -> Result<Vec<Listed>, StoreError> {
+        let (query, number) = match part {
+            Part::After(number) => (list_query!("listed > $1", "listed"), number),
+            Part::Before(number) => (list_query!("listed < $1", "listed DESC"), number),
+        };
+        let rows = sqlx::query(query)
+            .bind(i64::try_from(number).unwrap_or(i64::MAX))
+            .bind(filter.state)
+            .bind(filter.origin)
+            .bind(filter.room_name.as_str())
+            .bind(i64::try_from(filter.created_from_ms).unwrap_or(i64::MAX))
+            .bind(i64::try_from(filter.created_before_ms).unwrap_or(i64::MAX))
+            .bind(filter.kind)
+            .bind(filter.participant.as_str())
+            .bind(filter.hosted_here)
+            .bind(i64::try_from(count).unwrap_or(i64::MAX))
+            .fetch_all(&self.pool)
+            .await
+            .map_err(failure)?;
+        Ok(rows
+            .iter()
+            .map(|row| listed(row.get(0), row.get(2), row.get(1)))
+            .collect())
+    }
+
+    /// See `Store::finished_games`.
+    pub(super) async fn finished_games(&self) -> Result<u64, StoreError> {
+        let count: i64 = sqlx::query_scalar("SELECT count(*) FROM games WHERE state <> 0")
+            .fetch_one(&self.pool)
+            .await
+            .map_err(failure)?;
+        Ok(u64::try_from(count).unwrap_or_default())
+    }
+
+    /// See `Store::prunable`. Games without a record are none of the newest ones.
+    pub(super) async fn prunable(
+        &self,
+        keep: Keep,
+        mut after: u64,
+        count: usize,
+    ) -> Result<Vec<(u64, Id)>, StoreError> {
+        let integer = |number: u64| i64::try_from(number).unwrap_or(i64::MAX);
+        let mut connection = self.pool.acquire().await.map_err(failure)?;
+        let (mut found, mut units) = (Vec::new(), Units::default());
+        let mut page = count;
+        loop {
+            /// Number, game, encoding version, header.
+            type Row = (i64, Vec<u8>, i64, Option<Vec<u8>>);
+            let rows: Vec<Row> = sqlx::query_as(
+                "SELECT number, game_id, form, header FROM games
+                 WHERE state <> 0 AND number > $1 AND coalesce(ended_at_ms, created_at_ms, 0) < $3
+                   AND (summary IS NULL
+                        OR filed = 1 AND listed <= (SELECT listed FROM games WHERE listed IS NOT NULL
+                                                    ORDER BY listed DESC LIMIT 1 OFFSET $2))
+                 ORDER BY number LIMIT $4",
+            )
+            .bind(integer(after))
+            .bind(integer(keep.newest.unwrap_or_default().max(1)))
+            .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
+            .bind(integer(page as u64))
+            .fetch_all(&mut *connection)
+            .await
+            .map_err(failure)?;
+            let Some((last, ..)) = rows.last() else {
+                return Ok(found);
+            };
+            after = last.unsigned_abs();
+            for (number, id, form, header) in rows {
+                let Ok(id) = id.try_into() else { continue };
+                let needed = units.need(&mut connection, form, header.as_deref());
+                if !needed.await.map_err(failure)? {
+                    found.push((number.unsigned_abs(), Id(id)));
+                }
+                if found.len() >= count {
+                    return Ok(found);
+                }
+            }
+            page = MAX_PRUNABLE_READ.min(page * 2);
+        }
+    }
+
+    /// See `Store::without_record_file`.
+    pub(super) async fn without_record_file(&self) -> Result<Vec<Id>, StoreError> {
+        let ids: Vec<Vec<u8>> = sqlx::query_scalar(
+            "SELECT game_id FROM games WHERE filed = 0 AND summary IS NOT NULL ORDER BY number",
+        )
+        .fetch_all(&self.pool)
+        .await
+        .map_err(failure)?;
+        let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
+        Ok(ids.into_iter().filter_map(id).collect())
+    }
+}

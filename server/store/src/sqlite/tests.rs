@@ -1,0 +1,643 @@
+//! The database returns what was stored. `opening` tests folders and files that cannot be used.
+
+mod damage;
+mod full;
+mod opening;
+pub(crate) mod tournaments;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_agents::{AgentKind, NamedAgent};
+use chefshat_engine::SeedPlan;
+use chefshat_engine::{ActionId, RULES_VERSION, RuleSetSpec, Seat, Seed};
+use chefshat_proto::v1;
+use futures::FutureExt as _;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
+use sqlx::{Connection as _, Executor as _};
+
+use super::{OpenError, SqliteStore};
+use crate::form;
+use crate::testing::{TypedUnits as _, cup};
+use crate::tournaments::TournamentEntry;
+use crate::{Keep, Part, Store, StoredGame};
+use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::journal::{
+    AbortReason, Branch, Change, Decided, Entry, Fill, GameHeader, GameStart, Marked,
+    ParticipantKind, RecordedSeat, SeatedParticipant, Source, TakenOver,
+};
+use chefshat_room::policy::{Durability, Policy};
+
+fn header(game: u8, durability: Durability) -> GameHeader {
+    GameHeader {
+        room_id: Id([game ^ 0xff; 16]),
+        game_id: Id([game; 16]),
+        name: "a room with ünïcode".into(),
+        rules: RuleSetSpec::default().validate().expect("the standard"),
+        rules_version: RULES_VERSION,
+        server_version: "0.0.1".into(),
+        participant_removed: false,
+        policy: Policy {
+            durability,
+            bank: Duration::from_millis(1_234),
+            pace: Some(Duration::ZERO),
+            clocks: Vec::new(),
+            // Games of earlier servers have none.
+            absence_time: None,
+            ..Policy::default()
+        },
+        fills: vec![
+            Fill::Open { reserved_for: None },
+            Fill::Open {
+                reserved_for: Some(ParticipantKind::Robot),
+            },
+            Fill::BuiltIn(AgentKind::Greedy.into()),
+            Fill::Replay(RecordedSeat {
+                game: Id([9; 16]),
+                seat: Seat::new(2),
+            }),
+        ],
+        display_names: BTreeMap::new(),
+        wizards: std::collections::BTreeSet::new(),
+        recorded: BTreeMap::new(),
+        start: GameStart {
+            script: None,
+            branch: Some(Branch {
+                game: Id([8; 16]),
+                same_deals: true,
+                taken_over: vec![
+                    TakenOver {
+                        seed: Seed([1; 32]),
+                        actions: vec![ActionId::new(3), ActionId::new(199)],
+                    },
+                    TakenOver {
+                        seed: Seed([2; 32]),
+                        actions: vec![ActionId::new(7)],
+                    },
+                ],
+            }),
+        },
+        seed: SeedPlan::Committed {
+            server_seed: [4; 32],
+            nonce: [5; 32],
+        },
+        created_at_ms: 1_700_000_000_000,
+        join_code: "ABCDEFGH".into(),
+        owner: SecretHash::of(b"owner"),
+        tournament: None,
+        table: None,
+        study: None,
+    }
+}
+
+/// One entry of every kind.
+fn entries() -> Vec<Entry> {
+    let seat = Seat::new(1);
+    let seated = |name_fingerprint: &str| Change::Seated {
+        seat,
+        participant: Box::new(SeatedParticipant {
+            name: "Ada".into(),
+            name_fingerprint: name_fingerprint.into(),
+            kind: ParticipantKind::Human,
+            ticket: SecretHash::of(b"ticket"),
+        }),
+    };
+    let changes = [
+        seated(""),
+        Change::Vacated(seat),
+        Change::Started {
+            entropy: vec![vec![], vec![1, 2, 3], vec![0; 32], vec![7]],
+        },
+        Change::Disconnected(seat),
+        Change::Returned(seat),
+        Change::Substituted(Seat::new(0)),
+        Change::Attempted {
+            seat,
+            action: u32::MAX,
+        },
+        Change::Decided(Decided {
+            seat,
+            action: ActionId::new(213),
+            source: Source::Recorded,
+            time_us: u64::MAX,
+            bank_left_ms: 17,
+            annotations: Some(Box::from([1, 2, 3])),
+        }),
+        Change::Expressed {
+            seat,
+            record_only: true,
+            expression: Box::from([4, 5]),
+        },
+        Change::ServerRestarted,
+        Change::Aborted(AbortReason::TooLong),
+        // Newer than the changes above.
+        Change::Retired(Seat::new(3)),
+        Change::Marked(Box::new(Marked {
+            label: "EEG on".into(),
+            moment: Duration::from_micros(1_234_567),
+        })),
+        seated("0123456789abcdef"),
+        Change::EndConfirmed,
+    ];
+    (1..)
+        .zip(changes)
+        .map(|(step, change)| Entry {
+            at: Duration::from_micros(step * 1_000_001),
+            change,
+        })
+        .collect()
+}
+
+fn summary(header: &GameHeader) -> Box<v1::RecordSummary> {
+    Box::new(v1::RecordSummary {
+        game_id: header.game_id.to_string(),
+        room_name: header.name.clone(),
+        state: v1::RoomState::Finished.into(),
+        origin: v1::GameOrigin::Dealt.into(),
+        created_at_ms: header.created_at_ms,
+        ended_at_ms: header.created_at_ms + 1_000,
+        seats: vec![
+            v1::Participant {
+                name: format!("player of {:?}", header.game_id.0[0]),
+                kind: v1::ParticipantKind::Robot.into(),
+                ..v1::Participant::default()
+            },
+            v1::Participant {
+                seat: 1,
+                name: format!("name of {:?}", header.game_id.0[0]),
+                built_in_agent: format!("agent of {:?}", header.game_id.0[0]),
+                kind: v1::ParticipantKind::Agent.into(),
+                ..v1::Participant::default()
+            },
+        ],
+        ..v1::RecordSummary::default()
+    })
+}
+
+fn shown(value: &(impl std::fmt::Debug + ?Sized)) -> String {
+    format!("{value:?}")
+}
+
+async fn opened(folder: &Path) -> SqliteStore {
+    SqliteStore::open(folder).await.expect("a usable folder")
+}
+
+/// The journal of a hosted game that has ended.
+async fn finished_journal(store: &SqliteStore, game: Id) -> Vec<Entry> {
+    let stored = store.finished(game).await.expect("readable");
+    let Some(StoredGame::Hosted(_, journal, _)) = stored else {
+        panic!("not stored: {stored:?}");
+    };
+    journal.to_vec()
+}
+
+#[tokio::test]
+async fn an_unfinished_game_resumes_where_it_stopped() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let header = Arc::new(header(1, Durability::Durable));
+    let entries = entries();
+    let store = opened(folder.path()).await;
+    let mut journal = store
+        .create(Arc::clone(&header), Vec::new())
+        .await
+        .expect("committed");
+    // In parts, as a room commits them.
+    for part in entries.chunks(3) {
+        let mut part = part.to_vec();
+        journal.append(&mut part).await.expect("committed");
+        assert!(part.is_empty());
+    }
+    // The process dies: nothing is closed.
+    drop(journal);
+    drop(store);
+    let store = opened(folder.path()).await;
+    let mut unfinished = store.resumable_games(u64::MAX).await.expect("readable");
+    assert_eq!(unfinished.len(), 1);
+    let mut game = unfinished.pop().expect("one");
+    assert_eq!(shown(&game.header), shown(&*header));
+    assert_eq!(shown(&game.entries), shown(&entries));
+    assert!(
+        store
+            .finished(header.game_id)
+            .await
+            .expect("readable")
+            .is_none(),
+        "it is not finished"
+    );
+    // It resumes and ends.
+    let more = vec![entries[3].clone()];
+    game.journal
+        .append(&mut more.clone())
+        .await
+        .expect("committed");
+    game.journal
+        .finish(Some(summary(&header)), None)
+        .await
+        .expect("committed");
+    store.close().await;
+    drop(store);
+    let store = opened(folder.path()).await;
+    assert!(
+        store
+            .resumable_games(u64::MAX)
+            .await
+            .expect("readable")
+            .is_empty()
+    );
+    let stored = store.finished(header.game_id).await.expect("readable");
+    let Some(StoredGame::Hosted(stored, journal, _)) = stored else {
+        panic!("not stored: {stored:?}");
+    };
+    assert_eq!(shown(&*stored), shown(&*header));
+    assert_eq!(shown(&journal.to_vec()), shown(&[entries, more].concat()));
+    let ended_at_ms = summary(&header).ended_at_ms;
+    let left = store.resumable_games(ended_at_ms).await.expect("readable");
+    assert_eq!(left.len(), 1, "it is still resumable for a while");
+    assert!(left[0].concluded);
+    assert_eq!(
+        store.without_record_file().await.expect("readable"),
+        [header.game_id]
+    );
+    store
+        .mark_record_written(header.game_id)
+        .await
+        .expect("committed");
+    assert!(
+        store
+            .without_record_file()
+            .await
+            .expect("readable")
+            .is_empty()
+    );
+}
+
+#[tokio::test]
+async fn a_game_is_created_with_its_first_entries() {
+    for durability in [Durability::Durable, Durability::Ephemeral] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let header = Arc::new(header(1, durability));
+        let entries = entries();
+        let (first, rest) = entries.split_at(2);
+        let store = opened(folder.path()).await;
+        let begun = store.create(Arc::clone(&header), first.to_vec()).await;
+        let mut journal = begun.expect("committed");
+        if durability == Durability::Durable {
+            // After a crash here, no game is without its first entries.
+            let left = store.resumable_games(u64::MAX).await.expect("readable");
+            assert_eq!(left.len(), 1);
+            assert_eq!(shown(&left[0].entries), shown(&first.to_vec()));
+        }
+        journal.append(&mut rest.to_vec()).await.expect("committed");
+        journal
+            .finish(Some(summary(&header)), None)
+            .await
+            .expect("committed");
+        let journal = finished_journal(&store, header.game_id).await;
+        assert_eq!(shown(&journal), shown(&entries));
+    }
+}
+
+#[tokio::test]
+async fn an_ephemeral_game_is_stored_only_when_it_ends() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    let header = Arc::new(header(1, Durability::Ephemeral));
+    let mut journal = store
+        .create(Arc::clone(&header), Vec::new())
+        .await
+        .expect("begun");
+    journal.append(&mut entries()).await.expect("in memory");
+    assert!(
+        store
+            .resumable_games(u64::MAX)
+            .await
+            .expect("readable")
+            .is_empty()
+    );
+    journal
+        .finish(Some(summary(&header)), None)
+        .await
+        .expect("committed");
+    let journal = finished_journal(&store, header.game_id).await;
+    assert_eq!(shown(&journal), shown(&entries()));
+}
+
+#[tokio::test]
+async fn many_rooms_share_the_writer() {
+    // More than fit one statement, and not a round number.
+    const ROOMS: u8 = 201;
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = Arc::new(opened(folder.path()).await);
+    let playing = (0..ROOMS).map(|room| {
+        let store = Arc::clone(&store);
+        tokio::spawn(async move {
+            let header = Arc::new(header(room, Durability::Durable));
+            let mut journal = store.create(header, Vec::new()).await.expect("committed");
+            for entry in entries() {
+                journal.append(&mut vec![entry]).await.expect("committed");
+            }
+        })
+    });
+    for room in playing.collect::<Vec<_>>() {
+        room.await.expect("no panic");
+    }
+    let unfinished = store.resumable_games(u64::MAX).await.expect("readable");
+    assert_eq!(unfinished.len(), usize::from(ROOMS));
+    for game in unfinished {
+        assert_eq!(shown(&game.entries), shown(&entries()));
+    }
+}
+
+#[tokio::test]
+async fn an_imported_game_is_stored_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    let header = header(1, Durability::Durable);
+    let lines: Arc<[v1::RecordLine]> = Arc::from([
+        v1::RecordLine {
+            line: Some(v1::record_line::Line::Header(v1::RecordHeader {
+                game_id: header.game_id.to_string(),
+                ..v1::RecordHeader::default()
+            })),
+        },
+        v1::RecordLine {
+            line: Some(v1::record_line::Line::Footer(v1::RecordFooter::default())),
+        },
+    ]);
+    let import = || store.import(header.game_id, *summary(&header), Arc::clone(&lines));
+    // One caller is cancelled before the answer; others call at the same time.
+    assert!(import().now_or_never().is_none());
+    let answers = tokio::join!(import(), import());
+    assert_eq!(answers, (Ok(false), Ok(false)), "the first was stored");
+    assert!(
+        store.failed().now_or_never().is_none(),
+        "a taken id is not a failure"
+    );
+    let listed = (store.list(&v1::RecordFilter::default(), Part::FROM_OLDEST, 9)).await;
+    let listed = listed.expect("readable");
+    assert!(listed.len() == 1 && listed[0].1.as_ref().is_ok_and(|it| it.added));
+    let hosted_here = v1::RecordFilter {
+        hosted_here: true,
+        ..v1::RecordFilter::default()
+    };
+    let listed = store.list(&hosted_here, Part::FROM_OLDEST, 9).await;
+    let listed = listed.expect("readable");
+    assert!(listed.is_empty());
+    let stored = store.finished(header.game_id).await.expect("readable");
+    let Some(StoredGame::Imported(stored)) = stored else {
+        panic!("not stored: {stored:?}");
+    };
+    assert_eq!(stored, lines);
+    assert!(
+        store
+            .resumable_games(u64::MAX)
+            .await
+            .expect("readable")
+            .is_empty()
+    );
+}
+
+#[tokio::test]
+async fn an_unreadable_game_is_left_unchanged_and_others_resume() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    for game in 1..=4 {
+        let mut journal = store
+            .create(Arc::new(header(game, Durability::Durable)), Vec::new())
+            .await
+            .expect("committed");
+        for entry in entries() {
+            journal.append(&mut vec![entry]).await.expect("committed");
+        }
+    }
+    store.close().await;
+    drop(store);
+    let options = SqliteConnectOptions::new().filename(folder.path().join(super::errors::FILE));
+    let mut connection = SqliteConnection::connect_with(&options)
+        .await
+        .expect("a connection");
+    for damage in [
+        "UPDATE journal SET entries = x'ff' WHERE game = 1 AND position = 2",
+        "DELETE FROM journal WHERE game = 2 AND position = 4",
+        "UPDATE games SET form = 99 WHERE number = 4",
+    ] {
+        let changed = connection.execute(damage).await.expect("executed");
+        assert_eq!(changed.rows_affected(), 1, "{damage}");
+    }
+    connection.close().await.expect("closed");
+    let store = opened(folder.path()).await;
+    let unfinished = store.resumable_games(u64::MAX).await.expect("readable");
+    let games: Vec<Id> = unfinished.iter().map(|game| game.header.game_id).collect();
+    assert_eq!(games, [Id([3; 16])]);
+}
+
+/// Stores two finished games with [`entries`], whose rows alternate, and closes the database.
+async fn two_games(folder: &Path) -> [Arc<GameHeader>; 2] {
+    let store = opened(folder).await;
+    let headers = [1, 2].map(|game| Arc::new(header(game, Durability::Durable)));
+    let mut journals = Vec::new();
+    for header in &headers {
+        let journal = store.create(Arc::clone(header), Vec::new()).await;
+        journals.push(journal.expect("committed"));
+    }
+    for entry in entries() {
+        for journal in &mut journals {
+            let mut entry = vec![entry.clone()];
+            journal.append(&mut entry).await.expect("committed");
+        }
+    }
+    for (journal, header) in journals.iter_mut().zip(&headers) {
+        let finished = journal.finish(Some(summary(header)), None).await;
+        finished.expect("committed");
+    }
+    store.close().await;
+    headers
+}
+
+/// Executes a statement on a closed database.
+async fn edit(folder: &Path, statement: &'static str) {
+    let options = SqliteConnectOptions::new().filename(folder.join(super::errors::FILE));
+    let connection = SqliteConnection::connect_with(&options).await;
+    let mut connection = connection.expect("a connection");
+    connection.execute(statement).await.expect("executed");
+    connection.close().await.expect("closed");
+}
+
+#[tokio::test]
+async fn a_missing_part_of_a_finished_game_is_detected() {
+    for damage in [
+        "DELETE FROM journal WHERE game = 1 AND position = 0",
+        "DELETE FROM journal WHERE game = 1 AND position = 4",
+        "DELETE FROM journal WHERE row = (SELECT max(row) FROM journal WHERE game = 1)",
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let headers = two_games(folder.path()).await;
+        edit(folder.path(), damage).await;
+        let store = opened(folder.path()).await;
+        let error = store.finished(headers[0].game_id).await.expect_err("a gap");
+        assert!(error.to_string().contains("missing"), "{error}");
+        let journal = finished_journal(&store, headers[1].game_id).await;
+        assert_eq!(shown(&journal), shown(&entries()));
+    }
+}
+
+#[tokio::test]
+async fn deleting_a_damaged_game_deletes_no_row_of_another() {
+    for damage in [
+        "UPDATE journal SET previous = row - 1 WHERE game = 2",
+        // A circle.
+        "UPDATE journal SET previous = (SELECT max(row) FROM journal WHERE game = 2)
+         WHERE game = 2 AND position = 0",
+        "UPDATE games SET last_row = (SELECT max(row) FROM journal WHERE game = 1)
+         WHERE number = 2",
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [whole, damaged] = two_games(folder.path()).await;
+        edit(folder.path(), damage).await;
+        let store = opened(folder.path()).await;
+        let deleted = store.delete(vec![damaged.game_id]).await;
+        deleted.expect("committed");
+        assert!(matches!(store.finished(damaged.game_id).await, Ok(None)));
+        let journal = finished_journal(&store, whole.game_id).await;
+        assert_eq!(shown(&journal), shown(&entries()));
+    }
+}
+
+#[tokio::test]
+async fn an_import_of_an_earlier_version_is_kept_from_the_first_start_of_this_one() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    let imported = header(1, Durability::Durable);
+    for game in [imported.game_id, Id([2; 16])] {
+        let import = store.import(game, *summary(&imported), Arc::from([])).await;
+        assert_eq!(import, Ok(true));
+        store.mark_record_written(game).await.expect("committed");
+    }
+    store.close().await;
+    drop(store);
+    edit(
+        folder.path(),
+        "UPDATE games SET ended_at_ms = 1; DELETE FROM _sqlx_migrations WHERE version > 4;
+         DROP TABLE study_traces; DROP TABLE study_changes; DROP TABLE studies",
+    )
+    .await;
+    let store = opened(folder.path()).await;
+    for (ended_since_ms, prunable) in [(summary(&imported).ended_at_ms, 0), (u64::MAX, 1)] {
+        let keep = Keep {
+            ended_since_ms: Some(ended_since_ms),
+            ..Keep::default()
+        };
+        let found = store.prunable(keep, 0, 9).await.expect("readable");
+        assert_eq!(found.len(), prunable);
+    }
+}
+
+#[tokio::test]
+async fn games_of_what_cannot_be_read_are_not_pruned() {
+    for (damage, needed) in [
+        ("SELECT 1", false),
+        ("UPDATE tournaments SET form = 99", true),
+        ("UPDATE tournament_entries SET entries = x'ff'", true),
+        ("UPDATE games SET header = x'ff'", true),
+        ("UPDATE games SET form = 99", true),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store = opened(folder.path()).await;
+        let over = vec![TournamentEntry::Change(
+            chefshat_tournament::Change::Finished,
+        )];
+        let created = store.create_tournament(Arc::new(cup(9)), over).await;
+        created.expect("committed");
+        for game in 1..=2 {
+            let header = Arc::new(GameHeader {
+                tournament: Some(chefshat_room::journal::TournamentGame {
+                    tournament: Id([9; 16]),
+                    series: None,
+                }),
+                ..header(game, Durability::Durable)
+            });
+            let created = store.create(Arc::clone(&header), Vec::new()).await;
+            let mut journal = created.expect("committed");
+            let finished = journal.finish(Some(summary(&header)), None).await;
+            finished.expect("committed");
+            let written = store.mark_record_written(header.game_id).await;
+            written.expect("committed");
+        }
+        store.close().await;
+        drop(store);
+        edit(folder.path(), damage).await;
+        let store = opened(folder.path()).await;
+        let found = store.prunable(Keep::default(), 0, 9).await;
+        assert_eq!(found.expect("readable").is_empty(), needed, "{damage}");
+        store.prune(vec![Id([1; 16])]).await.expect("committed");
+        let left = store.finished_games().await;
+        assert_eq!(left, Ok(1 + u64::from(needed)), "{damage}");
+        store.close().await;
+    }
+}
+
+/// The encoding never changes: games stored by any version must be readable by every later one.
+#[test]
+fn the_encoding_of_stored_data_does_not_change() {
+    let header = header(1, Durability::Durable);
+    let mut journal = Vec::new();
+    for entry in entries() {
+        form::put_entry(&entry, &mut journal);
+    }
+    let written = format!(
+        "{}\n{}\n",
+        hex::encode(form::header_to_bytes(&header)),
+        hex::encode(&journal)
+    );
+    assert_eq!(written, include_str!("fixtures/form2.hex"));
+    let former = include_str!("fixtures/form1.hex");
+    let (first, second) = former.split_once('\n').expect("two lines");
+    let bytes = hex::decode(first).expect("hexadecimal digits");
+    let read = form::header_from_bytes(&bytes).expect("readable");
+    assert_eq!(read.server_version, "0.1.0", "the first version named none");
+    let bytes = hex::decode(second.trim()).expect("hexadecimal digits");
+    let mut read = Vec::new();
+    form::read_entries(&bytes, &mut read).expect("readable");
+    assert_eq!(shown(&read), shown(&entries()[..read.len()]));
+    let (first, second) = written.split_once('\n').expect("two lines");
+    let bytes = hex::decode(first).expect("hexadecimal digits");
+    let read = form::header_from_bytes(&bytes).expect("readable");
+    assert_eq!(shown(&read), shown(&header));
+    let bytes = hex::decode(second.trim()).expect("hexadecimal digits");
+    let mut read = Vec::new();
+    form::read_entries(&bytes, &mut read).expect("readable");
+    assert_eq!(shown(&read), shown(&entries()));
+}
+
+#[test]
+fn fields_added_later_are_read_back() {
+    let header = GameHeader {
+        display_names: BTreeMap::from([(2, "Greta".to_owned())]),
+        policy: Policy::default(),
+        ..header(1, Durability::Durable)
+    };
+    let read = form::header_from_bytes(&form::header_to_bytes(&header)).expect("readable");
+    assert_eq!(shown(&read), shown(&header));
+}
+
+/// The bounds of a search apply to requests alone.
+#[test]
+fn what_was_stored_with_larger_searches_is_read_back() {
+    let agent: NamedAgent = "monte_carlo:60000ms".parse().expect("an agent");
+    chefshat_wire::convert::check_budget("seats", agent).expect_err("no request may name it");
+    let mut stored = header(1, Durability::Durable);
+    stored.policy.substitute = agent;
+    stored.fills[2] = Fill::BuiltIn(agent);
+    let read = form::header_from_bytes(&form::header_to_bytes(&stored)).expect("readable");
+    assert_eq!(read.policy.substitute, agent);
+    assert_eq!(shown(&read.fills[2]), shown(&stored.fills[2]));
+    let mut cup = cup(1);
+    cup.settings.built_in_agents = vec![agent.name(); 2];
+    cup.settings.filler = agent.name();
+    let read = form::tournament_from_bytes(&form::tournament_to_bytes(&cup)).expect("readable");
+    let plan =
+        chefshat_wire::convert::tournament_plan(&read.settings, [0; 32]).expect("it resumes");
+    assert_eq!((plan.built_in, plan.core.filler), (vec![agent; 2], agent));
+}

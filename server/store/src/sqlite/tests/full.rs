@@ -1,0 +1,84 @@
+//! A full disk, which is a database that may have no more pages: what frees space does not wait
+//! behind what needs it.
+
+use tokio::sync::{mpsc, oneshot, watch};
+use tokio::time::timeout;
+
+use super::*;
+use crate::StoreError;
+use crate::sqlite::open::{self, IfGone};
+use crate::sqlite::space::Space;
+use crate::sqlite::writer::{self, Pending, WriteCommand};
+use crate::units::{UnitKind, UnitWrite};
+use chefshat_base::metrics::StoreMetrics;
+
+/// Longest time that a test waits for a commit.
+const LIMIT: Duration = Duration::from_secs(20);
+
+type Reply = oneshot::Receiver<Result<(), StoreError>>;
+
+async fn send(commands: &mpsc::Sender<Pending>, command: WriteCommand) -> Reply {
+    let (reply, committed) = oneshot::channel();
+    let sent = commands.send((command, reply)).await;
+    assert!(sent.is_ok(), "the writer runs");
+    committed
+}
+
+async fn committed(reply: Reply) {
+    let answer = timeout(LIMIT, reply).await.expect("in time");
+    assert_eq!(answer.expect("an answer"), Ok(()));
+}
+
+fn imported(number: u8) -> WriteCommand {
+    WriteCommand::Import {
+        number: i64::from(number),
+        game_id: Id([number; 16]),
+        record: vec![number; 400_000],
+        summary: Box::new(v1::RecordSummary {
+            state: v1::RoomState::Finished.into(),
+            added: true,
+            ..v1::RecordSummary::default()
+        }),
+    }
+}
+
+#[tokio::test]
+async fn deletions_go_first_while_the_disk_is_full() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let opened = open::open(folder.path(), IfGone::CreateFirst).await;
+    let mut opened = opened.expect("a new database");
+    let text = "PRAGMA max_page_count = 300";
+    opened.writer.execute(text).await.expect("a small limit");
+    let space = Space::new(folder.path());
+    let (commands, queue) = mpsc::channel(writer::QUEUE);
+    let (failed, _) = watch::channel(None);
+    let metrics = StoreMetrics::default();
+    let running = writer::run(opened.writer, 0, queue, failed, metrics, Arc::clone(&space));
+    let running = tokio::spawn(running);
+    for game in [1, 2] {
+        committed(send(&commands, imported(game)).await).await;
+    }
+    let study = UnitKind::Study.id(Id([9; 16]));
+    let create = UnitWrite::Create {
+        join_code: None,
+        header: Vec::new(),
+        first: None,
+    };
+    committed(send(&commands, WriteCommand::Unit(study, create)).await).await;
+
+    let mut third = send(&commands, imported(3)).await;
+    while !space.is_full() {
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    let mut fourth = send(&commands, imported(4)).await;
+    let delete = WriteCommand::Unit(study, UnitWrite::Delete);
+    committed(send(&commands, delete).await).await;
+    assert!(third.try_recv().is_err() && fourth.try_recv().is_err());
+    let games = vec![Id([1; 16]), Id([2; 16])];
+    committed(send(&commands, WriteCommand::Prune { games }).await).await;
+    committed(third).await;
+    committed(fourth).await;
+    assert!(!space.is_full());
+    drop(commands);
+    running.await.expect("it ends");
+}

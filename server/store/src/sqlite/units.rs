@@ -1,0 +1,178 @@
+//! Tournaments and studies: what the writer writes for them, and what is read of them.
+
+use sqlx::Row as _;
+use sqlx::sqlite::SqliteConnection;
+
+use super::errors::failure;
+use super::reader::Reader;
+use crate::StoreError;
+use crate::form::{self, FORM};
+use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitId, UnitKind, UnitRow, UnitWrite};
+use chefshat_room::ids::Id;
+
+const CREATE: &str = "INSERT INTO {units} ({unit_id}, form, header) VALUES ($1, $2, $3)
+     ON CONFLICT ({unit_id}) DO NOTHING";
+const APPEND: &str = "INSERT INTO {rows} ({unit}, position, {entries})
+     SELECT number, $2, $3 FROM {units} WHERE {unit_id} = $1";
+const END: &str = "UPDATE tournaments SET over = 1 WHERE tournament_id = $1";
+const DELETE_ROWS: &str =
+    "DELETE FROM {rows} WHERE {unit} = (SELECT number FROM {units} WHERE {unit_id} = $1)";
+const DELETE_TRACES: &str =
+    "DELETE FROM study_traces WHERE study = (SELECT number FROM studies WHERE study_id = $1)";
+const DELETE: &str = "DELETE FROM {units} WHERE {unit_id} = $1";
+
+/// Writes something for a unit; `false` if its id is taken.
+pub(super) async fn write(
+    connection: &mut SqliteConnection,
+    unit: UnitId,
+    change: &UnitWrite,
+) -> sqlx::Result<bool> {
+    match change {
+        UnitWrite::Create { header, first, .. } => {
+            let created = sqlx::query(unit.kind.sql(CREATE))
+                .bind(unit.id.0.as_slice())
+                .bind(FORM)
+                .bind(header.as_slice())
+                .execute(&mut *connection)
+                .await?;
+            if created.rows_affected() == 0 {
+                return Ok(false);
+            }
+            if let Some(row) = first {
+                append(connection, unit, row).await?;
+            }
+        }
+        UnitWrite::Append(row) => append(connection, unit, row).await?,
+        UnitWrite::Rewrite { entries, forgotten } => {
+            run(connection, unit, DELETE_ROWS).await?;
+            for participant in forgotten {
+                sqlx::query(
+                    "DELETE FROM study_traces
+                     WHERE study = (SELECT number FROM studies WHERE study_id = $1)
+                       AND participant = $2",
+                )
+                .bind(unit.id.0.as_slice())
+                .bind(participant)
+                .execute(&mut *connection)
+                .await?;
+            }
+            let row = UnitRow {
+                position: 0,
+                entries: entries.clone(),
+                over: false,
+            };
+            append(connection, unit, &row).await?;
+        }
+        UnitWrite::Traces(traces) => {
+            sqlx::query(
+                "INSERT INTO study_traces (study, participant, game_id, traces)
+                 SELECT number, $2, $3, $4 FROM studies WHERE study_id = $1",
+            )
+            .bind(unit.id.0.as_slice())
+            .bind(traces.number)
+            .bind(traces.game.0.as_slice())
+            .bind(form::traces_to_bytes(&traces.traces))
+            .execute(&mut *connection)
+            .await?;
+        }
+        UnitWrite::Delete => {
+            for text in [DELETE_TRACES, DELETE_ROWS, DELETE] {
+                run(connection, unit, text).await?;
+            }
+        }
+    }
+    Ok(true)
+}
+
+async fn append(
+    connection: &mut SqliteConnection,
+    unit: UnitId,
+    row: &UnitRow,
+) -> sqlx::Result<()> {
+    sqlx::query(unit.kind.sql(APPEND))
+        .bind(unit.id.0.as_slice())
+        .bind(i64::try_from(row.position).unwrap_or(i64::MAX))
+        .bind(row.entries.as_slice())
+        .execute(&mut *connection)
+        .await?;
+    match row.over {
+        true => run(connection, unit, END).await,
+        false => Ok(()),
+    }
+}
+
+/// Runs a statement about one unit.
+async fn run(
+    connection: &mut SqliteConnection,
+    unit: UnitId,
+    text: &'static str,
+) -> sqlx::Result<()> {
+    sqlx::query(unit.kind.sql(text))
+        .bind(unit.id.0.as_slice())
+        .execute(connection)
+        .await
+        .map(drop)
+}
+
+impl Reader {
+    /// See `Store::unit`.
+    pub(super) async fn unit(&self, unit: UnitId) -> Result<Option<StoredUnit>, StoreError> {
+        let row = sqlx::query(unit.kind.sql(HEADER))
+            .bind(unit.id.0.as_slice())
+            .fetch_optional(&self.pool)
+            .await
+            .map_err(failure)?;
+        let Some(row) = row else { return Ok(None) };
+        let rows = sqlx::query_scalar(unit.kind.sql(ROWS))
+            .bind(row.get::<i64, _>(0))
+            .fetch_all(&self.pool)
+            .await
+            .map_err(failure)?;
+        Ok(Some(StoredUnit {
+            form: row.get(1),
+            header: row.get(2),
+            rows,
+        }))
+    }
+
+    /// See `Store::units`.
+    pub(super) async fn units(
+        &self,
+        kind: UnitKind,
+        newest_over: usize,
+    ) -> Result<Vec<Id>, StoreError> {
+        let newest_over = i64::try_from(newest_over).unwrap_or(i64::MAX);
+        let query = match kind {
+            UnitKind::Tournament => sqlx::query_scalar(
+                "SELECT tournament_id FROM tournaments WHERE number IN (
+                     SELECT number FROM tournaments WHERE over = 0
+                     UNION ALL
+                     SELECT * FROM (
+                         SELECT number FROM tournaments WHERE over = 1
+                         ORDER BY number DESC LIMIT $1))
+                 ORDER BY number",
+            )
+            .bind(newest_over),
+            UnitKind::Study => sqlx::query_scalar("SELECT study_id FROM studies ORDER BY number"),
+        };
+        let ids: Vec<Vec<u8>> = query.fetch_all(&self.pool).await.map_err(failure)?;
+        let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
+        Ok(ids.into_iter().filter_map(id).collect())
+    }
+
+    /// See `Store::traces`.
+    pub(super) async fn traces(&self, study: Id) -> Result<Vec<StoredTraces>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT participant, game_id, traces FROM study_traces
+             WHERE study = (SELECT number FROM studies WHERE study_id = $1) ORDER BY number",
+        )
+        .bind(study.0.as_slice())
+        .fetch_all(&self.pool)
+        .await
+        .map_err(failure)?;
+        let read = |row: &sqlx::sqlite::SqliteRow| {
+            StoredTraces::read(study, row.get(0), row.get(1), row.get(2))
+        };
+        Ok(rows.iter().filter_map(read).collect())
+    }
+}

@@ -1,0 +1,209 @@
+//! What tests share: a store that fails on request, and tournaments and studies by their types.
+
+mod failing;
+
+use std::sync::Arc;
+
+use chefshat_engine::{RULES_VERSION, RuleSetSpec, SeedPlan};
+use chefshat_proto::v1;
+use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::journal::{Fill, GameHeader, GameStart};
+use chefshat_room::policy::{Durability, Policy};
+use chefshat_study::Change;
+use chefshat_tournament::Tournament;
+use chefshat_wire::convert::tournament_plan;
+use futures::FutureExt as _;
+use futures::future::BoxFuture;
+
+pub use failing::{FailingStore, Read};
+
+use crate::studies::{StoredStudy, StudyHeader, changes_to_bytes};
+use crate::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use crate::units::{StoredTraces, UnitKind, UnitRow, UnitWrite};
+use crate::{Store, StoreError};
+
+type Written<'s> = BoxFuture<'s, Result<(), StoreError>>;
+
+/// Tournaments and studies by their types, as tests write and read them.
+pub trait TypedUnits: Store {
+    /// Creates a tournament with these entries as its first row.
+    fn create_tournament(
+        &self,
+        header: Arc<TournamentHeader>,
+        entries: Vec<TournamentEntry>,
+    ) -> Written<'_> {
+        let create = UnitWrite::Create {
+            join_code: Some(header.join_code.clone()),
+            header: header.to_bytes(),
+            first: Some(tournament_row(0, &entries)),
+        };
+        self.write_unit(UnitKind::Tournament.id(header.id), create)
+    }
+
+    /// Adds a row to a tournament.
+    fn append_tournament(
+        &self,
+        tournament: Id,
+        row: u64,
+        entries: Vec<TournamentEntry>,
+    ) -> Written<'_> {
+        let append = UnitWrite::Append(tournament_row(row, &entries));
+        self.write_unit(UnitKind::Tournament.id(tournament), append)
+    }
+
+    /// The tournaments that are not over, and the newest ones that are.
+    fn tournaments(
+        &self,
+        newest_over: usize,
+    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
+        async move {
+            let mut found = Vec::new();
+            for id in self.units(UnitKind::Tournament, newest_over).await? {
+                let unit = self.unit(UnitKind::Tournament.id(id)).await?;
+                found.push(StoredTournament::decode(id, &unit.expect("it is there"))?);
+            }
+            Ok(found)
+        }
+        .boxed()
+    }
+
+    /// Creates a study.
+    fn create_study(&self, header: Arc<StudyHeader>) -> Written<'_> {
+        let create = UnitWrite::Create {
+            join_code: None,
+            header: header.to_bytes(),
+            first: None,
+        };
+        self.write_unit(UnitKind::Study.id(header.id), create)
+    }
+
+    /// Adds a row to a study.
+    fn append_study(&self, study: Id, row: u64, changes: Vec<Change>) -> Written<'_> {
+        let append = UnitWrite::Append(UnitRow {
+            position: row,
+            entries: changes_to_bytes(&changes),
+            over: false,
+        });
+        self.write_unit(UnitKind::Study.id(study), append)
+    }
+
+    /// Replaces the rows of a study, and deletes traces of participants.
+    fn rewrite_study(&self, study: Id, changes: Vec<Change>, forgotten: Vec<u32>) -> Written<'_> {
+        let rewrite = UnitWrite::Rewrite {
+            entries: changes_to_bytes(&changes),
+            forgotten,
+        };
+        self.write_unit(UnitKind::Study.id(study), rewrite)
+    }
+
+    /// Deletes a study.
+    fn delete_study(&self, study: Id) -> Written<'_> {
+        self.write_unit(UnitKind::Study.id(study), UnitWrite::Delete)
+    }
+
+    /// Adds interface traces to a study.
+    fn append_traces(&self, study: Id, traces: StoredTraces) -> Written<'_> {
+        self.write_unit(UnitKind::Study.id(study), UnitWrite::Traces(traces))
+    }
+
+    /// A study.
+    fn study(&self, study: Id) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {
+        async move {
+            let unit = self.unit(UnitKind::Study.id(study)).await?;
+            unit.map(|unit| StoredStudy::decode(study, &unit))
+                .transpose()
+        }
+        .boxed()
+    }
+
+    /// The ids of all studies.
+    fn studies(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+        self.units(UnitKind::Study, usize::MAX)
+    }
+}
+
+impl<S: Store + ?Sized> TypedUnits for S {}
+
+fn tournament_row(position: u64, entries: &[TournamentEntry]) -> UnitRow {
+    UnitRow {
+        position,
+        entries: TournamentEntry::to_bytes(entries),
+        over: entries.iter().any(TournamentEntry::is_end),
+    }
+}
+
+/// The header of a game with this number.
+pub fn header(game: u8, durability: Durability) -> Arc<GameHeader> {
+    Arc::new(GameHeader {
+        room_id: Id([200 + game; 16]),
+        game_id: Id([game; 16]),
+        name: format!("game {game}"),
+        rules: RuleSetSpec::default().validate().expect("the standard"),
+        policy: Policy {
+            durability,
+            ..Policy::default()
+        },
+        rules_version: RULES_VERSION,
+        server_version: "0.0.1".into(),
+        participant_removed: false,
+        fills: vec![Fill::Open { reserved_for: None }; 4],
+        display_names: Default::default(),
+        wizards: std::collections::BTreeSet::new(),
+        recorded: Default::default(),
+        start: GameStart::default(),
+        seed: SeedPlan::Fixed {
+            game_seed: [game; 32],
+        },
+        created_at_ms: 1_000,
+        join_code: format!("ABCDE{game:03}"),
+        owner: SecretHash::of(b"owner"),
+        tournament: None,
+        table: None,
+        study: None,
+    })
+}
+
+/// Its summary, once it is over.
+pub fn summary(header: &GameHeader) -> Box<v1::RecordSummary> {
+    Box::new(v1::RecordSummary {
+        game_id: header.game_id.to_string(),
+        room_name: header.name.clone(),
+        state: v1::RoomState::Finished.into(),
+        created_at_ms: header.created_at_ms,
+        ended_at_ms: 2_000,
+        ..v1::RecordSummary::default()
+    })
+}
+
+/// The header of a tournament with this number.
+pub fn cup(number: u8) -> TournamentHeader {
+    TournamentHeader {
+        id: Id([number; 16]),
+        settings: v1::TournamentSettings {
+            name: "Coppa dello chef".into(),
+            format: v1::TournamentFormat::Swiss.into(),
+            max_calls: 2,
+            ..v1::TournamentSettings::default()
+        },
+        created_at_ms: 1_700_000_000_000,
+        join_code: "ABCDEFGH".into(),
+        owner: SecretHash::of(b"owner"),
+        deal_secret: [6; 32],
+    }
+}
+
+/// A tournament as its journal has it.
+///
+/// # Errors
+/// Why this version cannot resume it.
+pub fn folded(stored: &StoredTournament) -> Result<Tournament, String> {
+    let plan = tournament_plan(&stored.header.settings, [0; 32]);
+    let plan = plan.map_err(|problem| problem.to_string())?;
+    let mut core = Tournament::new(plan.core).map_err(|problem| problem.to_string())?;
+    for entry in &stored.entries {
+        if let TournamentEntry::Change(change) = entry {
+            core.fold(change);
+        }
+    }
+    Ok(core)
+}

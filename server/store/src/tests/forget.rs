@@ -1,0 +1,375 @@
+//! Removing a participant, from each store. The tests of the command line cover played games and
+//! their files.
+
+use chefshat_engine::{ActionId, Seat};
+use chefshat_record::pseudonym::{Named, Redactions};
+use chefshat_room::journal::{Decided, Marked, ParticipantKind, SeatedParticipant, Source};
+use chefshat_tournament::{Change as TournamentChange, Entrant};
+
+use super::*;
+use crate::tournaments::TournamentEntry;
+
+fn ana() -> Pseudonym {
+    Pseudonym {
+        of: Named {
+            name: "Ana".into(),
+            fingerprint: None,
+        },
+        pseudonym: "deleted 1".into(),
+        key: None,
+    }
+}
+
+fn at_once(change: Change) -> Entry {
+    Entry {
+        at: std::time::Duration::ZERO,
+        change,
+    }
+}
+
+/// The fingerprint of a name; a pseudonym has none.
+fn fingerprint_of(name: &str) -> String {
+    match name {
+        "deleted 1" => String::new(),
+        name => format!("key of {name}"),
+    }
+}
+
+fn seated(seat: usize, name: &str) -> Entry {
+    at_once(Change::Seated {
+        seat: Seat::new(seat),
+        participant: Box::new(SeatedParticipant {
+            name: name.into(),
+            name_fingerprint: fingerprint_of(name),
+            kind: ParticipantKind::Human,
+            ticket: SecretHash::of(b"ticket"),
+        }),
+    })
+}
+
+fn expressed(seat: usize) -> Entry {
+    at_once(Change::Expressed {
+        seat: Seat::new(seat),
+        record_only: false,
+        expression: Box::from([]),
+    })
+}
+
+fn decided(seat: usize) -> Entry {
+    at_once(Change::Decided(Decided {
+        seat: Seat::new(seat),
+        action: ActionId::new(0),
+        source: Source::Agent,
+        time_us: 5,
+        bank_left_ms: 0,
+        annotations: Some(Box::from([])),
+    }))
+}
+
+fn marked(label: &str) -> Entry {
+    at_once(Change::Marked(Box::new(Marked {
+        label: label.into(),
+        moment: std::time::Duration::ZERO,
+    })))
+}
+
+/// Ana sat down, left, and came back to another seat; Bo is there, too.
+fn game(number: u8) -> (Arc<GameHeader>, [Vec<Entry>; 2]) {
+    let header = Arc::new(GameHeader {
+        name: "Ana’s table".into(),
+        ..GameHeader::clone(&header(number, Durability::Durable))
+    });
+    let begin = vec![
+        seated(0, "Ana"),
+        at_once(Change::Vacated(Seat::new(0))),
+        seated(1, "Ana"),
+        seated(0, "Bo"),
+    ];
+    let rest = vec![
+        expressed(0),
+        expressed(1),
+        decided(0),
+        decided(1),
+        marked("Ana laughs"),
+        marked("Anatole laughs"),
+    ];
+    (header, [begin, rest])
+}
+
+fn summary_of(header: &GameHeader) -> Box<v1::RecordSummary> {
+    let seat = |number: u32, name: &str, agent: &str| v1::Participant {
+        seat: number,
+        name: name.into(),
+        name_fingerprint: fingerprint_of(name),
+        built_in_agent: agent.into(),
+        ..v1::Participant::default()
+    };
+    Box::new(v1::RecordSummary {
+        seats: vec![
+            seat(0, "Bo", ""),
+            seat(1, "Ana", ""),
+            // A built-in agent may have the same name.
+            seat(2, "Ana", "random"),
+        ],
+        ..*summary(header)
+    })
+}
+
+#[tokio::test]
+async fn a_participant_is_removed_from_its_games_and_others_stay() {
+    with_each_store(async |store| {
+        let (header, [begin, rest]) = game(1);
+        let created = store.create(Arc::clone(&header), begin).await;
+        let mut journal = created.expect("a new game");
+        let mut rest = rest;
+        journal.append(&mut rest).await.expect("committed");
+        let ended = journal.finish(
+            Some(summary_of(&header)),
+            Some(v1::RecordSignature::default()),
+        );
+        ended.await.expect("committed");
+        let mut other = created_of_others(store).await;
+        finish(&mut other, 2).await;
+        for game in [1, 2] {
+            let written = store.mark_record_written(Id([game; 16]));
+            written.await.expect("committed");
+        }
+
+        let forgotten = store.forget(&ana()).await.expect("it is over");
+        assert_eq!(forgotten.games, [header.game_id]);
+        let has_files = store.outlives_server();
+        let filed: &[Id] = if has_files { &[header.game_id] } else { &[] };
+        assert_eq!(forgotten.filed, filed);
+        let redactions = Redactions {
+            names: 4,
+            expressions: 1,
+            annotations: 1,
+        };
+        assert_eq!(forgotten.redactions, redactions);
+        let unwritten = store.without_record_file().await.expect("readable");
+        assert_eq!(unwritten, filed);
+
+        let stored = store.finished(header.game_id).await.expect("readable");
+        let Some(StoredGame::Hosted(header, entries, None)) = stored else {
+            panic!("signed, or not there: {stored:?}");
+        };
+        assert_eq!(header.name, "deleted 1’s table");
+        let expected = [
+            seated(0, "deleted 1"),
+            at_once(Change::Vacated(Seat::new(0))),
+            seated(1, "deleted 1"),
+            seated(0, "Bo"),
+            expressed(0),
+            decided(0),
+            match decided(1).change {
+                Change::Decided(decided) => at_once(Change::Decided(Decided {
+                    annotations: None,
+                    ..decided
+                })),
+                _ => unreachable!("it is a decision"),
+            },
+            marked("deleted 1 laughs"),
+            marked("Anatole laughs"),
+        ];
+        assert_eq!(format!("{entries:?}"), format!("{expected:?}"));
+        let named = |participant: &str| v1::RecordFilter {
+            participant: participant.into(),
+            ..v1::RecordFilter::default()
+        };
+        for (name, games) in [("Ana", 0), ("deleted 1", 1), ("Bo", 1), ("random", 1)] {
+            let found = store.list(&named(name), Part::FROM_OLDEST, 9).await;
+            assert_eq!(found.expect("readable").len(), games, "{name}");
+        }
+        let again = store.forget(&ana()).await.expect("nothing to do");
+        assert_eq!(again, Forgotten::default());
+    })
+    .await;
+}
+
+async fn created_of_others(store: &dyn Store) -> Box<dyn Journal> {
+    let created = store.create(header(2, Durability::Durable), vec![seated(0, "Bo")]);
+    created.await.expect("a new game")
+}
+
+#[tokio::test]
+async fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
+    with_each_store(async |store| {
+        let without_key = |mut entry: Entry| {
+            if let Change::Seated { participant, .. } = &mut entry.change {
+                participant.name_fingerprint.clear();
+            }
+            entry
+        };
+        let mut both = summary_of(&header(1, Durability::Durable));
+        both.seats[0].name = "Ana".into();
+        both.seats[0].name_fingerprint.clear();
+        let mut other = both.clone();
+        other.seats.truncate(1);
+        let games = [
+            (
+                1,
+                vec![without_key(seated(0, "Ana")), seated(1, "Ana")],
+                both,
+            ),
+            (2, vec![without_key(seated(0, "Ana"))], other),
+        ];
+        for (number, mut entries, summary) in games {
+            let created = store.create(header(number, Durability::Durable), Vec::new());
+            let mut journal = created.await.expect("a new game");
+            entries.extend([expressed(0), expressed(1), marked("Ana laughs")]);
+            journal.append(&mut entries).await.expect("committed");
+            let ended = journal.finish(Some(summary), None);
+            ended.await.expect("committed");
+        }
+        let games_of = async |name: &str| {
+            let filter = v1::RecordFilter {
+                participant: name.into(),
+                ..v1::RecordFilter::default()
+            };
+            let found = store.list(&filter, Part::FROM_OLDEST, 9).await;
+            found.expect("readable").len()
+        };
+        let with_fingerprint = |fingerprint: &str| Pseudonym {
+            of: Named {
+                name: "Ana".into(),
+                fingerprint: Some(fingerprint.into()),
+            },
+            pseudonym: format!("deleted {fingerprint}"),
+            key: None,
+        };
+        let nobody = store.forget(&with_fingerprint("key of Bo")).await;
+        assert_eq!(nobody.expect("nothing to do"), Forgotten::default());
+
+        let with_key = with_fingerprint("key of Ana");
+        let forgotten = store.forget(&with_key).await.expect("it is over");
+        assert_eq!(forgotten.games, [Id([1; 16])]);
+        let redactions = Redactions {
+            names: 2,
+            expressions: 1,
+            annotations: 0,
+        };
+        assert_eq!(forgotten.redactions, redactions);
+        let found = (games_of("Ana").await, games_of(&with_key.pseudonym).await);
+        assert_eq!(found, (2, 1));
+
+        let forgotten = store.forget(&with_fingerprint("")).await;
+        assert_eq!(forgotten.expect("both are over").games.len(), 2);
+        let found = (games_of("Ana").await, games_of("deleted ").await);
+        assert_eq!(found, (0, 2));
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn a_player_at_a_physical_table_is_removed() {
+    with_each_database(async |store| {
+        let mut fills = vec![Fill::Open { reserved_for: None }; 4];
+        fills[0] = Fill::AtTable(ParticipantKind::Human);
+        let at_table = Arc::new(GameHeader {
+            name: "Ana’s table".into(),
+            fills,
+            display_names: [(0, "Ana".to_owned())].into(),
+            ..GameHeader::clone(&header(1, Durability::Durable))
+        });
+        let created = store.create(Arc::clone(&at_table), Vec::new()).await;
+        let mut journal = created.expect("a new game");
+        let mut summary = summary_of(&at_table);
+        summary.seats.truncate(2);
+        let ended = journal.finish(Some(summary), None);
+        ended.await.expect("committed");
+        let with_key = Pseudonym {
+            of: Named {
+                fingerprint: Some("key of Ana".into()),
+                ..ana().of
+            },
+            ..ana()
+        };
+        let forgotten = store.forget(&with_key).await.expect("it is over");
+        assert_eq!(forgotten, Forgotten::default(), "nobody there has a key");
+        let forgotten = store.forget(&ana()).await.expect("it is over");
+        assert_eq!(forgotten.games, [at_table.game_id]);
+        let stored = store.finished(at_table.game_id).await.expect("readable");
+        let Some(StoredGame::Hosted(header, ..)) = stored else {
+            panic!("{stored:?}");
+        };
+        assert_eq!(header.name, "deleted 1’s table");
+        assert_eq!(header.display_names[&0], "deleted 1");
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn an_imported_record_is_changed_too() {
+    with_each_store(async |store| {
+        let header = header(1, Durability::Durable);
+        let record: Arc<[v1::RecordLine]> = Arc::from([v1::RecordLine {
+            line: Some(v1::record_line::Line::Header(v1::RecordHeader {
+                seats: summary_of(&header).seats,
+                ..v1::RecordHeader::default()
+            })),
+        }]);
+        let imported = store.import(header.game_id, *summary_of(&header), record);
+        assert_eq!(imported.await, Ok(true));
+        let forgotten = store.forget(&ana()).await.expect("it is over");
+        assert_eq!(forgotten.games, [header.game_id]);
+        let stored = store.finished(header.game_id).await.expect("readable");
+        let Some(StoredGame::Imported(lines)) = stored else {
+            panic!("{stored:?}");
+        };
+        let Some(v1::record_line::Line::Header(header)) = &lines[0].line else {
+            panic!("{lines:?}");
+        };
+        let names: Vec<&str> = header.seats.iter().map(|seat| seat.name.as_str()).collect();
+        assert_eq!(names, ["Bo", "deleted 1", "Ana"]);
+    })
+    .await;
+}
+
+#[tokio::test]
+async fn what_is_not_over_prevents_it() {
+    with_each_database(async |store| {
+        let (header, [begin, _]) = game(1);
+        let created = store.create(Arc::clone(&header), begin).await;
+        let mut journal = created.expect("a new game");
+        let mut over = created_of_others(store).await;
+        over.append(&mut vec![seated(1, "Ana")])
+            .await
+            .expect("committed");
+        finish(&mut over, 2).await;
+        let refused = store.forget(&ana()).await;
+        assert!(matches!(refused, Err(ForgetError::GameRunning(name)) if name == "Ana"));
+        let stored = store.finished(Id([2; 16])).await.expect("readable");
+        assert!(format!("{stored:?}").contains("Ana"), "nothing was changed");
+        let ended = journal.finish(Some(summary_of(&header)), None);
+        ended.await.expect("committed");
+
+        let entrant = Entrant {
+            name: "Ana".into(),
+            name_fingerprint: fingerprint_of("Ana"),
+            kind: chefshat_tournament::ParticipantKind::Human,
+            built_in: None,
+            filler: false,
+            stateless: false,
+            max_games: 1,
+            at_table: false,
+        };
+        let tournament = Arc::new(cup(7));
+        let joined = vec![TournamentEntry::Change(TournamentChange::Joined(entrant))];
+        let made = store.create_tournament(Arc::clone(&tournament), joined);
+        made.await.expect("committed");
+        let refused = store.forget(&ana()).await;
+        assert!(matches!(refused, Err(ForgetError::TournamentRunning(_))));
+        let closed = vec![TournamentEntry::Change(TournamentChange::Closed)];
+        let closing = store.append_tournament(tournament.id, 1, closed);
+        closing.await.expect("committed");
+        let forgotten = store.forget(&ana()).await.expect("all is over");
+        assert_eq!((forgotten.games.len(), forgotten.tournaments), (2, 1));
+        let stored = store.tournaments(9).await.expect("readable");
+        let stored = format!("{:?}", stored[0].entries);
+        assert!(
+            stored.contains("deleted 1") && !stored.contains("Ana"),
+            "{stored}"
+        );
+    })
+    .await;
+}

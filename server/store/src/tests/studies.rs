@@ -1,0 +1,178 @@
+//! Stored studies, in each store that has them.
+
+use chefshat_study::{Answer, Change, ConsentGiven, ItemAnswer, Outcome, PlacedGame};
+
+use super::*;
+use crate::studies::StudyHeader;
+
+fn header(study: u8) -> Arc<StudyHeader> {
+    Arc::new(StudyHeader {
+        id: Id([study; 16]),
+        settings: v1::StudySettings {
+            name: format!("study {study}"),
+            ..v1::StudySettings::default()
+        },
+        created_at_ms: 1000,
+        owner: SecretHash::of(b"owner"),
+        key: [study; 32],
+    })
+}
+
+fn added(number: u32) -> Change {
+    Change::Added {
+        number,
+        pseudonym: format!("Pseudonym {number}"),
+    }
+}
+
+fn every_change() -> Vec<Change> {
+    let answer = |item: usize, value: Answer, answered_after_ms: Option<u32>| ItemAnswer {
+        item,
+        value,
+        answered_after_ms,
+    };
+    let game = |seed_index: Option<usize>| PlacedGame {
+        step: 2,
+        condition: 1,
+        practice: seed_index.is_none(),
+        seed_index,
+        seat: 3,
+        attempt: 2,
+        room: [8; 16],
+        game: [9; 16],
+    };
+    let (number, at_ms) = (1, 5000);
+    vec![
+        added(number),
+        Change::Opened {
+            number,
+            slot: Some(0),
+            at_ms,
+        },
+        Change::Opened {
+            number,
+            slot: None,
+            at_ms,
+        },
+        Change::Consented {
+            number,
+            slot: None,
+            consent: ConsentGiven {
+                text_sha256: [7; 32],
+                version: "2".to_owned(),
+                language: "it".to_owned(),
+                at_ms,
+            },
+        },
+        Change::Answered {
+            number,
+            answers: Arc::new([
+                answer(0, Answer::Number(-3), Some(0)),
+                answer(1, Answer::Options(vec![0, 4]), None),
+                answer(2, Answer::Text("words".to_owned()), Some(9)),
+            ]),
+            at_ms,
+        },
+        Change::Saved {
+            number,
+            answers: Arc::new([answer(2, Answer::Text("wor".to_owned()), Some(8))]),
+        },
+        Change::Placed {
+            number,
+            game: game(None),
+        },
+        Change::Placed {
+            number,
+            game: game(Some(0)),
+        },
+        Change::GameEnded {
+            number,
+            outcome: Outcome::Finished,
+            at_ms,
+        },
+        Change::GameEnded {
+            number,
+            outcome: Outcome::Aborted,
+            at_ms,
+        },
+        Change::Continued {
+            number,
+            step_over: true,
+            at_ms,
+        },
+        Change::Continued {
+            number,
+            step_over: false,
+            at_ms,
+        },
+        Change::DroppedOut { number, at_ms },
+        Change::Withdrew {
+            number,
+            delete_data: true,
+            at_ms,
+        },
+        Change::Withdrew {
+            number,
+            delete_data: false,
+            at_ms,
+        },
+        Change::Removed { number, at_ms },
+        Change::Closed,
+    ]
+}
+
+fn traces(number: u32) -> StoredTraces {
+    StoredTraces {
+        number,
+        game: Id([9; 16]),
+        traces: vec![v1::StudyTrace {
+            kind: v1::StudyTraceKind::Hover.into(),
+            target: format!("card of {number}"),
+            ..v1::StudyTrace::default()
+        }],
+    }
+}
+
+#[tokio::test]
+async fn stored_studies_are_read_back_and_forget_participants() {
+    with_each_store(async |store| {
+        let (id, other) = (Id([1; 16]), Id([2; 16]));
+        for study in [1, 2] {
+            store.create_study(header(study)).await.expect("committed");
+        }
+        let taken = store.create_study(header(1)).await;
+        assert_eq!(taken, Err(StoreError::Taken(id)));
+        let changes = every_change();
+        let (first, rest) = changes.split_at(4);
+        for (row, changes) in [first, rest].into_iter().enumerate() {
+            let appended = store.append_study(id, row as u64, changes.to_vec());
+            appended.await.expect("committed");
+        }
+        let appended = store.append_study(other, 0, vec![added(1)]);
+        appended.await.expect("committed");
+        for number in [1, 2, 1] {
+            let appended = store.append_traces(id, traces(number));
+            appended.await.expect("committed");
+        }
+        let stored = store.study(id).await.expect("readable").expect("stored");
+        assert_eq!((stored.changes, stored.rows), (changes, 2));
+        assert_eq!(format!("{:?}", stored.header), format!("{:?}", header(1)));
+        assert!(store.study(Id([3; 16])).await.expect("readable").is_none());
+        let all = [1, 2, 1].map(traces).to_vec();
+        assert_eq!(store.traces(id).await, Ok(all));
+
+        let rewritten = store.rewrite_study(id, vec![added(2)], vec![1]);
+        rewritten.await.expect("committed");
+        let appended = store.append_study(id, 1, vec![Change::Closed]);
+        appended.await.expect("committed");
+        let stored = store.study(id).await.expect("readable").expect("stored");
+        assert_eq!(
+            (stored.changes, stored.rows),
+            (vec![added(2), Change::Closed], 2)
+        );
+        assert_eq!(store.traces(id).await, Ok(vec![traces(2)]));
+        let stored = store.study(other).await.expect("readable").expect("stored");
+        assert_eq!((stored.changes, stored.rows), (vec![added(1)], 1));
+    })
+    .await;
+}

@@ -1,0 +1,179 @@
+//! Tournaments and studies as stores know them: units that have a header, and rows of a journal, in
+//! bytes that only their own code reads (`tournaments`, `studies`). Their games are stored as games.
+
+use chefshat_proto::v1;
+use sqlx::AssertSqlSafe;
+
+use super::form::{FORM, Unreadable, check_form};
+use super::{StoreError, form};
+use chefshat_room::ids::Id;
+
+/// What a unit is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum UnitKind {
+    /// A tournament, which is over at some time.
+    Tournament,
+    /// A study, which stays until it is deleted.
+    Study,
+}
+
+impl UnitKind {
+    /// The id of a unit of this kind.
+    pub fn id(self, id: Id) -> UnitId {
+        UnitId { kind: self, id }
+    }
+
+    /// A statement about units of this kind. Its text has the names of tables and columns in braces:
+    /// `{units}` with `{unit_id}`, and `{rows}` with `{unit}` and `{entries}`.
+    pub(super) fn sql(self, text: &'static str) -> AssertSqlSafe<String> {
+        let names = match self {
+            Self::Tournament => [
+                ("{units}", "tournaments"),
+                ("{unit_id}", "tournament_id"),
+                ("{rows}", "tournament_entries"),
+                ("{unit}", "tournament"),
+                ("{entries}", "entries"),
+            ],
+            Self::Study => [
+                ("{units}", "studies"),
+                ("{unit_id}", "study_id"),
+                ("{rows}", "study_changes"),
+                ("{unit}", "study"),
+                ("{entries}", "changes"),
+            ],
+        };
+        let named = |text: String, (place, name): (&str, &str)| text.replace(place, name);
+        AssertSqlSafe(names.into_iter().fold(text.to_owned(), named))
+    }
+}
+
+impl std::fmt::Display for UnitKind {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str(match self {
+            Self::Tournament => "tournament",
+            Self::Study => "study",
+        })
+    }
+}
+
+/// The header of a unit, by its id.
+pub(super) const HEADER: &str = "SELECT number, form, header FROM {units} WHERE {unit_id} = $1";
+/// The rows of a unit, by its number.
+pub(super) const ROWS: &str = "SELECT {entries} FROM {rows} WHERE {unit} = $1 ORDER BY position";
+
+/// Which unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct UnitId {
+    /// Its kind.
+    pub kind: UnitKind,
+    /// Its id.
+    pub id: Id,
+}
+
+/// What is written for a unit.
+#[derive(Debug, Clone)]
+pub enum UnitWrite {
+    /// Creates it.
+    Create {
+        /// Its join code, in its normal form, if it has one.
+        join_code: Option<String>,
+        /// Its header.
+        header: Vec<u8>,
+        /// The first row of its journal, if it begins with one.
+        first: Option<UnitRow>,
+    },
+    /// Adds a row to its journal.
+    Append(UnitRow),
+    /// Replaces its journal by one row, and deletes the interface traces of these participants.
+    Rewrite {
+        /// The entries of the row.
+        entries: Vec<u8>,
+        /// Numbers of participants.
+        forgotten: Vec<u32>,
+    },
+    /// Adds interface traces to those of a participant's game.
+    Traces(StoredTraces),
+    /// Deletes it with its journal and interface traces, if it is there. Its games are deleted as
+    /// games.
+    Delete,
+}
+
+/// A row of the journal of a unit.
+#[derive(Debug, Clone)]
+pub struct UnitRow {
+    /// Its number in the journal, from 0.
+    pub position: u64,
+    /// Its entries.
+    pub entries: Vec<u8>,
+    /// Whether the unit is over with it.
+    pub over: bool,
+}
+
+/// A unit as stored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredUnit {
+    /// The version of the encoding.
+    pub form: i64,
+    /// Its header.
+    pub header: Vec<u8>,
+    /// The rows of its journal, in order.
+    pub rows: Vec<Vec<u8>>,
+}
+
+impl StoredUnit {
+    /// A new one.
+    pub fn new(header: Vec<u8>, rows: Vec<Vec<u8>>) -> Self {
+        Self {
+            form: FORM,
+            header,
+            rows,
+        }
+    }
+
+    /// The header and the entries of the journal.
+    ///
+    /// # Errors
+    /// An encoding that this version does not read, or an invalid field or entry.
+    pub(super) fn decode<H, E>(
+        &self,
+        header: impl FnOnce(&[u8]) -> Result<H, Unreadable>,
+        entries: impl Fn(&[u8]) -> Result<Vec<E>, Unreadable>,
+    ) -> Result<(H, Vec<E>), Unreadable> {
+        check_form(self.form)?;
+        let mut all = Vec::new();
+        for row in &self.rows {
+            all.extend(entries(row)?);
+        }
+        Ok((header(&self.header)?, all))
+    }
+}
+
+/// Interface traces of a game.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredTraces {
+    /// Number of the participant.
+    pub number: u32,
+    /// The game.
+    pub game: Id,
+    /// The traces, in order.
+    pub traces: Vec<v1::StudyTrace>,
+}
+
+impl StoredTraces {
+    /// From columns of a table; one that cannot be read is logged and left out.
+    pub(super) fn read(study: Id, number: u32, game: &[u8], traces: &[u8]) -> Option<Self> {
+        form::stored_traces(number, game, traces)
+            .inspect_err(|problem| {
+                tracing::error!(%study, %problem, "traces of a game are left out");
+            })
+            .ok()
+    }
+}
+
+impl UnitId {
+    /// That the unit cannot be read.
+    pub(super) fn unreadable(self, problem: &Unreadable) -> StoreError {
+        let Self { kind, id } = self;
+        StoreError::Unreadable(format!("{kind} {id} cannot be read: {problem}"))
+    }
+}
