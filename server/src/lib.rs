@@ -2,7 +2,6 @@
 //! and the page. The core of a room is `chefshat-room`, the rules are `chefshat-engine`; the
 //! command line is `chefshat`, in `server/cli` and `server/lab`.
 
-pub mod access;
 pub mod cluster;
 pub mod config;
 pub mod connections;
@@ -11,7 +10,8 @@ pub mod grpc;
 pub mod handshakes;
 pub mod host;
 pub mod journaled;
-pub mod limits;
+#[cfg(test)]
+mod limits_page;
 pub mod participants;
 pub mod record_writer;
 pub mod retention;
@@ -31,3 +31,5 @@ pub use chefshat_base::{clock, file_watch, metrics, post, proxies, tasks, thread
 pub use chefshat_store as store;
 pub use chefshat_store::samples;
 pub use chefshat_wire::{convert, encoded as wire, outbox};
+
+pub use chefshat_admission::{access, limits};

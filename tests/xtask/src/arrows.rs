@@ -65,6 +65,18 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("chefshat-base", &["chefshat-room"]),
     (
+        "chefshat-admission",
+        &[
+            "chefshat-base",
+            "chefshat-engine",
+            "chefshat-proto",
+            "chefshat-agents",
+            "chefshat-search",
+            "chefshat-record",
+            "chefshat-room",
+        ],
+    ),
+    (
         "chefshat-wire",
         &[
             "chefshat-base",
@@ -99,6 +111,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "chefshat-base",
             "chefshat-wire",
             "chefshat-store",
+            "chefshat-admission",
             "chefshat-engine",
             "chefshat-proto",
             "chefshat-agents",

@@ -9,15 +9,15 @@ use std::time::Duration;
 use rayon::ThreadPoolBuildError;
 
 use super::{Held, Key, Places, Rate, Shares};
-use crate::tasks::short;
-use crate::threads::{Priority, Threads};
+use chefshat_base::tasks::short;
+use chefshat_base::threads::{Priority, Threads};
 
 /// Games of built-in agents that are played at a time; others wait for their first decision.
-pub(super) const MAX_GAMES: usize = 32;
+pub const MAX_GAMES: usize = 32;
 /// 1/N of the cores play them.
 const CORES: usize = 4;
 /// Longest time for which decisions may be made faster than the rate.
-pub(super) const BURST: Duration = Duration::from_secs(60);
+pub const BURST: Duration = Duration::from_secs(60);
 
 /// Plays the games of built-in agents.
 #[derive(Debug)]

@@ -12,9 +12,9 @@ use tokio::time::{Instant, Sleep};
 use tonic::transport::server::Connected;
 
 /// Control frames that a connection may send in a second.
-pub(super) const PER_SECOND: u32 = 1_000;
+pub const PER_SECOND: u32 = 1_000;
 /// Control frames that it may send at once.
-pub(super) const BURST: u32 = 4_000;
+pub const BURST: u32 = 4_000;
 /// Window updates that cost as much as one control frame. A client sends about one for each
 /// message that it reads.
 const WINDOW_UPDATES: u32 = 20;

@@ -10,7 +10,7 @@ use tokio::sync::oneshot;
 use super::{Key, Shares};
 
 /// Longest time that a call waits until its caller may make another one.
-pub(super) const MAX_WAIT: Duration = Duration::from_secs(5);
+pub const MAX_WAIT: Duration = Duration::from_secs(5);
 
 /// Places for connections, streams, rooms, calls, or turns of work.
 #[derive(Debug)]

@@ -18,8 +18,8 @@ use super::calls::{Call, Scoped};
 use super::file::{StoredToken, TokenFile, TokenFileError};
 use super::secrets::Secrets;
 use super::token::{AccessToken, TokenId};
-use crate::clock::since_epoch_ms;
-use crate::file_watch::FileWatch;
+use chefshat_base::clock::since_epoch_ms;
+use chefshat_base::file_watch::FileWatch;
 
 /// How often the tokens file is looked at, and expired tokens are searched for.
 const INTERVAL: Duration = Duration::from_secs(1);

@@ -18,8 +18,8 @@ use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 
 use super::{Key, Places, Shares};
-use crate::metrics::{Metrics, SearchOutcome};
-use crate::threads::{Priority, Threads};
+use chefshat_base::metrics::{Metrics, SearchOutcome};
+use chefshat_base::threads::{Priority, Threads};
 
 /// When a search ends, even if its rollouts are not done.
 const MAX_SEARCH_TIME: Duration = Duration::from_secs(5);

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::caller::{Role, Scope};
 use super::token::{AccessToken, TokenId};
-use crate::clock::since_epoch_ms;
+use chefshat_base::clock::since_epoch_ms;
 
 /// Name of the file in the data directory. A data directory that contains it belongs to a server
 /// that requires tokens.

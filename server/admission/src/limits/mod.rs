@@ -3,15 +3,13 @@
 //! computations with deadlines ([`WorkQueue`]), and the games and searches of built-in agents, on
 //! threads of their own ([`Background`], [`Searches`]).
 
-mod background;
-mod calls;
-mod decoding;
-mod frames;
+pub mod background;
+pub mod calls;
+pub mod decoding;
+pub mod frames;
 mod key;
 mod log_pace;
-#[cfg(test)]
-mod page;
-mod places;
+pub mod places;
 mod rate;
 mod searches;
 mod stored;
@@ -24,9 +22,7 @@ pub use calls::{
     Admitted, BYTES_PER_CALL, COST_OF_BUILT_IN_GAME, COST_OF_ROOM, COST_OF_TOURNAMENT, CallLimits,
     DECODED_BYTES_PER_CALL, Executing, HISTORY_STEP,
 };
-#[cfg(test)]
-pub(crate) use decoding::MAX_DECODED;
-pub use decoding::{Decoding, MESSAGE_TIMEOUT, SMALL_DECODED, SMALL_MESSAGE};
+pub use decoding::{Decoding, MAX_DECODED, MESSAGE_TIMEOUT, SMALL_DECODED, SMALL_MESSAGE};
 pub use frames::Metered;
 pub use key::{Key, Payer, Shares};
 pub use log_pace::LogPace;

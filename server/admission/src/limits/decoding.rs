@@ -9,9 +9,9 @@ use super::places::{MAX_WAIT, within};
 use super::{Held, Key, Places, Refused, Shares};
 
 /// Most bytes of messages that are received at a time, beyond small ones.
-pub(super) const MAX_RECEIVED: usize = 32 * 1024 * 1024;
+pub const MAX_RECEIVED: usize = 32 * 1024 * 1024;
 /// Most bytes of memory that decoded messages take at a time, beyond small ones.
-pub(crate) const MAX_DECODED: usize = 96 * 1024 * 1024;
+pub const MAX_DECODED: usize = 96 * 1024 * 1024;
 /// A message of at most this many bytes is received without a permit.
 pub const SMALL_MESSAGE: usize = 4 * 1024;
 /// What takes at most this many bytes is decoded without a permit.
@@ -64,7 +64,7 @@ impl Decoding {
     }
 
     /// Bytes of all permits.
-    #[cfg(test)]
+    #[cfg(any(test, feature = "testing"))]
     pub fn taken(&self) -> usize {
         (self.received.taken() + self.decoded.taken()) * PLACE
     }

@@ -8,23 +8,23 @@ use super::places::{MAX_WAIT, within};
 use super::{Decoding, Held, Key, Places, Rate, Refused, Shares};
 
 /// Most streams of all callers, except those that have limits of their own.
-pub(super) const MAX_STREAMS: usize = 20_000;
+pub const MAX_STREAMS: usize = 20_000;
 /// Most answers of all callers that have not been read.
-pub(super) const MAX_ANSWERS: usize = 1_024;
+pub const MAX_ANSWERS: usize = 1_024;
 /// Most calls of all callers that are executed at a time.
-pub(super) const MAX_EXECUTED: usize = 64;
+pub const MAX_EXECUTED: usize = 64;
 /// Most bytes of streams of other nodes that are kept for spectators who share them, of all callers.
-pub(super) const MAX_HISTORY: usize = 64 * 1024 * 1024;
+pub const MAX_HISTORY: usize = 64 * 1024 * 1024;
 /// Bytes that such a stream takes at a time.
 pub const HISTORY_STEP: usize = 16 * 1024;
 /// Most lists of rooms and of studies that are made at a time: each asks many rooms.
-pub(super) const MAX_LISTS: usize = 4;
+pub const MAX_LISTS: usize = 4;
 /// Most calls of all callers that wait for something.
-pub(super) const MAX_WAITING: usize = 16_384;
+pub const MAX_WAITING: usize = 16_384;
 /// Calls of one caller in a second; an answer counts as one more call for each 512 bytes.
-pub(super) const CALLS_PER_SECOND: u64 = 2_000;
+pub const CALLS_PER_SECOND: u64 = 2_000;
 /// Calls of one caller at once.
-pub(super) const CALLS_AT_ONCE: u64 = 20_000;
+pub const CALLS_AT_ONCE: u64 = 20_000;
 /// Bytes of an answer that cost as much as one call.
 pub const BYTES_PER_CALL: u64 = 512;
 /// Bytes of a decoded message that cost as much as one call.
@@ -37,13 +37,15 @@ pub const COST_OF_BUILT_IN_GAME: u64 = 100;
 pub const COST_OF_TOURNAMENT: u64 = 100;
 /// How long a refusal takes: a caller that ignores it and calls again waits each time.
 const REFUSAL_DELAY: Duration = Duration::from_secs(1);
-/// Wrong join codes of one caller in a second, and at once.
-pub(super) const WRONG_CODES_PER_SECOND: u64 = 1;
-pub(super) const WRONG_CODES_AT_ONCE: u64 = 100;
-/// Wrong join codes of all callers in a second, and at once. Beyond them, callers that have just
-/// sent wrong codes are refused.
-pub(super) const ALL_WRONG_CODES_PER_SECOND: u64 = 50;
-pub(super) const ALL_WRONG_CODES_AT_ONCE: u64 = 5_000;
+/// Wrong join codes of one caller in a second.
+pub const WRONG_CODES_PER_SECOND: u64 = 1;
+/// Wrong join codes of one caller at once.
+pub const WRONG_CODES_AT_ONCE: u64 = 100;
+/// Wrong join codes of all callers in a second. Beyond them, callers that have just sent wrong codes
+/// are refused.
+pub const ALL_WRONG_CODES_PER_SECOND: u64 = 50;
+/// Those at once.
+pub const ALL_WRONG_CODES_AT_ONCE: u64 = 5_000;
 
 /// What the calls of all callers take.
 #[derive(Debug)]
@@ -254,7 +256,7 @@ impl CallLimits {
     }
 
     /// How many times a caller alone may have that memory.
-    #[cfg(test)]
+    #[cfg(any(test, feature = "testing"))]
     pub fn share_of_histories(&self, key: Key) -> usize {
         self.histories.share_of(key)
     }

@@ -4,7 +4,6 @@ use std::fmt::Display;
 use std::path::Path;
 use std::time::Duration;
 
-use super::{background, calls, decoding, frames, places};
 use crate::access::{COST_OF_STREAM, Call, MessageLimits};
 use crate::config::{
     FIRST_MESSAGE_TIMEOUT, IMPORT_IDLE_TIMEOUT, MAX_ANALYSES, MAX_ANALYSIS_TIME, MAX_FOLLOWERS,
@@ -18,6 +17,7 @@ use crate::convert::{MAX_SEARCH_BUDGET, MAX_SEARCH_ROLLOUTS};
 use crate::handshakes::{
     COST_OF_FAILED, HANDSHAKES_AT_ONCE, HANDSHAKES_PER_SECOND, MAX_HANDSHAKES,
 };
+use crate::limits::{background, calls, decoding, frames, places};
 use crate::room::MAX_SPECTATORS;
 use crate::store::MAX_CONCURRENT_RECORDS;
 use crate::web::{MAX_PREVIEWS, MAX_PREVIEWS_WAITING, PICTURE_PATIENCE};
