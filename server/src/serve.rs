@@ -32,10 +32,7 @@ use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
 use tracing::{info, warn};
 
 use crate::access::{Access, Call, TokenFileError};
-use crate::cluster::{
-    CONNECTION_WINDOW, ClusterNode, Directory, Hosted, MAX_RESET_STREAMS, NodeLease, PING_INTERVAL,
-    PING_TIMEOUT, PeerPort, STREAM_WINDOW, SingleServer, StoreDirectory,
-};
+use crate::cluster::{ClusterNode, Directory, Hosted, NodeLease, SingleServer, StoreDirectory};
 use crate::config::{
     CLOSE_LIMIT, DRAIN_LIMIT, END_LIMIT, HAND_OVER_LIMIT, MAX_STREAMS_PER_CONNECTION, ServerConfig,
     longest_shutdown,
@@ -47,6 +44,9 @@ use crate::handshakes::Handshakes;
 use crate::limits::{CallLimits, Metered};
 use crate::metrics::Metrics;
 use crate::participants::Participants;
+use crate::peers::{
+    CONNECTION_WINDOW, MAX_RESET_STREAMS, PING_INTERVAL, PING_TIMEOUT, PeerPort, STREAM_WINDOW,
+};
 use crate::proxies::{TrustedProxies, TrustedProxy};
 use crate::retention::Retention;
 use crate::rooms::Rooms;

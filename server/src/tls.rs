@@ -3,7 +3,6 @@
 //! its files change; existing connections keep theirs.
 
 use std::io;
-use std::path::{Path, PathBuf};
 use std::pin::Pin;
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
@@ -11,10 +10,7 @@ use std::time::Duration;
 
 use arc_swap::ArcSwap;
 use futures::{Stream, StreamExt as _, stream};
-use rustls::pki_types::pem::PemObject as _;
-use rustls::pki_types::{CertificateDer, PrivateKeyDer};
-use rustls::server::WebPkiClientVerifier;
-use rustls::{ClientConfig, RootCertStore, ServerConfig};
+use rustls::ServerConfig;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::task::JoinSet;
 use tokio::time::{sleep, timeout};
@@ -27,145 +23,12 @@ use crate::file_watch::FileWatch;
 use crate::handshakes::{Handshake, Handshakes};
 use crate::limits::Key;
 use crate::tasks::short;
+pub use crate::tls_files::{TlsError, TlsFiles};
 
 /// How long a client may take for the handshake.
 const HANDSHAKE_TIMEOUT: Duration = Duration::from_secs(10);
 /// How often the files are looked at.
 const INTERVAL: Duration = Duration::from_secs(1);
-
-/// The files that make a server use TLS.
-#[derive(Debug, Clone)]
-pub struct TlsFiles {
-    /// The certificate of the server and those that lead to its authority, PEM.
-    pub certificate: PathBuf,
-    /// Its private key, PEM.
-    pub key: PathBuf,
-    /// Certificates of the authorities whose clients are admitted, PEM; `None`: clients need no
-    /// certificate.
-    pub client_authority: Option<PathBuf>,
-}
-
-/// Why the files cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum TlsError {
-    /// A file is unreadable or is not PEM.
-    #[error("cannot read {path}: {problem}")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        problem: String,
-    },
-    /// The certificate and the key cannot be used together.
-    #[error("cannot use the certificate {path} with its key: {source}")]
-    Certificate {
-        /// The file of the certificate.
-        path: PathBuf,
-        /// The reason.
-        source: rustls::Error,
-    },
-    /// The certificates of the authorities cannot be used.
-    #[error("cannot use the authorities in {path}: {problem}")]
-    Authority {
-        /// The file of the authorities.
-        path: PathBuf,
-        /// What is wrong.
-        problem: String,
-    },
-}
-
-impl TlsFiles {
-    fn paths(&self) -> impl Iterator<Item = &Path> {
-        let always = [self.certificate.as_path(), self.key.as_path()];
-        always.into_iter().chain(self.client_authority.as_deref())
-    }
-
-    fn read(&self) -> Result<Arc<ServerConfig>, TlsError> {
-        let provider = Arc::new(rustls::crypto::ring::default_provider());
-        let chain = certificates(&self.certificate)?;
-        let key =
-            PrivateKeyDer::from_pem_file(&self.key).map_err(|it| unreadable(&self.key, &it))?;
-        let builder = ServerConfig::builder_with_provider(Arc::clone(&provider))
-            .with_safe_default_protocol_versions()
-            .expect("ring supports the default versions");
-        let builder = match &self.client_authority {
-            None => builder.with_no_client_auth(),
-            Some(path) => {
-                let wrong = |problem: &dyn std::fmt::Display| bad_authority(path, problem);
-                let roots = roots(path)?;
-                let verifier = WebPkiClientVerifier::builder_with_provider(roots.into(), provider);
-                builder.with_client_cert_verifier(verifier.build().map_err(|error| wrong(&error))?)
-            }
-        };
-        let mut config = builder.with_single_cert(chain, key).map_err(|source| {
-            let path = self.certificate.clone();
-            TlsError::Certificate { path, source }
-        })?;
-        config.alpn_protocols = vec![b"h2".to_vec(), b"http/1.1".to_vec()];
-        Ok(Arc::new(config))
-    }
-
-    /// How a node connects to others: it shows its certificate, and admits servers of the authority
-    /// for clients alone.
-    ///
-    /// # Errors
-    /// The files cannot be used.
-    pub fn client_config(&self) -> Result<Arc<ClientConfig>, TlsError> {
-        let provider = Arc::new(rustls::crypto::ring::default_provider());
-        let chain = certificates(&self.certificate)?;
-        let key =
-            PrivateKeyDer::from_pem_file(&self.key).map_err(|it| unreadable(&self.key, &it))?;
-        let roots = match &self.client_authority {
-            Some(path) => roots(path)?,
-            None => RootCertStore::empty(),
-        };
-        let builder = ClientConfig::builder_with_provider(provider)
-            .with_safe_default_protocol_versions()
-            .expect("ring supports the default versions")
-            .with_root_certificates(roots);
-        let mut config = builder
-            .with_client_auth_cert(chain, key)
-            .map_err(|source| {
-                let path = self.certificate.clone();
-                TlsError::Certificate { path, source }
-            })?;
-        config.alpn_protocols = vec![b"h2".to_vec()];
-        Ok(Arc::new(config))
-    }
-}
-
-/// The authorities of a file.
-fn roots(path: &Path) -> Result<RootCertStore, TlsError> {
-    let mut roots = RootCertStore::empty();
-    for certificate in certificates(path)? {
-        (roots.add(certificate)).map_err(|error| bad_authority(path, &error))?;
-    }
-    Ok(roots)
-}
-
-fn bad_authority(path: &Path, problem: &dyn std::fmt::Display) -> TlsError {
-    TlsError::Authority {
-        path: path.to_path_buf(),
-        problem: problem.to_string(),
-    }
-}
-
-/// The certificates of a file, at least one.
-fn certificates(path: &Path) -> Result<Vec<CertificateDer<'static>>, TlsError> {
-    let read = CertificateDer::pem_file_iter(path).and_then(Iterator::collect);
-    let found: Vec<_> = read.map_err(|error| unreadable(path, &error))?;
-    match found.is_empty() {
-        true => Err(unreadable(path, &"it has no certificate in PEM")),
-        false => Ok(found),
-    }
-}
-
-fn unreadable(path: &Path, problem: &dyn std::fmt::Display) -> TlsError {
-    TlsError::File {
-        path: path.to_path_buf(),
-        problem: problem.to_string(),
-    }
-}
 
 /// The certificate of a server, as its files are.
 #[derive(Debug)]
@@ -345,6 +208,7 @@ impl<C: AsyncRead + AsyncWrite + Unpin> AsyncWrite for MaybeTls<C> {
 mod tests {
     use futures::TryStreamExt as _;
     use rustls::pki_types::ServerName;
+    use rustls::{ClientConfig, RootCertStore};
     use tokio::io::{AsyncReadExt as _, DuplexStream, duplex};
     use tokio_rustls::TlsConnector;
 

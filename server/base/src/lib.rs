@@ -7,3 +7,4 @@ pub mod post;
 pub mod proxies;
 pub mod tasks;
 pub mod threads;
+pub mod tls_files;

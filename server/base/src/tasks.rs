@@ -231,7 +231,14 @@ mod tests {
     ];
 
     /// Where tasks are spawned.
-    const PARTS: [&str; 5] = ["admission/src", "base/src", "src", "store/src", "wire/src"];
+    const PARTS: [&str; 6] = [
+        "admission/src",
+        "base/src",
+        "hosting/src",
+        "src",
+        "store/src",
+        "wire/src",
+    ];
 
     fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
         for entry in std::fs::read_dir(folder).expect("it exists") {

@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use chefshat_server::cluster::{LeaseTimes, PeerPort};
+use chefshat_server::cluster::LeaseTimes;
+use chefshat_server::peers::PeerPort;
 use chefshat_server::store::cluster::{ClusterStore, NodeInfo, NodeStatus};
 use chefshat_server::store::{PostgresOptions, PostgresStore, Store as _};
 use chefshat_server::tls::TlsFiles;

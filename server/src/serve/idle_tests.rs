@@ -6,7 +6,9 @@ use std::collections::BTreeMap;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use futures::Stream;
+use futures::future::join as both;
+use futures::{Stream, stream};
+use tokio::io::DuplexStream;
 use tokio::net::TcpListener;
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
@@ -21,9 +23,9 @@ use v1::tournament_service_client::TournamentServiceClient;
 
 use super::*;
 use crate::access::{AccessSettings, Mode};
-use crate::cluster::tests::fake::{Database, FakeStore};
 use crate::config::KeepGames;
 use crate::store::SqliteStore;
+use crate::store::testing::{Database, FakeStore};
 use crate::tasks::{LongTask, polls, short_polls};
 use crate::tls::TlsFiles;
 use crate::webhooks::WebhookSettings;
@@ -77,6 +79,8 @@ const DROPS_OUT_MS: u64 = 60_000;
 
 /// Longer than a participant may be away.
 const GRACE: Duration = Duration::from_secs(90);
+/// When the database goes away, and how long joining may take.
+const MINUTE: Duration = Duration::from_secs(60);
 
 std::thread_local! {
     /// When the test of this thread began, on its stopped clock.
@@ -460,4 +464,28 @@ fn every_task_that_lives_long_is_driven() {
         driven, all,
         "drive a new task in these tests, or say why not"
     );
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_node_whose_database_is_away_ends_within_one_budget() {
+    let database = Database::new();
+    let store = FakeStore::new(&database);
+    let shared: Arc<dyn ClusterStore> = Arc::clone(&store) as Arc<dyn ClusterStore>;
+    let config = ServerConfig::default();
+    let longest = longest_shutdown(config.grace);
+    let info = NodeInfo::default();
+    let node = timeout(MINUTE, Server::joined(config, shared, info)).await;
+    let node = node.expect("in time").expect("the database is there");
+    let (stop, stopped) = oneshot::channel::<()>();
+    let serving = node.serve_incoming(stream::pending::<io::Result<DuplexStream>>(), async {
+        stopped.await.expect("the test stops it");
+    });
+    let away = async {
+        sleep(MINUTE).await;
+        store.cut_off.send_replace(true);
+        stop.send(()).expect("it serves");
+    };
+    let served = timeout(MINUTE + longest, both(serving, away)).await;
+    let (served, ()) = served.expect("it ends in time");
+    served.expect("only the database is away");
 }

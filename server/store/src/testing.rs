@@ -1,5 +1,6 @@
 //! What tests share: a store that fails on request, and tournaments and studies by their types.
 
+mod cluster;
 mod failing;
 
 use std::sync::Arc;
@@ -15,6 +16,7 @@ use chefshat_wire::convert::tournament_plan;
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
 
+pub use cluster::{Database, FakeStore};
 pub use failing::{FailingStore, Read};
 
 use crate::studies::{StoredStudy, StudyHeader, changes_to_bytes};

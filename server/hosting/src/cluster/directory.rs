@@ -1,0 +1,118 @@
+//! Which node has a room or tournament. A node asks for those that it does not have in memory
+//! itself, so the directory of a single server has nothing to say and never waits.
+
+use std::fmt;
+use std::sync::Arc;
+
+use futures::FutureExt as _;
+use futures::future::{BoxFuture, ready};
+
+use chefshat_admission::limits::Key;
+use chefshat_room::ids::{Id, normal_code};
+use chefshat_store::cluster::Kind;
+use chefshat_store::{ResumableGame, StoreError};
+
+/// Another node of the cluster.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Peer {
+    /// Its name, unique in the cluster.
+    pub node: Arc<str>,
+    /// Where its peer listener is: `HOST:PORT`.
+    pub endpoint: Arc<str>,
+}
+
+/// Where a room or tournament is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Location {
+    /// This node owns it. If it is not in memory, it is about to be resumed.
+    Here,
+    /// Another node owns it.
+    Node(Peer),
+    /// It is over, and the node that had it is gone. Every node may load it to show its end.
+    Over(Id, Kind),
+    /// No node has it.
+    Nowhere,
+    /// The directory cannot be read now.
+    Unknown,
+}
+
+/// What a request is about is at another node.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("another node has it")]
+pub struct Elsewhere {
+    /// The node.
+    pub peer: Peer,
+    /// How it was found.
+    pub found_by: FoundBy,
+}
+
+/// How a room or tournament is found.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FoundBy {
+    /// By its id.
+    Id(Id),
+    /// By its join code, in its normal form.
+    Code(String),
+    /// A room by its game, which is not over.
+    Game(Id),
+}
+
+impl From<Id> for FoundBy {
+    fn from(id: Id) -> Self {
+        Self::Id(id)
+    }
+}
+
+impl From<&str> for FoundBy {
+    fn from(code: &str) -> Self {
+        Self::Code(normal_code(code))
+    }
+}
+
+/// Finds the owners of rooms and tournaments. It may remember nodes that it has named; a node that
+/// is not the owner any more says so, and is then forgotten. That nobody has something is never
+/// remembered.
+pub trait Directory: Send + Sync + 'static {
+    /// The name of this node, and the other nodes that are alive.
+    fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)>;
+
+    /// The location of a room or tournament that is not in memory, for this caller.
+    fn locate<'a>(&'a self, found_by: &'a FoundBy, caller: Key) -> BoxFuture<'a, Location>;
+
+    /// Whether a tournament of another node is over, so that no record of its games is withheld.
+    fn is_over(&self, tournament: Id) -> BoxFuture<'_, bool>;
+
+    /// The room of a game that is over, if its end is still shown.
+    fn ended_room(&self, _room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
+        ready(Ok(None)).boxed()
+    }
+
+    /// The node that was named last does not own it any more, or cannot be reached.
+    fn forget(&self, found_by: &FoundBy);
+}
+
+impl fmt::Debug for dyn Directory {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("Directory")
+    }
+}
+
+/// The directory of a server without peers: what it does not have in memory does not exist.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SingleServer;
+
+impl Directory for SingleServer {
+    fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)> {
+        ready((Arc::from(""), Vec::new())).boxed()
+    }
+
+    fn is_over(&self, _tournament: Id) -> BoxFuture<'_, bool> {
+        ready(false).boxed()
+    }
+
+    fn locate<'a>(&'a self, _found_by: &'a FoundBy, _caller: Key) -> BoxFuture<'a, Location> {
+        ready(Location::Nowhere).boxed()
+    }
+
+    fn forget(&self, _found_by: &FoundBy) {}
+}

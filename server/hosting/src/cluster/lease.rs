@@ -1,0 +1,139 @@
+//! What the rooms, tournaments and studies of a node share with its task: until when they may publish, and
+//! which of them are new or have stopped by themselves.
+
+use std::collections::BTreeSet;
+use std::future::Future;
+use std::sync::{Mutex, MutexGuard};
+
+use chefshat_cluster::NodeId;
+use chefshat_room::ids::Id;
+use tokio::sync::{Notify, watch};
+use tokio::time::{Instant, sleep_until};
+use tokio_util::sync::CancellationToken;
+
+use chefshat_store::StoreError;
+
+/// The lease of a node, as its rooms, tournaments and studies see it.
+///
+/// It is checked before anything is published, on the clock and not by a message from the task: a
+/// process that was stopped for a while must not publish before that task runs again.
+#[derive(Debug)]
+pub struct NodeLease {
+    until: watch::Sender<Instant>,
+    node: Mutex<Option<NodeId>>,
+    news: Mutex<BTreeSet<(Id, News)>>,
+    has_news: Notify,
+}
+
+/// What the task of a node learns about a unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum News {
+    /// It was created here.
+    Created {
+        /// Whether it is a room that no other node can resume.
+        ephemeral: bool,
+    },
+    /// Something of it has stopped by itself: it was fenced, or it failed.
+    Stopped,
+}
+
+impl NodeLease {
+    /// No lease yet.
+    pub fn new() -> Self {
+        Self {
+            until: watch::Sender::new(Instant::now()),
+            node: Mutex::default(),
+            news: Mutex::default(),
+            has_news: Notify::new(),
+        }
+    }
+
+    /// Whether the node may publish now.
+    pub fn holds(&self) -> bool {
+        Instant::now() < *self.until.borrow()
+    }
+
+    /// The node, once it has joined.
+    pub(super) fn node(&self) -> Option<NodeId> {
+        *self.node.lock().expect("nothing panics under this lock")
+    }
+
+    /// Sets the node, which has just joined.
+    pub(super) fn joined(&self, node: NodeId) {
+        *self.node.lock().expect("nothing panics under this lock") = Some(node);
+    }
+
+    /// Waits until the node may not publish.
+    pub async fn lapsed(&self) {
+        while self.holds() {
+            let until = *self.until.borrow();
+            sleep_until(until).await;
+        }
+    }
+
+    /// Waits until the node may publish.
+    pub async fn held(&self) {
+        let mut until = self.until.subscribe();
+        let held = until.wait_for(|until| Instant::now() < *until).await;
+        held.expect("the sender is borrowed");
+    }
+
+    /// The result of a write for a tournament or study, once the node may publish it. Its task must
+    /// stop, which cancels `end`, if another node may have it.
+    ///
+    /// # Errors
+    /// The write failed, or the task stops.
+    pub async fn published<T>(
+        &self,
+        unit: Id,
+        end: &CancellationToken,
+        written: impl Future<Output = Result<T, StoreError>>,
+    ) -> Result<T, StoreError> {
+        let written = async {
+            let written = written.await?;
+            self.held().await;
+            Ok(written)
+        };
+        tokio::select! {
+            biased;
+            written = written => written,
+            () = end.cancelled() => Err(StoreError::Fenced(unit)),
+        }
+    }
+
+    /// Sets until when the node may publish.
+    pub fn set(&self, until: Instant) {
+        self.until.send_if_modified(|known| {
+            let is_new = *known != until;
+            *known = until;
+            is_new
+        });
+    }
+
+    /// Tells the task of the node about a unit.
+    pub fn report(&self, unit: Id, news: News) {
+        self.all_news().insert((unit, news));
+        self.has_news.notify_one();
+    }
+
+    /// Waits until there is news, and returns it.
+    pub(super) async fn news(&self) -> BTreeSet<(Id, News)> {
+        loop {
+            let news = std::mem::take(&mut *self.all_news());
+            if !news.is_empty() {
+                return news;
+            }
+            self.has_news.notified().await;
+        }
+    }
+
+    fn all_news(&self) -> MutexGuard<'_, BTreeSet<(Id, News)>> {
+        (self.news.lock()).expect("nothing panics under this lock")
+    }
+}
+
+impl Default for NodeLease {
+    fn default() -> Self {
+        Self::new()
+    }
+}

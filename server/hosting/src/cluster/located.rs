@@ -1,0 +1,182 @@
+//! The directory of a node: asks the database who owns what, and remembers what other nodes own.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
+
+use futures::FutureExt as _;
+use futures::future::BoxFuture;
+use tokio::sync::Mutex as AsyncMutex;
+use tokio::time::{Instant, timeout};
+use tracing::{debug, warn};
+
+use super::directory::{Directory, FoundBy, Location, Peer};
+use super::lease::NodeLease;
+use chefshat_admission::limits::{Key, Places, Shares};
+use chefshat_room::ids::Id;
+use chefshat_store::cluster::{self, ClusterStore, NodeId};
+use chefshat_store::{ResumableGame, StoreError};
+
+/// Most rooms and tournaments of other nodes that are remembered, by whatever they were found.
+const MAX_REMEMBERED: usize = 20_000;
+/// Most rooms and tournaments that are looked for in the database at a time, for callers in turns:
+/// a caller that makes ids up leaves connections for everything else.
+const LOOKED_FOR_AT_ONCE: usize = 2;
+/// How long a look takes at most, with the wait for its turn: many for one caller would otherwise wait
+/// for a database that hangs one after another.
+pub(super) const LOOK_LIMIT: Duration = Duration::from_secs(2);
+/// How long it is known which nodes have a lease.
+const NODES_KNOWN_FOR: Duration = Duration::from_secs(1);
+
+/// Finds the owners of rooms and tournaments in the database.
+pub struct StoreDirectory {
+    store: Arc<dyn ClusterStore>,
+    lease: Arc<NodeLease>,
+    /// Owners among the other nodes.
+    known: Mutex<BTreeMap<FoundBy, Peer>>,
+    looking: Arc<Places>,
+    /// Locked while they are read, so that one request reads them for all.
+    nodes: AsyncMutex<Option<Nodes>>,
+}
+
+/// The nodes that have a lease, or why they are unknown, and when they were read.
+struct Nodes {
+    read: Instant,
+    alive: Result<BTreeMap<NodeId, Peer>, StoreError>,
+}
+
+impl StoreDirectory {
+    /// Reads from this database, for the node with this lease. One caller has at most its share of
+    /// what is read at a time.
+    pub fn new(store: Arc<dyn ClusterStore>, lease: Arc<NodeLease>, shares: Shares) -> Self {
+        Self {
+            store,
+            lease,
+            known: Mutex::default(),
+            looking: Places::new(LOOKED_FOR_AT_ONCE, shares),
+            nodes: AsyncMutex::default(),
+        }
+    }
+
+    fn known(&self) -> MutexGuard<'_, BTreeMap<FoundBy, Peer>> {
+        (self.known.lock()).expect("nothing panics under this lock")
+    }
+
+    /// Reads where something is.
+    async fn read(&self, found_by: &FoundBy, caller: Key) -> Result<Location, StoreError> {
+        let _place = self.looking.take(caller).await;
+        let found = match found_by {
+            FoundBy::Id(id) => self.store.locate(*id).await?,
+            FoundBy::Code(code) => self.store.locate_code(code).await?,
+            FoundBy::Game(game) => self.store.locate_game(*game).await?,
+        };
+        self.location(found).await
+    }
+
+    /// The location of something that stands in the database.
+    async fn location(&self, found: Option<cluster::Location>) -> Result<Location, StoreError> {
+        let Some(found) = found else {
+            return Ok(Location::Nowhere);
+        };
+        if found.node.is_some() && found.node == self.lease.node() {
+            return Ok(match found.over {
+                true => Location::Over(found.id, found.kind),
+                false => Location::Here,
+            });
+        }
+        let peer = match found.node {
+            Some(node) => self.alive().await?.remove(&node),
+            None => None,
+        };
+        Ok(match peer {
+            Some(peer) => Location::Node(peer),
+            None if found.over => Location::Over(found.id, found.kind),
+            // A node will soon take it over.
+            None => Location::Unknown,
+        })
+    }
+
+    /// The nodes that have a lease.
+    async fn alive(&self) -> Result<BTreeMap<NodeId, Peer>, StoreError> {
+        let mut nodes = self.nodes.lock().await;
+        let recent = |nodes: &&Nodes| nodes.read.elapsed() < NODES_KNOWN_FOR;
+        if let Some(nodes) = nodes.as_ref().filter(recent) {
+            return nodes.alive.clone();
+        }
+        let alive = self.store.alive().await.map(|alive| {
+            let peers = alive.into_iter().map(|(id, info)| {
+                let peer = Peer {
+                    node: format!("{} #{}", info.name, id.0).into(),
+                    endpoint: info.peer_endpoint.into(),
+                };
+                (id, peer)
+            });
+            peers.collect()
+        });
+        *nodes = Some(Nodes {
+            read: Instant::now(),
+            alive: alive.clone(),
+        });
+        alive
+    }
+}
+
+impl Directory for StoreDirectory {
+    fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
+        self.store.ended_room(room)
+    }
+
+    fn locate<'a>(&'a self, found_by: &'a FoundBy, caller: Key) -> BoxFuture<'a, Location> {
+        async move {
+            if let Some(peer) = self.known().get(found_by) {
+                return Location::Node(peer.clone());
+            }
+            let read = timeout(LOOK_LIMIT, self.read(found_by, caller)).await;
+            let location = match read {
+                Ok(Ok(location)) => location,
+                Ok(Err(error)) => {
+                    debug!(%error, "the owner of a room or tournament cannot be found");
+                    Location::Unknown
+                }
+                Err(_) => {
+                    debug!("the database did not say in time who owns a room or tournament");
+                    Location::Unknown
+                }
+            };
+            if let Location::Node(peer) = &location {
+                let mut known = self.known();
+                if known.len() >= MAX_REMEMBERED {
+                    known.clear();
+                }
+                known.insert(found_by.clone(), peer.clone());
+            }
+            location
+        }
+        .boxed()
+    }
+
+    fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)> {
+        async move {
+            let mut alive = self.alive().await.unwrap_or_else(|error| {
+                warn!(%error, "the nodes of the cluster are unknown");
+                BTreeMap::new()
+            });
+            let own = self.lease.node().and_then(|node| alive.remove(&node));
+            let name = own.map_or_else(|| Arc::from(""), |own| own.node);
+            (name, alive.into_values().collect())
+        }
+        .boxed()
+    }
+
+    fn is_over(&self, tournament: Id) -> BoxFuture<'_, bool> {
+        async move {
+            let found = self.store.locate(tournament).await;
+            found.is_ok_and(|found| found.is_some_and(|location| location.over))
+        }
+        .boxed()
+    }
+
+    fn forget(&self, found_by: &FoundBy) {
+        self.known().remove(found_by);
+    }
+}

@@ -1,0 +1,191 @@
+//! The units that a node runs: resumes, stops and suspends their rooms, tournaments and studies.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use tracing::{info, warn};
+
+use crate::rooms::Rooms;
+use crate::studies::Studies;
+use crate::tournaments::Tournaments;
+use chefshat_room::ids::Id;
+use chefshat_store::StoreError;
+use chefshat_store::cluster::{ClusterStore, Epoch};
+use chefshat_store::units::UnitKind;
+use tokio::sync::Semaphore;
+use tokio::time::{Duration, sleep, timeout};
+
+/// Pause before a unit that could not be read is read again.
+const RETRY: Duration = Duration::from_secs(1);
+/// Units that are read and replayed at a time, so that many orphans do not slow down what runs.
+pub(super) const LOADS_AT_ONCE: usize = 4;
+
+/// What became of resuming a unit.
+pub(super) enum Resumed {
+    /// It runs here, or is not to run here any more.
+    Runs,
+    /// It has nothing to run, or is not the node's.
+    Nothing,
+    /// This version of the program cannot resume it.
+    Impossible,
+}
+
+/// What a server hosts.
+#[derive(Debug)]
+pub struct Hosted {
+    /// The rooms, those of games of tournaments and studies as well.
+    pub rooms: Arc<Rooms>,
+    /// The tournaments.
+    pub tournaments: Arc<Tournaments>,
+    /// The studies.
+    pub studies: Arc<Studies>,
+}
+
+/// The units of a node. What is done with one unit is done one after another, by the caller.
+pub(super) struct Units {
+    store: Arc<dyn ClusterStore>,
+    rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
+    studies: Arc<Studies>,
+    /// How long ephemeral games may continue when the node hands over.
+    grace: Duration,
+    /// The units that are to run here, with their epochs.
+    wanted: Mutex<BTreeMap<Id, Epoch>>,
+    loads: Semaphore,
+}
+
+impl Units {
+    pub(super) fn new(store: Arc<dyn ClusterStore>, hosted: Hosted, grace: Duration) -> Self {
+        let Hosted {
+            rooms,
+            tournaments,
+            studies,
+        } = hosted;
+        Self {
+            grace,
+            store,
+            rooms,
+            tournaments,
+            studies,
+            wanted: Mutex::default(),
+            loads: Semaphore::new(LOADS_AT_ONCE),
+        }
+    }
+
+    /// From here on, a unit is to run here at this epoch.
+    pub(super) fn want(&self, unit: Id, epoch: Epoch) {
+        self.wanted().insert(unit, epoch);
+    }
+
+    /// From here on, a unit is not to run here.
+    pub(super) fn unwant(&self, unit: Id) {
+        self.wanted().remove(&unit);
+    }
+
+    /// Prevents a unit from publishing anything from here on. It ends with [`Units::stop`].
+    pub(super) fn fence(&self, unit: Id) {
+        self.unwant(unit);
+        self.tournaments.fence(unit);
+        self.studies.fence(unit);
+        self.rooms.fence_unit(unit);
+    }
+
+    fn wanted(&self) -> MutexGuard<'_, BTreeMap<Id, Epoch>> {
+        (self.wanted.lock()).expect("nothing panics under this lock")
+    }
+
+    /// Whether a unit runs here, or is being created.
+    fn runs(&self, unit: Id) -> bool {
+        self.rooms.runs(unit) || self.tournaments.runs(unit) || self.studies.runs(unit)
+    }
+
+    /// Whether something of a unit is here: it runs, is being created, or is over.
+    pub(super) fn has(&self, unit: Id) -> bool {
+        self.runs(unit)
+            || self.rooms.is_over(unit) == Some(true)
+            || self.tournaments.get(unit).is_some()
+    }
+
+    /// Runs a unit that the node owns at this epoch, as long as it is wanted. Tries again while the
+    /// database cannot be read.
+    pub(super) async fn resume(&self, unit: Id, epoch: Epoch) -> Resumed {
+        // It was created here, and its node learns of it from its beat.
+        let is_new = epoch == Epoch::FIRST;
+        if is_new && self.runs(unit) {
+            return Resumed::Runs;
+        }
+        self.stop(unit).await;
+        while self.wanted().get(&unit) == Some(&epoch) {
+            match self.load(unit, epoch).await {
+                Ok(resumed) => return resumed,
+                Err(error) => {
+                    warn!(%unit, %error, "a room or tournament cannot be read; trying again");
+                    sleep(RETRY).await;
+                }
+            }
+        }
+        Resumed::Runs
+    }
+
+    /// Reads and runs a unit.
+    async fn load(&self, unit: Id, epoch: Epoch) -> Result<Resumed, StoreError> {
+        let _permit = self.loads.acquire().await.expect("it is never closed");
+        let Some(loaded) = self.store.load(unit, epoch).await? else {
+            return Ok(Resumed::Nothing);
+        };
+        let games = self.rooms.resume_all(loaded.games).await;
+        let has_unit = match loaded.stored {
+            Some((UnitKind::Tournament, stored)) => self.tournaments.resume(unit, stored).await,
+            Some((UnitKind::Study, stored)) => self.studies.resume(unit, stored).await,
+            None => false,
+        };
+        let is_resumed = games > 0 || has_unit;
+        info!(%unit, epoch = epoch.0, games, is_resumed, "taken over");
+        Ok(match is_resumed {
+            true => Resumed::Runs,
+            false => Resumed::Impossible,
+        })
+    }
+
+    /// Ends everything of a unit that runs here.
+    pub(super) async fn stop(&self, unit: Id) {
+        self.tournaments.stop_one(unit).await;
+        self.studies.stop_one(unit).await;
+        self.rooms.stop_unit(unit).await;
+    }
+
+    /// Waits until a unit is not an ephemeral room in which a game is running, or for the grace: no
+    /// other node can resume it.
+    pub(super) async fn until_ephemeral_over(&self, unit: Id) {
+        // If it is not over in time, it is ended.
+        let _ = timeout(self.grace, self.rooms.until_ephemeral_over(unit)).await;
+    }
+
+    /// Releases a unit that cannot be resumed here, as long as it is wanted. Returns whether the
+    /// database knows.
+    pub(super) async fn give_up(&self, unit: Id, epoch: Epoch) -> bool {
+        while self.wanted().get(&unit) == Some(&epoch) {
+            if self.release(unit, epoch).await {
+                self.unwant(unit);
+                return true;
+            }
+            sleep(RETRY).await;
+        }
+        false
+    }
+
+    /// Ends everything of a unit after its next commits, and gives it up. Returns whether the
+    /// database knows.
+    pub(super) async fn release(&self, unit: Id, epoch: Epoch) -> bool {
+        self.tournaments.stop_one(unit).await;
+        self.studies.stop_one(unit).await;
+        self.rooms.suspend_unit(unit).await;
+        match self.store.release(unit, epoch).await {
+            Ok(()) => true,
+            Err(error) => {
+                warn!(%unit, %error, "a room or tournament cannot be released");
+                false
+            }
+        }
+    }
+}

@@ -1,0 +1,349 @@
+//! All units of a kind on this server: creates each once, finds, stops and forgets them.
+
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use tokio::sync::Notify;
+use tokio_util::task::TaskTracker;
+use tracing::{error, info};
+
+use super::actor::{self, Stop};
+use super::table::Table;
+use super::{Handle, Journaled, Unit, UnitHeader as _};
+use crate::cluster::News;
+use crate::rooms::Rooms;
+use chefshat_admission::limits::{Held, Key, Places, Refused};
+use chefshat_base::tasks::{named, short};
+use chefshat_room::ids::{Id, RequestKey, Token, normal_code};
+use chefshat_store::StoreError;
+use chefshat_store::units::{StoredUnit, UnitKind, UnitRow, UnitWrite};
+
+/// Why a unit was not created. `P`: why its settings are refused.
+#[derive(Debug, thiserror::Error)]
+pub enum CreateProblem<P: std::error::Error> {
+    /// A setting is invalid.
+    #[error(transparent)]
+    Settings(P),
+    /// Its creator, or the server, has too many.
+    #[error(transparent)]
+    Refused(#[from] Refused),
+    /// The request id was used for another unit of this kind.
+    #[error("this request id was used to create another {0}; draw a new one")]
+    RequestIdUsed(UnitKind),
+    /// The server is shutting down.
+    #[error("the server is shutting down and accepts no new {0}")]
+    ShuttingDown(&'static str),
+    /// The disk has no space for more games.
+    #[error("the server's disk is nearly full; the rest is reserved for running games")]
+    DiskNearlyFull,
+    /// The store failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+/// Why a unit of this kind was not created.
+type Problem<U> = CreateProblem<<U as Journaled>::SettingsProblem>;
+
+/// The owner token of what a request creates: repetitions have the same.
+pub(crate) fn owner_of(request: Option<RequestKey>) -> Token {
+    request.map_or_else(|| Token::random(Id::random()), |key| key.owner())
+}
+
+/// A unit as its journal has it.
+pub struct Folded<U: Journaled> {
+    pub(crate) header: U::Header,
+    pub(crate) plan: U::Plan,
+    pub(crate) state: U::State,
+    /// Number of rows of the journal.
+    pub(crate) rows: u64,
+}
+
+/// A unit that is in the store and about to run.
+pub(crate) struct New<U: Journaled> {
+    pub(crate) folded: Folded<U>,
+    pub(crate) shared: U::Shared,
+}
+
+/// The units of a kind on a server.
+pub struct Registry<U: Journaled> {
+    pub(crate) rooms: Arc<Rooms>,
+    pub(crate) tracker: TaskTracker,
+    pub(crate) common: U::Common,
+    stop: Stop,
+    table: Mutex<Table<U>>,
+    /// Notified when the creation of a unit has ended.
+    created: Notify,
+    places: Arc<Places>,
+}
+
+impl<U: Journaled> std::fmt::Debug for Registry<U> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(formatter, "{}", U::NAMES)
+    }
+}
+
+impl<U: Journaled> Registry<U> {
+    /// Creates an empty set. A shutdown waits for the tasks in `tracker`.
+    pub(crate) fn empty(rooms: Arc<Rooms>, tracker: TaskTracker, common: U::Common) -> Arc<Self> {
+        let places = Places::new(U::MOST, rooms.shares());
+        Arc::new(Self {
+            rooms,
+            tracker,
+            common,
+            stop: Stop::default(),
+            table: Mutex::default(),
+            created: Notify::new(),
+            places,
+        })
+    }
+
+    /// The rooms of its games.
+    pub fn rooms(&self) -> &Arc<Rooms> {
+        &self.rooms
+    }
+
+    /// Whether new units are accepted now.
+    ///
+    /// # Errors
+    /// They are not.
+    pub(crate) fn check_accepting(&self) -> Result<(), Problem<U>> {
+        if self.stop.no_more_games.is_cancelled() || self.rooms.is_shutting_down() {
+            return Err(CreateProblem::ShuttingDown(U::NAMES));
+        }
+        match self.rooms.store().has_space() {
+            true => Ok(()),
+            false => Err(CreateProblem::DiskNearlyFull),
+        }
+    }
+
+    /// Creates a unit with `make`, which stores it, unless an earlier request with the same owner token
+    /// has: then returns that one.
+    ///
+    /// # Errors
+    /// The request id was used for another one, its creator has too many, or `make` failed.
+    pub(crate) async fn create_once(
+        self: &Arc<Self>,
+        owner: Token,
+        charged: Key,
+        make: impl Future<Output = Result<New<U>, Problem<U>>> + Send + 'static,
+    ) -> Result<Arc<Handle<U>>, Problem<U>> {
+        let reservation = loop {
+            // A repetition of a request whose unit is still being created waits for it.
+            let created = self.created.notified();
+            if let Some(handle) = self.get(owner.room) {
+                return match handle.is_owner(&owner.to_text()) {
+                    true => Ok(handle),
+                    false => Err(CreateProblem::RequestIdUsed(U::KIND)),
+                };
+            }
+            match Reservation::of(self, owner.room, charged)? {
+                Some(reservation) => break reservation,
+                None => created.await,
+            }
+        };
+        // Runs to completion even if the caller is cancelled: a half-created unit would be stored
+        // without running.
+        let creating = self.tracker.spawn(short(U::CREATION, async move {
+            let new = make.await?;
+            Ok(reservation.start(new, charged))
+        }));
+        (creating.await).map_err(|error| {
+            StoreError::Failed(format!("creating a {} failed: {error}", U::KIND))
+        })?
+    }
+
+    /// Stores a new unit, with the entries that its journal begins with, if it begins with a row.
+    ///
+    /// # Errors
+    /// The store failed, or has something with this id or join code.
+    pub(crate) async fn store_new(
+        &self,
+        header: &U::Header,
+        first: Option<&[U::Entry]>,
+    ) -> Result<(), StoreError> {
+        let first = first.map(|entries| UnitRow {
+            position: 0,
+            entries: U::row_to_bytes(entries),
+            over: false,
+        });
+        let create = UnitWrite::Create {
+            join_code: header.join_code().map(str::to_owned),
+            header: U::header_to_bytes(header),
+            first,
+        };
+        let unit = U::KIND.id(header.id());
+        self.rooms.store().write_unit(unit, create).await
+    }
+
+    /// Resumes the units of the store, whose rooms must be restored already. Returns how many are not
+    /// over. One that cannot be read is logged and left unchanged.
+    ///
+    /// # Errors
+    /// The store failed.
+    pub async fn restore(&self) -> Result<usize, StoreError> {
+        let store = self.rooms.store();
+        let mut count = 0;
+        for id in store.units(U::KIND, U::MOST).await? {
+            if let Some(stored) = store.unit(U::KIND.id(id)).await? {
+                count += usize::from(self.resume(id, stored).await && self.runs(id));
+            }
+        }
+        if count > 0 {
+            info!(count, "{} resumed", U::NAMES);
+        }
+        Ok(count)
+    }
+
+    /// Resumes a unit, whose rooms must be restored already. Returns whether it is here; one that cannot
+    /// be read is logged and left unchanged.
+    pub(crate) async fn resume(&self, id: Id, stored: StoredUnit) -> bool {
+        // A long one takes a while, and others are played meanwhile.
+        let folding = tokio::task::spawn_blocking(move || U::fold(id, &stored));
+        match (folding.await).unwrap_or_else(|problem| Err(problem.to_string())) {
+            // Another request has shown its end meanwhile.
+            Ok(_) if self.get(id).is_some_and(|handle| handle.is_over()) => true,
+            Ok(folded) => {
+                // It counts among those of the server; who created it is unknown.
+                let charged = U::key_of(id);
+                let place = self.places.take_anyway(charged);
+                let shared = U::share(&self.common, &folded);
+                self.start(New { folded, shared }, charged, place);
+                true
+            }
+            Err(problem) => {
+                U::set_unreadable(id, &self.rooms);
+                let kind = U::KIND;
+                error!(%id, %problem, "a {kind} cannot be resumed; it is left unchanged");
+                false
+            }
+        }
+    }
+
+    /// Adds a unit to the table and starts its task, unless it is over.
+    fn start(&self, new: New<U>, charged: Key, place: Held) -> Arc<Handle<U>> {
+        let stop = Stop {
+            end: self.stop.end.child_token(),
+            ..self.stop.clone()
+        };
+        let rows = new.folded.rows;
+        let (handle, inbox) = Handle::new(new, charged, stop.end.clone());
+        self.lock().enter(Arc::clone(&handle));
+        U::enter(&handle, &self.rooms);
+        if !handle.is_over() {
+            let unit = Unit::new(Arc::clone(&handle), Arc::clone(&self.rooms), rows, place);
+            let running = actor::run(U::new(unit, &self.common), inbox, stop);
+            self.tracker.spawn(named(U::TASK, running));
+        }
+        handle
+    }
+
+    /// Whether this unit runs here, or is being created.
+    pub(crate) fn runs(&self, id: Id) -> bool {
+        let table = self.lock();
+        let running = |handle: &Arc<Handle<U>>| !handle.is_stopped();
+        table.get(id).is_some_and(running) || table.is_in_creation(id)
+    }
+
+    /// Makes the task of a unit end without publishing anything more.
+    pub(crate) fn fence(&self, id: Id) {
+        if let Some(handle) = self.get(id) {
+            handle.end.cancel();
+        }
+    }
+
+    /// Ends the task of a unit, and forgets the unit unless it is over: another node may have it.
+    pub async fn stop_one(&self, id: Id) {
+        loop {
+            let created = self.created.notified();
+            if !self.lock().is_in_creation(id) {
+                break;
+            }
+            created.await;
+        }
+        let Some(handle) = self.get(id) else { return };
+        handle.end.cancel();
+        handle.mailbox.closed().await;
+        if !handle.is_over() {
+            self.forget_one(id);
+        }
+    }
+
+    /// Removes a unit from memory.
+    pub(crate) fn forget_one(&self, id: Id) {
+        self.lock().remove_id(id);
+    }
+
+    /// Stops beginning and counting games; those that end from here on count when the server is
+    /// restarted.
+    pub fn stop(&self) {
+        self.stop.no_more_games.cancel();
+    }
+
+    /// Ends the tasks of all units.
+    pub fn end(&self) {
+        self.stop.end.cancel();
+    }
+
+    /// The unit with this id.
+    pub fn get(&self, id: Id) -> Option<Arc<Handle<U>>> {
+        self.lock().get(id).cloned()
+    }
+
+    /// The unit with this join code.
+    pub fn by_code(&self, code: &str) -> Option<Arc<Handle<U>>> {
+        self.lock().by_code(&normal_code(code)).cloned()
+    }
+
+    /// The units created before number `before`, or all; with their numbers, newest first.
+    pub fn earlier(&self, before: Option<u64>) -> Vec<(u64, Arc<Handle<U>>)> {
+        (self.lock().earlier(before))
+            .map(|(number, handle)| (number, Arc::clone(handle)))
+            .collect()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Table<U>> {
+        (self.table.lock()).expect("no code that holds this lock can panic")
+    }
+}
+
+/// A unit that is being created, and its place.
+struct Reservation<U: Journaled> {
+    registry: Arc<Registry<U>>,
+    id: Id,
+    place: Option<Held>,
+}
+
+impl<U: Journaled> Reservation<U> {
+    /// Reserves a place for a unit; `None` if it is being created or has just been.
+    fn of(registry: &Arc<Registry<U>>, id: Id, charged: Key) -> Result<Option<Self>, Refused> {
+        let mut table = registry.lock();
+        if table.is_in_creation(id) || table.get(id).is_some() {
+            return Ok(None);
+        }
+        let places = &registry.places;
+        let place = places.try_take(charged);
+        let place = place.ok_or_else(|| U::too_many(places.share_of(charged) as u64))?;
+        table.reserve(id);
+        drop(table);
+        Ok(Some(Self {
+            registry: Arc::clone(registry),
+            id,
+            place: Some(place),
+        }))
+    }
+
+    /// Starts the unit, which is stored by now.
+    fn start(mut self, new: New<U>, charged: Key) -> Arc<Handle<U>> {
+        let place = self.place.take().expect("it is started once");
+        if let Some(lease) = self.registry.rooms.lease() {
+            lease.report(self.id, News::Created { ephemeral: false });
+        }
+        self.registry.start(new, charged, place)
+    }
+}
+
+impl<U: Journaled> Drop for Reservation<U> {
+    fn drop(&mut self) {
+        self.registry.lock().release(self.id);
+        self.registry.created.notify_waiters();
+    }
+}

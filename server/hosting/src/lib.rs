@@ -1,0 +1,14 @@
+//! Rooms, tournaments and studies that live, what happens when their games end, and which node of a cluster has them.
+
+pub mod cluster;
+pub mod config;
+pub mod journaled;
+pub mod participants;
+pub mod record_writer;
+pub mod retention;
+pub mod room;
+pub mod rooms;
+pub mod signing;
+pub mod studies;
+pub mod tournaments;
+pub mod webhooks;

@@ -1,0 +1,191 @@
+//! A participant's data in stored studies. Deleting them while no server runs does what its
+//! withdrawal does while one runs.
+
+use std::sync::Arc;
+
+use chefshat_record::pseudonym::Named;
+use chefshat_room::ids::Id;
+use chefshat_study::{Answer, Change, Study, Task};
+use serde_json::json;
+
+use super::data::{DataError, ParticipantData};
+use super::export::Sheet;
+use chefshat_base::clock::since_epoch_ms;
+use chefshat_store::StoreError;
+use chefshat_store::samples::Samples;
+use chefshat_store::studies::StoredStudy;
+use chefshat_store::units::UnitKind;
+use chefshat_wire::convert;
+
+impl ParticipantData {
+    /// Whether a participant of this name has a game of a study that is not over.
+    pub(super) async fn plays_in_studies(&self, who: &Named) -> Result<bool, StoreError> {
+        for (stored, number) in self.in_studies(who).await? {
+            let mut is_playing = false;
+            for change in &stored.changes {
+                match change {
+                    Change::Placed { number: of, .. } if *of == number => is_playing = true,
+                    Change::GameEnded { number: of, .. } if *of == number => is_playing = false,
+                    _ => {}
+                }
+            }
+            if is_playing {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Deletes a participant's data from the studies. Returns from how many.
+    pub(super) async fn delete_from_studies(&self, who: &Named) -> Result<u64, DataError> {
+        let mut count = 0;
+        for (stored, number) in self.in_studies(who).await? {
+            let mut changes = stored.changes;
+            let games = games_of(&changes, number);
+            changes.push(Change::Withdrew {
+                number,
+                delete_data: true,
+                at_ms: since_epoch_ms(),
+            });
+            for change in &mut changes {
+                change.forget(number);
+            }
+            // A server completes what is interrupted between these two.
+            let id = stored.header.id;
+            let forgotten = vec![number];
+            StoredStudy::rewrite(self.store.as_ref(), id, &changes, forgotten).await?;
+            let samples = Arc::new(Samples::new(self.data_dir.clone()));
+            samples.delete(games.clone()).await?;
+            self.store.delete(games).await?;
+            count += 1;
+        }
+        Ok(count)
+    }
+
+    /// Sends a participant's consent, answers and interface traces.
+    pub(super) async fn export_studies(
+        &self,
+        who: &Named,
+        sheet: &mut Sheet<'_>,
+        unreadable: &mut Vec<String>,
+    ) -> Result<(), DataError> {
+        for (stored, number) in self.in_readable_studies(who, unreadable).await? {
+            let id = stored.header.id;
+            let Some(study) = folded(&stored) else {
+                continue;
+            };
+            let Some(participant) = study.participant(number) else {
+                continue;
+            };
+            let state = convert::participant_state(participant.status);
+            let consent = participant.consent.as_ref().map(|consent| {
+                json!({
+                    "atMs": consent.at_ms,
+                    "version": consent.version,
+                    "language": consent.language,
+                    "textSha256": hex::encode(consent.text_sha256),
+                })
+            });
+            let games = games_of(&stored.changes, number);
+            let games: Vec<String> = games.iter().map(Id::to_string).collect();
+            let mut lines = vec![json!({ "study": {
+                "studyId": id.to_string(),
+                "name": stored.header.settings.name,
+                "number": number,
+                "state": state.as_str_name(),
+                "consent": consent,
+                "reachedAtMs": participant.reached_at_ms,
+                "endedAtMs": participant.ended_at_ms,
+                "gameIds": games,
+            } })];
+            let sequence = study.sequence_of(participant).unwrap_or_default();
+            let steps = study.settings().steps(sequence);
+            for (step, answers) in &participant.answers {
+                let Some(Task::Questionnaire(questionnaire)) = steps.get(*step).map(|it| it.task)
+                else {
+                    continue;
+                };
+                for answer in answers.iter() {
+                    let item = questionnaire.items.get(answer.item);
+                    let value = match &answer.value {
+                        Answer::Number(number) => json!(number),
+                        Answer::Options(options) => json!(options),
+                        Answer::Text(text) => json!(text),
+                    };
+                    lines.push(json!({ "answer": {
+                        "step": step,
+                        "questionnaire": questionnaire.id,
+                        "item": item.map(|item| &item.id),
+                        "value": value,
+                        "answeredAfterMs": answer.answered_after_ms,
+                    }, "studyId": id.to_string() }));
+                }
+            }
+            sheet.send(lines).await?;
+            let all = self.store.traces(id).await?;
+            for traces in all.iter().filter(|traces| traces.number == number) {
+                let game = traces.game.to_string();
+                let lines = traces.traces.iter();
+                let lines = lines.map(|trace| json!({ "trace": trace, "gameId": game }));
+                sheet.send(lines.collect()).await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The studies that have the participant, with its number. Nobody has a key there.
+    pub(super) async fn in_studies(
+        &self,
+        who: &Named,
+    ) -> Result<Vec<(StoredStudy, u32)>, StoreError> {
+        let mut unreadable = Vec::new();
+        let found = self.in_readable_studies(who, &mut unreadable).await?;
+        // What is to be changed everywhere must be readable everywhere.
+        match unreadable.pop() {
+            Some(problem) => Err(StoreError::Unreadable(problem)),
+            None => Ok(found),
+        }
+    }
+
+    /// As [`Self::in_studies`]. Studies that cannot be read are named.
+    async fn in_readable_studies(
+        &self,
+        who: &Named,
+        unreadable: &mut Vec<String>,
+    ) -> Result<Vec<(StoredStudy, u32)>, StoreError> {
+        let mut found = Vec::new();
+        for id in self.store.units(UnitKind::Study, usize::MAX).await? {
+            let stored = match StoredStudy::read(self.store.as_ref(), id).await {
+                Err(StoreError::Unreadable(problem)) => {
+                    unreadable.push(problem);
+                    continue;
+                }
+                stored => stored?,
+            };
+            let Some(stored) = stored else { continue };
+            let number = stored.changes.iter().find_map(|change| match change {
+                Change::Added { number, pseudonym } if who.is(pseudonym, "") => Some(*number),
+                _ => None,
+            });
+            found.extend(number.map(|number| (stored, number)));
+        }
+        Ok(found)
+    }
+}
+
+/// The games of a participant.
+fn games_of(changes: &[Change], wanted: u32) -> Vec<Id> {
+    let games = changes.iter().filter_map(|change| match change {
+        Change::Placed { number, game } if *number == wanted => Some(Id(game.game)),
+        _ => None,
+    });
+    games.collect()
+}
+
+/// The state of a study; `None` if this version cannot read its settings.
+fn folded(stored: &StoredStudy) -> Option<Study> {
+    let plan = convert::study_plan(&stored.header.settings).ok()?;
+    let mut study = Study::new(plan.core).ok()?;
+    stored.changes.iter().for_each(|change| study.fold(change));
+    Some(study)
+}

@@ -1,0 +1,103 @@
+//! Writes the records of finished games to files, in the background, those of each caller in turns.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tokio::sync::{OwnedRwLockWriteGuard, RwLock};
+use tokio_util::task::TaskTracker;
+use tracing::{error, info};
+
+use chefshat_admission::limits::{Background, Key};
+use chefshat_base::tasks::short;
+use chefshat_room::ids::Id;
+use chefshat_store::{Store, StoredGame};
+
+/// Writes records to the folder of records of a data directory.
+#[derive(Clone)]
+pub struct RecordWriter {
+    store: Arc<dyn Store>,
+    /// `None`: records are not written.
+    data_dir: Option<PathBuf>,
+    tracker: TaskTracker,
+    background: Arc<Background>,
+    /// Locked for reading while a record is written.
+    writing: Arc<RwLock<()>>,
+}
+
+impl RecordWriter {
+    /// Writes games of `store` under `data_dir`; a shutdown waits for `tracker`.
+    pub fn new(
+        store: Arc<dyn Store>,
+        data_dir: Option<PathBuf>,
+        tracker: TaskTracker,
+        background: Arc<Background>,
+    ) -> Self {
+        Self {
+            store,
+            data_dir,
+            tracker,
+            background,
+            writing: Arc::default(),
+        }
+    }
+
+    /// The data directory, if records are written.
+    pub fn data_dir(&self) -> Option<&Path> {
+        self.data_dir.as_deref()
+    }
+
+    /// Waits until no record is being written, and lets none begin while the value lives.
+    pub async fn pause(&self) -> OwnedRwLockWriteGuard<()> {
+        Arc::clone(&self.writing).write_owned().await
+    }
+
+    /// Queues the record of a finished game, charged to its creator, and marks it as written in the
+    /// store. A record that fails is tried again at the next start of the server.
+    pub fn write_record(&self, game: Id, charged: Key) {
+        if let Some(data_dir) = self.data_dir.clone() {
+            let writer = self.clone();
+            self.tracker
+                .spawn(short("one record", writer.write(game, charged, data_dir)));
+        }
+    }
+
+    async fn write(self, game: Id, charged: Key, data_dir: PathBuf) {
+        // Before it is read: a long record takes much memory.
+        let _slice = self.background.slice(charged).await;
+        let _writing = self.writing.read().await;
+        let stored = match self.store.finished(game).await {
+            Ok(Some(stored)) => stored,
+            Ok(None) => return,
+            Err(error) => {
+                error!(%game, %error, "writing a record failed");
+                return;
+            }
+        };
+        if let StoredGame::Hosted(header, ..) = &stored
+            && header.study.is_some()
+        {
+            // Its record is in the database alone, from which a participant's data can be deleted.
+            if let Err(error) = self.store.mark_record_written(game).await {
+                error!(%game, %error, "a game of a study was not marked as needing no record file");
+            }
+            return;
+        }
+        let writing = self.background.run(move || {
+            let path = chefshat_record::jsonl::path_of(&data_dir, &game.to_string());
+            let written = chefshat_record::jsonl::write_private(&path, |write| {
+                stored.each_line(|line| write(&line));
+            });
+            written.map(|()| path)
+        });
+        match writing.await {
+            Some(Ok(path)) => {
+                info!(%game, path = %path.display(), "record written");
+                if let Err(error) = self.store.mark_record_written(game).await {
+                    error!(%game, %error, "a record was written but not marked as written");
+                }
+            }
+            Some(Err(error)) => error!(%game, %error, "writing a record failed"),
+            None => error!(%game, "writing a record failed"),
+        }
+    }
+}

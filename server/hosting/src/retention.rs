@@ -1,0 +1,258 @@
+//! How long finished games are kept: deletes the oldest with the files of their records, at an
+//! operator's request or on a schedule, and gives their disk space back. The store decides which, and
+//! only then are files deleted. A crash in between leaves nothing behind that the next run does not
+//! delete.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_record::{atomic_file, jsonl};
+use chefshat_room::ids::Id;
+use tracing::{error, info, warn};
+
+use crate::config::KeepGames;
+use crate::rooms::Rooms;
+use chefshat_base::clock::since_epoch_ms;
+use chefshat_store::{DiskUsage, Keep, StoreError};
+
+/// Games that are deleted in one commit: rooms wait for it.
+const GAMES_PER_COMMIT: usize = 16;
+/// Pause between two commits, in which rooms commit.
+const PAUSE: Duration = Duration::from_millis(20);
+/// Time between two runs of the schedule.
+const INTERVAL: Duration = Duration::from_secs(600);
+
+/// A file of the data directory with the ids of games whose deletion has begun, one a line. It is
+/// deleted after their files.
+const PRUNING: &str = "pruning";
+
+/// Which games a setting keeps now.
+fn kept_now(setting: KeepGames) -> Keep {
+    match setting {
+        KeepGames::Newest(count) => Keep {
+            newest: Some(count),
+            ..Keep::default()
+        },
+        KeepGames::For(time) => {
+            let ms = u64::try_from(time.as_millis()).unwrap_or(u64::MAX);
+            Keep {
+                ended_since_ms: Some(since_epoch_ms().saturating_sub(ms)),
+                ..Keep::default()
+            }
+        }
+    }
+}
+
+/// What was deleted.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Pruned {
+    /// Number of games.
+    pub games: u64,
+    /// Bytes that the database and the files take less.
+    pub freed_bytes: u64,
+}
+
+/// How much is stored.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Usage {
+    /// The disk of the store.
+    pub disk: DiskUsage,
+    /// Number of finished games.
+    pub finished_games: u64,
+    /// Bytes of the files of records.
+    pub record_bytes: u64,
+    /// Number of these files.
+    pub record_files: u64,
+}
+
+/// Deletes finished games of a server.
+#[derive(Debug, Clone)]
+pub struct Retention {
+    rooms: Arc<Rooms>,
+}
+
+impl Retention {
+    /// For the games of these rooms. Their store knows which of them tournaments and studies need.
+    pub fn new(rooms: Arc<Rooms>) -> Self {
+        Self { rooms }
+    }
+
+    /// How much is stored.
+    ///
+    /// # Errors
+    /// The store failed.
+    pub async fn usage(&self) -> Result<Usage, StoreError> {
+        let finished_games = self.rooms.store().finished_games().await?;
+        let folder = self.rooms.record_writer().data_dir().map(jsonl::folder_of);
+        let looking = tokio::task::spawn_blocking(move || folder.map(|it| size_of(&it)));
+        let (record_bytes, record_files) = looking.await.ok().flatten().unwrap_or_default();
+        Ok(Usage {
+            disk: self.rooms.store().disk().unwrap_or_default(),
+            finished_games,
+            record_bytes,
+            record_files,
+        })
+    }
+
+    /// Deletes all finished games but those to keep, oldest first.
+    ///
+    /// # Errors
+    /// The store failed. What was deleted until then stays deleted.
+    pub async fn prune(&self, keep: Keep) -> Result<Pruned, StoreError> {
+        let before = self.usage().await?;
+        let mut pruned = Pruned::default();
+        self.delete(self.left_over()).await?;
+        let mut after = 0;
+        loop {
+            let store = self.rooms.store();
+            let found = store.prunable(keep, after, GAMES_PER_COMMIT).await?;
+            let Some((last, _)) = found.last() else { break };
+            after = *last;
+            let games: Vec<Id> = found.into_iter().map(|(_, game)| game).collect();
+            pruned.games += self.delete(games).await?;
+            tokio::time::sleep(PAUSE).await;
+        }
+        let after = self.usage().await?;
+        let bytes = |usage: &Usage| usage.disk.bytes + usage.record_bytes;
+        pruned.freed_bytes = bytes(&before).saturating_sub(bytes(&after));
+        if pruned.games > 0 {
+            // The leaderboard counts only what is left.
+            self.rooms.count_forgotten();
+            info!(
+                games = pruned.games,
+                freed_bytes = pruned.freed_bytes,
+                "old games deleted"
+            );
+        }
+        Ok(pruned)
+    }
+
+    /// Deletes those of these games that nothing needs, and their files. Returns how many it did.
+    pub(crate) async fn delete(&self, games: Vec<Id>) -> Result<u64, StoreError> {
+        if games.is_empty() {
+            return Ok(0);
+        }
+        let data_dir = self.rooms.record_writer().data_dir();
+        if let Some(data_dir) = data_dir {
+            let ids: Vec<String> = games.iter().map(Id::to_string).collect();
+            // A disk that is full must not prevent what frees space.
+            if let Err(error) = std::fs::write(data_dir.join(PRUNING), ids.join("\n")) {
+                warn!(%error, "a crash from here on may leave files of deleted games behind");
+            }
+        }
+        let deleted = self.rooms.prune_games(games).await?;
+        if let Some(data_dir) = data_dir {
+            let records = deleted.iter().map(ToString::to_string);
+            let mut paths: Vec<_> = (records)
+                .map(|game| jsonl::path_of(data_dir, &game))
+                .collect();
+            paths.push(data_dir.join(PRUNING));
+            let deleting = move || paths.iter().try_for_each(|path| atomic_file::remove(path));
+            (tokio::task::spawn_blocking(deleting).await)
+                .map_err(|error| StoreError::Failed(error.to_string()))?
+                .map_err(|error| StoreError::Failed(format!("deleting a record: {error}")))?;
+        }
+        Ok(deleted.len() as u64)
+    }
+
+    /// The games whose deletion an earlier run began and may not have completed.
+    fn left_over(&self) -> Vec<Id> {
+        let data_dir = self.rooms.record_writer().data_dir();
+        let read = data_dir.and_then(|it| std::fs::read_to_string(it.join(PRUNING)).ok());
+        let ids = read.unwrap_or_default();
+        ids.lines().filter_map(Id::parse).collect()
+    }
+
+    /// Deletes games on a schedule, until the future is dropped.
+    pub async fn follow(self, keep: KeepGames) {
+        let mut interval = tokio::time::interval(INTERVAL);
+        loop {
+            interval.tick().await;
+            if let Err(error) = self.prune(kept_now(keep)).await {
+                error!(%error, "deleting old games failed");
+            }
+        }
+    }
+}
+
+/// Bytes and number of the files of a folder.
+fn size_of(folder: &Path) -> (u64, u64) {
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    files
+        .filter_map(|file| file.metadata().ok())
+        .filter(|about| about.is_file())
+        .fold((0, 0), |(bytes, files), about| {
+            (bytes + about.len(), files + 1)
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use chefshat_record::samples;
+    use chefshat_room::journal::{GameHeader, TournamentGame};
+    use chefshat_room::policy::Durability;
+    use tokio_util::task::TaskTracker;
+
+    use super::*;
+    use crate::config::ServerConfig;
+    use chefshat_store::testing::{TypedUnits as _, cup, header, summary};
+    use chefshat_store::{MemoryStore, Store};
+
+    /// What the store keeps, keeps its files, also if it was to be deleted; and what a server that ended
+    /// in between has left is deleted by the next run.
+    #[tokio::test]
+    async fn only_the_files_of_deleted_games_are_deleted() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let store: Arc<dyn Store> = Arc::new(MemoryStore::default());
+        let created = store.create_tournament(Arc::new(cup(7)), Vec::new()).await;
+        created.expect("committed");
+        for (game, tournament) in [(1, Some(Id([7; 16]))), (2, None), (3, None)] {
+            let header = Arc::new(GameHeader {
+                tournament: tournament.map(|tournament| TournamentGame {
+                    tournament,
+                    series: None,
+                }),
+                ..GameHeader::clone(&header(game, Durability::Durable))
+            });
+            let created = store.create(Arc::clone(&header), Vec::new()).await;
+            let mut journal = created.expect("a new game");
+            let finished = journal.finish(Some(summary(&header)), None).await;
+            finished.expect("committed");
+            let written = store.mark_record_written(header.game_id).await;
+            written.expect("committed");
+        }
+        let config = ServerConfig {
+            data_dir: Some(folder.path().to_path_buf()),
+            ..ServerConfig::default()
+        };
+        let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new()).expect("threads");
+        let id = |game: u8| Id([game; 16]).to_string();
+        let files = |game: u8| {
+            [
+                jsonl::path_of(folder.path(), &id(game)),
+                samples::path_of(folder.path(), &id(game), 0),
+            ]
+        };
+        for path in (1..=4).flat_map(files) {
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("created");
+            std::fs::write(path, "{}").expect("written");
+        }
+        let left = |game: u8| files(game).iter().filter(|path| path.exists()).count();
+        let retention = Retention::new(rooms);
+        let deleted = retention.delete(vec![Id([1; 16]), Id([2; 16])]).await;
+        assert_eq!(deleted, Ok(1));
+        assert_eq!([1, 2, 3, 4].map(left), [2, 0, 2, 2]);
+
+        let newest = Keep {
+            newest: Some(1),
+            ..Keep::default()
+        };
+        let pruning = folder.path().join("pruning");
+        assert!(!pruning.exists());
+        std::fs::write(&pruning, format!("{}\n{}", id(1), id(4))).expect("written");
+        retention.prune(newest).await.expect("deleted");
+        assert_eq!([1, 2, 3, 4].map(left), [2, 0, 2, 0]);
+        assert!(!pruning.exists());
+    }
+}

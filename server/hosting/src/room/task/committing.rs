@@ -1,0 +1,185 @@
+//! How a room commits its changes, ends its game, and fails. Nothing is published before it is
+//! committed, nor while another node of the cluster may have the room.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_proto::v1;
+use chefshat_room::State;
+use chefshat_room::ids::Id;
+use tokio::time::Instant;
+use tracing::{error, info, warn};
+
+use super::Room;
+use chefshat_store::StoreError;
+use chefshat_wire::convert;
+use chefshat_wire::outbox::StreamEnd;
+
+/// How long a node tries to read a journal to sign the record, as long as its store tries to commit
+/// the end of the game, and the pause before the next attempt.
+const SIGNING_LIMIT: Duration = Duration::from_mins(5);
+const SIGNING_PAUSE: Duration = Duration::from_secs(1);
+
+impl Room {
+    /// Commits new changes if this takes no time.
+    pub(super) fn commit_now(&mut self) -> bool {
+        let metrics = &self.context.metrics;
+        self.observed.count_changes(&mut self.core, metrics);
+        self.core.pending().is_empty() || self.journal.append_now(self.core.pending())
+    }
+
+    /// Commits new changes, then publishes what subscribers may know. Returns `false` when the room
+    /// must stop.
+    pub(super) async fn commit_and_publish(&mut self) -> bool {
+        if !self.commit_now() {
+            let room = self.core.header().room_id;
+            let appended = self.journal.append(self.core.pending());
+            if let Err(error) = unless(self.fence.cancelled(), room, appended).await {
+                self.fail(&error);
+                return false;
+            }
+            // The time of the commit does not count as thinking time.
+            self.now = self.clock.now();
+        }
+        let ends = self.core.state().is_over() && self.over_since.is_none();
+        if ends && !self.conclude().await {
+            return false;
+        }
+        if !self.wait_for_lease().await {
+            return false;
+        }
+        self.publish();
+        if ends {
+            // A shutdown that waits for games to end may close streams at once: everything has been
+            // queued.
+            self.context.watcher.game_over(self.core.header().room_id);
+        }
+        true
+    }
+
+    /// Waits until the server may publish. Returns `false` if the room must stop instead.
+    async fn wait_for_lease(&mut self) -> bool {
+        let Some(lease) = self.context.lease.as_ref().filter(|lease| !lease.holds()) else {
+            return true;
+        };
+        tokio::select! {
+            () = self.fence.cancelled() => return false,
+            () = lease.held() => {}
+        }
+        self.now = self.clock.now();
+        true
+    }
+
+    /// Handles the end of the game: finishes the journal and writes the record.
+    async fn conclude(&mut self) -> bool {
+        self.over_since = Some(self.now);
+        let header = Arc::clone(self.core.header());
+        // A game without a deal has no record.
+        let summary = self.core.game().map(|_| convert::summary(&self.core));
+        let has_record = summary.is_some();
+        let announced = summary.clone().filter(|_| self.context.webhooks.is_on());
+        (self.context.metrics).game_ended(self.core.state() == State::Finished);
+        let signature = match has_record {
+            true => self.sign().await,
+            false => Ok(None),
+        };
+        let finished = match signature {
+            Ok(signature) => {
+                let finished = self.journal.finish(summary.map(Box::new), signature);
+                // A node that has a lease learns from its beat that the game is over, maybe before
+                // it learns the outcome: it is fenced then, and not lost.
+                let lost = async {
+                    self.fence.cancelled().await;
+                    if let Some(lease) = &self.context.lease {
+                        lease.lapsed().await;
+                    }
+                };
+                unless(lost, header.room_id, finished).await
+            }
+            Err(error) => Err(error),
+        };
+        if let Err(error) = finished {
+            self.over_since = None;
+            self.fail(&error);
+            return false;
+        }
+        (self.context.webhooks).game_ended(&header, announced.as_ref());
+        info!(
+            room = %header.room_id,
+            game = %header.game_id,
+            finished = self.core.state() == State::Finished,
+            decisions = self.core.decisions(),
+            "the game has ended"
+        );
+        if has_record {
+            let owner = self.context.owner;
+            self.context
+                .record_writer
+                .write_record(header.game_id, owner);
+        }
+        true
+    }
+
+    /// Signs the record of the game. If its journal cannot be read, the record stays unsigned; a
+    /// node, whose database may be away, tries again before.
+    ///
+    /// # Errors
+    /// The room was fenced meanwhile.
+    async fn sign(&mut self) -> Result<Option<v1::RecordSignature>, StoreError> {
+        let background = self.core.is_built_in_only();
+        let background = background.then_some((&*self.context.background, self.context.owner));
+        let header = self.core.header();
+        let (game, unit) = (header.game_id, header.unit());
+        let limit = match self.context.lease {
+            Some(_) => SIGNING_LIMIT,
+            None => Duration::ZERO,
+        };
+        let began = Instant::now();
+        loop {
+            let header = Arc::clone(self.core.header());
+            let journal = &mut *self.journal;
+            let signing = self.context.signer.sign(header, journal, background);
+            let error = match signing.await {
+                Ok(signature) => return Ok(signature),
+                Err(error) => error,
+            };
+            if began.elapsed() >= limit {
+                error!(%game, %error, "a record could not be signed; it stays unsigned");
+                return Ok(None);
+            }
+            tokio::select! {
+                () = self.fence.cancelled() => return Err(StoreError::Fenced(unit)),
+                () = tokio::time::sleep(SIGNING_PAUSE) => {}
+            }
+        }
+    }
+
+    /// Handles a failure of the store: nothing uncommitted is published. The streams end, so that
+    /// agents reconnect and find the game as the restarted server, or the node that owns it, finds
+    /// it.
+    fn fail(&mut self, error: &StoreError) {
+        let room = self.core.header().room_id;
+        self.releases.clear();
+        match (error, &self.context.lease) {
+            (StoreError::Fenced(_), _) => info!(%room, %error, "the room stops here"),
+            (_, Some(_)) => warn!(%room, %error, "the room stops until its node resumes it"),
+            (_, None) => {
+                error!(%room, %error, "the store failed; the room stops");
+                self.end_streams(StreamEnd::StoreFailed);
+            }
+        }
+    }
+}
+
+/// The result of a write, unless the room is lost before.
+async fn unless(
+    lost: impl Future<Output = ()>,
+    room: Id,
+    written: impl Future<Output = Result<(), StoreError>>,
+) -> Result<(), StoreError> {
+    tokio::select! {
+        biased;
+        written = written => written,
+        () = lost => Err(StoreError::Fenced(room)),
+    }
+}

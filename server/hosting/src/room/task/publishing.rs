@@ -1,0 +1,254 @@
+//! What a room sends: answers to callers, and events to its connections and spectators, once the
+//! changes are committed.
+
+use std::sync::Arc;
+
+use chefshat_engine::Seat;
+use chefshat_proto::v1;
+use chefshat_room::ConnectionId;
+use chefshat_room::journal::ParticipantKind;
+use tokio::sync::oneshot;
+
+use super::{Release, Room, answer, is_connection};
+use crate::room::markers::MarkerLog;
+use crate::room::message::{
+    AttachRequest, AttachedSeat, NotAttached, SpectateError, SpectateRequest,
+};
+use crate::room::subscriber::{
+    MAX_PENDING_EVENTS, Publication, SeatConnection, Subscriber, is_urgent,
+};
+use chefshat_wire::convert;
+use chefshat_wire::outbox::HandStamp;
+
+/// Most events that a room of built-in agents keeps for spectators who come late. Its record has
+/// all of them.
+const MAX_EVENTS_UNREAD: usize = 16_384;
+/// The same, once its game is over.
+const MAX_EVENTS_UNREAD_AFTERWARDS: usize = 1_024;
+
+impl Room {
+    fn spectate(&mut self, request: SpectateRequest) -> Result<(), SpectateError> {
+        let policy = &self.core.header().policy;
+        if !policy.spectators && !request.is_owner {
+            return Err(SpectateError::NotAdmitted);
+        }
+        if request.snapshot && policy.spectator_delay_decisions > 0 {
+            return Err(SpectateError::SnapshotDelayed);
+        }
+        let first = self.core.log().first();
+        if !request.snapshot && request.from < first {
+            return Err(SpectateError::EventsGone(first));
+        }
+        let place = (self.spectator_places.try_take(request.charged)).ok_or(SpectateError::Full)?;
+        let spectator = Subscriber::spectator(
+            &self.core,
+            request.outbox,
+            Arc::clone(&self.on_space),
+            request.from,
+            request.snapshot,
+            (self.context.metrics.spectator(), place),
+        );
+        let position = spectator.position();
+        self.spectators.push(spectator);
+        if position < self.public.encoded().start {
+            self.public.restart_at(first);
+            self.public.follow(&self.core);
+        }
+        Ok(())
+    }
+
+    /// Sends committed changes to subscribers and results to callers.
+    pub(super) fn publish(&mut self) {
+        self.core.released(self.now);
+        if self.core.is_built_in_only() {
+            self.forget_unread();
+        }
+        self.public.follow(&self.core);
+        let mut releases = std::mem::take(&mut self.releases);
+        for release in releases.drain(..) {
+            self.release(release);
+        }
+        self.releases = releases;
+        if let Some(table) = &self.table {
+            table.follow(&self.core, self.now);
+        }
+        if let Some(markers) = &self.markers {
+            markers.follow(&self.core);
+        }
+        self.deliver();
+        self.observed.trace_decision(&self.core);
+        let metrics = &self.context.metrics;
+        self.observed.count_published(&self.core, metrics);
+    }
+
+    /// Drops old events of a game without participants that no spectator waits for.
+    fn forget_unread(&mut self) {
+        let length = self.core.log().len();
+        let unread = self.spectators.iter().map(Subscriber::position).min();
+        // What spectators have not read yet is encoded again, which is little: they keep up.
+        if unread.is_none() || self.public.encoded().len() > 2 * MAX_EVENTS_UNREAD {
+            self.public.restart_at(unread.unwrap_or(length));
+        }
+        let kept = match self.core.state().is_over() {
+            true => MAX_EVENTS_UNREAD_AFTERWARDS,
+            false => MAX_EVENTS_UNREAD,
+        };
+        let visible = self.core.visible_to_spectators();
+        let keep_from = length.saturating_sub(kept).min(visible);
+        let keep_from = unread.map_or(keep_from, |unread| keep_from.min(unread));
+        self.core.drop_log_before(keep_from);
+    }
+
+    fn release(&mut self, release: Release) {
+        match release {
+            Release::Join(reply, joined) => answer(reply, joined),
+            Release::Attach(request, seat, connection, reply) => {
+                self.release_attach(*request, seat, connection, reply);
+            }
+            Release::Result(seat, connection, result) => {
+                if let Some(subscriber) = self.current(seat, connection) {
+                    subscriber.send_result(result);
+                    self.always_visit[seat.index()] = true;
+                }
+            }
+            Release::Refuse(seat, connection, refused) => {
+                if let Some(subscriber) = self.current(seat, connection) {
+                    subscriber.refuse(refused);
+                    self.always_visit[seat.index()] = true;
+                }
+            }
+            Release::Acted(reply, acted) => answer(reply, Some(acted)),
+            Release::Hint(reply, hint) => answer(reply, Some(Ok(hint))),
+            Release::Closed(reply) => answer(reply, Some(convert::describe(&self.core))),
+            Release::Left(reply, left) => {
+                answer(reply, Some(left.map(|()| convert::describe(&self.core))));
+            }
+            Release::Describe(reply) => {
+                let watching = (self.spectators.iter())
+                    .filter(|it| !it.is_abandoned())
+                    .count();
+                let room = v1::Room {
+                    spectators: convert::number(watching),
+                    ..convert::describe_at(&self.core, self.now)
+                };
+                answer(reply, room);
+            }
+            Release::Spectate(request, reply) => answer(reply, self.spectate(*request)),
+            Release::Reported(reply, outcome) => {
+                let state = (self.table.as_ref()).map(|table| table.state(&self.core, self.now));
+                let state = state.map_or_else(v1::TableState::default, Arc::unwrap_or_clone);
+                let response = convert::report_response(&outcome, state);
+                answer(reply, Some(Ok(Box::new(response))));
+            }
+            Release::Marked(reply, number) => {
+                let marker = &self.core.markers()[number - 1];
+                let marker = convert::marker_to_proto(number - 1, marker);
+                answer(reply, Some(Ok(marker)));
+            }
+            Release::FollowMarkers(position, reply) => {
+                let core = &self.core;
+                let log = (self.markers).get_or_insert_with(|| Box::new(MarkerLog::new(core)));
+                log.follow(core);
+                let following = log.subscribe(position).ok_or(SpectateError::Full);
+                answer(reply, Some(following));
+            }
+            Release::WatchTable(reply) => {
+                let watching = (self.table.as_ref())
+                    .and_then(|table| table.watch(&self.core, self.now))
+                    .ok_or(SpectateError::Full);
+                answer(reply, Some(watching));
+            }
+        }
+    }
+
+    fn release_attach(
+        &mut self,
+        request: AttachRequest,
+        seat: Seat,
+        connection: ConnectionId,
+        reply: oneshot::Sender<Result<AttachedSeat, NotAttached>>,
+    ) {
+        // Its participant may have left or been removed in the same batch.
+        if self.core.seat_of_ticket(&request.secret) != Some(seat) {
+            return answer(reply, Err(NotAttached::TicketUnknown));
+        }
+        let participant = self.core.standing(seat).participant;
+        let kind = participant.map_or(ParticipantKind::Agent, |participant| participant.kind);
+        let stamp = HandStamp::new(self.clock.clone());
+        let connected = SeatConnection::new(
+            (seat, connection, request.charged),
+            request.handle,
+            request.options,
+            Arc::clone(&stamp),
+            request.by_gateway,
+            request.detached,
+            self.context.metrics.seat(kind),
+        );
+        let mut subscriber =
+            Subscriber::seat(connected, request.outbox, Arc::clone(&self.on_space));
+        subscriber.confirm_attached(&self.core, request.request_id, request.assigned_ticket);
+        let news = Publication::new(&self.core, &self.public, self.now);
+        subscriber.deliver(&news, true);
+        if let Some(mut older) = self.connections[seat.index()].replace(subscriber) {
+            older.detach(v1::DetachReason::Superseded);
+        }
+        self.always_visit[seat.index()] = true;
+        let attached = AttachedSeat {
+            seat,
+            connection,
+            stamp,
+        };
+        answer(reply, Ok(attached));
+    }
+
+    /// The number of the newest connection of a seat, attached or about to be.
+    pub(super) fn holder(&self, seat: Seat) -> Option<u64> {
+        let mut attaching = self
+            .releases
+            .iter()
+            .rev()
+            .filter_map(|release| match release {
+                Release::Attach(_, of, connection, _) if *of == seat => Some(connection.0),
+                _ => None,
+            });
+        let attached = || {
+            let subscriber = self.connections[seat.index()].as_ref()?;
+            Some(subscriber.connection()?.id.0)
+        };
+        attaching.next().or_else(attached)
+    }
+
+    fn current(&mut self, seat: Seat, connection: ConnectionId) -> Option<&mut Subscriber> {
+        self.connections[seat.index()]
+            .as_mut()
+            .filter(|subscriber| is_connection(subscriber, connection))
+    }
+
+    /// Sends updates that are due. Visits only connections for which some may be: with many rooms,
+    /// each visit costs several cache misses.
+    fn deliver(&mut self) {
+        let events = self.core.log().since(self.delivered);
+        let length = self.core.log().len();
+        let news = Publication::new(&self.core, &self.public, self.now);
+        let awaited = self.core.awaited().map(|open| open.decision.seat);
+        let all = length >= self.backlog_due_at || self.core.state().is_over();
+        for seat in self.core.all_seats() {
+            let urgent = events.clone().any(|entry| is_urgent(&entry.event, seat));
+            let always_visit = &mut self.always_visit[seat.index()];
+            if (all || urgent || *always_visit || awaited == Some(seat))
+                && let Some(subscriber) = &mut self.connections[seat.index()]
+            {
+                subscriber.deliver(&news, urgent);
+                *always_visit = subscriber.must_always_be_visited();
+            }
+        }
+        if all {
+            let connected = self.connections.iter().flatten();
+            let due_at = connected.map(Subscriber::backlog_due_at).min();
+            self.backlog_due_at = due_at.unwrap_or(length + MAX_PENDING_EVENTS);
+        }
+        self.delivered = length;
+        self.spectators
+            .retain_mut(|spectator| spectator.deliver(&news, false));
+    }
+}

@@ -1,0 +1,203 @@
+//! The table of rooms, in the order of their creation, with look-up by id and join code.
+
+use std::collections::{BTreeMap, HashMap};
+use std::ops::{Deref, DerefMut};
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use crate::room::Handle;
+use chefshat_admission::limits::{Held, Refused};
+use chefshat_room::ids::Id;
+use chefshat_room::journal::GameHeader;
+use chefshat_store::StoreError;
+
+/// Why no room was created.
+#[derive(Debug, thiserror::Error)]
+pub enum CreateError {
+    /// The limit of rooms is reached.
+    #[error("the server already has {0} rooms; close one or try later")]
+    TooMany(usize),
+    /// Its creator has too many rooms.
+    #[error(transparent)]
+    Refused(#[from] Refused),
+    /// The request id was used for another room.
+    #[error("this request id was used to create another room; draw a new one")]
+    RequestIdUsed,
+    /// The server is shutting down.
+    #[error("the server is shutting down and accepts no new rooms")]
+    ShuttingDown,
+    /// The disk has no space for more games.
+    #[error("the server's disk is nearly full; the rest is reserved for running games")]
+    DiskNearlyFull,
+    /// The store failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+#[derive(Default)]
+pub(super) struct Table {
+    pub(super) next_number: u64,
+    /// In the order of their creation.
+    pub(super) by_number: BTreeMap<u64, Entry>,
+    pub(super) numbers: HashMap<Id, u64>,
+    pub(super) codes: HashMap<String, u64>,
+    /// The rooms of games, by the ids of the games.
+    games: HashMap<Id, u64>,
+    /// Rooms that are being created, for which space is reserved, with their units.
+    pub(super) in_creation: HashMap<Id, Id>,
+    pub(super) shutting_down: bool,
+    /// Removed rooms, until the table is unlocked: the last handle of a room may end it, and a room
+    /// that ends looks into the table.
+    removed: Vec<Entry>,
+}
+
+/// The table while it is locked. What was removed meanwhile is dropped once it is unlocked.
+pub(super) struct LockedTable<'a>(Option<MutexGuard<'a, Table>>);
+
+impl<'a> LockedTable<'a> {
+    pub(super) fn new(table: &'a Mutex<Table>) -> Self {
+        let locked = table.lock();
+        Self(Some(
+            locked.expect("no code that holds this lock can panic"),
+        ))
+    }
+}
+
+impl Deref for LockedTable<'_> {
+    type Target = Table;
+
+    fn deref(&self) -> &Table {
+        self.0.as_ref().expect("locked until it is dropped")
+    }
+}
+
+impl DerefMut for LockedTable<'_> {
+    fn deref_mut(&mut self) -> &mut Table {
+        self.0.as_mut().expect("locked until it is dropped")
+    }
+}
+
+impl Drop for LockedTable<'_> {
+    fn drop(&mut self) {
+        let removed = std::mem::take(&mut self.removed);
+        drop(self.0.take());
+        drop(removed);
+    }
+}
+
+pub(super) struct Entry {
+    pub(super) handle: Handle,
+    pub(super) header: Arc<GameHeader>,
+    /// Whether the game survives a restart of the server.
+    pub(super) durable: bool,
+    /// The game has ended.
+    pub(super) over: bool,
+    /// The room has ended but its game resumes when the server is restarted. It stays in the table,
+    /// so that clients are asked to try again: the room is not unknown.
+    pub(super) suspended: bool,
+    /// Whether lists show it.
+    pub(super) listed: bool,
+    /// Its place among its creator's rooms, until its game is over.
+    pub(super) place: Option<Held>,
+}
+
+impl Entry {
+    pub(super) fn is_open(&self) -> bool {
+        !self.over && !self.suspended
+    }
+}
+
+impl Table {
+    pub(super) fn get(&self, id: Id) -> Option<&Entry> {
+        self.by_number.get(self.numbers.get(&id)?)
+    }
+
+    /// Reserves space for a room that will be created.
+    pub(super) fn reserve(
+        &mut self,
+        id: Id,
+        unit: Id,
+        max_rooms: usize,
+    ) -> Result<(), CreateError> {
+        if self.shutting_down {
+            return Err(CreateError::ShuttingDown);
+        }
+        let full = self.by_number.len() + self.in_creation.len() >= max_rooms;
+        if full {
+            let open = self.by_number.values().filter(|it| it.is_open()).count();
+            if open + self.in_creation.len() >= max_rooms {
+                return Err(CreateError::TooMany(max_rooms));
+            }
+        }
+        self.in_creation.insert(id, unit);
+        Ok(())
+    }
+
+    pub(super) fn enter(&mut self, entry: Entry) {
+        let number = self.next_number;
+        self.next_number += 1;
+        self.numbers.insert(entry.handle.id(), number);
+        let code = entry.header.join_code.clone();
+        let taken_by = self.codes.get(&code).and_then(|it| self.by_number.get(it));
+        // The codes of rooms that are over are given to new ones, which are found by them.
+        if !(entry.over && taken_by.is_some_and(|other| !other.over)) {
+            self.codes.insert(code, number);
+        }
+        self.games.insert(entry.header.game_id, number);
+        self.by_number.insert(number, entry);
+    }
+
+    /// The room of a game that is not over.
+    pub(super) fn of_game(&self, game: Id) -> Option<&Entry> {
+        let entry = self.by_number.get(self.games.get(&game)?)?;
+        (!entry.over).then_some(entry)
+    }
+
+    /// Removes ended rooms if their space is needed.
+    pub(super) fn make_space(&mut self, max_rooms: usize) {
+        while self.by_number.len() >= max_rooms
+            && let Some(number) = self
+                .by_number
+                .iter()
+                .find(|(_, entry)| !entry.is_open())
+                .map(|(number, _)| *number)
+        {
+            self.remove(number);
+        }
+    }
+
+    pub(super) fn any_open(&self, which: impl Fn(Id) -> bool) -> bool {
+        self.by_number
+            .values()
+            .any(|entry| entry.is_open() && which(entry.handle.id()))
+    }
+
+    /// Whether there is an open room of this durability.
+    pub(super) fn any_open_of(&self, durable: bool) -> bool {
+        self.by_number
+            .values()
+            .any(|entry| entry.is_open() && entry.durable == durable)
+    }
+
+    pub(super) fn remove_over(&mut self) {
+        let over: Vec<u64> = (self.by_number.iter())
+            .filter(|(_, entry)| entry.over)
+            .map(|(number, _)| *number)
+            .collect();
+        for number in over {
+            self.remove(number);
+        }
+    }
+
+    pub(super) fn remove(&mut self, number: u64) {
+        if let Some(entry) = self.by_number.remove(&number) {
+            self.numbers.remove(&entry.handle.id());
+            if self.games.get(&entry.header.game_id) == Some(&number) {
+                self.games.remove(&entry.header.game_id);
+            }
+            if self.codes.get(&entry.header.join_code) == Some(&number) {
+                self.codes.remove(&entry.header.join_code);
+            }
+            self.removed.push(entry);
+        }
+    }
+}

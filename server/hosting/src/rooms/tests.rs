@@ -1,0 +1,136 @@
+//! Creation of rooms.
+
+use std::collections::BTreeMap;
+
+use super::*;
+use chefshat_room::ids::{SecretHash, Token};
+use chefshat_room::journal::{
+    AbortReason, Change, Entry, Fill, ParticipantKind, SeatedParticipant,
+};
+use chefshat_store::testing::FailingStore;
+use chefshat_store::{MemoryStore, ResumableGame};
+
+#[tokio::test]
+async fn participants_of_a_tournament_are_committed_with_their_room() {
+    // It stores new games, but no further entries.
+    let store = Arc::new(FailingStore::after(0));
+    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
+    let fill = Fill::Open {
+        reserved_for: Some(ParticipantKind::Agent),
+    };
+    let seated = |name: &str| SeatedParticipant {
+        name: name.into(),
+        name_fingerprint: String::new(),
+        kind: ParticipantKind::Agent,
+        ticket: SecretHash::of(name.as_bytes()),
+    };
+    let made = rooms.create(NewRoom {
+        name: "a game of a tournament".into(),
+        fills: vec![fill; 4],
+        seating: Some(Seating {
+            part_of: PartOf::Tournament(TournamentGame {
+                tournament: Id([1; 16]),
+                series: None,
+            }),
+            owner: Token::random(Id([2; 16])),
+            game_id: Id([3; 16]),
+            participants: BTreeMap::from([(0, seated("Ada")), (2, seated("Bo"))]),
+            server_seed: None,
+        }),
+        ..NewRoom::for_tests()
+    });
+    let made = made.await.expect("the first commit succeeds");
+    let room = made.handle.describe().await.expect("the room exists");
+    let names: Vec<&str> = room.seats.iter().map(|seat| seat.name.as_str()).collect();
+    assert_eq!(names, ["Ada", "", "Bo", ""]);
+}
+
+#[tokio::test]
+async fn a_room_that_is_over_takes_no_join_code_from_an_open_one() {
+    let store = Arc::new(MemoryStore::default());
+    let rooms = Rooms::new(
+        &ServerConfig::default(),
+        Arc::clone(&store) as _,
+        TaskTracker::new(),
+    );
+    let rooms = rooms.expect("threads");
+    let made = rooms.create(NewRoom::for_tests());
+    let open = made.await.expect("a room").handle.id();
+    let header = rooms.header(open).expect("it exists");
+    // Its code was that of a room that another node had.
+    let former = GameHeader {
+        room_id: Id([8; 16]),
+        game_id: Id([9; 16]),
+        ..(*header).clone()
+    };
+    let entries = vec![Entry {
+        at: Duration::ZERO,
+        change: Change::Aborted(AbortReason::Closed),
+    }];
+    let journal = store.create(Arc::new(former.clone()), entries.clone());
+    rooms
+        .show_ended(ResumableGame {
+            header: former,
+            entries,
+            journal: journal.await.expect("memory"),
+            concluded: true,
+        })
+        .await;
+    assert!(rooms.get(Id([8; 16])).is_some(), "it is shown");
+    let found = rooms.by_code(&header.join_code).expect("it is open");
+    assert_eq!(found.id(), open);
+}
+
+#[tokio::test]
+async fn the_room_of_a_game_is_found_until_the_game_is_over() {
+    let store = Arc::new(MemoryStore::default());
+    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+    let rooms = rooms.expect("threads");
+    let mut made = Vec::new();
+    for _ in 0..3 {
+        let room = rooms.create(NewRoom::for_tests()).await.expect("a room");
+        let game = rooms.header(room.handle.id()).expect("listed").game_id;
+        made.push((room.handle.id(), game));
+    }
+    for (room, game) in &made {
+        assert_eq!(rooms.room_of(*game), Some(*room));
+    }
+    assert_eq!(rooms.room_of(Id([0; 16])), None);
+    let [(first, ended), (_, removed), (third, other)] = made[..] else {
+        unreachable!("three were made");
+    };
+    {
+        let mut table = rooms.lock();
+        let number = table.numbers[&first];
+        table.by_number.get_mut(&number).expect("listed").over = true;
+    }
+    assert_eq!(rooms.room_of(ended), None);
+    let number = rooms.lock().numbers[&made[1].0];
+    rooms.lock().remove(number);
+    assert_eq!(rooms.room_of(removed), None);
+    assert_eq!(rooms.room_of(other), Some(third));
+}
+
+/// A room that ends looks into the table, so it must not end while the table is locked.
+#[test]
+fn a_room_may_end_with_the_handle_that_the_table_removes() {
+    let runtime = tokio::runtime::Runtime::new().expect("threads");
+    let (rooms, room) = runtime.block_on(async {
+        let store = Arc::new(MemoryStore::default());
+        let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+        let rooms = rooms.expect("threads");
+        let made = rooms.create(NewRoom::for_tests()).await.expect("a room");
+        let room = made.handle.id();
+        (rooms, room)
+    });
+    // Its task is gone; the table has the last handle.
+    drop(runtime);
+    assert!(rooms.header(room).is_some());
+    {
+        let mut table = rooms.lock();
+        let entries = table.by_number.values_mut();
+        entries.for_each(|entry| entry.over = true);
+        table.remove_over();
+    }
+    assert!(rooms.header(room).is_none());
+}

@@ -1,0 +1,104 @@
+//! The rooms of a unit, which change hands together in a cluster: a room without a tournament, or
+//! those of a tournament.
+
+use std::future::Future;
+
+use chefshat_proto::v1::RoomState;
+
+use super::{Rooms, Table};
+use crate::room::Handle;
+use chefshat_room::ids::Id;
+
+impl Rooms {
+    /// Whether the room that is this unit runs here, or is being created.
+    pub(crate) fn runs(&self, unit: Id) -> bool {
+        let table = self.lock();
+        table.get(unit).is_some_and(|entry| entry.is_open())
+            || table.in_creation.contains_key(&unit)
+    }
+
+    /// Stops all rooms of a unit at once, which publish nothing more, unless their games are over.
+    pub(crate) fn fence_unit(&self, unit: Id) {
+        for (handle, _) in self.open_of(unit) {
+            handle.fence();
+        }
+    }
+
+    /// Stops all durable rooms at once: the node ends without having handed them over.
+    pub fn fence_all(&self) {
+        for (handle, durable) in self.open() {
+            if durable {
+                handle.fence();
+            }
+        }
+    }
+
+    /// Stops all rooms of a unit, and forgets them when they have ended: another node may have
+    /// them. Those whose games are over stay.
+    pub async fn stop_unit(&self, unit: Id) {
+        self.end_unit(unit, |handle, _| async move { handle.fence() })
+            .await;
+    }
+
+    /// Waits until a room is not one in which an ephemeral game is running.
+    pub(crate) async fn until_ephemeral_over(&self, room: Id) {
+        let Some(handle) = self.get(room) else { return };
+        let described = handle.describe().await.ok();
+        if described.is_none_or(|room| room.state() == RoomState::Waiting) {
+            return;
+        }
+        let plays = |entry: &super::Entry| entry.is_open() && !entry.durable;
+        self.until(|table| !table.get(room).is_some_and(plays))
+            .await;
+    }
+
+    /// Suspends the durable rooms of a unit after their next commit, ends the others, and forgets
+    /// them: this node hands the unit over.
+    pub(crate) async fn suspend_unit(&self, unit: Id) {
+        let end = |handle: Handle, durable| async move { handle.end(durable).await };
+        self.end_unit(unit, end).await;
+    }
+
+    async fn end_unit<F: Future<Output = ()>>(&self, unit: Id, end: impl Fn(Handle, bool) -> F) {
+        self.until_created(unit).await;
+        for (handle, durable) in self.open_of(unit) {
+            end(handle, durable).await;
+        }
+        self.until(|table| !table.of_unit(unit).any(|(_, entry)| entry.is_open()))
+            .await;
+        let mut table = self.lock();
+        let suspended = table.of_unit(unit).filter(|(_, entry)| entry.suspended);
+        let suspended: Vec<u64> = suspended.map(|(number, _)| number).collect();
+        for number in suspended {
+            table.remove(number);
+        }
+    }
+
+    /// Waits until no room of a unit is being created.
+    async fn until_created(&self, unit: Id) {
+        loop {
+            let created = self.created.notified();
+            if !self.lock().in_creation.values().any(|of| *of == unit) {
+                return;
+            }
+            created.await;
+        }
+    }
+
+    fn open_of(&self, unit: Id) -> Vec<(Handle, bool)> {
+        let table = self.lock();
+        let open = table.of_unit(unit).filter(|(_, entry)| entry.is_open());
+        open.map(|(_, entry)| (entry.handle.clone(), entry.durable))
+            .collect()
+    }
+}
+
+impl Table {
+    /// The rooms of a unit, with their numbers.
+    fn of_unit(&self, unit: Id) -> impl Iterator<Item = (u64, &super::Entry)> {
+        let entries = self.by_number.iter();
+        entries
+            .filter(move |(_, entry)| entry.header.unit() == unit)
+            .map(|(number, entry)| (*number, entry))
+    }
+}

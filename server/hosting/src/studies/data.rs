@@ -1,0 +1,148 @@
+//! The memory of the participants of one study and of their answers, which last as long as the study:
+//! a budget of the whole server, of which each caller may use its share. Settings have a budget of
+//! their own.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
+
+use chefshat_study::{ItemAnswer, Participant, Study};
+
+use chefshat_admission::limits::{Held, Key, Places, Refused};
+use chefshat_base::clock::TimeOfDay;
+use chefshat_room::ids::Id;
+
+/// When it is worth trying again to create a study, or to add to one.
+pub(super) const RETRY_STUDIES: Duration = Duration::from_secs(3_600);
+/// Bytes that the answers of a questionnaire take besides their content.
+const OVERHEAD_OF_ANSWERS: usize = 256;
+
+/// What all studies of a server share.
+#[derive(Debug)]
+pub struct Budgets {
+    pub(super) now: TimeOfDay,
+    /// The memory of their settings, in KiB.
+    pub(super) memory: Arc<Places>,
+    /// The memory of their participants and answers, in bytes.
+    pub(super) data: Arc<Places>,
+}
+
+/// The memory that one study has taken, until it is dropped.
+#[derive(Debug)]
+pub(super) struct StudyData {
+    /// One place is one byte.
+    budget: Arc<Places>,
+    participants: Mutex<Vec<Held>>,
+    /// By number of the participant.
+    answers: Mutex<BTreeMap<u32, Answers>>,
+}
+
+/// The memory of the answers of a participant.
+#[derive(Debug, Default)]
+struct Answers {
+    given: Vec<Held>,
+    /// Of those that were saved while they are entered.
+    saved: Option<Held>,
+}
+
+impl StudyData {
+    /// Takes what a study has, even beyond the budget: a study that was stored is always resumed.
+    /// Who sent it is unknown.
+    pub(super) fn of(study: &Study, id: Id, budget: &Arc<Places>) -> Self {
+        let take = |bytes| budget.take_many_anyway(Key::Study(id), bytes);
+        let participants = study.participants();
+        let bytes: usize = (participants.values())
+            .map(|it| memory_of_participant(it.pseudonym.len()))
+            .sum();
+        let answers = participants.iter().map(|(number, participant)| {
+            let given = participant.answers.values();
+            let given = given.map(|answers| take(memory_of_answers(answers)));
+            let saved = &participant.saved_answers;
+            let saved = (!saved.is_empty()).then(|| take(memory_of_answers(saved)));
+            let given = given.collect();
+            (*number, Answers { given, saved })
+        });
+        Self {
+            answers: Mutex::new(answers.collect()),
+            participants: Mutex::new(Vec::from_iter((bytes > 0).then(|| take(bytes)))),
+            budget: Arc::clone(budget),
+        }
+    }
+
+    /// Takes memory for new participants with these pseudonyms.
+    ///
+    /// # Errors
+    /// The caller, or the server, has too much.
+    pub(super) fn for_participants(&self, key: Key, names: &[String]) -> Result<Held, Refused> {
+        let bytes = names.iter().map(|name| memory_of_participant(name.len()));
+        self.take(key, bytes.sum()).ok_or_else(|| Refused {
+            reason: "TOO_MANY_PARTICIPANTS",
+            what: "the participants of studies take too much memory together, in bytes; delete a study that is over",
+            ..self.refused(key)
+        })
+    }
+
+    /// Takes memory for answers.
+    ///
+    /// # Errors
+    /// The caller, or the server, has too much.
+    pub(super) fn for_answers(&self, key: Key, answers: &[ItemAnswer]) -> Result<Held, Refused> {
+        let taken = self.take(key, memory_of_answers(answers));
+        taken.ok_or_else(|| self.refused(key))
+    }
+
+    /// Keeps the memory of participants that were added.
+    pub(super) fn keep_participants(&self, held: Held) {
+        (self.participants.lock())
+            .expect("no code that holds this lock can panic")
+            .push(held);
+    }
+
+    /// Keeps the memory of answers that a participant gave, and no longer that of those it had saved.
+    pub(super) fn keep_answers(&self, number: u32, held: Held) {
+        let mut answers = self.lock_answers();
+        let answers = answers.entry(number).or_default();
+        answers.given.push(held);
+        answers.saved = None;
+    }
+
+    /// Keeps the memory of answers that a participant saved, in place of those it had saved before.
+    pub(super) fn keep_saved_answers(&self, number: u32, held: Held) {
+        self.lock_answers().entry(number).or_default().saved = Some(held);
+    }
+
+    /// Gives the memory of a participant's answers back.
+    pub(super) fn forget_answers(&self, number: u32) {
+        let forgotten = self.lock_answers().remove(&number);
+        drop(forgotten);
+    }
+
+    fn take(&self, key: Key, bytes: usize) -> Option<Held> {
+        self.budget.try_take_many(key, bytes)
+    }
+
+    fn refused(&self, key: Key) -> Refused {
+        Refused {
+            reason: "TOO_MANY_ANSWERS",
+            what: "the answers of studies take too much memory together, in bytes; shorten yours, or delete a study that is over",
+            limit: self.budget.share_of(key) as u64,
+            retry_after: RETRY_STUDIES,
+        }
+    }
+
+    fn lock_answers(&self) -> MutexGuard<'_, BTreeMap<u32, Answers>> {
+        (self.answers.lock()).expect("no code that holds this lock can panic")
+    }
+}
+
+/// Bytes of a participant with a name of this length, of which the task and its handle have a copy
+/// each.
+fn memory_of_participant(name: usize) -> usize {
+    2 * (size_of::<Participant>() + name)
+}
+
+/// Bytes of answers, which the copies share.
+fn memory_of_answers(answers: &[ItemAnswer]) -> usize {
+    let content: usize = answers.iter().map(ItemAnswer::memory).sum();
+    OVERHEAD_OF_ANSWERS + content
+}

@@ -1,0 +1,230 @@
+//! The games of participants and their rooms: a due game is assigned a room, which is created once
+//! that is committed, and after its end its outcome is read from the store. The core decides which
+//! game comes next.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use chefshat_engine::Seat;
+use chefshat_study::{Outcome, PlayedGame};
+use tokio::time::Instant;
+use tracing::warn;
+
+use super::task::StudyTask;
+use crate::config::TOURNAMENT_RETRY;
+use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
+use chefshat_base::tasks::short;
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Change, Fill, GameStart, SeatedParticipant, StudyGame};
+use chefshat_store::{StoreError, StoredGame};
+use chefshat_wire::convert::PARTICIPANT_KIND;
+
+impl StudyTask {
+    /// Assigns rooms to the games of participants who are there and have none.
+    pub(super) fn place_due_games(&mut self) {
+        for number in std::mem::take(&mut self.touched) {
+            if !self.unit.state.is_connected(number) {
+                continue;
+            }
+            let (room, game) = (Id::random(), Id::random());
+            if let Some(change) = self.unit.state.place(number, room.0, game.0) {
+                self.fold(change);
+            }
+        }
+        // Placing a game touches its participant, for whom nothing is due then.
+        self.touched.clear();
+    }
+
+    /// Reads the outcomes of games that have ended.
+    pub(super) async fn read_ended_games(&mut self) -> Result<(), StoreError> {
+        let playing: Vec<u32> = self.playing.iter().copied().collect();
+        for number in playing {
+            let participant = self.unit.state.participant(number);
+            let Some(game) = participant.and_then(|it| it.games.last()).cloned() else {
+                continue;
+            };
+            if self.without_room.contains(&number) {
+                if !self.is_active(number) {
+                    self.end_game(number, &game, Outcome::Aborted);
+                }
+                continue;
+            }
+            let room = Id(game.placed.room);
+            if self.unit.rooms.is_over(room) == Some(false) || self.unit.rooms.is_suspended(room) {
+                continue;
+            }
+            match self.outcome(&game).await? {
+                Some(outcome) => self.end_game(number, &game, outcome),
+                // The server ended before the room was created.
+                None if self.is_active(number) => drop(self.without_room.insert(number)),
+                None => self.end_game(number, &game, Outcome::Aborted),
+            }
+        }
+        Ok(())
+    }
+
+    fn end_game(&mut self, number: u32, game: &PlayedGame, outcome: Outcome) {
+        let id = game.placed.game;
+        if let Some(change) = (self.unit.state).game_ended(number, id, outcome, (self.now)()) {
+            self.fold(change);
+        }
+        self.closing.remove(&Id(game.placed.room));
+    }
+
+    /// The outcome of a game whose room is over or gone; `None` if it has no room yet.
+    async fn outcome(&self, game: &PlayedGame) -> Result<Option<Outcome>, StoreError> {
+        let stored = self
+            .unit
+            .rooms
+            .store()
+            .finished(Id(game.placed.game))
+            .await?;
+        if let Some(StoredGame::Hosted(_, entries, _)) = stored {
+            let was_aborted = (entries.iter()).any(|it| matches!(it.change, Change::Aborted(_)));
+            return Ok(Some(match was_aborted {
+                true => Outcome::Aborted,
+                false => Outcome::Finished,
+            }));
+        }
+        // A game that was aborted before it began has no record.
+        let had_room = self.unit.rooms.get(Id(game.placed.room)).is_some();
+        Ok(had_room.then_some(Outcome::Aborted))
+    }
+
+    /// Creates the rooms of placed games.
+    pub(super) async fn make_rooms(&mut self) -> Result<(), StoreError> {
+        if self.without_room.is_empty() || self.retry.is_some_and(|retry| Instant::now() < retry) {
+            return Ok(());
+        }
+        self.retry = None;
+        for number in self.without_room.clone() {
+            let Some(new) = self.new_room(number) else {
+                continue;
+            };
+            match self.unit.rooms.create(new).await {
+                Ok(_) => {
+                    self.without_room.remove(&number);
+                    self.unit.handle.notify_participant(number);
+                    self.unit.has_changed = true;
+                }
+                // The game was aborted before it began, and then the server was restarted; or its
+                // id is taken by another one.
+                Err(CreateError::Store(StoreError::Taken(_))) => {
+                    let participant = self.unit.state.participant(number);
+                    if let Some(game) = participant.and_then(|it| it.games.last()).cloned() {
+                        self.end_game(number, &game, Outcome::Aborted);
+                    }
+                }
+                Err(CreateError::Store(error)) => return Err(error),
+                // When the server is restarted, the game gets its room.
+                Err(CreateError::ShuttingDown) => self.retry = Some(retry()),
+                Err(error) => {
+                    if self.retry.replace(retry()).is_none() {
+                        warn!(study = %self.unit.handle.id(), %error, "games of a study wait for rooms");
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Closes the rooms of participants who have left.
+    pub(super) fn close_rooms(&mut self) {
+        for number in &self.playing {
+            let participant = self.unit.state.participant(*number);
+            let Some(game) = participant.and_then(|it| it.games.last()) else {
+                continue;
+            };
+            let room = Id(game.placed.room);
+            if !self.is_active(*number)
+                && let Some(handle) = self.unit.rooms.get(room)
+                && self.closing.insert(room)
+            {
+                tokio::spawn(short("one message", async move {
+                    handle.close_without_token().await
+                }));
+            }
+        }
+    }
+
+    /// The settings of the room of a participant's game.
+    fn new_room(&self, number: u32) -> Option<NewRoom> {
+        let participant = self.unit.state.participant(number)?;
+        let placed = &participant.games.last()?.placed;
+        let settings = self.unit.state.settings();
+        let condition = &settings.conditions[placed.condition];
+        let plan = &self.unit.handle.plan.conditions[placed.condition];
+        let small = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+        let room = Id(placed.room);
+        let seat = placed.seat;
+        let mut fills = plan.fills.clone();
+        fills.insert(
+            seat.min(fills.len()),
+            Fill::Open {
+                reserved_for: Some(PARTICIPANT_KIND),
+            },
+        );
+        // The other seats make room for that of the participant.
+        let place = |index: usize| index + usize::from(index >= seat);
+        let names = plan.names.iter();
+        let display_names = names.map(|(index, name)| (place(*index), name.clone()));
+        let seated = SeatedParticipant {
+            name: participant.pseudonym.clone(),
+            name_fingerprint: String::new(),
+            kind: PARTICIPANT_KIND,
+            ticket: self.unit.handle.ticket_of(room).hash(),
+        };
+        let seeds = match condition.seeds.is_empty() {
+            true => &settings.seeds,
+            false => &condition.seeds,
+        };
+        Some(NewRoom {
+            // What everybody with a seat sees: it must not name the condition.
+            name: settings
+                .title
+                .chars()
+                .take(chefshat_wire::convert::MAX_NAME_CHARS)
+                .collect(),
+            rules: match placed.practice {
+                true => plan.practice_rules,
+                false => plan.rules,
+            },
+            policy: plan.policy.clone(),
+            fills,
+            display_names: display_names.collect(),
+            recorded: BTreeMap::new(),
+            wizards: plan.wizards.iter().map(|index| place(*index)).collect(),
+            start: GameStart::default(),
+            game_seed: placed.seed_index.map(|index| seeds[index]),
+            physical: false,
+            request: None,
+            charged: self.unit.handle.charged,
+            creator: None,
+            seating: Some(Seating {
+                part_of: PartOf::Study(Arc::new(StudyGame {
+                    study: self.unit.handle.id(),
+                    name: self.unit.handle.plan.name.clone(),
+                    condition: condition.id.clone(),
+                    levels: condition.levels.clone(),
+                    number,
+                    participant: participant.pseudonym.clone(),
+                    session: participant.session,
+                    step: small(placed.step),
+                    practice: placed.practice,
+                    seed_index: placed.seed_index.map(small),
+                    seat: Seat::new(seat),
+                    attempt: placed.attempt,
+                    labels: plan.labels,
+                })),
+                owner: self.unit.handle.room_owner(room),
+                game_id: Id(placed.game),
+                participants: BTreeMap::from([(seat, seated)]),
+                server_seed: None,
+            }),
+        })
+    }
+}
+
+fn retry() -> Instant {
+    Instant::now() + TOURNAMENT_RETRY
+}

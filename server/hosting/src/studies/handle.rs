@@ -1,0 +1,564 @@
+//! The handle of one study: what others can read of it, and messages to its task.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use chefshat_proto::v1;
+use chefshat_study::{
+    At, Change, Content, ItemAnswer, ParticipantLink, Refusal, SessionSecret, Study,
+};
+use tokio::sync::{Mutex as AsyncMutex, watch};
+
+use super::data::StudyData;
+use super::message::{Command, Message};
+use super::task::StudyTask;
+use crate::journaled::{Handle, Stopped};
+use crate::rooms::Rooms;
+use chefshat_admission::limits::{Held, Key, Refused};
+use chefshat_base::tasks::short;
+use chefshat_room::ids::{Id, SecretHash, Token};
+use chefshat_store::StoreError;
+use chefshat_store::units::{StoredTraces, UnitKind, UnitWrite};
+use chefshat_wire::convert::{self, StudyPlan};
+
+/// Most interface traces in one request.
+pub const MAX_TRACES: usize = 500;
+/// Most interface traces of a game.
+pub const MAX_TRACES_OF_GAME: usize = 20_000;
+/// Longest target of an interface trace, characters.
+const MAX_TRACE_TARGET: usize = 64;
+
+/// Why interface traces are refused.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum TraceRefusal {
+    /// The participant has no such game.
+    #[error("the participant has no such game")]
+    GameUnknown,
+    /// One is invalid, or there are too many.
+    #[error("{0}")]
+    Invalid(String),
+    /// The game has too many.
+    #[error("a game has at most {MAX_TRACES_OF_GAME} interface traces")]
+    TooMany,
+    /// The session may not act.
+    #[error(transparent)]
+    Session(#[from] Refusal),
+}
+
+/// Why a study does not grow.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotAdded {
+    /// The study does not admit it.
+    #[error(transparent)]
+    Study(#[from] Refusal),
+    /// The server has no memory for it.
+    #[error(transparent)]
+    Memory(#[from] Refused),
+}
+
+/// A study of this server.
+pub type StudyHandle = Handle<StudyTask>;
+
+/// What readers of a study share besides its state.
+#[derive(Debug)]
+pub struct StudyShared {
+    /// The memory of its settings.
+    pub(super) _memory: Held,
+    /// The memory of its participants and answers.
+    pub(super) data: Arc<StudyData>,
+    /// Counts the changes of each participant to whom somebody has listened.
+    views: Mutex<BTreeMap<u32, watch::Sender<u64>>>,
+    /// Participants whose data are being deleted.
+    deleting: Mutex<BTreeSet<u32>>,
+    /// Number of interface traces by game, since the server was started. Locked while traces are
+    /// added or deleted.
+    pub(super) traces: AsyncMutex<BTreeMap<Id, usize>>,
+    streams: AtomicU64,
+}
+
+impl StudyShared {
+    pub(super) fn new(memory: Held, data: Arc<StudyData>) -> Self {
+        Self {
+            _memory: memory,
+            data,
+            views: Mutex::default(),
+            deleting: Mutex::default(),
+            traces: AsyncMutex::default(),
+            streams: AtomicU64::new(0),
+        }
+    }
+}
+
+impl StudyHandle {
+    /// Its settings.
+    pub fn plan(&self) -> &StudyPlan {
+        &self.plan
+    }
+
+    /// Its settings as a message, every field set.
+    pub fn settings(&self) -> &v1::StudySettings {
+        &self.header.settings
+    }
+
+    /// The study as a message.
+    pub fn describe(&self) -> v1::Study {
+        let study = self.committed();
+        let header = &self.header;
+        convert::study_to_proto(header.id, &header.settings, header.created_at_ms, &study)
+    }
+
+    /// A participant as a message, for researchers.
+    pub fn participant(&self, number: u32, rooms: &Rooms) -> Option<v1::StudyParticipant> {
+        let study = self.committed();
+        self.participant_of(&study, number, rooms)
+    }
+
+    /// All participants as messages, by number.
+    pub fn participants(&self, rooms: &Rooms) -> Vec<v1::StudyParticipant> {
+        let study = self.committed();
+        (study.participants().keys())
+            .filter_map(|number| self.participant_of(&study, *number, rooms))
+            .collect()
+    }
+
+    fn participant_of(
+        &self,
+        study: &Study,
+        number: u32,
+        rooms: &Rooms,
+    ) -> Option<v1::StudyParticipant> {
+        let join_code = |room| {
+            let header = rooms.header(room);
+            header.map_or_else(String::new, |header| header.join_code.clone())
+        };
+        convert::study_participant(study, &self.plan, number, join_code)
+    }
+
+    /// The link of a participant.
+    pub fn link(&self, number: u32) -> v1::StudyLink {
+        let study = self.committed();
+        let participant = study.participant(number);
+        v1::StudyLink {
+            number,
+            pseudonym: participant.map_or_else(String::new, |it| it.pseudonym.clone()),
+            link: ParticipantLink::new(&self.header.key, self.short_id(), number).to_text(),
+        }
+    }
+
+    /// The participant with this link.
+    pub fn number_of(&self, link: &ParticipantLink) -> Option<u32> {
+        let number = link.verify(&self.header.key)?;
+        self.committed().participant(number).map(|_| number)
+    }
+
+    /// The participant and the number of its session with this secret.
+    pub fn session_of(&self, secret: &SessionSecret) -> Option<(u32, u32)> {
+        let (number, session) = secret.verify(&self.header.key)?;
+        self.committed()
+            .participant(number)
+            .map(|_| (number, session))
+    }
+
+    /// The secret of a session.
+    pub fn session_secret(&self, number: u32, session: u32) -> String {
+        let key = &self.header.key;
+        SessionSecret::new(key, self.short_id(), number, session).to_text()
+    }
+
+    fn short_id(&self) -> [u8; 12] {
+        std::array::from_fn(|index| self.header.id.0[index])
+    }
+
+    /// What a participant sees now; `None` if it has not begun.
+    pub fn view(&self, number: u32, rooms: &Rooms) -> Option<v1::StudyView> {
+        let mut view = self.committed().view(number)?;
+        if let Content::Game(game) = &mut view.content
+            && !game.ended
+        {
+            // A game is placed before its room exists.
+            game.place = game
+                .place
+                .filter(|(room, _)| rooms.get(Id(*room)).is_some());
+        }
+        Some(convert::study_view(view, |room| {
+            self.ticket_of(room).to_text()
+        }))
+    }
+
+    /// Whether this is the newest session of a participant.
+    pub fn is_newest(&self, number: u32, session: u32) -> bool {
+        let study = self.committed();
+        study
+            .participant(number)
+            .is_some_and(|it| it.session == session)
+    }
+
+    /// The ticket of the participant's seat in a room.
+    pub(super) fn ticket_of(&self, room: Id) -> Token {
+        Token::of_request(room, &SecretHash::from_bytes(self.header.key), &[0; 32])
+    }
+
+    /// Adds participants with these pseudonyms, empty ones by number, and charges a caller for their
+    /// memory. Returns the number of the first.
+    ///
+    /// # Errors
+    /// The server ends, or (inner result) the request is refused.
+    pub async fn add(
+        &self,
+        key: Key,
+        pseudonyms: Vec<String>,
+    ) -> Result<Result<u32, NotAdded>, Stopped> {
+        let memory = match self.shared.data.for_participants(key, &pseudonyms) {
+            Ok(memory) => memory,
+            Err(refused) => return Ok(Err(refused.into())),
+        };
+        let data = Arc::clone(&self.shared.data);
+        let added = self.command(move |study, _| {
+            let first = study.participants().len() + 1;
+            let first = u32::try_from(first).unwrap_or(u32::MAX);
+            let changes = study.add(&pseudonyms)?;
+            // Here, because the caller may go before it gets its answer.
+            data.keep_participants(memory);
+            Ok((changes, first))
+        });
+        Ok(added.await?.map_err(NotAdded::from))
+    }
+
+    /// Opens a session of a participant. Returns its number; 0 if there is only the end to show.
+    ///
+    /// # Errors
+    /// As [`StudyHandle::add`].
+    pub async fn open(&self, number: u32) -> Result<Result<u32, Refusal>, Stopped> {
+        self.command(move |study, now_ms| {
+            let Some(change) = study.open(number, now_ms)? else {
+                return Ok((Vec::new(), 0));
+            };
+            let before = study.participant(number).map_or(0, |it| it.session);
+            Ok((vec![change], before + 1))
+        })
+        .await
+    }
+
+    /// Records the consent of a participant.
+    ///
+    /// # Errors
+    /// As [`StudyHandle::add`].
+    pub async fn consent(&self, at: At) -> Result<Result<u32, Refusal>, Stopped> {
+        self.command(move |study, now_ms| Ok((vec![study.consent(at, now_ms)?], 0)))
+            .await
+    }
+
+    /// Records the answers of a participant, and charges a caller for their memory.
+    ///
+    /// # Errors
+    /// As [`StudyHandle::add`].
+    pub async fn answer(
+        &self,
+        key: Key,
+        at: At,
+        answers: Vec<ItemAnswer>,
+    ) -> Result<Result<u32, NotAdded>, Stopped> {
+        let change = move |study: &Study, answers, now_ms| study.answer(at, answers, now_ms);
+        self.keep(key, at.number, answers, change, StudyData::keep_answers)
+            .await
+    }
+
+    /// Saves what a participant has entered so far, and charges a caller for its memory.
+    ///
+    /// # Errors
+    /// As [`StudyHandle::add`].
+    pub async fn save(
+        &self,
+        key: Key,
+        at: At,
+        answers: Vec<ItemAnswer>,
+    ) -> Result<Result<u32, NotAdded>, Stopped> {
+        let change = move |study: &Study, answers, _| study.save(at, answers);
+        self.keep(
+            key,
+            at.number,
+            answers,
+            change,
+            StudyData::keep_saved_answers,
+        )
+        .await
+    }
+
+    /// Makes the change of answers of a participant, and charges a caller for their memory, which
+    /// `kept` holds.
+    async fn keep(
+        &self,
+        key: Key,
+        number: u32,
+        answers: Vec<ItemAnswer>,
+        change: impl FnOnce(&Study, Vec<ItemAnswer>, u64) -> Result<Change, Refusal>
+        + Send
+        + Sync
+        + 'static,
+        kept: fn(&StudyData, u32, Held),
+    ) -> Result<Result<u32, NotAdded>, Stopped> {
+        let memory = match self.shared.data.for_answers(key, &answers) {
+            Ok(memory) => memory,
+            Err(refused) => return Ok(Err(refused.into())),
+        };
+        let data = Arc::clone(&self.shared.data);
+        let changed = self.command(move |study, now_ms| {
+            let change = change(study, answers, now_ms)?;
+            // Here, because the caller may go before it gets its answer.
+            kept(&data, number, memory);
+            Ok((vec![change], 0))
+        });
+        Ok(changed.await?.map_err(NotAdded::from))
+    }
+
+    /// What a participant has entered at its step so far, and how long ago it reached the step, in
+    /// milliseconds.
+    pub fn progress(&self, number: u32, now_ms: u64) -> (Vec<v1::StudyItemAnswer>, u64) {
+        let study = self.committed();
+        let Some(participant) = study.participant(number) else {
+            return (Vec::new(), 0);
+        };
+        let reached_ms = participant.reached_at_ms.last().copied();
+        let age_ms = now_ms.saturating_sub(reached_ms.unwrap_or(now_ms));
+        (
+            convert::answers_to_proto(&participant.saved_answers),
+            age_ms,
+        )
+    }
+
+    /// Continues with the next step of a participant.
+    ///
+    /// # Errors
+    /// As [`StudyHandle::add`].
+    pub async fn proceed(&self, at: At) -> Result<Result<u32, Refusal>, Stopped> {
+        self.command(move |study, now_ms| Ok((vec![study.proceed(at, now_ms)?], 0)))
+            .await
+    }
+
+    /// Withdraws a participant. If its data are to be deleted, returns when they are.
+    ///
+    /// # Errors
+    /// As [`StudyHandle::add`].
+    pub async fn withdraw(
+        &self,
+        number: u32,
+        delete_data: bool,
+    ) -> Result<Result<(), Refusal>, Stopped> {
+        let withdrawn = self.command(move |study, now_ms| {
+            let change = study.withdraw(number, delete_data, now_ms)?;
+            Ok((Vec::from_iter(change), 0))
+        });
+        if let Err(refusal) = withdrawn.await? {
+            return Ok(Err(refusal));
+        }
+        let mut changes = self.changes();
+        while delete_data && self.lock_deleting().contains(&number) {
+            tokio::select! {
+                changed = changes.changed() => changed.map_err(|_| Stopped)?,
+                () = self.mailbox.closed() => return Err(Stopped),
+            }
+        }
+        Ok(Ok(()))
+    }
+
+    /// Removes a participant, and adds another one if wanted, for whose memory a caller is charged.
+    /// Returns the number of the other; 0 if there is none.
+    ///
+    /// # Errors
+    /// As [`StudyHandle::add`].
+    pub async fn remove(
+        &self,
+        key: Key,
+        number: u32,
+        replace: bool,
+    ) -> Result<Result<u32, NotAdded>, Stopped> {
+        let memory = match replace.then(|| self.shared.data.for_participants(key, &[String::new()]))
+        {
+            Some(Err(refused)) => return Ok(Err(refused.into())),
+            memory => memory.and_then(Result::ok),
+        };
+        let data = Arc::clone(&self.shared.data);
+        let removed = self.command(move |study, now_ms| {
+            let mut changes = Vec::from_iter(study.remove(number, now_ms)?);
+            let Some(memory) = memory else {
+                return Ok((changes, 0));
+            };
+            let next = u32::try_from(study.participants().len() + 1).unwrap_or(u32::MAX);
+            changes.extend(study.add(&[String::new()])?);
+            data.keep_participants(memory);
+            Ok((changes, next))
+        });
+        Ok(removed.await?.map_err(NotAdded::from))
+    }
+
+    /// Closes the study.
+    ///
+    /// # Errors
+    /// As [`StudyHandle::add`].
+    pub async fn close(&self) -> Result<(), Stopped> {
+        let closed = self.command(|study, _| Ok((Vec::from_iter(study.close()), 0)));
+        closed.await.map(drop)
+    }
+
+    /// Deletes the study, and returns the number of its games once all is deleted. Participants
+    /// in the middle of it are removed if `force` is set.
+    ///
+    /// # Errors
+    /// The server ends or its store failed, or (inner result) somebody is in the middle of it: how
+    /// many.
+    pub(super) async fn delete(&self, force: bool) -> Result<Result<usize, usize>, Stopped> {
+        self.ask(|reply| Message::Delete { force, reply }).await
+    }
+
+    /// Records interface traces of a participant's game.
+    ///
+    /// # Errors
+    /// The store failed, or (inner result) the traces are refused.
+    pub async fn record_traces(
+        &self,
+        (number, session): (u32, u32),
+        game: Id,
+        traces: Vec<v1::StudyTrace>,
+        rooms: &Rooms,
+    ) -> Result<Result<(), TraceRefusal>, StoreError> {
+        if let Err(problem) = check_traces(&traces) {
+            return Ok(Err(TraceRefusal::Invalid(problem)));
+        }
+        // Deletion waits for it, so that nothing is added after the data were deleted.
+        let mut counts = self.shared.traces.lock().await;
+        {
+            let study = self.committed();
+            let participant = study.participant(number).filter(|it| !it.data_deleted);
+            let Some(participant) = participant else {
+                return Ok(Err(Refusal::Over.into()));
+            };
+            if participant.session != session {
+                return Ok(Err(Refusal::Superseded.into()));
+            }
+            if !(participant.games.iter()).any(|played| played.placed.game == game.0) {
+                return Ok(Err(TraceRefusal::GameUnknown));
+            }
+            if !study.settings().traces || traces.is_empty() {
+                return Ok(Ok(()));
+            }
+        }
+        let count = counts.entry(game).or_default();
+        if *count + traces.len() > MAX_TRACES_OF_GAME {
+            return Ok(Err(TraceRefusal::TooMany));
+        }
+        *count += traces.len();
+        let traces = StoredTraces {
+            number,
+            game,
+            traces,
+        };
+        let unit = UnitKind::Study.id(self.id());
+        let traces = UnitWrite::Traces(traces);
+        rooms.store().write_unit(unit, traces).await.map(Ok)
+    }
+
+    /// Adds a stream that shows the study to a participant. While the value lives, the participant
+    /// is present.
+    pub async fn present(self: &Arc<Self>, number: u32, session: u32) -> Presence {
+        let stream = self.shared.streams.fetch_add(1, Ordering::Relaxed);
+        let message = Message::Present {
+            number,
+            session,
+            stream,
+        };
+        // On failure the server ends, and the stream with it.
+        let _ = self.mailbox.send(message).await;
+        Presence {
+            handle: Arc::clone(self),
+            number,
+            stream,
+        }
+    }
+
+    /// Counts the changes of a participant's view.
+    pub fn view_changes(&self, number: u32) -> watch::Receiver<u64> {
+        let mut views = self.lock_views();
+        let sender = views.entry(number).or_insert_with(|| watch::Sender::new(0));
+        sender.subscribe()
+    }
+
+    /// Whether nothing can change by itself any more: it is closed, and nobody is active.
+    pub fn is_complete(&self) -> bool {
+        let study = self.committed();
+        let is_active =
+            |it: &chefshat_study::Participant| it.status == chefshat_study::Status::Active;
+        study.is_closed() && !study.participants().values().any(is_active)
+    }
+
+    /// Reads the committed state.
+    pub fn read<T>(&self, read: impl FnOnce(&Study) -> T) -> T {
+        read(&self.committed())
+    }
+
+    /// Notifies the streams of a participant.
+    pub(super) fn notify_participant(&self, number: u32) {
+        if let Some(sender) = self.lock_views().get(&number) {
+            sender.send_modify(|count| *count += 1);
+        }
+    }
+
+    pub(super) fn lock_deleting(&self) -> MutexGuard<'_, BTreeSet<u32>> {
+        (self.shared.deleting.lock()).expect("no code that holds this lock can panic")
+    }
+
+    fn lock_views(&self) -> MutexGuard<'_, BTreeMap<u32, watch::Sender<u64>>> {
+        (self.shared.views.lock()).expect("no code that holds this lock can panic")
+    }
+
+    async fn command(
+        &self,
+        command: impl FnOnce(&Study, u64) -> Result<(Vec<Change>, u32), Refusal> + Send + Sync + 'static,
+    ) -> Result<Result<u32, Refusal>, Stopped> {
+        let command: Command = Box::new(command);
+        self.ask(|reply| Message::Command(command, reply)).await
+    }
+}
+
+/// A stream that shows the study to a participant.
+#[derive(Debug)]
+pub struct Presence {
+    handle: Arc<StudyHandle>,
+    number: u32,
+    stream: u64,
+}
+
+impl Drop for Presence {
+    fn drop(&mut self) {
+        let (handle, number, stream) = (Arc::clone(&self.handle), self.number, self.stream);
+        // The mailbox may be full: the message must not be lost. Without a runtime the server has
+        // ended.
+        if let Ok(runtime) = tokio::runtime::Handle::try_current() {
+            runtime.spawn(short("one message", async move {
+                let _ = handle.mailbox.send(Message::Gone { number, stream }).await;
+            }));
+        }
+    }
+}
+
+fn check_traces(traces: &[v1::StudyTrace]) -> Result<(), String> {
+    if traces.len() > MAX_TRACES {
+        let count = traces.len();
+        return Err(format!(
+            "{count} traces; send at most {MAX_TRACES} at a time"
+        ));
+    }
+    for trace in traces {
+        if trace.kind() == v1::StudyTraceKind::Unspecified {
+            return Err("a trace has no kind".to_owned());
+        }
+        if trace.target.chars().count() > MAX_TRACE_TARGET
+            || trace.target.chars().any(char::is_control)
+        {
+            return Err(format!(
+                "a target has at most {MAX_TRACE_TARGET} characters, none of them a control character"
+            ));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,197 @@
+//! The studies of a server: creates, finds and resumes them. `chefshat_study` decides what each
+//! participant does next; `task` runs one study; `export` gathers its data.
+
+mod data;
+mod export;
+mod games;
+mod handle;
+mod message;
+mod task;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use chefshat_proto::cost::{Cost, shapes};
+use chefshat_proto::v1;
+use chefshat_study::{SettingsProblem, Study};
+use prost::Message as _;
+use tokio_util::task::TaskTracker;
+
+pub use export::{ExportError, ExportedFile};
+pub use handle::{MAX_TRACES, MAX_TRACES_OF_GAME, NotAdded, Presence, StudyHandle, TraceRefusal};
+
+pub use crate::journaled::Stopped;
+
+use crate::config::{MAX_STUDY_DATA, MAX_STUDY_MEMORY};
+use crate::journaled::{self, Folded, Journaled as _, New, Registry, owner_of};
+use crate::rooms::Rooms;
+use chefshat_admission::limits::{Key, Places, Refused};
+use chefshat_base::clock::{TimeOfDay, since_epoch_ms};
+use chefshat_base::tasks::short;
+use chefshat_room::ids::{Id, RequestKey, Token, random_bytes};
+use chefshat_store::StoreError;
+use chefshat_store::studies::{StoredStudy, StudyHeader};
+use chefshat_wire::convert::{self, StudyPlan};
+use data::{Budgets, StudyData};
+use handle::StudyShared;
+use task::StudyTask;
+
+/// Why a study was not created.
+pub type CreateProblem = journaled::CreateProblem<SettingsProblem>;
+
+/// The studies of a server.
+pub type Studies = Registry<StudyTask>;
+
+/// A study whose settings are valid.
+struct Checked {
+    settings: v1::StudySettings,
+    plan: StudyPlan,
+    core: Study,
+    /// Bytes that the settings take in memory, at most.
+    memory: usize,
+}
+
+impl Studies {
+    /// Creates an empty set. A shutdown waits for the tasks in `tracker`.
+    pub fn new(rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
+        Self::at(since_epoch_ms, rooms, tracker)
+    }
+
+    /// As [`Studies::new`], with this clock.
+    pub fn at(now: TimeOfDay, rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
+        let memory = Places::new(MAX_STUDY_MEMORY / 1024, rooms.shares());
+        let data = Places::new(MAX_STUDY_DATA, rooms.shares());
+        Self::empty(rooms, tracker, Budgets { now, memory, data })
+    }
+
+    /// The id of the study that this request creates.
+    pub fn created_id(request: RequestKey) -> Id {
+        shortened(request.owner().room)
+    }
+
+    /// Creates a study. Returns it with its owner token.
+    ///
+    /// # Errors
+    /// See [`CreateProblem`].
+    pub async fn create(
+        self: &Arc<Self>,
+        settings: v1::StudySettings,
+        request: Option<RequestKey>,
+        charged: Key,
+    ) -> Result<(Arc<StudyHandle>, Token), CreateProblem> {
+        let durable = self.rooms.store().outlives_server();
+        // Long settings take milliseconds to check.
+        let checking = tokio::task::spawn_blocking(move || check(settings, durable));
+        let checked = (checking.await)
+            .map_err(|error| StoreError::Failed(format!("checking settings failed: {error}")))?
+            .map_err(CreateProblem::Settings)?;
+        self.check_accepting()?;
+        let owner = owner_of(request);
+        let owner = Token {
+            room: shortened(owner.room),
+            ..owner
+        };
+        let studies = Arc::clone(self);
+        let making = async move { studies.make(checked, owner, charged).await };
+        Ok((self.create_once(owner, charged, making).await?, owner))
+    }
+
+    async fn make(
+        &self,
+        checked: Checked,
+        owner: Token,
+        charged: Key,
+    ) -> Result<New<StudyTask>, CreateProblem> {
+        let budget = &self.common.memory;
+        let share = budget.share_of(charged);
+        let memory = budget.try_take_many(charged, checked.memory.div_ceil(1024).min(share));
+        let memory = memory.ok_or_else(|| Refused {
+            what: "studies take too much memory together; delete some, or shorten them",
+            ..StudyTask::too_many(share as u64 * 1024)
+        })?;
+        let header = StudyHeader {
+            id: owner.room,
+            settings: checked.settings,
+            created_at_ms: (self.common.now)(),
+            owner: owner.hash(),
+            key: random_bytes(),
+        };
+        self.store_new(&header, None).await?;
+        let data = StudyData::of(&checked.core, header.id, &self.common.data);
+        let folded = Folded {
+            header,
+            plan: checked.plan,
+            state: checked.core,
+            rows: 0,
+        };
+        let shared = StudyShared::new(memory, Arc::new(data));
+        Ok(New { folded, shared })
+    }
+
+    /// Deletes a study with all its data. Returns the numbers of its participants and games.
+    ///
+    /// # Errors
+    /// The server ends or its store failed, or (inner result) somebody is in the middle of it: how
+    /// many.
+    pub async fn delete(
+        self: &Arc<Self>,
+        handle: Arc<StudyHandle>,
+        force: bool,
+    ) -> Result<Result<(usize, usize), usize>, Stopped> {
+        let studies = Arc::clone(self);
+        // Runs to completion even if the caller is cancelled.
+        let deleting = self.tracker.spawn(short("one study", async move {
+            let games = match handle.delete(force).await? {
+                Ok(games) => games,
+                Err(active) => return Ok(Err(active)),
+            };
+            studies.forget_one(handle.id());
+            let participants = handle.read(|study| study.participants().len());
+            Ok(Ok((participants, games)))
+        }));
+        deleting.await.map_err(|_| Stopped)?
+    }
+
+    /// The id that begins with these bytes, as links have them.
+    pub fn full_id(short: [u8; 12]) -> Id {
+        let mut id = [0; 16];
+        id[..short.len()].copy_from_slice(&short);
+        Id(id)
+    }
+}
+
+fn check(settings: v1::StudySettings, durable: bool) -> Result<Checked, SettingsProblem> {
+    let settings = convert::complete_settings(settings, random_bytes, durable)?;
+    let plan = convert::study_plan(&settings)?;
+    let core = Study::new(Arc::clone(&plan.core))?;
+    let memory = memory_of(&settings);
+    Ok(Checked {
+        settings,
+        plan,
+        core,
+        memory,
+    })
+}
+
+/// The state of a stored study.
+fn restored(stored: &StoredStudy) -> Result<(StudyPlan, Study), SettingsProblem> {
+    let plan = convert::study_plan(&stored.header.settings)?;
+    let mut study = Study::new(Arc::clone(&plan.core))?;
+    stored.changes.iter().for_each(|change| study.fold(change));
+    Ok((plan, study))
+}
+
+/// Bytes that settings take in memory, at most.
+fn memory_of(settings: &v1::StudySettings) -> usize {
+    let cost = shapes::STUDY_SETTINGS.cost(&settings.encode_to_vec(), Cost::MAX);
+    cost.expect("what was just encoded is readable").memory
+}
+
+/// An id whose last four bytes are 0, so that links can leave them out.
+fn shortened(id: Id) -> Id {
+    Id(std::array::from_fn(|index| match index {
+        0..12 => id.0[index],
+        _ => 0,
+    }))
+}

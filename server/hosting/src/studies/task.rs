@@ -1,0 +1,370 @@
+//! The task of one study: what its changes bring about. `games` acts on games and their rooms.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_study::{Change, Refusal, SettingsProblem, Status, Study};
+use tokio::sync::{mpsc, oneshot};
+use tokio::time::Instant;
+use tracing::info;
+
+use super::data::{Budgets, RETRY_STUDIES, StudyData};
+use super::handle::StudyShared;
+use super::message::{Command, Message};
+use super::{StudyPlan, memory_of, restored};
+use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
+use crate::journaled::{Folded, Journaled, Unit, UnitHeader};
+use chefshat_admission::limits::{Key, Refused};
+use chefshat_base::clock::TimeOfDay;
+use chefshat_base::tasks::LongTask;
+use chefshat_room::ids::{Id, SecretHash};
+use chefshat_store::StoreError;
+use chefshat_store::studies::{StoredStudy, StudyHeader, changes_to_bytes};
+use chefshat_store::units::{StoredUnit, UnitKind, UnitWrite};
+
+impl UnitHeader for StudyHeader {
+    fn id(&self) -> Id {
+        self.id
+    }
+
+    fn owner(&self) -> &SecretHash {
+        &self.owner
+    }
+
+    fn created_at_ms(&self) -> u64 {
+        self.created_at_ms
+    }
+}
+
+/// Runs a study.
+pub struct StudyTask {
+    pub(super) unit: Unit<Self>,
+    pub(super) now: TimeOfDay,
+    /// Streams of participants.
+    streams: BTreeMap<u32, u64>,
+    /// Participants for whom a game may be due.
+    pub(super) touched: BTreeSet<u32>,
+    /// Participants with a running game.
+    pub(super) playing: BTreeSet<u32>,
+    /// Those of them whose game has no room yet.
+    pub(super) without_room: BTreeSet<u32>,
+    /// Rooms that were asked to close.
+    pub(super) closing: BTreeSet<Id>,
+    /// When rooms whose creation failed are tried again.
+    pub(super) retry: Option<Instant>,
+    /// Those who wait for the deletion of the study, once that is requested.
+    deletion: Vec<oneshot::Sender<Result<usize, usize>>>,
+}
+
+impl Journaled for StudyTask {
+    type Header = StudyHeader;
+    type Plan = StudyPlan;
+    type State = Study;
+    type Entry = Change;
+    type Message = Message;
+    type Shared = StudyShared;
+    type Common = Budgets;
+    type SettingsProblem = SettingsProblem;
+
+    const KIND: UnitKind = UnitKind::Study;
+    const NAMES: &'static str = "studies";
+    const TASK: LongTask = LongTask::Study;
+    const CREATION: &'static str = "one study";
+    const MAILBOX: usize = STUDY_MAILBOX;
+    const MOST: usize = MAX_STUDIES;
+
+    fn header_to_bytes(header: &StudyHeader) -> Vec<u8> {
+        header.to_bytes()
+    }
+
+    fn row_to_bytes(changes: &[Change]) -> Vec<u8> {
+        changes_to_bytes(changes)
+    }
+
+    fn fold(id: Id, stored: &StoredUnit) -> Result<Folded<Self>, String> {
+        let stored = StoredStudy::decode(id, stored).map_err(|problem| problem.to_string())?;
+        let (plan, state) = restored(&stored).map_err(|problem| problem.to_string())?;
+        Ok(Folded {
+            header: stored.header,
+            plan,
+            state,
+            rows: stored.rows,
+        })
+    }
+
+    fn share(common: &Budgets, folded: &Folded<Self>) -> StudyShared {
+        let memory = memory_of(&folded.header.settings).div_ceil(1024);
+        let memory = (common.memory).take_many_anyway(Self::key_of(folded.header.id), memory);
+        let data = StudyData::of(&folded.state, folded.header.id, &common.data);
+        StudyShared::new(memory, Arc::new(data))
+    }
+
+    fn key_of(id: Id) -> Key {
+        Key::Study(id)
+    }
+
+    fn too_many(limit: u64) -> Refused {
+        Refused {
+            reason: "TOO_MANY_STUDIES",
+            what: "too many studies",
+            limit,
+            retry_after: RETRY_STUDIES,
+        }
+    }
+
+    fn apply(state: &mut Study, change: &Change) {
+        state.fold(change);
+    }
+
+    /// Its participants' data can still be deleted.
+    fn is_over(_: &Study) -> bool {
+        false
+    }
+
+    fn new(unit: Unit<Self>, common: &Budgets) -> Self {
+        let participants = unit.state.participants();
+        let playing = participants
+            .iter()
+            .filter(|(_, it)| it.games.last().is_some_and(|game| game.ended.is_none()));
+        let playing = playing.map(|(number, _)| *number).collect();
+        // A server that ended in the middle of a deletion completes it.
+        let deleted = participants.iter().filter(|(_, it)| it.data_deleted);
+        *unit.handle.lock_deleting() = deleted.map(|(number, _)| *number).collect();
+        Self {
+            unit,
+            now: common.now,
+            streams: BTreeMap::new(),
+            touched: BTreeSet::new(),
+            playing,
+            without_room: BTreeSet::new(),
+            closing: BTreeSet::new(),
+            retry: None,
+            deletion: Vec::new(),
+        }
+    }
+
+    fn unit(&self) -> &Unit<Self> {
+        &self.unit
+    }
+
+    fn unit_mut(&mut self) -> &mut Unit<Self> {
+        &mut self.unit
+    }
+
+    async fn receive(&mut self, message: Message) -> Result<(), StoreError> {
+        match message {
+            Message::Command(command, reply) => {
+                let executed = self.execute(command);
+                self.unit.reply(reply, executed);
+            }
+            Message::Delete { force, reply } => {
+                let participants = self.unit.state.participants().iter();
+                let active = participants.filter(|(_, it)| it.status == Status::Active);
+                let active: Vec<u32> = active.map(|(number, _)| *number).collect();
+                if !active.is_empty() && !force {
+                    // The caller may have gone.
+                    let _ = reply.send(Err(active.len()));
+                    return Ok(());
+                }
+                let at_ms = (self.now)();
+                for number in active {
+                    self.fold(Change::Removed { number, at_ms });
+                }
+                if let Some(change) = self.unit.state.close() {
+                    self.fold(change);
+                }
+                self.deletion.push(reply);
+            }
+            Message::Present {
+                number,
+                session,
+                stream,
+            } => {
+                let newest = self.unit.state.participant(number).map(|it| it.session);
+                if newest == Some(session) {
+                    self.streams.insert(number, stream);
+                    self.set_connected(number, true);
+                }
+            }
+            Message::Gone { number, stream } => {
+                if self.streams.get(&number) == Some(&stream) {
+                    self.streams.remove(&number);
+                    self.set_connected(number, false);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    async fn follow(&mut self) -> Result<(), StoreError> {
+        self.read_ended_games().await?;
+        let now_ms = (self.now)();
+        while let Some(change) = self.unit.state.next(now_ms) {
+            self.fold(change);
+        }
+        self.place_due_games();
+        Ok(())
+    }
+
+    fn announce(&mut self, changes: &[Change]) {
+        for number in changes.iter().filter_map(Change::number) {
+            self.unit.handle.notify_participant(number);
+        }
+    }
+
+    async fn act(&mut self) -> Result<(), StoreError> {
+        self.make_rooms().await?;
+        self.close_rooms();
+        Ok(())
+    }
+
+    /// Deletes the data of participants who want it, once their games are over: of all of them
+    /// together, because each time the whole journal is read and written.
+    async fn delete(&mut self) -> Result<(), StoreError> {
+        let mut due = self.unit.handle.lock_deleting().clone();
+        due.retain(|number| !self.playing.contains(number));
+        if due.is_empty() {
+            return Ok(());
+        }
+        let handle = Arc::clone(&self.unit.handle);
+        let mut counts = handle.shared.traces.lock().await;
+        let store = self.unit.rooms.store();
+        let Some(stored) = StoredStudy::read(store.as_ref(), handle.id()).await? else {
+            return Ok(());
+        };
+        let mut changes = stored.changes;
+        let mut is_changed = false;
+        for change in &mut changes {
+            for number in &due {
+                is_changed |= change.forget(*number);
+            }
+        }
+        // Everybody has a pseudonym to forget, so an unchanged journal was written before, by a
+        // server that ended before its games were deleted. Traces were deleted with it.
+        if is_changed {
+            let forgotten = due.iter().copied().collect();
+            StoredStudy::rewrite(store.as_ref(), handle.id(), &changes, forgotten).await?;
+            self.unit.rows = 1;
+        }
+        let played = due
+            .iter()
+            .filter_map(|number| self.unit.state.participant(*number));
+        let games: Vec<_> = played.flat_map(|it| &it.games).collect();
+        let ids: Vec<Id> = games.iter().map(|game| Id(game.placed.game)).collect();
+        for game in &ids {
+            counts.remove(game);
+        }
+        for game in &games {
+            self.unit.rooms.forget(Id(game.placed.room));
+        }
+        let count = ids.len();
+        self.unit.rooms.delete_games(ids).await?;
+        for number in &due {
+            handle.shared.data.forget_answers(*number);
+        }
+        handle.lock_deleting().retain(|it| !due.contains(it));
+        if is_changed {
+            info!(study = %handle.id(), participants = due.len(), games = count, "the data of participants were deleted");
+        }
+        self.unit.has_changed = true;
+        Ok(())
+    }
+
+    /// Deletes the study if that was requested and no game runs any more. Returns whether it did.
+    async fn conclude(&mut self, inbox: &mut mpsc::Receiver<Message>) -> Result<bool, StoreError> {
+        if self.deletion.is_empty() || !self.playing.is_empty() {
+            return Ok(false);
+        }
+        let participants = self.unit.state.participants().values();
+        let played: Vec<_> = participants.flat_map(|it| &it.games).collect();
+        for game in &played {
+            self.unit.rooms.forget(Id(game.placed.room));
+        }
+        let games: Vec<Id> = played.iter().map(|game| Id(game.placed.game)).collect();
+        let count = games.len();
+        let store = self.unit.rooms.store();
+        // The games first: a repetition completes what was interrupted in between.
+        self.unit.rooms.delete_games(games).await?;
+        let unit = Self::KIND.id(self.unit.handle.id());
+        store.write_unit(unit, UnitWrite::Delete).await?;
+        info!(study = %self.unit.handle.id(), games = count, "a study was deleted");
+        // Those who asked while it was deleted get the same answer.
+        inbox.close();
+        while let Ok(message) = inbox.try_recv() {
+            if let Message::Delete { reply, .. } = message {
+                self.deletion.push(reply);
+            }
+        }
+        self.unit.send_replies();
+        for reply in self.deletion.drain(..) {
+            // The caller may have gone.
+            let _ = reply.send(Ok(count));
+        }
+        Ok(true)
+    }
+
+    fn wake_at(&self) -> Option<Instant> {
+        let by_core = self.unit.state.wake_at().map(|at_ms| {
+            let wait = at_ms.saturating_sub((self.now)());
+            Instant::now() + Duration::from_millis(wait)
+        });
+        by_core.into_iter().chain(self.retry).min()
+    }
+}
+
+impl StudyTask {
+    fn execute(&mut self, command: Command) -> Result<u32, Refusal> {
+        if !self.deletion.is_empty() {
+            return Err(Refusal::Closed);
+        }
+        let (changes, number) = command(&self.unit.state, (self.now)())?;
+        changes.into_iter().for_each(|change| self.fold(change));
+        Ok(number)
+    }
+
+    fn set_connected(&mut self, number: u32, connected: bool) {
+        let now_ms = (self.now)();
+        self.unit.state.set_connected(number, connected, now_ms);
+        (self.unit.handle.committed()).set_connected(number, connected, now_ms);
+        self.touched.insert(number);
+        self.unit.has_changed = true;
+    }
+
+    /// Applies a change and adds it to the next commit.
+    pub(super) fn fold(&mut self, change: Change) {
+        self.unit.push(change.clone());
+        self.touched.extend(change.number());
+        match &change {
+            Change::Placed { number, .. } => {
+                self.playing.insert(*number);
+                self.without_room.insert(*number);
+            }
+            Change::GameEnded { number, .. } => {
+                self.playing.remove(number);
+                self.without_room.remove(number);
+            }
+            Change::Opened { number, .. } => {
+                // The stream of the earlier session ends.
+                self.streams.remove(number);
+                let now_ms = (self.now)();
+                self.unit.state.set_connected(*number, false, now_ms);
+                (self.unit.handle.committed()).set_connected(*number, false, now_ms);
+            }
+            Change::Withdrew {
+                number,
+                delete_data: true,
+                ..
+            } => {
+                self.unit.handle.lock_deleting().insert(*number);
+            }
+            _ => {}
+        }
+    }
+
+    /// Whether a participant is in the middle of the study.
+    pub(super) fn is_active(&self, number: u32) -> bool {
+        let participant = self.unit.state.participant(number);
+        participant.is_some_and(|it| it.status == Status::Active)
+    }
+}

@@ -1,0 +1,496 @@
+//! Studies of a server whose clock is stopped: dropping out, and deleting a study.
+
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use chefshat_study::{At, ParticipantLink, Status};
+use tokio::time::advance;
+
+use super::*;
+use crate::config::{MAX_STUDIES, ServerConfig};
+use chefshat_base::tasks::{LongTask, polls};
+use chefshat_store::testing::TypedUnits as _;
+use chefshat_store::{MemoryStore, Store};
+
+/// How long a participant may be away.
+const LIMIT: Duration = Duration::from_secs(60);
+
+std::thread_local! {
+    /// When the test of this thread began, on its stopped clock.
+    static BEGAN: OnceLock<tokio::time::Instant> = const { OnceLock::new() };
+}
+
+/// A time of day that advances with the clock of the test.
+fn stopped_clock() -> u64 {
+    let began = BEGAN.with(|began| *began.get_or_init(tokio::time::Instant::now));
+    1_000_000 + u64::try_from(began.elapsed().as_millis()).expect("not that long")
+}
+
+/// A study of two participants who read a text and consent.
+fn settings() -> v1::StudySettings {
+    use v1::study_stage::Stage;
+    let seat = v1::SeatConfig {
+        filled_by: Some(v1::seat_config::FilledBy::BuiltInAgent("random".into())),
+        ..v1::SeatConfig::default()
+    };
+    let stage = |stage| v1::StudyStage { stage: Some(stage) };
+    v1::StudySettings {
+        name: "away".into(),
+        title: "A game of cards".into(),
+        participants: 1,
+        conditions: vec![v1::StudyCondition {
+            id: "only".into(),
+            seats: vec![seat; 3],
+            ..v1::StudyCondition::default()
+        }],
+        stages: vec![
+            stage(Stage::Consent(v1::StudyConsent {
+                text: "I take part.".into(),
+                version: "1".into(),
+            })),
+            stage(Stage::Games(v1::StudyGames { count: 1 })),
+        ],
+        drop_out_after_ms: u64::try_from(LIMIT.as_millis()).expect("small"),
+        ..v1::StudySettings::default()
+    }
+}
+
+struct Lab {
+    store: Arc<dyn Store>,
+    studies: Arc<Studies>,
+    study: Arc<StudyHandle>,
+}
+
+/// The studies of a server with this store.
+fn server(store: &Arc<dyn Store>) -> Arc<Studies> {
+    let tracker = TaskTracker::new();
+    let config = ServerConfig::default();
+    let rooms = Rooms::new(&config, Arc::clone(store), tracker.clone()).expect("threads");
+    Studies::at(stopped_clock, rooms, tracker)
+}
+
+impl Lab {
+    /// A new study with two participants.
+    async fn new() -> Self {
+        let store: Arc<dyn Store> = Arc::new(MemoryStore::default());
+        let studies = server(&store);
+        let created = studies.create(settings(), None, Key::Local).await;
+        let (study, _) = created.expect("valid settings");
+        let added = study.add(Key::Local, vec![String::new(); 2]).await;
+        assert_eq!(added.expect("it runs"), Ok(1));
+        Self {
+            store,
+            studies,
+            study,
+        }
+    }
+
+    fn status(&self, number: u32) -> Status {
+        self.study
+            .read(|study| study.participants()[&number].status)
+    }
+
+    /// Waits until a participant has a status.
+    async fn until(&self, number: u32, status: Status) {
+        let mut changes = self.study.changes();
+        while self.status(number) != status {
+            changes.changed().await.expect("the study runs");
+        }
+    }
+
+    /// Lets the study execute what has been sent to it.
+    async fn settled(&self) {
+        let unknown = self.study.open(99).await.expect("it runs");
+        assert_eq!(unknown, Err(chefshat_study::Refusal::Unknown));
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_participant_who_is_away_for_long_gives_its_slot_to_the_next() {
+    let lab = Lab::new().await;
+    let open = async |number| lab.study.open(number).await.expect("it runs");
+    let consent = async |number, session| {
+        let at = At {
+            number,
+            session,
+            step: 0,
+        };
+        lab.study.consent(at).await.expect("it runs")
+    };
+    assert_eq!((open(1).await, open(2).await), (Ok(1), Ok(1)));
+    assert_eq!(consent(1, 1).await, Ok(0));
+    assert_eq!(consent(2, 1).await, Err(chefshat_study::Refusal::Full));
+    let present = lab.study.present(1, 1).await;
+    lab.settled().await;
+    advance(LIMIT * 2).await;
+    lab.settled().await;
+    assert_eq!(lab.status(1), Status::Active, "it is there");
+
+    drop(present);
+    let mut changes = lab.study.changes();
+    while lab.study.read(|study| study.is_connected(1)) {
+        changes.changed().await.expect("the study runs");
+    }
+    lab.settled().await;
+    advance(LIMIT - Duration::from_millis(1)).await;
+    lab.settled().await;
+    assert_eq!(lab.status(1), Status::Active, "not for long enough");
+    advance(Duration::from_millis(1)).await;
+    lab.until(1, Status::DroppedOut).await;
+    let stored = lab.store.study(lab.study.id()).await.expect("readable");
+    let stored = format!("{:?}", stored.expect("it exists").changes);
+    assert!(stored.contains("DroppedOut"), "{stored}");
+
+    // Until somebody has its slot, it may come back.
+    assert_eq!(open(1).await, Ok(2));
+    assert_eq!(lab.status(1), Status::Active);
+    lab.settled().await;
+    advance(LIMIT).await;
+    lab.until(1, Status::DroppedOut).await;
+    assert_eq!(open(2).await, Ok(2), "without a slot it may always return");
+    assert_eq!(consent(2, 2).await, Ok(0));
+    assert_eq!(open(1).await, Ok(0), "there is only the end to show");
+    assert_eq!(lab.status(1), Status::DroppedOut);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_study_sleeps_while_the_server_ends_although_something_is_due() {
+    let lab = Lab::new().await;
+    assert_eq!(lab.study.open(1).await.expect("it runs"), Ok(1));
+    drop(lab.study.present(1, 1).await);
+    let mut changes = lab.study.changes();
+    while lab.study.read(|study| study.is_connected(1)) {
+        changes.changed().await.expect("the study runs");
+    }
+    lab.studies.stop();
+    lab.settled().await;
+    let before = polls()[&LongTask::Study];
+    tokio::time::sleep(LIMIT * 60).await;
+    assert!(polls()[&LongTask::Study] <= before + 1);
+    assert_eq!(lab.status(1), Status::Active, "the next start decides");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_study_is_deleted_once_nobody_is_in_the_middle_of_it() {
+    let lab = Lab::new().await;
+    let id = lab.study.id();
+    let (study, studies) = (&lab.study, &lab.studies);
+    assert_eq!(study.open(1).await.expect("it runs"), Ok(1));
+    let refused = studies.delete(Arc::clone(study), false).await;
+    assert_eq!(refused.expect("it runs"), Err(1));
+    let at = At {
+        number: 1,
+        session: 1,
+        step: 0,
+    };
+    let consented = study.consent(at).await.expect("it runs");
+    assert_eq!(consented, Ok(0), "it continues");
+    // Its game begins when it is there.
+    let _present = study.present(1, 1).await;
+    let mut changes = study.changes();
+    while study.read(|study| study.participants()[&1].games.is_empty()) {
+        changes.changed().await.expect("the study runs");
+    }
+    let link = study.link(1).link;
+    let link = ParticipantLink::parse(&link).expect("a link");
+    assert!(studies.get(Studies::full_id(link.study())).is_some());
+
+    let deleted = studies.delete(Arc::clone(study), true).await;
+    assert_eq!(deleted.expect("it runs"), Ok((2, 1)));
+    assert!(lab.store.study(id).await.expect("readable").is_none());
+    assert_eq!(lab.store.studies().await, Ok(Vec::new()));
+    assert!(studies.get(Studies::full_id(link.study())).is_none());
+    assert!(studies.earlier(None).is_empty());
+    assert!(study.open(1).await.is_err(), "its task has ended");
+    assert!(study.is_complete());
+}
+
+#[tokio::test(start_paused = true)]
+async fn all_who_delete_a_study_are_answered() {
+    let lab = Lab::new().await;
+    assert_eq!(lab.study.open(1).await.expect("it runs"), Ok(1));
+    let delete = || lab.studies.delete(Arc::clone(&lab.study), true);
+    let (first, second) = tokio::join!(delete(), delete());
+    assert_eq!(first.expect("it is deleted"), Ok((2, 0)));
+    assert_eq!(second.expect("it is deleted"), Ok((2, 0)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn studies_count_after_a_restart_too() {
+    let lab = Lab::new().await;
+    let studies = server(&lab.store);
+    studies.restore().await.expect("readable");
+    assert_eq!(studies.earlier(None).len(), 1);
+    let mut created = 1;
+    // Two callers, because none may have all places.
+    for caller in [Key::Local, Key::Resumed] {
+        while studies.create(settings(), None, caller).await.is_ok() {
+            created += 1;
+        }
+    }
+    assert_eq!(created, MAX_STUDIES);
+
+    // More than there may be, as an earlier version let there be, are all resumed.
+    let studies = server(&lab.store);
+    let one_more = lab.studies.create(settings(), None, Key::Local).await;
+    one_more.expect("this server has one");
+    studies.restore().await.expect("readable");
+    assert_eq!(studies.earlier(None).len(), MAX_STUDIES + 1);
+    let newest = Arc::clone(&studies.earlier(None)[0].1);
+    let deleted = studies.delete(newest, true).await;
+    assert_eq!(deleted.expect("it runs"), Ok((0, 0)));
+    let refused = studies.create(settings(), None, Key::Local).await;
+    assert!(
+        matches!(refused, Err(CreateProblem::Refused(_))),
+        "still full"
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
+    let lab = Lab::new().await;
+    let id = lab.study.id();
+    let rows = async || {
+        let stored = lab.store.study(id).await.expect("readable");
+        stored.expect("it exists").rows
+    };
+    for number in [1, 2] {
+        let withdrawn = lab.study.withdraw(number, true).await;
+        assert_eq!(withdrawn.expect("it runs"), Ok(()));
+    }
+    assert_eq!(rows().await, 1, "rewritten");
+    let added = lab.study.add(Key::Local, vec!["Ada".into()]).await;
+    assert_eq!(added.expect("it runs"), Ok(3));
+    assert_eq!(rows().await, 2);
+    lab.studies.end();
+
+    let studies = server(&lab.store);
+    studies.restore().await.expect("readable");
+    let study = studies.get(id).expect("it is resumed");
+    let unknown = study.open(99).await.expect("it runs");
+    assert_eq!(unknown, Err(chefshat_study::Refusal::Unknown));
+    assert_eq!(rows().await, 2, "nothing is left to delete");
+
+    // A server that ended right after the withdrawals.
+    let added = study.add(Key::Local, vec!["Bo".into()]).await;
+    assert_eq!(added.expect("it runs"), Ok(4));
+    studies.end();
+    let withdrew = |number| chefshat_study::Change::Withdrew {
+        number,
+        delete_data: true,
+        at_ms: 1,
+    };
+    let appended = lab
+        .store
+        .append_study(id, 3, vec![withdrew(3), withdrew(4)]);
+    appended.await.expect("committed");
+    let studies = server(&lab.store);
+    studies.restore().await.expect("readable");
+    let study = studies.get(id).expect("it is resumed");
+    let unknown = study.open(99).await.expect("it runs");
+    assert_eq!(unknown, Err(chefshat_study::Refusal::Unknown));
+    assert_eq!(rows().await, 1, "rewritten");
+    let stored = lab.store.study(id).await.expect("readable");
+    let stored = format!("{:?}", stored.expect("it exists").changes);
+    assert!(
+        !stored.contains("Ada") && !stored.contains("Bo"),
+        "{stored}"
+    );
+}
+
+/// Who imports a record under the id of a study's game adds nothing to the study's data.
+#[tokio::test]
+async fn a_record_from_elsewhere_is_no_data_of_a_study() {
+    let lab = Lab::new().await;
+    let game = Id([9; 16]);
+    let summary = v1::RecordSummary::default();
+    let imported = lab.store.import(game, summary, Arc::from([])).await;
+    assert_eq!(imported, Ok(true));
+    let record = super::export::record_of(lab.studies.rooms(), lab.study.id(), game).await;
+    assert_eq!(record, Ok(None));
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_settings_of_all_studies_of_a_caller_take_its_share_of_memory() {
+    use v1::study_stage::Stage;
+    let studies = server(&(Arc::new(MemoryStore::default()) as Arc<dyn Store>));
+    let remote = Key::Address([192, 0, 2, 1].into());
+    let mut long = settings();
+    let text = v1::StudyText {
+        text: "x".repeat(20_000),
+        ..v1::StudyText::default()
+    };
+    let text = v1::StudyStage {
+        stage: Some(Stage::Text(text)),
+    };
+    long.stages.splice(1..1, vec![text; 45]);
+    let create = async || studies.create(long.clone(), None, remote).await;
+    let mut created = Vec::new();
+    let refused = loop {
+        match create().await {
+            Ok((study, _)) => created.push(study),
+            Err(refused) => break refused,
+        }
+        assert!(created.len() < 10, "there is no limit");
+    };
+    // A tenth of 48 MiB.
+    assert_eq!(created.len(), 5);
+    let CreateProblem::Refused(refused) = refused else {
+        panic!("{refused}");
+    };
+    assert_eq!(refused.reason, "TOO_MANY_STUDIES");
+    assert_eq!(refused.limit, 48 * 1024 * 1024 / 10 / 1024 * 1024);
+    let small = studies.create(settings(), None, remote).await;
+    small.expect("a small one still fits");
+    let other = Key::Address([192, 0, 2, 2].into());
+    let other = studies.create(long.clone(), None, other).await;
+    other.expect("the memory of another caller");
+    let deleted = created.pop().expect("one");
+    let deleting = studies.delete(deleted, true).await.expect("it runs");
+    deleting.expect("nobody is in it");
+    tokio::task::yield_now().await;
+    create().await.expect("its memory is free again");
+    assert!(matches!(create().await, Err(CreateProblem::Refused(_))));
+}
+
+/// One participant, who answers questionnaires with long texts and nothing else.
+fn long_answers(questionnaires: usize) -> v1::StudySettings {
+    use v1::study_item::Kind;
+    use v1::study_stage::Stage;
+    let item = |number| v1::StudyItem {
+        id: format!("q{number}"),
+        text: "Why?".into(),
+        kind: Some(Kind::FreeText(v1::StudyFreeText {
+            max_characters: 10_000,
+        })),
+        ..v1::StudyItem::default()
+    };
+    let questionnaire = |number| v1::StudyStage {
+        stage: Some(Stage::Questionnaire(v1::StudyQuestionnaire {
+            id: format!("s{number}"),
+            items: (0..100).map(item).collect(),
+            ..v1::StudyQuestionnaire::default()
+        })),
+    };
+    let mut settings = settings();
+    settings
+        .stages
+        .splice(0..1, (0..questionnaires).map(questionnaire));
+    settings
+}
+
+#[tokio::test(start_paused = true)]
+async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
+    let lab = Lab::new().await;
+    let (studies, store) = (&lab.studies, &lab.store);
+    let created = studies.create(long_answers(49), None, Key::Local).await;
+    let (study, _) = created.expect("valid settings");
+    let added = study.add(Key::Local, vec![String::new(); 2]).await;
+    assert_eq!(added.expect("it runs"), Ok(1));
+    assert_eq!(study.open(1).await.expect("it runs"), Ok(1));
+    let address = |last| Key::Address([192, 0, 2, last].into());
+    let before = studies.common.data.taken();
+    let answer = |item| chefshat_study::ItemAnswer {
+        item,
+        value: chefshat_study::Answer::Text("x".repeat(10_000)),
+        answered_after_ms: None,
+    };
+    let answers: Vec<_> = (0..100).map(answer).collect();
+    let mut step = 0;
+    let mut answer = async |key, study: &StudyHandle| {
+        let at = At {
+            number: 1,
+            session: 1,
+            step,
+        };
+        let answered = study.answer(key, at, answers.clone()).await;
+        let answered = answered.expect("it runs");
+        step += usize::from(answered.is_ok());
+        answered
+    };
+    // An answer at another step is charged for nothing.
+    let wrong = At {
+        number: 1,
+        session: 1,
+        step: 7,
+    };
+    let refused = study.answer(address(1), wrong, answers.clone()).await;
+    assert!(
+        matches!(refused, Ok(Err(NotAdded::Study(_)))),
+        "{refused:?}"
+    );
+    assert_eq!(studies.common.data.taken(), before);
+
+    // What is saved replaces what was saved before, and goes when it is answered.
+    let save = async |count: usize| {
+        let at = At {
+            number: 1,
+            session: 1,
+            step: 0,
+        };
+        let saved = study.save(address(1), at, answers[..count].to_vec()).await;
+        assert_eq!(saved.expect("it runs"), Ok(0));
+        studies.common.data.taken() - before
+    };
+    let few = save(1).await;
+    assert!((10_000..11_000).contains(&few), "{few}");
+    assert!(save(50).await > 500_000);
+    assert_eq!(save(1).await, few);
+
+    // A caller stores its share; others store theirs.
+    let share = MAX_STUDY_DATA / 10;
+    while answer(address(1), &study).await.is_ok() {}
+    let taken = studies.common.data.taken() - before;
+    assert!((share - 2_000_000..=share).contains(&taken), "{taken}");
+    let refused = answer(address(1), &study).await;
+    assert!(
+        matches!(&refused, Err(NotAdded::Memory(it)) if it.reason == "TOO_MANY_ANSWERS"),
+        "{refused:?}"
+    );
+    assert_eq!(answer(address(2), &study).await, Ok(0));
+    let stored = studies.common.data.taken();
+
+    // A restart counts them, and loads them even if there are too many.
+    studies.end();
+    let resumed = server(store);
+    let full = resumed
+        .common
+        .data
+        .take_many_anyway(Key::Local, MAX_STUDY_DATA);
+    resumed.restore().await.expect("readable");
+    let counted = resumed.common.data.taken() - MAX_STUDY_DATA;
+    // With the names that participants got.
+    assert!((stored..stored + 100).contains(&counted), "{counted}");
+    drop(full);
+    let study = resumed.get(study.id()).expect("it is resumed");
+    let mut callers = 3;
+    while answer(address(callers), &study).await.is_ok() || callers < 20 {
+        callers += 1;
+    }
+    assert!(resumed.common.data.taken() <= MAX_STUDY_DATA);
+    let free = MAX_STUDY_DATA - resumed.common.data.taken();
+    let others = resumed.common.data.take_many_anyway(Key::Local, free);
+    let one_more = study.add(address(200), vec![String::new()]).await;
+    assert!(
+        matches!(&one_more, Ok(Err(NotAdded::Memory(it))) if it.reason == "TOO_MANY_PARTICIPANTS"),
+        "{one_more:?}"
+    );
+
+    drop(others);
+    let added = study.add(address(200), vec![String::new()]).await;
+    assert_eq!(added.expect("it runs"), Ok(3));
+
+    // What is deleted is free again.
+    let withdrawn = study.withdraw(1, true).await;
+    assert_eq!(withdrawn.expect("it runs"), Ok(()));
+    assert!(
+        resumed.common.data.taken() < share,
+        "{}",
+        resumed.common.data.taken()
+    );
+    let deleted = resumed.delete(study, true).await;
+    deleted.expect("it runs").expect("nobody is in it");
+    let left = resumed.common.data.taken();
+    let participants = 2 * 2 * size_of::<chefshat_study::Participant>() + 4 * "P01".len();
+    assert_eq!(left, participants, "those of the other study");
+}

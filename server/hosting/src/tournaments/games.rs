@@ -1,0 +1,314 @@
+//! The games of a tournament and their rooms: a called game is assigned a room, its participants
+//! are notified, and after its end its result is read from the store, so that it counts exactly
+//! once even if the server restarts in between. The core decides when games are called and what
+//! counts.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use chefshat_engine::Seat;
+use chefshat_proto::v1;
+use chefshat_record::outcome;
+use chefshat_tournament::Ended;
+use futures::future::join_all;
+use tokio::time::Instant;
+use tracing::warn;
+
+use super::message::Call;
+use super::task::TournamentTask;
+use crate::config::TOURNAMENT_RETRY;
+use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
+use chefshat_base::tasks::short;
+use chefshat_room::ids::Id;
+use chefshat_room::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
+use chefshat_store::tournaments::TournamentEntry;
+use chefshat_store::{StoreError, StoredGame};
+use chefshat_wire::convert::MAX_NAME_CHARS;
+
+impl TournamentTask {
+    /// Assigns a room to a game. The room is created once that is committed.
+    pub(super) fn place(&mut self, game: usize) {
+        let (room_id, game_id) = (Id::random(), Id::random());
+        if let Some(deal) = self.unit.state.core.games()[game].deal {
+            self.unit
+                .rooms
+                .withhold(self.unit.handle.series(deal), true);
+        }
+        self.without_room.insert(game);
+        self.seen.remove(&game);
+        self.retired.retain(|(other, _)| *other != game);
+        self.unit.push(TournamentEntry::Placed {
+            game,
+            room_id,
+            game_id,
+        });
+    }
+
+    /// Reads the results of games that have ended.
+    pub(super) async fn read_ended_games(&mut self) -> Result<(), StoreError> {
+        let playing: Vec<usize> = self.unit.state.core.playing().collect();
+        for game in playing {
+            if self.without_room.contains(&game) {
+                continue;
+            }
+            let placed = self.unit.state.placed.get(&game).copied();
+            let Some((room, game_id)) = placed else {
+                self.place(game);
+                continue;
+            };
+            if self.unit.rooms.is_over(room) == Some(false) {
+                self.seen.insert(game);
+                continue;
+            }
+            if self.unit.rooms.lease().is_some() && self.unit.rooms.is_suspended(room) {
+                // It has stopped, and the tournament will be: this node does not own it any more.
+                continue;
+            }
+            match self.ended(game, room, game_id).await? {
+                Some(ended) => {
+                    let change = self.unit.state.core.ended(game, ended);
+                    self.fold_all(change.into_iter().collect());
+                }
+                // The server ended before the room was created, or together with it: nothing that
+                // counts was played.
+                None if !self.unit.rooms.is_shutting_down() => self.place(game),
+                None => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The result of a game whose room is over or gone; `None` if it must be played again.
+    async fn ended(&self, game: usize, room: Id, game_id: Id) -> Result<Option<Ended>, StoreError> {
+        // An imported record with this id is not the tournament's game.
+        let is_ours = |game: &StoredGame| {
+            (game.tournament()).is_some_and(|game| game.tournament == self.unit.handle.id())
+        };
+        let background = self.unit.rooms.background();
+        // Before it is read: the record of a long game takes much time and memory.
+        let slice = background.slice(self.unit.handle.charged).await;
+        if let Some(stored) = self
+            .unit
+            .rooms
+            .store()
+            .finished(game_id)
+            .await?
+            .filter(is_ours)
+        {
+            let reading = background.run(move || {
+                let lines = stored.lines();
+                (outcome::outcome(&lines), abort_reason(&lines))
+            });
+            let (outcome, reason) = (reading.await)
+                .ok_or_else(|| StoreError::Failed("reading a record failed".into()))?;
+            drop(slice);
+            return Ok(match (outcome, reason) {
+                (Ok(outcome), _) => Some(Ended::Played {
+                    shifts: outcome.shifts,
+                    seats: outcome.seats.iter().map(|seat| seat.statistics).collect(),
+                }),
+                (Err(_), Some(v1::AbortReason::Shutdown)) => None,
+                (Err(problem), _) => {
+                    warn!(%game_id, %problem, "a game of a tournament has no result");
+                    Some(Ended::Aborted)
+                }
+            });
+        }
+        let Some(handle) = self.unit.rooms.get(room) else {
+            return Ok(None);
+        };
+        let Ok(described) = handle.describe().await else {
+            return Ok(None);
+        };
+        Ok(match described.abort_reason() {
+            v1::AbortReason::Shutdown => None,
+            // The participants present at that time are unknown.
+            _ if !self.seen.contains(&game) => None,
+            _ => {
+                let seats = self.unit.state.core.games()[game].seats.clone();
+                let disconnected = described.seats.iter().zip(seats);
+                let missing = disconnected
+                    .filter(|(seat, _)| !seat.connected)
+                    .map(|(_, participant)| participant)
+                    .collect();
+                Some(Ended::NeverStarted { missing })
+            }
+        })
+    }
+
+    /// Creates the rooms of called games and notifies their participants.
+    pub(super) async fn make_rooms(&mut self) -> Result<(), StoreError> {
+        if self.without_room.is_empty() || self.retry.is_some_and(|retry| Instant::now() < retry) {
+            return Ok(());
+        }
+        self.retry = None;
+        let without_room: Vec<usize> = self.without_room.iter().copied().collect();
+        let creating = without_room.iter().map(|game| {
+            let new = self.new_room(*game);
+            let rooms = &self.unit.rooms;
+            async move { (*game, rooms.create(new).await) }
+        });
+        for (game, made) in join_all(creating).await {
+            match made {
+                Ok(_) => {
+                    self.without_room.remove(&game);
+                    self.seen.insert(game);
+                    self.unit.has_changed = true;
+                    self.call(game);
+                }
+                // It gets new ids.
+                Err(CreateError::Store(StoreError::Taken(id))) => {
+                    warn!(tournament = %self.unit.handle.id(), %id, "the id of a game is taken");
+                    self.place(game);
+                }
+                Err(CreateError::Store(error)) => return Err(error),
+                // When the server is restarted, the game is assigned a new room.
+                Err(CreateError::ShuttingDown) => self.retry = Some(retry()),
+                Err(error) => {
+                    if self.retry.replace(retry()).is_none() {
+                        warn!(tournament = %self.unit.handle.id(), %error, "games of a tournament wait for rooms");
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives up the seats of participants who have left the tournament, or whose place somebody else
+    /// has taken.
+    pub(super) fn retire_seats(&mut self) {
+        let core = &self.unit.state.core;
+        for number in core.playing() {
+            let game = &core.games()[number];
+            if game.left.is_empty() || self.without_room.contains(&number) {
+                continue;
+            }
+            let Some((room, _)) = self.unit.state.placed.get(&number) else {
+                continue;
+            };
+            for (seat, participant) in game.seats.iter().enumerate() {
+                if game.left.contains(participant)
+                    && self.retired.insert((number, *participant))
+                    && let Some(room) = self.unit.rooms.get(*room)
+                {
+                    tokio::spawn(short("one message", async move {
+                        room.retire(Seat::new(seat)).await
+                    }));
+                }
+            }
+        }
+    }
+
+    /// Notifies the connected participants of a game of its room.
+    fn call(&mut self, game: usize) {
+        let Some((room, _)) = self.unit.state.placed.get(&game).copied() else {
+            return;
+        };
+        let called = self.unit.state.core.games()[game].clone();
+        for participant in &called.seats {
+            if !called.is_played_by(*participant) {
+                continue;
+            }
+            let connection = self.connections.get(participant);
+            if connection.is_some_and(|(_, connection)| !connection.call(Call::Seat(room))) {
+                self.disconnected(*participant);
+            }
+        }
+    }
+
+    /// The settings of the room of a game.
+    fn new_room(&self, number: usize) -> NewRoom {
+        let state = &self.unit.state;
+        let game = &state.core.games()[number];
+        let plan = &self.unit.handle.plan;
+        let entrants = state.core.participants();
+        let (mut participants, mut display_names) = (BTreeMap::new(), BTreeMap::new());
+        let fills = game.seats.iter().enumerate();
+        let fills: Vec<Fill> = fills
+            .map(|(seat, participant)| {
+                let entrant = &entrants[*participant];
+                if game.forfeited.contains(participant) {
+                    return Fill::BuiltIn(plan.core.filler);
+                }
+                if let Some(kind) = entrant.built_in {
+                    display_names.insert(seat, entrant.name.clone());
+                    return Fill::BuiltIn(kind);
+                }
+                let kind = entrant.kind;
+                if entrant.at_table {
+                    display_names.insert(seat, entrant.name.clone());
+                    return Fill::AtTable(kind);
+                }
+                if let Some(ticket) = state.tickets.get(participant) {
+                    let seated = SeatedParticipant {
+                        name: entrant.name.clone(),
+                        name_fingerprint: entrant.name_fingerprint.clone(),
+                        kind,
+                        ticket: *ticket,
+                    };
+                    participants.insert(seat, seated);
+                }
+                Fill::Open {
+                    reserved_for: Some(kind),
+                }
+            })
+            .collect();
+        let physical = fills.iter().any(|fill| matches!(fill, Fill::AtTable(_)));
+        let (room_id, game_id) = state.placed[&number];
+        let place = format!(
+            " · round {}, table {}, game {}",
+            game.round, game.table, game.number
+        );
+        let space = MAX_NAME_CHARS.saturating_sub(place.chars().count());
+        let name: String = self
+            .unit
+            .handle
+            .header
+            .settings
+            .name
+            .chars()
+            .take(space)
+            .collect();
+        NewRoom {
+            name: name + &place,
+            rules: plan.rules,
+            policy: plan.policy.clone(),
+            fills,
+            display_names,
+            wizards: BTreeSet::new(),
+            recorded: BTreeMap::new(),
+            start: GameStart::default(),
+            game_seed: self.unit.handle.game_seed(number, game.deal),
+            physical,
+            request: None,
+            charged: self.unit.handle.charged,
+            creator: None,
+            seating: Some(Seating {
+                part_of: PartOf::Tournament(TournamentGame {
+                    tournament: self.unit.handle.id(),
+                    series: game.deal.map(|deal| self.unit.handle.series(deal)),
+                }),
+                owner: self.unit.handle.room_owner(room_id),
+                game_id,
+                participants,
+                server_seed: game.deal.map(|deal| self.unit.handle.server_seed(deal)),
+            }),
+        }
+    }
+}
+
+fn retry() -> Instant {
+    Instant::now() + TOURNAMENT_RETRY
+}
+
+/// Why the game of a record was aborted, if it was.
+fn abort_reason(lines: &[v1::RecordLine]) -> Option<v1::AbortReason> {
+    use v1::game_event::Kind;
+    use v1::record_line::Line;
+    lines.iter().rev().find_map(|line| match &line.line {
+        Some(Line::Event(event)) => match &event.kind {
+            Some(Kind::GameAborted(aborted)) => Some(aborted.reason()),
+            _ => None,
+        },
+        _ => None,
+    })
+}

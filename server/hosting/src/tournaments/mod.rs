@@ -1,0 +1,230 @@
+//! The tournaments of a server: creates, finds and resumes them. `chefshat_tournament` decides
+//! pairings and results; `task` runs one tournament.
+
+mod by_hand;
+mod ended;
+mod games;
+mod handle;
+mod leaderboard;
+mod message;
+mod shared;
+mod task;
+#[cfg(any(test, feature = "testing"))]
+mod testing;
+#[cfg(test)]
+mod tests;
+mod views;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_record::convert::FieldProblem;
+use chefshat_record::pseudonym::{Named, Pseudonym};
+use chefshat_tournament::{Change, Entrant, ParticipantKind, SettingsProblem, State, Tournament};
+use tokio::sync::Mutex as AsyncMutex;
+use tokio_util::task::TaskTracker;
+
+pub use handle::{TableProblem, TournamentHandle};
+pub use leaderboard::{Leaderboard, finish};
+pub use message::{ByHand, ByHandRefusal, Call, Connection, Entry, JoinRefusal, Newcomer, Who};
+pub use shared::ComputeError;
+
+pub use crate::journaled::Stopped;
+
+use crate::config::MAX_START_AHEAD;
+use crate::journaled::{self, Folded, New, Registry, owner_of};
+use crate::rooms::{CODES_TRIED, Rooms};
+use chefshat_admission::limits::Key;
+use chefshat_base::clock::since_epoch_ms;
+use chefshat_room::ids::{Id, RequestKey, Token, join_code, random_bytes};
+use chefshat_store::StoreError;
+use chefshat_store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use chefshat_wire::convert::{self, TournamentPlan};
+use handle::{TournamentShared, TournamentState};
+use task::TournamentTask;
+
+/// Most rooms and tournaments that are over and are read at a time.
+const READ_AT_ONCE: usize = 4;
+
+/// Why a tournament was not created.
+pub type CreateProblem = journaled::CreateProblem<SettingsProblem>;
+
+/// The tournaments of a server.
+pub type Tournaments = Registry<TournamentTask>;
+
+/// What all tournaments of a server share.
+#[derive(Debug, Default)]
+pub struct Common {
+    /// Locked while something that is over is read.
+    reading: [AsyncMutex<()>; READ_AT_ONCE],
+}
+
+impl Tournaments {
+    /// Creates an empty set. A shutdown waits for the tasks in `tracker`.
+    pub fn new(rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
+        Self::empty(rooms, tracker, Common::default())
+    }
+
+    /// Creates a tournament. Returns it with its owner token.
+    ///
+    /// # Errors
+    /// See [`CreateProblem`].
+    pub async fn create(
+        self: &Arc<Self>,
+        name: &str,
+        plan: TournamentPlan,
+        request: Option<RequestKey>,
+        charged: Key,
+    ) -> Result<(Arc<TournamentHandle>, Token), CreateProblem> {
+        let core = Tournament::new(plan.core.clone()).map_err(CreateProblem::Settings)?;
+        self.check_accepting()?;
+        let owner = owner_of(request);
+        let (tournaments, name) = (Arc::clone(self), name.to_owned());
+        let making = async move { tournaments.make(&name, plan, core, owner).await };
+        Ok((self.create_once(owner, charged, making).await?, owner))
+    }
+
+    async fn make(
+        &self,
+        name: &str,
+        plan: TournamentPlan,
+        core: Tournament,
+        owner: Token,
+    ) -> Result<New<TournamentTask>, CreateProblem> {
+        check_start(plan.start_at_ms).map_err(CreateProblem::Settings)?;
+        let mut header = TournamentHeader {
+            id: owner.room,
+            settings: convert::settings_to_proto(name, &plan),
+            created_at_ms: since_epoch_ms(),
+            join_code: join_code(),
+            owner: owner.hash(),
+            deal_secret: random_bytes(),
+        };
+        let built_in = built_in(&plan).into_iter().map(Change::Joined);
+        let entries: Vec<_> = built_in.map(TournamentEntry::Change).collect();
+        let mut codes_left = CODES_TRIED;
+        loop {
+            match self.store_new(&header, Some(&entries)).await {
+                Err(StoreError::Taken(_)) if codes_left > 1 => {
+                    codes_left -= 1;
+                    header.join_code = join_code();
+                }
+                stored => break stored?,
+            }
+        }
+        let mut state = TournamentState::new(core);
+        entries.iter().for_each(|entry| state.apply(entry));
+        let folded = Folded {
+            header,
+            plan,
+            state,
+            rows: 1,
+        };
+        let shared = TournamentShared::default();
+        Ok(New { folded, shared })
+    }
+
+    /// Whether a tournament has announced a game with this id.
+    pub fn has_announced(&self, game: Id) -> bool {
+        let announces = |(_, handle): &(u64, Arc<TournamentHandle>)| {
+            (handle.committed().placed.values()).any(|(_, announced)| *announced == game)
+        };
+        self.earlier(None).iter().any(announces)
+    }
+
+    /// The newest `count` tournaments in this state, or in any; only those created before number
+    /// `before`, if set. With their numbers, newest first.
+    pub fn newest(
+        &self,
+        before: Option<u64>,
+        state: Option<State>,
+        count: usize,
+    ) -> Vec<(u64, Arc<TournamentHandle>)> {
+        let is_wanted = |handle: &TournamentHandle| {
+            state.is_none_or(|state| handle.read(Tournament::state) == state)
+        };
+        let earlier = self.earlier(before).into_iter();
+        let wanted = earlier.filter(|(_, handle)| is_wanted(handle));
+        wanted.take(count).collect()
+    }
+
+    /// Whether a participant, other than a built-in agent, is in a tournament that is not over.
+    pub fn is_playing(&self, who: &Named) -> bool {
+        let is_meant =
+            |it: &Entrant| it.built_in.is_none() && who.is(&it.name, &it.name_fingerprint);
+        let all = self.newest(None, None, usize::MAX);
+        all.iter().any(|(_, handle)| {
+            !handle.is_over() && handle.read(|core| core.participants().iter().any(is_meant))
+        })
+    }
+
+    /// Renames a participant in the tournaments in memory that are over. Returns in how many.
+    pub async fn forget(&self, who: &Pseudonym) -> u64 {
+        let mut count = 0;
+        for (_, handle) in self.newest(None, None, usize::MAX) {
+            if handle.is_over() && handle.forget(who) {
+                handle.shared.follower_update.clear().await;
+                handle.shared.results.clear().await;
+                count += 1;
+            }
+        }
+        count
+    }
+}
+
+/// Checks when a new tournament starts by itself.
+fn check_start(at_ms: Option<u64>) -> Result<(), SettingsProblem> {
+    let Some(at_ms) = at_ms else { return Ok(()) };
+    let now_ms = since_epoch_ms();
+    let latest = now_ms.saturating_add(millis(MAX_START_AHEAD));
+    let problem = match at_ms {
+        at_ms if at_ms <= now_ms => "this time has passed; choose a later one, or none",
+        at_ms if at_ms > latest => "more than 366 days ahead; choose an earlier time",
+        _ => return Ok(()),
+    };
+    Err(SettingsProblem {
+        field: "start_at_ms",
+        problem: problem.to_owned(),
+    })
+}
+
+fn millis(duration: Duration) -> u64 {
+    u64::try_from(duration.as_millis()).unwrap_or(u64::MAX)
+}
+
+/// The built-in participants of a tournament, named after their agents, numbered if there are
+/// several of one.
+fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
+    let mut entrants: Vec<Entrant> = Vec::new();
+    for kind in &plan.built_in {
+        let same = |other: &&Entrant| other.built_in == Some(*kind);
+        let before = entrants.iter().filter(same).count();
+        let several = plan.built_in.iter().filter(|other| *other == kind).count() > 1;
+        entrants.push(Entrant {
+            name: match several {
+                true => format!("{kind} {}", before + 1),
+                false => kind.name(),
+            },
+            name_fingerprint: String::new(),
+            kind: ParticipantKind::Agent,
+            built_in: Some(*kind),
+            filler: false,
+            stateless: true,
+            max_games: chefshat_tournament::MAX_GAMES_AT_A_TIME,
+            at_table: false,
+        });
+    }
+    entrants
+}
+
+/// Restores the state of a stored tournament.
+pub(crate) fn restored(
+    stored: &StoredTournament,
+) -> Result<(TournamentPlan, TournamentState), String> {
+    let plan = convert::tournament_plan(&stored.header.settings, [0; 32])
+        .map_err(|problem: FieldProblem| problem.to_string())?;
+    let core = Tournament::new(plan.core.clone()).map_err(|problem| problem.to_string())?;
+    let mut state = TournamentState::new(core);
+    stored.entries.iter().for_each(|entry| state.apply(entry));
+    Ok((plan, state))
+}

@@ -1,0 +1,486 @@
+//! The task of one tournament: what its entries bring about. `games` acts on games and their rooms.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_tournament::{Change, SettingsProblem, State, Tournament};
+use tokio::sync::mpsc;
+use tokio::time::Instant;
+use tracing::info;
+
+use super::handle::{TournamentHandle, TournamentShared, TournamentState};
+use super::message::{Call, Connection, Entry, JoinRefusal, Message};
+use super::{Common, TournamentPlan, restored};
+use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX, TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
+use crate::journaled::{Folded, Journaled, Unit, UnitHeader};
+use crate::rooms::Rooms;
+use chefshat_admission::limits::{Key, Refused};
+use chefshat_base::clock::{RoomClock, since_epoch_ms};
+use chefshat_base::tasks::LongTask;
+use chefshat_room::ids::{Id, SecretHash, Token};
+use chefshat_store::StoreError;
+use chefshat_store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use chefshat_store::units::{StoredUnit, UnitKind};
+use chefshat_wire::outbox::StreamEnd;
+
+/// When it is worth trying again to create a tournament.
+const RETRY_TOURNAMENTS: Duration = Duration::from_secs(60);
+
+impl UnitHeader for TournamentHeader {
+    fn id(&self) -> Id {
+        self.id
+    }
+
+    fn owner(&self) -> &SecretHash {
+        &self.owner
+    }
+
+    fn created_at_ms(&self) -> u64 {
+        self.created_at_ms
+    }
+
+    fn join_code(&self) -> Option<&str> {
+        Some(&self.join_code)
+    }
+}
+
+/// Runs a tournament.
+pub struct TournamentTask {
+    pub(super) unit: Unit<Self>,
+    /// Streams of participants, with their connection ids.
+    pub(super) connections: BTreeMap<usize, (u64, Connection)>,
+    /// Called games that have no room yet.
+    pub(super) without_room: BTreeSet<usize>,
+    /// Games whose rooms have existed since the server was started.
+    pub(super) seen: BTreeSet<usize>,
+    /// Deals whose remaining games must be checked.
+    deals: BTreeSet<u32>,
+    /// Number of participants who withdrew before the beginning, by who is charged for it, since the
+    /// server was started. Bounded by the number of such withdrawals.
+    pub(super) left_early: BTreeMap<Key, u32>,
+    /// Participants whose seats in a game were given up, by game, since the server was started.
+    pub(super) retired: BTreeSet<(usize, usize)>,
+    /// When a participant last joined, or the server was started.
+    joined_at: Instant,
+    /// When it starts by itself.
+    start_at: Option<Instant>,
+    /// When it was paused, or the server was started.
+    paused_at: Option<Instant>,
+    /// When rooms whose creation failed are tried again.
+    pub(super) retry: Option<Instant>,
+    /// Times of the core: a pause of the process makes no participant late.
+    clock: RoomClock,
+}
+
+impl Journaled for TournamentTask {
+    type Header = TournamentHeader;
+    type Plan = TournamentPlan;
+    type State = TournamentState;
+    type Entry = TournamentEntry;
+    type Message = Message;
+    type Shared = TournamentShared;
+    type Common = Common;
+    type SettingsProblem = SettingsProblem;
+
+    const KIND: UnitKind = UnitKind::Tournament;
+    const NAMES: &'static str = "tournaments";
+    const TASK: LongTask = LongTask::Tournament;
+    const CREATION: &'static str = "one tournament";
+    const MAILBOX: usize = TOURNAMENT_MAILBOX;
+    const MOST: usize = MAX_TOURNAMENTS;
+
+    fn header_to_bytes(header: &TournamentHeader) -> Vec<u8> {
+        header.to_bytes()
+    }
+
+    fn row_to_bytes(entries: &[TournamentEntry]) -> Vec<u8> {
+        TournamentEntry::to_bytes(entries)
+    }
+
+    fn fold(id: Id, stored: &StoredUnit) -> Result<Folded<Self>, String> {
+        let stored = StoredTournament::decode(id, stored).map_err(|problem| problem.to_string())?;
+        let (plan, state) = restored(&stored)?;
+        Ok(Folded {
+            header: stored.header,
+            plan,
+            state,
+            rows: stored.rows,
+        })
+    }
+
+    fn share(_: &Common, _: &Folded<Self>) -> TournamentShared {
+        TournamentShared::default()
+    }
+
+    /// The deals that it would withhold are unknown.
+    fn set_unreadable(id: Id, rooms: &Rooms) {
+        rooms.withhold(id, true);
+    }
+
+    fn key_of(id: Id) -> Key {
+        Key::Tournament(id)
+    }
+
+    fn too_many(limit: u64) -> Refused {
+        Refused {
+            reason: "TOO_MANY_TOURNAMENTS",
+            what: "too many tournaments that are not over; close one, or try later",
+            limit,
+            retry_after: RETRY_TOURNAMENTS,
+        }
+    }
+
+    fn apply(state: &mut TournamentState, entry: &TournamentEntry) {
+        state.apply(entry);
+    }
+
+    fn is_over(state: &TournamentState) -> bool {
+        state.core.state().is_over()
+    }
+
+    /// Withholds records that clients could request otherwise, and closes what still runs of a
+    /// tournament that is over.
+    fn enter(handle: &TournamentHandle, rooms: &Arc<Rooms>) {
+        let deals = handle.committed().deals();
+        handle.withhold(&deals, rooms);
+        if handle.is_over() {
+            handle.close_rooms(rooms);
+        }
+    }
+
+    fn new(unit: Unit<Self>, _: &Common) -> Self {
+        let start_at_ms = unit.handle.plan.start_at_ms;
+        let start_in = start_at_ms.map(|at| at.saturating_sub(since_epoch_ms()));
+        let now = Instant::now();
+        Self {
+            connections: BTreeMap::new(),
+            without_room: BTreeSet::new(),
+            seen: BTreeSet::new(),
+            deals: BTreeSet::new(),
+            left_early: BTreeMap::new(),
+            retired: BTreeSet::new(),
+            joined_at: now,
+            start_at: start_in.map(|time| now + Duration::from_millis(time)),
+            paused_at: unit.state.core.is_paused().then_some(now),
+            retry: None,
+            clock: RoomClock::of_age(Duration::ZERO, unit.rooms.process_clock()),
+            unit,
+        }
+    }
+
+    fn unit(&self) -> &Unit<Self> {
+        &self.unit
+    }
+
+    fn unit_mut(&mut self) -> &mut Unit<Self> {
+        &mut self.unit
+    }
+
+    async fn receive(&mut self, message: Message) -> Result<(), StoreError> {
+        match message {
+            Message::Join(entry, reply) => {
+                let joined = self.join(entry);
+                self.unit.reply(reply, joined);
+            }
+            Message::Begin(reply) => {
+                let started = self.off_thread(|core| core.begin()).await?;
+                let started = started.map(|changes| self.fold_all(changes));
+                self.unit.reply(reply, started);
+            }
+            Message::ByHand(what, reply) => {
+                let changed = self.change_by_hand(what);
+                self.unit.reply(reply, changed);
+            }
+            Message::Close(reply) => {
+                self.close();
+                self.unit.reply(reply, ());
+            }
+            Message::Enter(participant, ticket, number, connection) => {
+                self.enter(participant, &ticket, number, connection);
+            }
+            Message::Left(participant, number) => self.left(participant, number),
+        }
+        Ok(())
+    }
+
+    async fn follow(&mut self) -> Result<(), StoreError> {
+        self.expire();
+        self.read_ended_games().await?;
+        self.advance().await
+    }
+
+    /// Announces that the tournament has started or is over, and releases what is withheld no longer.
+    fn announce(&mut self, entries: &[TournamentEntry]) {
+        let handle = &self.unit.handle;
+        let (id, name) = (handle.id(), &handle.header.settings.name);
+        let webhooks = self.unit.rooms.webhooks();
+        let state = self.unit.state.core.state();
+        let has_begun = |entry| matches!(entry, &TournamentEntry::Change(Change::Begun { .. }));
+        if state != State::Closed && entries.iter().any(has_begun) {
+            let participants = self.unit.state.core.participants().len();
+            webhooks.tournament_started(id, name, participants);
+        }
+        if entries.iter().any(TournamentEntry::is_end) {
+            webhooks.tournament_ended(id, name, state == State::Finished);
+        }
+        let deals = std::mem::take(&mut self.deals);
+        handle.withhold(&deals, &self.unit.rooms);
+    }
+
+    async fn act(&mut self) -> Result<(), StoreError> {
+        self.make_rooms().await?;
+        self.retire_seats();
+        Ok(())
+    }
+
+    /// Closes running rooms and notifies all participants once the end is committed. Later messages
+    /// are answered from the committed state.
+    async fn conclude(&mut self, inbox: &mut mpsc::Receiver<Message>) -> Result<bool, StoreError> {
+        if !self.unit.handle.is_over() {
+            return Ok(false);
+        }
+        self.unit.handle.close_rooms(&self.unit.rooms);
+        for (_, connection) in std::mem::take(&mut self.connections).into_values() {
+            connection.call(Call::Over);
+        }
+        inbox.close();
+        while let Some(message) = inbox.recv().await {
+            if let Message::Enter(_, _, _, connection) = message {
+                connection.call(Call::Over);
+            }
+        }
+        Ok(true)
+    }
+
+    fn wake_at(&self) -> Option<Instant> {
+        let core = self.unit.state.core.wake_at();
+        let core = core.map(|ms| self.clock.instant(Duration::from_millis(ms)));
+        core.into_iter()
+            .chain(self.retry)
+            .chain(self.open_until())
+            .chain(self.start_at.filter(|_| self.unit.state.core.can_begin()))
+            .chain(self.paused_until())
+            .min()
+    }
+
+    /// They may reconnect, unless the whole server ends.
+    fn end_streams(&mut self) {
+        if self.unit.rooms.lease().is_none() {
+            return;
+        }
+        for (_, connection) in std::mem::take(&mut self.connections).into_values() {
+            connection.outbox.end(StreamEnd::RoomGone);
+        }
+    }
+}
+
+impl TournamentTask {
+    /// Whether it starts by itself now.
+    fn is_due_to_start(&self) -> bool {
+        let is_time = self.start_at.is_some_and(|at| at <= Instant::now());
+        is_time && self.unit.state.core.can_begin()
+    }
+
+    /// When a paused tournament resumes by itself.
+    fn paused_until(&self) -> Option<Instant> {
+        let paused_at = self.paused_at.filter(|_| self.unit.state.core.is_paused());
+        Some(paused_at? + TOURNAMENT_PAUSE)
+    }
+
+    /// When a tournament that nobody starts or joins is closed.
+    fn open_until(&self) -> Option<Instant> {
+        let is_open = self.unit.state.core.state() == State::Open;
+        let since = self.start_at.unwrap_or(self.joined_at).max(self.joined_at);
+        is_open.then(|| since + TOURNAMENT_OPEN_TIME)
+    }
+
+    /// Closes a tournament that nobody starts or joins, and resumes one that was paused for long.
+    fn expire(&mut self) {
+        if (self.open_until()).is_some_and(|until| until <= Instant::now()) {
+            self.close();
+        }
+        if (self.paused_until()).is_some_and(|until| until <= Instant::now())
+            && let Ok(Some(change)) = self.unit.state.core.set_paused(false)
+        {
+            self.fold(change);
+        }
+    }
+
+    fn now_ms(&self) -> u64 {
+        u64::try_from(self.clock.now().as_millis()).unwrap_or(u64::MAX)
+    }
+
+    fn join(&mut self, entry: Entry) -> Result<(usize, Token), JoinRefusal> {
+        let token = self.unit.handle.ticket_of(&entry);
+        if let Some(answer) = self.unit.state.joined_before(&entry, token) {
+            return answer;
+        }
+        let change = self.unit.state.core.join(entry.entrant())?;
+        let participant = self.unit.state.core.next_number();
+        self.fold(change);
+        self.joined_at = Instant::now();
+        let ticket = token.hash();
+        self.unit.push(TournamentEntry::Ticket {
+            participant,
+            ticket,
+        });
+        Ok((participant, token))
+    }
+
+    /// Closes the tournament; the rooms of its games are closed once that is committed.
+    fn close(&mut self) {
+        if let Some(change) = self.unit.state.core.close() {
+            self.fold(change);
+            self.without_room.clear();
+        }
+    }
+
+    fn enter(
+        &mut self,
+        participant: usize,
+        ticket: &SecretHash,
+        number: u64,
+        connection: Connection,
+    ) {
+        if !connection.outbox.is_open() {
+            return;
+        }
+        if self.unit.state.participant_of(ticket) != Some(participant) {
+            // The ticket has ended meanwhile: somebody else may have the place.
+            connection.call(Call::Over);
+            return;
+        }
+        let holder = self.connections.get(&participant).map(|(held, _)| *held);
+        if let Some(holder) = connection.supersedes.kept_by(holder) {
+            connection.call(Call::HeldBy(holder));
+            return;
+        }
+        if let Some((_, older)) = self.connections.remove(&participant) {
+            older.call(Call::Superseded);
+        }
+        if self.unit.handle.is_over() || self.unit.state.core.is_withdrawn(participant) {
+            connection.call(Call::Over);
+            return;
+        }
+        // Set before it is called: only the newest stream may take a seat.
+        self.set_connection(participant, Some(number));
+        let mut rooms = self.rooms_of(participant).into_iter();
+        let reached = rooms.all(|room| connection.call(Call::Seat(room)));
+        self.connections.insert(participant, (number, connection));
+        if !reached {
+            self.disconnected(participant);
+        }
+    }
+
+    pub(super) fn set_connection(&mut self, participant: usize, connection: Option<u64>) {
+        self.unit.state.set_connection(participant, connection);
+        (self.unit.handle.committed()).set_connection(participant, connection);
+        self.unit.has_changed = true;
+    }
+
+    fn left(&mut self, participant: usize, number: u64) {
+        if (self.connections.get(&participant)).is_some_and(|(newest, _)| *newest == number) {
+            self.disconnected(participant);
+        }
+    }
+
+    /// Handles a participant whose stream is gone.
+    pub(super) fn disconnected(&mut self, participant: usize) {
+        self.connections.remove(&participant);
+        self.set_connection(participant, None);
+    }
+
+    /// Rooms in which a participant has a seat now.
+    fn rooms_of(&self, participant: usize) -> Vec<Id> {
+        let state = &self.unit.state;
+        let games = state.core.playing().filter(|number| {
+            let game = &state.core.games()[*number];
+            !self.without_room.contains(number) && game.is_played_by(participant)
+        });
+        games
+            .filter_map(|number| state.placed.get(&number).map(|(room, _)| *room))
+            .collect()
+    }
+
+    /// Applies a change and adds it to the next commit.
+    pub(super) fn fold(&mut self, change: Change) {
+        let placed = match &change {
+            Change::Called { game, .. } => Some(*game),
+            _ => None,
+        };
+        match &change {
+            Change::Rescheduled { game, .. }
+            | Change::Counted { game, .. }
+            | Change::Recalled { game }
+            | Change::Voided { game } => {
+                self.deals.extend(self.unit.state.core.games()[*game].deal);
+            }
+            Change::Finished | Change::Closed => self.deals = self.unit.state.deals(),
+            Change::Paused => self.paused_at = Some(Instant::now()),
+            _ => {}
+        }
+        self.unit.push(TournamentEntry::Change(change));
+        if let Some(game) = placed {
+            self.place(game);
+        }
+    }
+
+    pub(super) fn fold_all(&mut self, changes: Vec<Change>) {
+        for change in changes {
+            self.fold(change);
+        }
+    }
+
+    /// Adds what the core says comes next. A draw of a round runs on another thread.
+    async fn advance(&mut self) -> Result<(), StoreError> {
+        if self.is_due_to_start() {
+            let begun = self.off_thread(|core| core.begin()).await?;
+            self.fold_all(begun.unwrap_or_default());
+        }
+        let now_ms = self.now_ms();
+        // If no game is running, a round may be due, which takes a while to draw.
+        let core = &self.unit.state.core;
+        let may_draw = match core.state() {
+            State::Open => core.settings().start_when_joined.is_some(),
+            State::Playing => core.playing().next().is_none(),
+            State::Finished | State::Closed => false,
+        };
+        if may_draw {
+            let following = move |mut core: Tournament| {
+                let mut changes = Vec::new();
+                while let Some(change) = core.next(now_ms) {
+                    core.fold(&change);
+                    changes.push(change);
+                }
+                changes
+            };
+            let changes = self.off_thread(following).await?;
+            self.fold_all(changes);
+        }
+        loop {
+            let next = self.unit.state.core.next(now_ms);
+            let Some(change) = next else { return Ok(()) };
+            self.fold(change);
+        }
+    }
+
+    /// Runs `work` on the tournament's core, on a blocking thread. It cannot change meanwhile.
+    async fn off_thread<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(Tournament) -> T + Send + 'static,
+    ) -> Result<T, StoreError> {
+        let core = self.unit.state.core.clone();
+        let working = tokio::task::spawn_blocking(move || work(core));
+        (working.await)
+            .map_err(|error| StoreError::Failed(format!("drawing a round failed: {error}")))
+    }
+}
+
+impl Drop for TournamentTask {
+    fn drop(&mut self) {
+        let handle = &self.unit.handle;
+        let state = handle.read(Tournament::state);
+        info!(tournament = %handle.id(), ?state, "the tournament's task has ended");
+    }
+}

@@ -1,0 +1,486 @@
+//! Creating, joining and restoring tournaments.
+
+use futures::FutureExt as _;
+
+use super::*;
+use crate::config::ServerConfig;
+use chefshat_admission::limits::Key;
+use chefshat_store::testing::TypedUnits as _;
+use chefshat_store::{SqliteStore, Store};
+use chefshat_tournament::ByHandProblem;
+
+#[tokio::test]
+async fn creating_a_tournament_completes_even_if_the_caller_is_cancelled() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = SqliteStore::open(folder.path()).await.expect("a new one");
+    let store: Arc<dyn Store> = Arc::new(store);
+    let tracker = TaskTracker::new();
+    let rooms = Rooms::new(
+        &ServerConfig::default(),
+        Arc::clone(&store),
+        tracker.clone(),
+    )
+    .expect("threads");
+    let tournaments = Tournaments::new(rooms, tracker.clone());
+    let settings = chefshat_proto::v1::TournamentSettings {
+        format: chefshat_proto::v1::TournamentFormat::Swiss.into(),
+        ..Default::default()
+    };
+    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+    // The caller is cancelled during the commit.
+    let asked = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .now_or_never();
+    assert!(asked.is_none(), "the commit takes a while");
+    tournaments.end();
+    tracker.close();
+    tracker.wait().await;
+
+    let made = tournaments.newest(None, None, 9);
+    let [(_, handle)] = made.as_slice() else {
+        panic!("not exactly one: {made:?}");
+    };
+    let found = tournaments.get(handle.id()).expect("found by its id");
+    assert_eq!(found.id(), handle.id());
+    let code = handle.join_code().to_lowercase();
+    let found = tournaments.by_code(&code).expect("found by its code");
+    assert_eq!(found.id(), handle.id());
+    let stored = store.tournaments(0).await.expect("readable");
+    assert_eq!(stored.len(), 1);
+    assert!(tournaments.get(Id::random()).is_none());
+    assert!(tournaments.by_code("").is_none());
+}
+
+/// Settings of a tournament of built-in agents in games of one Shift.
+fn built_in(name: &str) -> chefshat_proto::v1::TournamentSettings {
+    use chefshat_proto::v1;
+    v1::TournamentSettings {
+        name: name.into(),
+        format: v1::TournamentFormat::Swiss.into(),
+        built_in_agents: vec!["random".into(); 4],
+        rounds: 1,
+        rules: Some(v1::RuleSet {
+            stop: Some(v1::rule_set::Stop::TargetShifts(1)),
+            ..v1::RuleSet::default()
+        }),
+        ..Default::default()
+    }
+}
+
+fn entrant(name: &str) -> Entry {
+    Entry {
+        name: name.into(),
+        name_fingerprint: String::new(),
+        kind: chefshat_room::journal::ParticipantKind::Agent,
+        max_games: 1,
+        stateless: true,
+        at_table: false,
+        request_id: None,
+    }
+}
+
+#[tokio::test]
+async fn readers_see_only_committed_changes() {
+    let store = Arc::new(chefshat_store::testing::FailingStore::after(u64::MAX));
+    let commits = Arc::clone(&store.tournament_commits);
+    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
+    let tournaments = Tournaments::new(rooms, TaskTracker::new());
+    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
+    let (handle, _) = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .await
+        .expect("made");
+    commits.forget_permits(usize::MAX >> 3);
+    assert_eq!(commits.available_permits(), 0);
+
+    let joining = tokio::spawn({
+        let handle = Arc::clone(&handle);
+        async move { handle.join(entrant("Ada")).await }
+    });
+    // The task of the tournament has received the message and waits for the commit.
+    for _ in 0..100 {
+        tokio::task::yield_now().await;
+    }
+    assert!(!joining.is_finished());
+    let shown = handle.describe().participants.len();
+    assert_eq!(shown, 4, "uncommitted changes are not visible");
+    commits.add_permits(1);
+    joining
+        .await
+        .expect("no panic")
+        .expect("the task runs")
+        .expect("joined");
+    assert_eq!(handle.describe().participants.len(), 5);
+}
+
+#[tokio::test]
+async fn a_forged_record_of_a_coming_game_is_not_counted() {
+    use chefshat_proto::v1;
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = SqliteStore::open(folder.path()).await.expect("a new one");
+    let store: Arc<dyn Store> = Arc::new(store);
+    let start = |max_rooms| {
+        let config = ServerConfig {
+            max_rooms,
+            ..ServerConfig::default()
+        };
+        let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new()).expect("threads");
+        Tournaments::new(rooms, TaskTracker::new())
+    };
+    // No room can be created: the game has its id, and waits.
+    let tournaments = start(0);
+    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
+    let (handle, _) = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .await
+        .expect("made");
+    let mut changes = handle.changes();
+    handle
+        .begin()
+        .await
+        .expect("the task runs")
+        .expect("it can start");
+    let forged = loop {
+        match handle.games(0, 1).pop().map(|game| game.game_id) {
+            Some(game_id) if !game_id.is_empty() => break game_id,
+            _ => changes.changed().await.expect("the tournament exists"),
+        }
+    };
+    let game = Id::parse(&forged).expect("an id");
+    let summary = v1::RecordSummary {
+        game_id: forged.clone(),
+        state: v1::RoomState::Finished.into(),
+        ..Default::default()
+    };
+    let lines = chefshat_record::jsonl::read(std::path::Path::new(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/fixtures/records/committed.jsonl"
+    )));
+    let lines: Arc<[_]> = lines.expect("the fixture").into();
+    let imported = store.import(game, summary, lines).await;
+    assert_eq!(imported, Ok(true));
+    assert!(tournaments.has_announced(game), "imports of it are refused");
+    let id = handle.id();
+    tournaments.end();
+
+    let tournaments = start(9);
+    tournaments.restore().await.expect("readable");
+    let handle = tournaments.get(id).expect("restored");
+    let mut changes = handle.changes();
+    while !handle.is_over() {
+        changes.changed().await.expect("the tournament exists");
+    }
+    let games = handle.games(0, 9);
+    assert!(
+        store.failed().now_or_never().is_none(),
+        "the store keeps working"
+    );
+    assert!(!games.is_empty());
+    for game in games {
+        assert_eq!(game.state(), v1::TournamentGameState::Counted);
+        assert_ne!(game.game_id, forged);
+    }
+}
+
+#[tokio::test]
+async fn a_repeated_request_gets_the_same_answer_also_after_a_restart() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = SqliteStore::open(folder.path()).await.expect("a new one");
+    let store: Arc<dyn Store> = Arc::new(store);
+    let start = || {
+        let config = ServerConfig::default();
+        let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new()).expect("threads");
+        Tournaments::new(rooms, TaskTracker::new())
+    };
+    let plan = || convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
+    let request = RequestKey::new([1; 32], b"content");
+    let ada = || Entry {
+        request_id: Some([2; 32]),
+        ..entrant("Ada")
+    };
+    let tournaments = start();
+    let create = || tournaments.create("Coppa", plan(), Some(request), Key::Local);
+    let (first, second) = tokio::join!(create(), create());
+    let ((handle, owner), (other, again)) = (first.expect("made"), second.expect("made"));
+    assert!(Arc::ptr_eq(&handle, &other) && owner == again);
+    let other = RequestKey::new([1; 32], b"other content");
+    let refused = tournaments
+        .create("Coppa", plan(), Some(other), Key::Local)
+        .await;
+    assert!(matches!(refused, Err(CreateProblem::RequestIdUsed(_))));
+
+    let (first, second) = tokio::join!(handle.join(ada()), handle.join(ada()));
+    let joined = first.expect("the task runs").expect("joined");
+    assert_eq!(second.expect("the task runs").expect("joined"), joined);
+    handle
+        .begin()
+        .await
+        .expect("the task runs")
+        .expect("it can start");
+    assert_eq!(handle.join(ada()).await.expect("the task runs"), Ok(joined));
+    tournaments.end();
+
+    let tournaments = start();
+    tournaments.restore().await.expect("readable");
+    let (handle, again) = tournaments
+        .create("Coppa", plan(), Some(request), Key::Local)
+        .await
+        .expect("there");
+    assert!(again == owner && handle.is_owner(&owner.to_text()));
+    assert_eq!(tournaments.newest(None, None, 9).len(), 1);
+    assert_eq!(handle.join(ada()).await.expect("the task runs"), Ok(joined));
+    assert_eq!(handle.participant_of(&joined.1.secret), Some(joined.0));
+    let bo = Entry {
+        name: "Bo".into(),
+        ..ada()
+    };
+    let refused = handle.join(bo).await.expect("the task runs");
+    assert_eq!(refused, Err(JoinRefusal::RequestIdUsed));
+    assert_eq!(handle.describe().participants.len(), 5);
+}
+
+/// A server's tournaments in memory.
+fn in_memory() -> Arc<Tournaments> {
+    let store: Arc<dyn Store> = Arc::new(chefshat_store::MemoryStore::default());
+    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
+    Tournaments::new(rooms, TaskTracker::new())
+}
+
+/// Waits until a tournament is in this state, however long that takes on the paused clock.
+async fn until(handle: &TournamentHandle, wanted: impl Fn(&Tournament) -> bool) {
+    let mut changes = handle.changes();
+    while !handle.read(&wanted) {
+        changes.changed().await.expect("its handle is here");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn it_starts_by_itself_at_its_time_if_enough_have_joined() {
+    let tournaments = in_memory();
+    let hour_ms = 3_600_000;
+    let settings = |agents, start_at_ms| chefshat_proto::v1::TournamentSettings {
+        start_at_ms,
+        built_in_agents: vec!["random".into(); agents],
+        ..built_in("Coppa")
+    };
+    let create = async |agents, start_at_ms| {
+        let plan = convert::tournament_plan(&settings(agents, start_at_ms), [7; 32]);
+        let plan = plan.expect("valid settings");
+        tournaments.create("Coppa", plan, None, Key::Local).await
+    };
+    let now_ms = since_epoch_ms();
+    let before = tokio::time::Instant::now();
+    let (handle, _) = create(4, now_ms + hour_ms).await.expect("made");
+    assert_eq!(handle.read(Tournament::state), State::Open);
+    until(&handle, |core| core.state() != State::Open).await;
+    assert!(before.elapsed() >= Duration::from_millis(hour_ms - 60_000));
+
+    // With too few it waits for the second.
+    let (handle, _) = create(1, since_epoch_ms() + 1_000).await.expect("made");
+    tokio::time::sleep(Duration::from_secs(60)).await;
+    assert_eq!(handle.read(Tournament::state), State::Open);
+    let joined = handle.join(entrant("Ada")).await.expect("the task runs");
+    joined.expect("joined");
+    until(&handle, |core| core.state() != State::Open).await;
+
+    for refused in [now_ms - 1, since_epoch_ms() + 367 * 24 * hour_ms] {
+        let problem = create(4, refused)
+            .await
+            .expect_err("not a time to start at");
+        assert!(problem.to_string().starts_with("start_at_ms"), "{problem}");
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_pause_ends_by_itself() {
+    let tournaments = in_memory();
+    let settings = chefshat_proto::v1::TournamentSettings {
+        built_in_agents: Vec::new(),
+        no_show_time_ms: 86_400_000,
+        ..built_in("Coppa")
+    };
+    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+    let (handle, _) = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .await
+        .expect("made");
+    for name in ["Ada", "Bo", "Cem", "Dia"] {
+        let joined = handle.join(entrant(name)).await.expect("the task runs");
+        joined.expect("joined");
+    }
+    handle.begin().await.expect("the task runs").expect("begun");
+    let paused = handle.change_by_hand(ByHand::SetPaused(true)).await;
+    assert!(paused.expect("the task runs").is_ok());
+    let before = tokio::time::Instant::now();
+    until(&handle, |core| !core.is_paused()).await;
+    assert!(before.elapsed() >= crate::config::TOURNAMENT_PAUSE);
+    // Nobody comes, so it ends without results.
+    until(&handle, |core| core.state() == State::Finished).await;
+}
+
+/// A withdrawal with a ticket.
+fn withdrawal(ticket: &Token) -> ByHand {
+    ByHand::Withdraw {
+        who: Who::Ticket(ticket.hash()),
+        charged: Key::Local,
+    }
+}
+
+/// Somebody who takes a place, by a request with this id.
+fn cem(request_id: u8) -> Newcomer {
+    Newcomer::Somebody {
+        name: "Cem".into(),
+        kind: None,
+        max_games: 1,
+        stateless: true,
+        request_id: Some([request_id; 32]),
+    }
+}
+
+#[tokio::test]
+async fn the_ticket_of_a_participant_ends_with_its_place() {
+    let tournaments = in_memory();
+    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
+    let (handle, _) = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .await
+        .expect("made");
+    let join = async |name| {
+        let joined = handle.join(entrant(name)).await.expect("the task runs");
+        joined.expect("joined")
+    };
+    let change = async |what| handle.change_by_hand(what).await.expect("the task runs");
+    let known = |ticket: &Token| handle.participant_of(&ticket.secret);
+    let (ada, adas) = join("Ada").await;
+    assert_eq!(known(&adas), Some(ada));
+    assert_eq!(change(withdrawal(&adas)).await, Ok(None));
+    assert_eq!(known(&adas), None, "the place is free");
+    let (bo, bos) = join("Bo").await;
+    assert_ne!(bo, ada, "no number is used again");
+    // Decided when it is made: the ticket has no place any more.
+    let again = change(withdrawal(&adas)).await;
+    assert_eq!(again, Err(ByHandRefusal::TicketUnknown));
+    let (participant, by) = (bo, cem(3));
+    let replaced = change(ByHand::Replace { participant, by }).await;
+    let cems = replaced.expect("replaced").expect("a ticket");
+    assert_eq!((known(&bos), known(&cems)), (None, Some(bo)));
+    let late = change(withdrawal(&bos)).await;
+    assert_eq!(late, Err(ByHandRefusal::TicketUnknown));
+    // The response was lost.
+    let by = cem(3);
+    let again = change(ByHand::Replace { participant, by }).await;
+    assert_eq!(
+        again.map(|it| it.map(|it| it.secret)),
+        Ok(Some(cems.secret))
+    );
+    let other = change(ByHand::Replace {
+        participant: 0,
+        by: cem(3),
+    });
+    assert_eq!(other.await, Err(ByHandRefusal::RequestIdUsed));
+    handle.begin().await.expect("the task runs").expect("begun");
+    let postpone = ByHand::Postpone {
+        game: 0,
+        by: Some(bos.hash()),
+    };
+    assert_eq!(change(postpone).await, Err(ByHandRefusal::TicketUnknown));
+    assert_eq!(change(withdrawal(&cems)).await, Ok(None));
+    assert_eq!(known(&cems), Some(bo), "it may look at the results");
+    assert_eq!(change(withdrawal(&cems)).await, Ok(None));
+    assert_eq!(change(ByHand::Remove { participant }).await, Ok(None));
+    assert_eq!(known(&cems), None, "the organiser has removed it");
+}
+
+#[tokio::test]
+async fn a_repeated_replacement_by_a_built_in_agent_replaces_once() {
+    let tournaments = in_memory();
+    let settings = chefshat_proto::v1::TournamentSettings {
+        physical_tables: 1,
+        ..built_in("Coppa")
+    };
+    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+    let (handle, _) = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .await
+        .expect("made");
+    let table = Entry {
+        at_table: true,
+        ..entrant("Ada")
+    };
+    let (at_table, _) = (handle.join(table).await.expect("the task runs")).expect("joined");
+    let replace = async |participant, by| {
+        let what = ByHand::Replace { participant, by };
+        handle.change_by_hand(what).await.expect("the task runs")
+    };
+    let built_in = |agent: &str, name: &str, id: u8| Newcomer::BuiltIn {
+        agent: agent.parse().expect("a built-in agent"),
+        name: name.into(),
+        request_id: Some([id; 32]),
+    };
+    let former = |participant| handle.read(|core| core.former(participant).len());
+    let name =
+        |participant: usize| handle.read(|core| core.participants()[participant].name.clone());
+    // Two of them get the names "greedy" and "greedy 2"; the second is asked for twice.
+    let first = replace(0, built_in("greedy", "", 1)).await;
+    assert_eq!((first, name(0)), (Ok(None), "greedy".to_owned()));
+    for _ in 0..2 {
+        let second = replace(1, built_in("greedy", "", 2)).await;
+        assert_eq!(second, Ok(None));
+        assert_eq!((former(1), name(1)), (1, "greedy 2".to_owned()));
+        // The first name is free now.
+        replace(0, built_in("random", "Rita", 3))
+            .await
+            .expect("replaced");
+    }
+    assert_eq!(former(0), 2);
+    let other = replace(1, built_in("random", "", 2)).await;
+    assert_eq!(other, Err(ByHandRefusal::RequestIdUsed));
+    // Nor does a physical table return a ticket.
+    for _ in 0..2 {
+        assert_eq!(replace(at_table, cem(4)).await, Ok(None));
+        assert_eq!(former(at_table), 1);
+    }
+    // The answer is the same when the tournament is over.
+    handle.close().await.expect("the task runs");
+    assert_eq!(replace(at_table, cem(4)).await, Ok(None));
+    let late = replace(at_table, cem(5)).await;
+    assert_eq!(late, Err(ByHandProblem::Over.into()));
+}
+
+#[tokio::test]
+async fn one_caller_cannot_join_and_withdraw_for_ever() {
+    use crate::config::MAX_EARLY_WITHDRAWALS_OF_CALLER;
+    let tournaments = in_memory();
+    let plan = convert::tournament_plan(&built_in("Coppa"), [7; 32]).expect("valid settings");
+    let (handle, _) = tournaments
+        .create("Coppa", plan, None, Key::Local)
+        .await
+        .expect("made");
+    let come = async || {
+        let joined = handle.join(entrant("fickle")).await.expect("the task runs");
+        joined.expect("joined").1
+    };
+    let go = async |ticket: &Token, address: [u8; 4]| {
+        let what = ByHand::Withdraw {
+            who: Who::Ticket(ticket.hash()),
+            charged: Key::Address(address.into()),
+        };
+        handle.change_by_hand(what).await.expect("the task runs")
+    };
+    let (stranger, other) = ([192, 0, 2, 1], [192, 0, 2, 2]);
+    for _ in 0..MAX_EARLY_WITHDRAWALS_OF_CALLER {
+        assert_eq!(go(&come().await, stranger).await, Ok(None));
+    }
+    let ticket = come().await;
+    let refused = go(&ticket, stranger).await;
+    let most = MAX_EARLY_WITHDRAWALS_OF_CALLER;
+    assert_eq!(refused, Err(ByHandProblem::TooMany(most).into()));
+    assert_eq!(go(&ticket, other).await, Ok(None));
+    // What the organiser does is not counted there.
+    let ticket = come().await;
+    let participant = handle.participant_of(&ticket.secret).expect("joined");
+    let removed = ByHand::Remove { participant };
+    let removed = handle.change_by_hand(removed).await.expect("the task runs");
+    assert_eq!(removed, Ok(None));
+    handle.begin().await.expect("the task runs").expect("begun");
+}
