@@ -23,9 +23,11 @@
 //! ```
 
 mod actions;
+mod board;
 mod by_seat;
 mod cards;
 mod deal;
+mod decision;
 mod event;
 mod exchange;
 mod game;
@@ -44,15 +46,14 @@ mod rules;
 mod seed_plan;
 
 pub use actions::{Action, ActionSpace};
+pub use board::Board;
 pub use by_seat::BySeat;
 pub use cards::Cards;
 pub use deal::{Card, Deal, Seed};
+pub use decision::{Decision, DecisionKind, GiftRequirement, PlayRequirement, Requirement};
 pub use event::{Event, ShiftEnd, Viewer};
 pub use exchange::ExchangePair;
-pub use game::{
-    ActionError, Board, Decision, DecisionKind, Game, GameState, GiftRequirement, PlayRequirement,
-    Refusal, Requirement, Script, ScriptError, Stage, StateError,
-};
+pub use game::{ActionError, Game, GameState, Refusal, Script, ScriptError, Stage, StateError};
 pub use ids::{ActionId, Face, Seat};
 pub use mask::Mask;
 pub use metrics::{

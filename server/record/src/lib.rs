@@ -17,6 +17,7 @@ pub mod replay;
 pub mod samples;
 pub mod sheet;
 pub mod signature;
+mod stated;
 pub mod summary;
 #[cfg(feature = "testing")]
 pub mod testing;

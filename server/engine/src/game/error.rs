@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::decision::DecisionKind;
+use crate::DecisionKind;
 use crate::{Action, ActionId, Face};
 
 /// Why an action was refused. The game is unchanged.

@@ -3,12 +3,14 @@
 //! cards. `crate::patterns` lists all legal turns by table look-up; a test compares its masks with
 //! [`PlayRequirement::allows`] in random games, and with a second implementation of the rules.
 
-use super::decision::{Decision, GiftRequirement, PlayRequirement, Requirement};
 use super::error::{ActionError, Refusal};
 use super::{Game, Stage};
 use crate::exchange::default_gift;
 use crate::patterns::turn_mask;
-use crate::{Action, ActionId, ActionSpace, Cards, ExchangePair, Face, Mask, Opening, Seat};
+use crate::{
+    Action, ActionId, ActionSpace, Cards, Decision, ExchangePair, Face, GiftRequirement, Mask,
+    Opening, PlayRequirement, Requirement, Seat,
+};
 
 impl Game {
     /// What the rules require of the open decision; `None` if the game has ended.

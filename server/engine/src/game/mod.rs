@@ -1,10 +1,9 @@
 //! A game as a value: its open decision, applying an action, and reading its state. The modules:
-//! `decision` (the open decision and its requirements), `start` (deal, special action, exchange),
+//! `start` (deal, special action, exchange),
 //! `turn` (plays, passes, pizzas), `end` (places, points), `shift_state` (board and turn order),
 //! `legal` (what is legal), `view` (what a seat may know), `script` (games from given hands),
 //! `state` (the complete state as a value), `restore` (from a state to a game).
 
-mod decision;
 mod end;
 mod error;
 mod legal;
@@ -16,15 +15,13 @@ mod state;
 mod turn;
 mod view;
 
-pub use decision::{Decision, DecisionKind, GiftRequirement, PlayRequirement, Requirement};
 pub use error::{ActionError, Refusal};
 pub use script::{Script, ScriptError};
-pub use shift_state::Board;
 pub use state::{GameState, Stage, StateError};
 
 use crate::{
-    Action, ActionId, BySeat, Cards, Deal, Event, Role, RuleSet, Seat, SeatOrder, Seed,
-    SpecialAction, Standings, Stop,
+    Action, ActionId, BySeat, Cards, Deal, Decision, DecisionKind, Event, Role, RuleSet, Seat,
+    SeatOrder, Seed, SpecialAction, Standings, Stop,
 };
 use shift_state::ShiftState;
 

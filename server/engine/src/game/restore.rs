@@ -3,11 +3,12 @@
 //! moment; the decisions that led there are not part of a state.
 
 use super::Game;
-use super::shift_state::{Board, ShiftState, bit};
+use super::shift_state::{ShiftState, bit};
 use super::state::{GameState, Stage, StateError, ensure};
 use crate::deal::opening_leader;
 use crate::{
-    BySeat, Cards, ExchangePair, Face, Opening, PassScope, Role, Seat, SeatOrder, SpecialAction,
+    Board, BySeat, Cards, ExchangePair, Face, Opening, PassScope, Role, Seat, SeatOrder,
+    SpecialAction,
 };
 
 impl Game {

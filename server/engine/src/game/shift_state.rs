@@ -1,18 +1,7 @@
 //! The pizzas of one Shift (`docs/rules.md` §4): board, turn order, laps and places. Knows nothing
 //! of hands, points or events.
 
-use crate::{BySeat, Seat, SeatOrder};
-
-/// The play on the board.
-#[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
-pub struct Board {
-    /// The face, F+1 for a joker alone, 0 if the board is empty.
-    pub face: u8,
-    /// Number of cards, jokers included.
-    pub size: u8,
-    /// Number of jokers among them.
-    pub jokers: u8,
-}
+use crate::{Board, BySeat, Seat, SeatOrder};
 
 /// Bit of a seat in a set of seats.
 pub(super) const fn bit(seat: Seat) -> u8 {

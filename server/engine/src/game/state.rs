@@ -3,8 +3,8 @@
 
 use thiserror::Error;
 
-use super::shift_state::{Board, ShiftState, bit};
-use crate::{BySeat, Cards, RuleSet, Seat, SeatOrder, Seed, SpecialAction};
+use super::shift_state::{ShiftState, bit};
+use crate::{Board, BySeat, Cards, RuleSet, Seat, SeatOrder, Seed, SpecialAction};
 
 /// Where a game stands within a Shift.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]

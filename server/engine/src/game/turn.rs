@@ -1,9 +1,9 @@
 //! Applies a legal turn: moves the cards, then gives the turn to the next seat, or ends the pizza
 //! (`docs/rules.md` §4.6) or the Shift (§4.7).
 
-use super::shift_state::{Board, bit};
+use super::shift_state::bit;
 use super::{Game, Stage};
-use crate::{ActionId, Event, Face, Opening, PassScope, Seat};
+use crate::{ActionId, Board, Event, Face, Opening, PassScope, Seat};
 
 impl Game {
     pub(super) fn play_face(

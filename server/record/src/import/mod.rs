@@ -26,11 +26,9 @@ use crate::convert::{
 };
 use crate::jsonl::FORMAT_VERSION;
 use crate::replay::{game_started, replay};
-pub(crate) use facts::facts_of_record;
 use facts::facts_of_transcript;
 use notes::RuledShifts;
 pub use room::{PhysicalRoom, RoomEntry};
-pub(crate) use start::start_of_header;
 use start::start_of_transcript;
 use transcript::{Entry, Row, Transcript, read, wrong};
 pub use transcript::{MAX_TRANSCRIPT_BYTES, TranscriptError};

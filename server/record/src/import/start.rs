@@ -1,41 +1,9 @@
 //! The state of an imported game before its first stated Shift.
 
-use chefshat_engine::{BySeat, Deal, Role, RuleSet, Seat, SeatOrder};
-use chefshat_proto::v1;
-use chefshat_referee::{NO_SEED, StartState};
+use chefshat_engine::{BySeat, Role, Seat, SeatOrder};
+use chefshat_referee::StartState;
 
 use super::transcript::{Entry, Transcript, TranscriptError, wrong};
-use crate::convert::{FieldProblem, script_from_proto, seat_cards, seat_number};
-
-/// Reads the header of an imported record: a scripted Shift without hands, or none.
-pub(crate) fn start_of_header(
-    scripted: Option<&v1::ScriptedShift>,
-    rules: &RuleSet,
-) -> Result<StartState, FieldProblem> {
-    let scripted = scripted.cloned().unwrap_or_default();
-    if !scripted.hands.is_empty() || scripted.drawn_seat.is_some() {
-        return Err(FieldProblem::new(
-            "hands",
-            "hands of an imported game are stated in its Shifts",
-        ));
-    }
-    let deal = Deal::new(rules, NO_SEED, 1);
-    let any_hands = v1::ScriptedShift {
-        hands: deal
-            .hands()
-            .iter()
-            .map(|(seat, &hand)| seat_cards(seat, hand, rules.faces()))
-            .collect(),
-        drawn_seat: deal.drawn().map(seat_number),
-        ..scripted
-    };
-    let script = script_from_proto(&any_hands, rules)?;
-    Ok(StartState {
-        shift: script.shift,
-        last_order: script.last_order,
-        scores: script.scores,
-    })
-}
 
 /// Reads a transcript: the rows `role` and `points` of its first Shift, unless that is the
 /// first of the game.

@@ -16,8 +16,8 @@ use super::seed::Seeds;
 use crate::convert::{
     By, LAST_MS, check_marker, event_kind, final_table, seat_number, with_rewards,
 };
-use crate::import::facts_of_record;
 use crate::signature::{PublicKey, Signed, TextHash};
+use crate::stated::facts_of_record;
 
 /// The cause of the first deal, which follows from no decision.
 const NO_DECISION: By = By {

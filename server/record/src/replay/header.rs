@@ -14,9 +14,9 @@ use crate::convert::{
     LAST_MS, action_space, has_real_cards, reward_scheme_from_proto, rules_from_proto,
     rules_to_proto, script_from_proto,
 };
-use crate::import::start_of_header;
 use crate::jsonl::FORMAT_VERSION;
 use crate::pseudonym::is_fingerprint;
+use crate::stated::start_of_header;
 
 const COMMITMENT_BYTES: usize = 32;
 /// Milliseconds of a day, the longest time of a policy.

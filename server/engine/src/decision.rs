@@ -1,4 +1,4 @@
-//! A decision that a game waits for, and what the rules require of it. `super::legal` derives the
+//! A decision that a game waits for, and what the rules require of it. `game::legal` derives the
 //! requirement from the state of the game.
 
 use crate::{Action, Seat, SpecialAction};
