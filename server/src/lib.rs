@@ -2,18 +2,10 @@
 //! and the page. The core of a room is `chefshat-room`, the rules are `chefshat-engine`; the
 //! command line is `chefshat`, in `server/cli` and `server/lab`.
 
-pub mod connections;
-pub mod forwarded;
-pub mod grpc;
-pub mod handshakes;
 pub mod host;
 #[cfg(test)]
 mod limits_page;
-pub mod peers;
-pub mod scrape;
 pub mod serve;
-pub mod tls;
-pub mod web;
 
 pub use chefshat_base::{clock, file_watch, metrics, post, proxies, tasks, threads, tls_files};
 
@@ -24,6 +16,8 @@ pub use chefshat_wire::{convert, encoded as wire, outbox};
 pub use chefshat_admission::{access, limits};
 
 pub use chefshat_hosting::{
-    cluster, config, journaled, participants, record_writer, retention, room, rooms, signing,
+    cluster, config, journaled, node, participants, record_writer, retention, room, rooms, signing,
     studies, tournaments, webhooks,
 };
+
+pub use chefshat_gateway::{connections, forwarded, grpc, handshakes, peers, scrape, tls, web};

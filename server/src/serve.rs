@@ -32,7 +32,7 @@ use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
 use tracing::{info, warn};
 
 use crate::access::{Access, Call, TokenFileError};
-use crate::cluster::{ClusterNode, Directory, Hosted, NodeLease, SingleServer, StoreDirectory};
+use crate::cluster::{Directory, NodeLease, SingleServer, StoreDirectory};
 use crate::config::{
     CLOSE_LIMIT, DRAIN_LIMIT, END_LIMIT, HAND_OVER_LIMIT, MAX_STREAMS_PER_CONNECTION, ServerConfig,
     longest_shutdown,
@@ -43,6 +43,7 @@ use crate::grpc;
 use crate::handshakes::Handshakes;
 use crate::limits::{CallLimits, Metered};
 use crate::metrics::Metrics;
+use crate::node::{ClusterNode, Hosted};
 use crate::participants::Participants;
 use crate::peers::{
     CONNECTION_WINDOW, MAX_RESET_STREAMS, PING_INTERVAL, PING_TIMEOUT, PeerPort, STREAM_WINDOW,

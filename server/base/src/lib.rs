@@ -8,3 +8,6 @@ pub mod proxies;
 pub mod tasks;
 pub mod threads;
 pub mod tls_files;
+
+/// Version of this server, as its records and webhooks name it.
+pub const SERVER_VERSION: &str = env!("CARGO_PKG_VERSION");

@@ -222,18 +222,19 @@ mod tests {
             "move || {",
             "work for a pool of threads",
         ),
+        ("gateway/src/web/preview.rs", ");", "another process"),
         (
             "src/host.rs",
             "serve(listener, config, store, stopped)),",
             "the server itself",
         ),
-        ("src/web/preview.rs", ");", "another process"),
     ];
 
     /// Where tasks are spawned.
-    const PARTS: [&str; 6] = [
+    const PARTS: [&str; 7] = [
         "admission/src",
         "base/src",
+        "gateway/src",
         "hosting/src",
         "src",
         "store/src",

@@ -52,7 +52,7 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
 pub struct CommandLine<C: Subcommand> {
     #[command(subcommand)]
     command: C,
-    /// Log filter for standard error, for example `debug` or `chefshat_server=debug`.
+    /// Log filter for standard error, for example `debug` or `chefshat=debug`.
     #[arg(long, env = "CHEFSHAT_LOG", default_value = "warn", global = true)]
     log: String,
     /// Log lines as JSON.

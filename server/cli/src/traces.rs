@@ -55,7 +55,7 @@ impl Traces {
         tracing_opentelemetry::layer()
             .with_tracer(self.provider.tracer("chefshat"))
             .with_filter(filter_fn(|of| {
-                of.target().starts_with("chefshat_server") && *of.level() <= tracing::Level::DEBUG
+                of.target().starts_with("chefshat_") && *of.level() <= tracing::Level::DEBUG
             }))
     }
 }
@@ -123,9 +123,10 @@ mod tests {
             let traces = Traces::to(&format!("http://{address}")).expect("a URL");
             let subscriber = tracing_subscriber::registry().with(traces.layer());
             tracing::subscriber::with_default(subscriber, || {
-                let room = tracing::info_span!(target: "chefshat_server::room", "room", room = "r");
+                let room =
+                    tracing::info_span!(target: "chefshat_hosting::room", "room", room = "r");
                 let _room = room.enter();
-                tracing::debug_span!(target: "chefshat_server::room", "decision").in_scope(|| ());
+                tracing::debug_span!(target: "chefshat_hosting::room", "decision").in_scope(|| ());
                 tracing::error_span!(target: "hyper", "connection").in_scope(|| ());
             });
         });

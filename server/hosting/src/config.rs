@@ -13,8 +13,6 @@ use chefshat_admission::limits::Shares;
 use chefshat_base::proxies::TrustedProxies;
 use chefshat_base::tls_files::TlsFiles;
 
-/// Version of this server, as its records and webhooks name it.
-pub const SERVER_VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Largest message between nodes, bytes: a batch of inputs of one client, or of updates for it.
 pub const MAX_PEER_MESSAGE_BYTES: usize = 16 * 1024 * 1024;
 /// Most streams of one connection.

@@ -3,6 +3,7 @@
 pub mod cluster;
 pub mod config;
 pub mod journaled;
+pub mod node;
 pub mod participants;
 pub mod record_writer;
 pub mod retention;

@@ -112,7 +112,7 @@ impl Rewrite {
             })?;
             is_over |= entries.iter().any(TournamentEntry::is_end);
             if forget_entrant(&mut entries, &self.who) {
-                changed.push((position, form::tournament_entries_to_bytes(&entries)));
+                changed.push((position, TournamentEntry::to_bytes(&entries)));
             }
         }
         if changed.is_empty() {

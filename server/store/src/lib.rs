@@ -4,6 +4,7 @@
 pub mod cluster;
 mod codec;
 mod ephemeral;
+mod error;
 mod forget;
 mod form;
 mod memory;
@@ -28,6 +29,7 @@ use futures::future::{BoxFuture, ready};
 use prost::Message as _;
 
 pub use codec::MAX_CONCURRENT_RECORDS;
+pub use error::StoreError;
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
 pub use postgres::{
     DatabaseError, PostgresOptions, PostgresStore, TransferError, Transferred, migrate, transfer,
@@ -41,24 +43,6 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader, TournamentGame};
 use chefshat_wire::convert;
 use units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
-
-/// Why a store failed, with advice.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum StoreError {
-    /// The store failed; a commit in progress may or may not have succeeded.
-    #[error("{0}")]
-    Failed(String),
-    /// The id of a game or tournament is taken. Nothing was changed, and the store has not failed.
-    #[error("the id {0} is taken")]
-    Taken(Id),
-    /// A game or study cannot be read. The store has not failed.
-    #[error("{0}")]
-    Unreadable(String),
-    /// Another node of the cluster owns the unit of this room or tournament. Nothing was changed,
-    /// and the store has not failed; the room or tournament must stop and publish nothing more.
-    #[error("another node has taken {0} over")]
-    Fenced(Id),
-}
 
 /// A finished game in the store.
 #[derive(Debug, Clone)]

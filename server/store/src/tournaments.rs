@@ -3,9 +3,6 @@
 use chefshat_proto::v1;
 use chefshat_tournament::Change;
 
-use super::form::Unreadable;
-use super::units::{StoredUnit, UnitKind};
-use super::{StoreError, form};
 use chefshat_room::ids::{Id, SecretHash};
 
 /// The header of a tournament, which exists before anybody joins.
@@ -23,13 +20,6 @@ pub struct TournamentHeader {
     pub owner: SecretHash,
     /// The seed of games with shared deals.
     pub deal_secret: [u8; 32],
-}
-
-impl TournamentHeader {
-    /// Its encoding.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        form::tournament_to_bytes(self)
-    }
 }
 
 /// An entry of a tournament's journal.
@@ -57,11 +47,6 @@ pub enum TournamentEntry {
 }
 
 impl TournamentEntry {
-    /// The encoding of entries.
-    pub fn to_bytes(entries: &[Self]) -> Vec<u8> {
-        form::tournament_entries_to_bytes(entries)
-    }
-
     /// Whether it ends the tournament.
     pub fn is_end(&self) -> bool {
         matches!(self, Self::Change(Change::Finished | Change::Closed))
@@ -77,26 +62,4 @@ pub struct StoredTournament {
     pub entries: Vec<TournamentEntry>,
     /// Number of rows of the journal.
     pub rows: u64,
-}
-
-impl StoredTournament {
-    /// Decodes a tournament.
-    ///
-    /// # Errors
-    /// It cannot be read.
-    pub fn decode(id: Id, unit: &StoredUnit) -> Result<Self, StoreError> {
-        Self::readable(unit).map_err(|problem| UnitKind::Tournament.id(id).unreadable(&problem))
-    }
-
-    pub(super) fn readable(unit: &StoredUnit) -> Result<Self, Unreadable> {
-        let (header, entries) = unit.decode(
-            form::tournament_from_bytes,
-            form::tournament_entries_from_bytes,
-        )?;
-        Ok(Self {
-            header,
-            entries,
-            rows: unit.rows.len() as u64,
-        })
-    }
 }

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use chefshat_server::cluster::PEER_NAME;
+use chefshat_server::peers::PEER_NAME;
 use rcgen::{BasicConstraints, CertificateParams, IsCa, Issuer, KeyPair};
 
 /// The authority.

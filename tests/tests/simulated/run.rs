@@ -12,7 +12,6 @@ use chefshat_client::{
 };
 use chefshat_record::replay::replay;
 use chefshat_server::config::ServerConfig;
-use chefshat_server::convert::lines_of;
 use chefshat_server::serve::Server;
 use chefshat_tests::Ledger;
 use rand::{RngExt as _, SeedableRng as _};
@@ -324,7 +323,7 @@ fn check_end(disk: &Disk, ledger: &Ledger, outcomes: &[Outcome], trace: &Trace, 
         journal.clone().into(),
         None,
     );
-    let lines = lines_of(&stored);
+    let lines = stored.lines();
     replay(&lines).expect("the record verifies");
     run.acknowledged = ledger.assert_committed(&header.game_id.to_string(), &lines);
     assert_eq!(outcomes.len(), 4);

@@ -8,8 +8,8 @@ use chefshat_proto::v1::{
     self, room_service_client::RoomServiceClient, seat_update::Update,
     spectator_service_client::SpectatorServiceClient,
 };
-use chefshat_server::peers::{PEER_NAME, PeerPort, PeerPortError};
 use chefshat_server::config::ServerConfig;
+use chefshat_server::peers::{PEER_NAME, PeerPort, PeerPortError};
 use chefshat_server::proxies::TrustedProxies;
 use chefshat_server::tls::TlsFiles;
 use chefshat_tests::{StreamSeat, TestNodes};

@@ -202,7 +202,7 @@ async fn each_decision_is_logged_in_the_spans_of_its_room_and_itself() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut launch = Launch::new(folder.path())
         .flags(&["--log-json"])
-        .with("--log", "chefshat_server=debug");
+        .with("--log", "chefshat=debug");
     let server = launch.start().await.expect("the server starts");
     let client = Client::connect(&launch.url()).await.expect("it listens");
     let (created, tickets) = room_of_four(&client, one_shift(), v1::RoomPolicy::default()).await;

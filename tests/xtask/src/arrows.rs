@@ -124,7 +124,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
-        "chefshat-server",
+        "chefshat-gateway",
         &[
             "chefshat-base",
             "chefshat-wire",
@@ -139,12 +139,21 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "chefshat-tournament",
             "chefshat-simulation",
             "chefshat-record",
-            "chefshat-dataset",
-            "chefshat-render",
             "chefshat-room",
             "chefshat-vector",
-            "chefshat-cluster",
             "chefshat-study",
+        ],
+    ),
+    (
+        "chefshat-server",
+        &[
+            "chefshat-base",
+            "chefshat-wire",
+            "chefshat-store",
+            "chefshat-admission",
+            "chefshat-hosting",
+            "chefshat-gateway",
+            "chefshat-proto",
         ],
     ),
     ("chefshat-client", &["chefshat-proto"]),
@@ -208,7 +217,13 @@ const ALLOWED: &[(&str, &[&str])] = &[
 
 /// Crates that the tests of a crate may depend on besides [`ALLOWED`] and, for its test features,
 /// itself.
-const ALLOWED_IN_TESTS: &[(&str, &[&str])] = &[("chefshat-server", &["chefshat-postgres"])];
+const ALLOWED_IN_TESTS: &[(&str, &[&str])] = &[
+    ("chefshat-store", &["chefshat-agents", "chefshat-postgres"]),
+    (
+        "chefshat-server",
+        &["chefshat-engine", "chefshat-record", "chefshat-room"],
+    ),
+];
 
 /// Refuses dependencies between crates of the workspace that the tables do not allow.
 pub(crate) fn check(places: &Places) -> Result<(), Failure> {

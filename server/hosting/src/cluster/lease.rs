@@ -54,12 +54,12 @@ impl NodeLease {
     }
 
     /// The node, once it has joined.
-    pub(super) fn node(&self) -> Option<NodeId> {
+    pub(crate) fn node(&self) -> Option<NodeId> {
         *self.node.lock().expect("nothing panics under this lock")
     }
 
     /// Sets the node, which has just joined.
-    pub(super) fn joined(&self, node: NodeId) {
+    pub(crate) fn joined(&self, node: NodeId) {
         *self.node.lock().expect("nothing panics under this lock") = Some(node);
     }
 
@@ -117,7 +117,7 @@ impl NodeLease {
     }
 
     /// Waits until there is news, and returns it.
-    pub(super) async fn news(&self) -> BTreeSet<(Id, News)> {
+    pub(crate) async fn news(&self) -> BTreeSet<(Id, News)> {
         loop {
             let news = std::mem::take(&mut *self.all_news());
             if !news.is_empty() {

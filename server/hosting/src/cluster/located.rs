@@ -24,7 +24,7 @@ const MAX_REMEMBERED: usize = 20_000;
 const LOOKED_FOR_AT_ONCE: usize = 2;
 /// How long a look takes at most, with the wait for its turn: many for one caller would otherwise wait
 /// for a database that hangs one after another.
-pub(super) const LOOK_LIMIT: Duration = Duration::from_secs(2);
+pub(crate) const LOOK_LIMIT: Duration = Duration::from_secs(2);
 /// How long it is known which nodes have a lease.
 const NODES_KNOWN_FOR: Duration = Duration::from_secs(1);
 

@@ -3,18 +3,14 @@
 
 use std::sync::Arc;
 
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::mpsc;
 use tokio::time::{Instant, sleep_until};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info, warn};
 
-use super::{Handle, Journaled};
+use super::unit::Journaled;
 use crate::cluster::News;
-use crate::rooms::Rooms;
-use chefshat_admission::limits::Held;
-use chefshat_room::ids::Id;
 use chefshat_store::StoreError;
-use chefshat_store::units::{UnitRow, UnitWrite};
 
 /// Messages that are processed before their consequences are computed.
 const MESSAGES_AT_A_TIME: usize = 64;
@@ -27,89 +23,6 @@ pub(super) struct Stop {
     pub(super) no_more_games: CancellationToken,
     /// Cancelled when the tasks end.
     pub(super) end: CancellationToken,
-}
-
-/// What the task of every unit has: the state with what is not committed yet, and who waits for that.
-pub struct Unit<U: Journaled> {
-    pub(crate) handle: Arc<Handle<U>>,
-    pub(crate) rooms: Arc<Rooms>,
-    /// The state with pending entries; the handle's copy follows when they are committed.
-    pub(crate) state: U::State,
-    /// Number of committed rows.
-    pub(crate) rows: u64,
-    /// Whether something visible has changed that is not an entry.
-    pub(crate) has_changed: bool,
-    /// Entries of the next commit.
-    pending: Vec<U::Entry>,
-    /// What is done after the next commit.
-    replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
-    /// Its place among its creator's units.
-    _place: Held,
-}
-
-impl<U: Journaled> Unit<U> {
-    pub(super) fn new(handle: Arc<Handle<U>>, rooms: Arc<Rooms>, rows: u64, place: Held) -> Self {
-        let state = handle.committed().clone();
-        Self {
-            handle,
-            rooms,
-            state,
-            rows,
-            has_changed: false,
-            pending: Vec::new(),
-            replies: Vec::new(),
-            _place: place,
-        }
-    }
-
-    /// Applies an entry and adds it to the next commit.
-    pub(crate) fn push(&mut self, entry: U::Entry) {
-        U::apply(&mut self.state, &entry);
-        self.pending.push(entry);
-    }
-
-    /// Whether entries wait for the next commit.
-    pub(crate) fn is_pending(&self) -> bool {
-        !self.pending.is_empty()
-    }
-
-    /// Does something after the next commit.
-    pub(crate) fn after_commit(&mut self, reply: impl FnOnce() + Send + Sync + 'static) {
-        self.replies.push(Box::new(reply));
-    }
-
-    /// Answers a caller after the next commit.
-    pub(crate) fn reply<T: Send + Sync + 'static>(&mut self, reply: oneshot::Sender<T>, answer: T) {
-        self.after_commit(move || {
-            // The caller may have gone.
-            let _ = reply.send(answer);
-        });
-    }
-
-    /// Does what waited for the commit.
-    pub(crate) fn send_replies(&mut self) {
-        self.replies.drain(..).for_each(|reply| reply());
-    }
-
-    /// Adds a row to the journal in the store. Returns once this server may publish it.
-    async fn append(&self, entries: &[U::Entry]) -> Result<(), StoreError> {
-        let id = self.id();
-        let row = UnitRow {
-            position: self.rows,
-            entries: U::row_to_bytes(entries),
-            over: U::is_over(&self.state),
-        };
-        let store = self.rooms.store();
-        let written = store.write_unit(U::KIND.id(id), UnitWrite::Append(row));
-        match self.rooms.lease() {
-            Some(lease) => lease.published(id, &self.handle.end, written).await,
-            None => written.await,
-        }
-    }
-
-    fn id(&self) -> Id {
-        self.handle.id()
-    }
 }
 
 /// Runs a unit until it is over or deleted, the server ends, or its store fails.

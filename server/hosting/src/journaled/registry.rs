@@ -8,7 +8,7 @@ use tracing::{error, info};
 
 use super::actor::{self, Stop};
 use super::table::Table;
-use super::{Handle, Journaled, Unit, UnitHeader as _};
+use super::unit::{Handle, Journaled, New, Unit, UnitHeader as _};
 use crate::cluster::News;
 use crate::rooms::Rooms;
 use chefshat_admission::limits::{Held, Key, Places, Refused};
@@ -46,21 +46,6 @@ type Problem<U> = CreateProblem<<U as Journaled>::SettingsProblem>;
 /// The owner token of what a request creates: repetitions have the same.
 pub(crate) fn owner_of(request: Option<RequestKey>) -> Token {
     request.map_or_else(|| Token::random(Id::random()), |key| key.owner())
-}
-
-/// A unit as its journal has it.
-pub struct Folded<U: Journaled> {
-    pub(crate) header: U::Header,
-    pub(crate) plan: U::Plan,
-    pub(crate) state: U::State,
-    /// Number of rows of the journal.
-    pub(crate) rows: u64,
-}
-
-/// A unit that is in the store and about to run.
-pub(crate) struct New<U: Journaled> {
-    pub(crate) folded: Folded<U>,
-    pub(crate) shared: U::Shared,
 }
 
 /// The units of a kind on a server.

@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
-use super::{Handle, Journaled, UnitHeader as _};
+use super::unit::{Handle, Journaled, UnitHeader as _};
 use chefshat_room::ids::Id;
 
 pub(super) struct Table<U: Journaled> {

@@ -2,11 +2,16 @@
 //! a budget of the whole server, of which each caller may use its share. Settings have a budget of
 //! their own.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
+use chefshat_proto::cost::{Cost, shapes};
+use chefshat_proto::v1;
 use chefshat_study::{ItemAnswer, Participant, Study};
+use prost::Message as _;
+use tokio::sync::{Mutex as AsyncMutex, watch};
 
 use chefshat_admission::limits::{Held, Key, Places, Refused};
 use chefshat_base::clock::TimeOfDay;
@@ -16,6 +21,36 @@ use chefshat_room::ids::Id;
 pub(super) const RETRY_STUDIES: Duration = Duration::from_secs(3_600);
 /// Bytes that the answers of a questionnaire take besides their content.
 const OVERHEAD_OF_ANSWERS: usize = 256;
+
+/// What readers of a study share besides its state.
+#[derive(Debug)]
+pub struct StudyShared {
+    /// The memory of its settings.
+    pub(super) _memory: Held,
+    /// The memory of its participants and answers.
+    pub(super) data: Arc<StudyData>,
+    /// Counts the changes of each participant to whom somebody has listened.
+    pub(super) views: Mutex<BTreeMap<u32, watch::Sender<u64>>>,
+    /// Participants whose data are being deleted.
+    pub(super) deleting: Mutex<BTreeSet<u32>>,
+    /// Number of interface traces by game, since the server was started. Locked while traces are
+    /// added or deleted.
+    pub(super) traces: AsyncMutex<BTreeMap<Id, usize>>,
+    pub(super) streams: AtomicU64,
+}
+
+impl StudyShared {
+    pub(super) fn new(memory: Held, data: Arc<StudyData>) -> Self {
+        Self {
+            _memory: memory,
+            data,
+            views: Mutex::default(),
+            deleting: Mutex::default(),
+            traces: AsyncMutex::default(),
+            streams: AtomicU64::new(0),
+        }
+    }
+}
 
 /// What all studies of a server share.
 #[derive(Debug)]
@@ -145,4 +180,10 @@ fn memory_of_participant(name: usize) -> usize {
 fn memory_of_answers(answers: &[ItemAnswer]) -> usize {
     let content: usize = answers.iter().map(ItemAnswer::memory).sum();
     OVERHEAD_OF_ANSWERS + content
+}
+
+/// Bytes that settings take in memory, at most.
+pub(super) fn memory_of(settings: &v1::StudySettings) -> usize {
+    let cost = shapes::STUDY_SETTINGS.cost(&settings.encode_to_vec(), Cost::MAX);
+    cost.expect("what was just encoded is readable").memory
 }

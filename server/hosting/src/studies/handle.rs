@@ -1,14 +1,14 @@
 //! The handle of one study: what others can read of it, and messages to its task.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, MutexGuard};
 
 use chefshat_proto::v1;
 use chefshat_study::{
     At, Change, Content, ItemAnswer, ParticipantLink, Refusal, SessionSecret, Study,
 };
-use tokio::sync::{Mutex as AsyncMutex, watch};
+use tokio::sync::watch;
 
 use super::data::StudyData;
 use super::message::{Command, Message};
@@ -59,36 +59,6 @@ pub enum NotAdded {
 
 /// A study of this server.
 pub type StudyHandle = Handle<StudyTask>;
-
-/// What readers of a study share besides its state.
-#[derive(Debug)]
-pub struct StudyShared {
-    /// The memory of its settings.
-    pub(super) _memory: Held,
-    /// The memory of its participants and answers.
-    pub(super) data: Arc<StudyData>,
-    /// Counts the changes of each participant to whom somebody has listened.
-    views: Mutex<BTreeMap<u32, watch::Sender<u64>>>,
-    /// Participants whose data are being deleted.
-    deleting: Mutex<BTreeSet<u32>>,
-    /// Number of interface traces by game, since the server was started. Locked while traces are
-    /// added or deleted.
-    pub(super) traces: AsyncMutex<BTreeMap<Id, usize>>,
-    streams: AtomicU64,
-}
-
-impl StudyShared {
-    pub(super) fn new(memory: Held, data: Arc<StudyData>) -> Self {
-        Self {
-            _memory: memory,
-            data,
-            views: Mutex::default(),
-            deleting: Mutex::default(),
-            traces: AsyncMutex::default(),
-            streams: AtomicU64::new(0),
-        }
-    }
-}
 
 impl StudyHandle {
     /// Its settings.

@@ -12,10 +12,8 @@ mod tests;
 
 use std::sync::Arc;
 
-use chefshat_proto::cost::{Cost, shapes};
 use chefshat_proto::v1;
 use chefshat_study::{SettingsProblem, Study};
-use prost::Message as _;
 use tokio_util::task::TaskTracker;
 
 pub use export::{ExportError, ExportedFile};
@@ -31,10 +29,9 @@ use chefshat_base::clock::{TimeOfDay, since_epoch_ms};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{Id, RequestKey, Token, random_bytes};
 use chefshat_store::StoreError;
-use chefshat_store::studies::{StoredStudy, StudyHeader};
+use chefshat_store::studies::StudyHeader;
 use chefshat_wire::convert::{self, StudyPlan};
-use data::{Budgets, StudyData};
-use handle::StudyShared;
+use data::{Budgets, StudyData, StudyShared, memory_of};
 use task::StudyTask;
 
 /// Why a study was not created.
@@ -172,20 +169,6 @@ fn check(settings: v1::StudySettings, durable: bool) -> Result<Checked, Settings
         core,
         memory,
     })
-}
-
-/// The state of a stored study.
-fn restored(stored: &StoredStudy) -> Result<(StudyPlan, Study), SettingsProblem> {
-    let plan = convert::study_plan(&stored.header.settings)?;
-    let mut study = Study::new(Arc::clone(&plan.core))?;
-    stored.changes.iter().for_each(|change| study.fold(change));
-    Ok((plan, study))
-}
-
-/// Bytes that settings take in memory, at most.
-fn memory_of(settings: &v1::StudySettings) -> usize {
-    let cost = shapes::STUDY_SETTINGS.cost(&settings.encode_to_vec(), Cost::MAX);
-    cost.expect("what was just encoded is readable").memory
 }
 
 /// An id whose last four bytes are 0, so that links can leave them out.

@@ -9,10 +9,8 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
 use tracing::info;
 
-use super::data::{Budgets, RETRY_STUDIES, StudyData};
-use super::handle::StudyShared;
+use super::data::{Budgets, RETRY_STUDIES, StudyData, StudyShared, memory_of};
 use super::message::{Command, Message};
-use super::{StudyPlan, memory_of, restored};
 use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
 use crate::journaled::{Folded, Journaled, Unit, UnitHeader};
 use chefshat_admission::limits::{Key, Refused};
@@ -22,6 +20,7 @@ use chefshat_room::ids::{Id, SecretHash};
 use chefshat_store::StoreError;
 use chefshat_store::studies::{StoredStudy, StudyHeader, changes_to_bytes};
 use chefshat_store::units::{StoredUnit, UnitKind, UnitWrite};
+use chefshat_wire::convert::{self, StudyPlan};
 
 impl UnitHeader for StudyHeader {
     fn id(&self) -> Id {
@@ -367,4 +366,12 @@ impl StudyTask {
         let participant = self.unit.state.participant(number);
         participant.is_some_and(|it| it.status == Status::Active)
     }
+}
+
+/// The state of a stored study.
+fn restored(stored: &StoredStudy) -> Result<(StudyPlan, Study), SettingsProblem> {
+    let plan = convert::study_plan(&stored.header.settings)?;
+    let mut study = Study::new(Arc::clone(&plan.core))?;
+    stored.changes.iter().for_each(|change| study.fold(change));
+    Ok((plan, study))
 }

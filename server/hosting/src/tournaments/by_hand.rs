@@ -4,8 +4,9 @@
 use chefshat_agents::NamedAgent;
 use chefshat_tournament::{ByHandProblem, Entrant, Leaving, State};
 
-use super::handle::{TournamentHandle, TournamentState};
+use super::handle::TournamentHandle;
 use super::message::{ByHand, ByHandRefusal, Call, Message, Newcomer, Who};
+use super::state::TournamentState;
 use super::task::TournamentTask;
 use crate::config::MAX_EARLY_WITHDRAWALS_OF_CALLER;
 use crate::journaled::Stopped;

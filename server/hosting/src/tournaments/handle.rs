@@ -1,17 +1,15 @@
 //! The handle of one tournament: what others can read of it, and messages to its task.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use chefshat_proto::v1;
 use chefshat_record::pseudonym::Pseudonym;
-use chefshat_tournament::{
-    BeginProblem, Change, Entrant, GameState, JoinProblem, State, Tournament,
-};
+use chefshat_tournament::{BeginProblem, Entrant, GameState, JoinProblem, Tournament};
 use sha2::{Digest as _, Sha256};
 use tokio::sync::mpsc;
 
 use super::message::{Call, Connection, Entry, JoinRefusal, Message};
-use super::shared::{AsOf, Shared};
+use super::state::TournamentState;
 use super::task::TournamentTask;
 use crate::journaled::{Handle, Stopped};
 use crate::rooms::Rooms;
@@ -20,7 +18,6 @@ use chefshat_base::tasks::short;
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::Visibility;
-use chefshat_store::tournaments::TournamentEntry;
 use chefshat_wire::convert;
 use chefshat_wire::outbox::StreamEnd;
 
@@ -41,108 +38,8 @@ pub enum TableProblem {
     Over,
 }
 
-/// The state of a tournament. Its task has one with pending changes; the handle has one with only
-/// committed changes, for readers.
-#[derive(Debug, Clone)]
-pub struct TournamentState {
-    pub(crate) core: Tournament,
-    /// Hashed tickets of participants; built-in ones have none.
-    pub(super) tickets: BTreeMap<usize, SecretHash>,
-    /// Rooms and game ids of the tournament's games.
-    pub(super) placed: BTreeMap<usize, (Id, Id)>,
-    /// Ids of the connections that have participants now.
-    pub(super) connected: BTreeMap<usize, u64>,
-}
-
-impl TournamentState {
-    /// The initial state.
-    pub(super) fn new(core: Tournament) -> Self {
-        Self {
-            core,
-            tickets: BTreeMap::new(),
-            placed: BTreeMap::new(),
-            connected: BTreeMap::new(),
-        }
-    }
-
-    /// The participant with this ticket, in constant time for each.
-    pub(super) fn participant_of(&self, ticket: &SecretHash) -> Option<usize> {
-        let mut tickets = self.tickets.iter();
-        tickets
-            .find(|(_, known)| known.is(ticket))
-            .map(|(participant, _)| *participant)
-    }
-
-    /// The answer to an earlier request with the same id; `None` if the request is new.
-    pub(super) fn joined_before(
-        &self,
-        entry: &Entry,
-        ticket: Token,
-    ) -> Option<Result<(usize, Token), JoinRefusal>> {
-        let participant = self.participant_of(&ticket.hash())?;
-        Some(
-            match self.core.participants()[participant] == entry.entrant() {
-                true => Ok((participant, ticket)),
-                false => Err(JoinRefusal::RequestIdUsed),
-            },
-        )
-    }
-
-    /// Applies an entry of the tournament's journal.
-    pub(super) fn apply(&mut self, entry: &TournamentEntry) {
-        match entry {
-            TournamentEntry::Change(change) => {
-                match change {
-                    Change::Withdrawn {
-                        participant,
-                        removed,
-                    } if *removed || self.core.state() == State::Open => {
-                        self.tickets.remove(participant);
-                    }
-                    Change::Replaced { participant, .. } => {
-                        self.tickets.remove(participant);
-                    }
-                    _ => {}
-                }
-                self.core.fold(change);
-            }
-            TournamentEntry::Ticket {
-                participant,
-                ticket,
-            } => drop(self.tickets.insert(*participant, *ticket)),
-            TournamentEntry::Placed {
-                game,
-                room_id,
-                game_id,
-            } => drop(self.placed.insert(*game, (*room_id, *game_id))),
-        }
-    }
-
-    /// Sets or clears the connection of a participant. Connections are not part of the journal.
-    pub(super) fn set_connection(&mut self, participant: usize, connection: Option<u64>) {
-        match connection {
-            Some(number) => drop(self.connected.insert(participant, number)),
-            None => drop(self.connected.remove(&participant)),
-        }
-        self.core.set_present(participant, connection.is_some());
-    }
-
-    /// All deals that several games share.
-    pub(super) fn deals(&self) -> BTreeSet<u32> {
-        let games = self.core.games().iter();
-        games.filter_map(|game| game.deal).collect()
-    }
-}
-
 /// A tournament of this server.
 pub type TournamentHandle = Handle<TournamentTask>;
-
-/// What readers of a tournament share besides its state: what is expensive to compute.
-#[derive(Debug, Default)]
-pub struct TournamentShared {
-    pub(super) follower_update: Shared<AsOf<v1::FollowTournamentResponse>>,
-    pub(super) results: Shared<AsOf<v1::GetTournamentResultsResponse>>,
-}
 
 impl TournamentHandle {
     /// Its join code.

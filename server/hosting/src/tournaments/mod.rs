@@ -8,6 +8,7 @@ mod handle;
 mod leaderboard;
 mod message;
 mod shared;
+mod state;
 mod task;
 #[cfg(any(test, feature = "testing"))]
 mod testing;
@@ -18,10 +19,8 @@ mod views;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_record::convert::FieldProblem;
 use chefshat_record::pseudonym::{Named, Pseudonym};
 use chefshat_tournament::{Change, Entrant, ParticipantKind, SettingsProblem, State, Tournament};
-use tokio::sync::Mutex as AsyncMutex;
 use tokio_util::task::TaskTracker;
 
 pub use handle::{TableProblem, TournamentHandle};
@@ -38,26 +37,16 @@ use chefshat_admission::limits::Key;
 use chefshat_base::clock::since_epoch_ms;
 use chefshat_room::ids::{Id, RequestKey, Token, join_code, random_bytes};
 use chefshat_store::StoreError;
-use chefshat_store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use chefshat_store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_wire::convert::{self, TournamentPlan};
-use handle::{TournamentShared, TournamentState};
+use state::{Common, TournamentShared, TournamentState};
 use task::TournamentTask;
-
-/// Most rooms and tournaments that are over and are read at a time.
-const READ_AT_ONCE: usize = 4;
 
 /// Why a tournament was not created.
 pub type CreateProblem = journaled::CreateProblem<SettingsProblem>;
 
 /// The tournaments of a server.
 pub type Tournaments = Registry<TournamentTask>;
-
-/// What all tournaments of a server share.
-#[derive(Debug, Default)]
-pub struct Common {
-    /// Locked while something that is over is read.
-    reading: [AsyncMutex<()>; READ_AT_ONCE],
-}
 
 impl Tournaments {
     /// Creates an empty set. A shutdown waits for the tasks in `tracker`.
@@ -215,16 +204,4 @@ fn built_in(plan: &TournamentPlan) -> Vec<Entrant> {
         });
     }
     entrants
-}
-
-/// Restores the state of a stored tournament.
-pub(crate) fn restored(
-    stored: &StoredTournament,
-) -> Result<(TournamentPlan, TournamentState), String> {
-    let plan = convert::tournament_plan(&stored.header.settings, [0; 32])
-        .map_err(|problem: FieldProblem| problem.to_string())?;
-    let core = Tournament::new(plan.core.clone()).map_err(|problem| problem.to_string())?;
-    let mut state = TournamentState::new(core);
-    stored.entries.iter().for_each(|entry| state.apply(entry));
-    Ok((plan, state))
 }

@@ -9,11 +9,10 @@ use tokio::sync::mpsc;
 use tokio::time::Instant;
 use tracing::info;
 
-use super::handle::{TournamentHandle, TournamentShared, TournamentState};
 use super::message::{Call, Connection, Entry, JoinRefusal, Message};
-use super::{Common, TournamentPlan, restored};
+use super::state::{Common, TournamentShared, TournamentState, restored};
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX, TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
-use crate::journaled::{Folded, Journaled, Unit, UnitHeader};
+use crate::journaled::{Folded, Handle, Journaled, Unit, UnitHeader};
 use crate::rooms::Rooms;
 use chefshat_admission::limits::{Key, Refused};
 use chefshat_base::clock::{RoomClock, since_epoch_ms};
@@ -22,6 +21,7 @@ use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_store::StoreError;
 use chefshat_store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use chefshat_store::units::{StoredUnit, UnitKind};
+use chefshat_wire::convert::TournamentPlan;
 use chefshat_wire::outbox::StreamEnd;
 
 /// When it is worth trying again to create a tournament.
@@ -141,7 +141,7 @@ impl Journaled for TournamentTask {
 
     /// Withholds records that clients could request otherwise, and closes what still runs of a
     /// tournament that is over.
-    fn enter(handle: &TournamentHandle, rooms: &Arc<Rooms>) {
+    fn enter(handle: &Handle<Self>, rooms: &Arc<Rooms>) {
         let deals = handle.committed().deals();
         handle.withhold(&deals, rooms);
         if handle.is_over() {

@@ -7,7 +7,8 @@ use chefshat_proto::v1;
 use chefshat_tournament::{Change, Entrant, MAX_GAMES_AT_A_TIME, ParticipantKind, Tournament};
 use tokio_util::sync::CancellationToken;
 
-use super::handle::{TournamentHandle, TournamentShared, TournamentState};
+use super::handle::TournamentHandle;
+use super::state::{TournamentShared, TournamentState};
 use crate::journaled::{Folded, New};
 use chefshat_admission::limits::Key;
 use chefshat_room::ids::{Id, Token};

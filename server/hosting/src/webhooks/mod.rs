@@ -22,7 +22,7 @@ pub use delivery::{ANSWER_TIME, LAST_DELIVERIES, MAX_ATTEMPTS, MAX_HOLD_UP, MAX_
 use event::{Event, Outcomes};
 pub use settings::{FIRST_PAUSE, WebhookSettings};
 
-use crate::config::SERVER_VERSION;
+use chefshat_base::SERVER_VERSION;
 use chefshat_base::clock::since_epoch;
 use chefshat_base::metrics::{Metrics, WebhookOutcome};
 

@@ -1,5 +1,5 @@
 //! Silent decisions: nothing that others can see depends on a special action that is declined or
-//! that runs out. `server/src/wire/silent_tests.rs` compares the messages of many such games.
+//! that runs out. `server/wire/src/encoded/silent_tests.rs` compares the messages of many such games.
 
 use std::sync::Arc;
 use std::time::Duration;

@@ -10,6 +10,7 @@ mod header;
 mod signature;
 mod study;
 mod tournament;
+mod unit;
 
 use chefshat_engine::ActionId;
 use chefshat_proto::v1;
@@ -20,14 +21,9 @@ pub(super) use entry::put_entry;
 pub(super) use entry::{entries_to_bytes, put_entries, read_entries};
 pub(super) use header::{header_from_bytes, header_to_bytes, stored_header, stored_unit};
 pub(super) use signature::{signature_from_bytes, signature_to_bytes};
-pub(super) use study::{
-    stored_traces, study_changes_from_bytes, study_changes_to_bytes, study_from_bytes,
-    study_to_bytes, traces_to_bytes,
-};
-pub(super) use tournament::{
-    tournament_entries_from_bytes, tournament_entries_to_bytes, tournament_from_bytes,
-    tournament_to_bytes,
-};
+pub use study::changes_to_bytes;
+pub(super) use study::traces_to_bytes;
+pub(super) use tournament::{tournament_entries_from_bytes, tournament_from_bytes};
 
 /// Version of the encoding. It is raised by every new kind of entry and every new field, so that nodes
 /// of the version before leave alone what they would read without it; `forms.rs` knows what each

@@ -7,8 +7,10 @@ use chefshat_study::{Answer, Change, ConsentGiven, ItemAnswer, Outcome, PlacedGa
 use prost::Message;
 
 use super::{Unreadable, array};
-use crate::studies::StudyHeader;
-use crate::units::StoredTraces;
+use crate::Store;
+use crate::error::StoreError;
+use crate::studies::{StoredStudy, StudyHeader};
+use crate::units::{StoredTraces, StoredUnit, UnitKind, UnitWrite};
 use chefshat_room::ids::{Id, SecretHash};
 
 #[derive(Clone, PartialEq, Message)]
@@ -169,20 +171,22 @@ struct TracesForm {
     traces: Vec<v1::StudyTrace>,
 }
 
-/// Encodes a header.
-pub(crate) fn study_to_bytes(header: &StudyHeader) -> Vec<u8> {
-    HeaderForm {
-        id: header.id.0.to_vec(),
-        settings: Some(header.settings.clone()),
-        created_at_ms: header.created_at_ms,
-        owner: header.owner.bytes().to_vec(),
-        key: header.key.to_vec(),
+impl StudyHeader {
+    /// Its encoding.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        HeaderForm {
+            id: self.id.0.to_vec(),
+            settings: Some(self.settings.clone()),
+            created_at_ms: self.created_at_ms,
+            owner: self.owner.bytes().to_vec(),
+            key: self.key.to_vec(),
+        }
+        .encode_to_vec()
     }
-    .encode_to_vec()
 }
 
-/// Encodes changes.
-pub(crate) fn study_changes_to_bytes(changes: &[Change]) -> Vec<u8> {
+/// The encoding of changes.
+pub fn changes_to_bytes(changes: &[Change]) -> Vec<u8> {
     let mut out = Vec::new();
     for change in changes {
         let kind = Some(kind_of(change));
@@ -217,7 +221,7 @@ pub(crate) fn stored_traces(
 ///
 /// # Errors
 /// An invalid field.
-pub(crate) fn study_from_bytes(bytes: &[u8]) -> Result<StudyHeader, Unreadable> {
+fn study_from_bytes(bytes: &[u8]) -> Result<StudyHeader, Unreadable> {
     let form = HeaderForm::decode(bytes)?;
     Ok(StudyHeader {
         id: Id(array(&form.id, "the study's id")?),
@@ -232,7 +236,7 @@ pub(crate) fn study_from_bytes(bytes: &[u8]) -> Result<StudyHeader, Unreadable> 
 ///
 /// # Errors
 /// An invalid change.
-pub(crate) fn study_changes_from_bytes(mut bytes: &[u8]) -> Result<Vec<Change>, Unreadable> {
+fn study_changes_from_bytes(mut bytes: &[u8]) -> Result<Vec<Change>, Unreadable> {
     let mut changes = Vec::new();
     while !bytes.is_empty() {
         let form = ChangeForm::decode_length_delimited(&mut bytes)?;
@@ -240,6 +244,49 @@ pub(crate) fn study_changes_from_bytes(mut bytes: &[u8]) -> Result<Vec<Change>, 
         changes.push(change_of(kind)?);
     }
     Ok(changes)
+}
+
+impl StoredStudy {
+    /// Reads a study; `None` if it is not in the store.
+    ///
+    /// # Errors
+    /// The store failed, or the study cannot be read.
+    pub async fn read(store: &dyn Store, id: Id) -> Result<Option<Self>, StoreError> {
+        let unit = store.unit(UnitKind::Study.id(id)).await?;
+        unit.map(|unit| Self::decode(id, &unit)).transpose()
+    }
+
+    /// Decodes a study.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub fn decode(id: Id, unit: &StoredUnit) -> Result<Self, StoreError> {
+        let decoded = unit.decode(study_from_bytes, study_changes_from_bytes);
+        let (header, changes) =
+            decoded.map_err(|problem| UnitKind::Study.id(id).unreadable(&problem))?;
+        Ok(Self {
+            header,
+            changes,
+            rows: unit.rows.len() as u64,
+        })
+    }
+
+    /// Replaces its journal by these changes, and deletes the interface traces of participants.
+    ///
+    /// # Errors
+    /// The store failed.
+    pub async fn rewrite(
+        store: &dyn Store,
+        id: Id,
+        changes: &[Change],
+        forgotten: Vec<u32>,
+    ) -> Result<(), StoreError> {
+        let rewrite = UnitWrite::Rewrite {
+            entries: changes_to_bytes(changes),
+            forgotten,
+        };
+        store.write_unit(UnitKind::Study.id(id), rewrite).await
+    }
 }
 
 fn kind_of(change: &Change) -> KindForm {

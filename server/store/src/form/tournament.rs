@@ -6,7 +6,9 @@ use prost::Message;
 
 use super::entry::{KINDS, number_of, value_of};
 use super::{Unreadable, array};
-use crate::tournaments::{TournamentEntry, TournamentHeader};
+use crate::error::StoreError;
+use crate::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
+use crate::units::{StoredUnit, UnitKind};
 use chefshat_room::ids::{Id, SecretHash};
 
 #[derive(Clone, PartialEq, Message)]
@@ -203,17 +205,19 @@ struct SeatForm {
     hinted: bool,
 }
 
-/// Encodes a header.
-pub(crate) fn tournament_to_bytes(header: &TournamentHeader) -> Vec<u8> {
-    HeaderForm {
-        id: header.id.0.to_vec(),
-        settings: Some(header.settings.clone()),
-        created_at_ms: header.created_at_ms,
-        join_code: header.join_code.clone(),
-        owner: header.owner.bytes().to_vec(),
-        deal_secret: header.deal_secret.to_vec(),
+impl TournamentHeader {
+    /// Its encoding.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        HeaderForm {
+            id: self.id.0.to_vec(),
+            settings: Some(self.settings.clone()),
+            created_at_ms: self.created_at_ms,
+            join_code: self.join_code.clone(),
+            owner: self.owner.bytes().to_vec(),
+            deal_secret: self.deal_secret.to_vec(),
+        }
+        .encode_to_vec()
     }
-    .encode_to_vec()
 }
 
 /// Decodes a header.
@@ -232,14 +236,17 @@ pub(crate) fn tournament_from_bytes(bytes: &[u8]) -> Result<TournamentHeader, Un
     })
 }
 
-/// Encodes entries.
-pub(crate) fn tournament_entries_to_bytes(entries: &[TournamentEntry]) -> Vec<u8> {
-    let mut out = Vec::new();
-    for entry in entries {
-        let kind = Some(kind_of(entry));
-        (EntryForm { kind }.encode_length_delimited(&mut out)).expect("a vector grows as needed");
+impl TournamentEntry {
+    /// The encoding of entries.
+    pub fn to_bytes(entries: &[Self]) -> Vec<u8> {
+        let mut out = Vec::new();
+        for entry in entries {
+            let kind = Some(kind_of(entry));
+            (EntryForm { kind }.encode_length_delimited(&mut out))
+                .expect("a vector grows as needed");
+        }
+        out
     }
-    out
 }
 
 /// Decodes entries.
@@ -256,6 +263,26 @@ pub(crate) fn tournament_entries_from_bytes(
         entries.push(entry_of(kind)?);
     }
     Ok(entries)
+}
+
+impl StoredTournament {
+    /// Decodes a tournament.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub fn decode(id: Id, unit: &StoredUnit) -> Result<Self, StoreError> {
+        Self::readable(unit).map_err(|problem| UnitKind::Tournament.id(id).unreadable(&problem))
+    }
+
+    pub(super) fn readable(unit: &StoredUnit) -> Result<Self, Unreadable> {
+        let (header, entries) =
+            unit.decode(tournament_from_bytes, tournament_entries_from_bytes)?;
+        Ok(Self {
+            header,
+            entries,
+            rows: unit.rows.len() as u64,
+        })
+    }
 }
 
 fn kind_of(entry: &TournamentEntry) -> KindForm {

@@ -17,6 +17,7 @@ use super::rows::{self, Read};
 use crate::Keep;
 use crate::codec::Codec;
 use crate::form::{self, Unreadable, check_form, stored_header};
+use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitId, UnitKind};
 use crate::{Listed, Part, ResumableGame, StoreError, StoredGame, listed};
 use chefshat_room::ids::Id;
 
@@ -167,6 +168,67 @@ impl Reader {
             .fetch_one(&self.pool)
             .await
             .map_err(failure)
+    }
+
+    /// See `Store::unit`.
+    pub(super) async fn unit(&self, unit: UnitId) -> Result<Option<StoredUnit>, StoreError> {
+        let row = sqlx::query(unit.kind.sql(HEADER))
+            .bind(unit.id.0.as_slice())
+            .fetch_optional(&self.pool)
+            .await
+            .map_err(failure)?;
+        let Some(row) = row else { return Ok(None) };
+        let rows = sqlx::query_scalar(unit.kind.sql(ROWS))
+            .bind(row.get::<i64, _>(0))
+            .fetch_all(&self.pool)
+            .await
+            .map_err(failure)?;
+        Ok(Some(StoredUnit {
+            form: row.get(1),
+            header: row.get(2),
+            rows,
+        }))
+    }
+
+    /// See `Store::units`.
+    pub(super) async fn units(
+        &self,
+        kind: UnitKind,
+        newest_over: usize,
+    ) -> Result<Vec<Id>, StoreError> {
+        let newest_over = i64::try_from(newest_over).unwrap_or(i64::MAX);
+        let query = match kind {
+            UnitKind::Tournament => sqlx::query_scalar(
+                "SELECT tournament_id FROM tournaments WHERE number IN (
+                     SELECT number FROM tournaments WHERE over = 0
+                     UNION ALL
+                     SELECT * FROM (
+                         SELECT number FROM tournaments WHERE over = 1
+                         ORDER BY number DESC LIMIT $1))
+                 ORDER BY number",
+            )
+            .bind(newest_over),
+            UnitKind::Study => sqlx::query_scalar("SELECT study_id FROM studies ORDER BY number"),
+        };
+        let ids: Vec<Vec<u8>> = query.fetch_all(&self.pool).await.map_err(failure)?;
+        let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
+        Ok(ids.into_iter().filter_map(id).collect())
+    }
+
+    /// See `Store::traces`.
+    pub(super) async fn traces(&self, study: Id) -> Result<Vec<StoredTraces>, StoreError> {
+        let rows = sqlx::query(
+            "SELECT participant, game_id, traces FROM study_traces
+             WHERE study = (SELECT number FROM studies WHERE study_id = $1) ORDER BY number",
+        )
+        .bind(study.0.as_slice())
+        .fetch_all(&self.pool)
+        .await
+        .map_err(failure)?;
+        let read = |row: &sqlx::sqlite::SqliteRow| {
+            StoredTraces::read(study, row.get(0), row.get(1), row.get(2))
+        };
+        Ok(rows.iter().filter_map(read).collect())
     }
 
     /// The journals of all running games, by game number; the inner result says why one cannot be

@@ -636,7 +636,7 @@ fn what_was_stored_with_larger_searches_is_read_back() {
     let mut cup = cup(1);
     cup.settings.built_in_agents = vec![agent.name(); 2];
     cup.settings.filler = agent.name();
-    let read = form::tournament_from_bytes(&form::tournament_to_bytes(&cup)).expect("readable");
+    let read = form::tournament_from_bytes(&cup.to_bytes()).expect("readable");
     let plan =
         chefshat_wire::convert::tournament_plan(&read.settings, [0; 32]).expect("it resumes");
     assert_eq!((plan.built_in, plan.core.filler), (vec![agent; 2], agent));

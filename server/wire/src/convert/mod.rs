@@ -17,6 +17,7 @@ mod record;
 #[cfg(test)]
 mod record_tests;
 mod room;
+mod snapshot;
 mod standings;
 mod start;
 mod study;
@@ -43,8 +44,9 @@ pub use ratings::{leaderboard, rating_to_proto};
 pub use record::{each_record_line, record_lines};
 pub use room::{
     awaited_to_proto, describe, describe_at, display_names_from_proto, fills_from_proto,
-    next_sequence, participants, seats_to_proto, snapshot, tournament_id, wizards_from_proto,
+    participants, seats_to_proto, tournament_id, wizards_from_proto,
 };
+pub use snapshot::{next_sequence, snapshot};
 pub use standings::{confidence_to_proto, standings_to_proto};
 pub use start::{start_from_proto, start_to_proto};
 pub use study::{

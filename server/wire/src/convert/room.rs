@@ -4,12 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use chefshat_agents::BuiltInAgent;
-use chefshat_engine::{MAX_SEATS, RuleSet, Seat, Viewer};
+use chefshat_engine::{MAX_SEATS, RuleSet, Seat};
 use chefshat_proto::v1::{self, seat_config::FilledBy};
-use chefshat_record::convert::{FieldProblem, observation_to_proto, rules_to_proto, seat_number};
+use chefshat_record::convert::{FieldProblem, rules_to_proto, seat_number};
 
 use super::agent::agent_from_proto;
-use super::event::game_started;
 use super::kind::{kind_from_proto, kind_to_proto};
 use super::labels::{labelled, shown_policy};
 use super::name::checked_name;
@@ -305,22 +304,6 @@ pub(super) fn recorded_participants(core: &Core) -> Vec<v1::Participant> {
         }
     }
     seats
-}
-
-/// The state of the game, for a viewer.
-pub fn snapshot(core: &Core, viewer: Viewer) -> v1::Snapshot {
-    v1::Snapshot {
-        game_started: core.game().map(|_| game_started(core)),
-        observation: core
-            .observe(viewer)
-            .map(|observation| observation_to_proto(&observation)),
-        next_sequence: next_sequence(core),
-    }
-}
-
-/// The number of the next event.
-pub fn next_sequence(core: &Core) -> u64 {
-    u64::try_from(core.log().len()).unwrap_or(u64::MAX) + 1
 }
 
 #[cfg(test)]

@@ -110,10 +110,7 @@ fn tournament() -> (Vec<u8>, Vec<u8>) {
         round(3),
     ];
     entries.extend(changes.map(TournamentEntry::Change));
-    (
-        form::tournament_to_bytes(&cup(3)),
-        form::tournament_entries_to_bytes(&entries),
-    )
+    (cup(3).to_bytes(), TournamentEntry::to_bytes(&entries))
 }
 
 #[test]

@@ -181,8 +181,8 @@ async fn stored_tournaments_are_read_back_in_order() {
 fn the_encoding_of_tournaments_stays_readable() {
     let written = format!(
         "{}\n{}\n",
-        hex::encode(form::tournament_to_bytes(&cup(3))),
-        hex::encode(form::tournament_entries_to_bytes(&every_entry()))
+        hex::encode(cup(3).to_bytes()),
+        hex::encode(TournamentEntry::to_bytes(&every_entry()))
     );
     assert_eq!(written, include_str!("../fixtures/tournament2.hex"));
     let former = include_str!("../fixtures/tournament1.hex");

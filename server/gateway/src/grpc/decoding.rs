@@ -1,0 +1,866 @@
+//! The layer directly in front of the services that costs each message before it is decoded: what
+//! is longer than its call needs is refused before it is read, and what has too many elements, or
+//! would take too much memory, before it is decoded. `access/calls.rs` has the limits of each call
+//! and `limits/decoding.rs` the memory of all; `chefshat_proto::cost` counts.
+
+use std::collections::HashMap;
+use std::pin::Pin;
+use std::sync::{Arc, LazyLock, Mutex};
+use std::task::{Context, Poll, ready};
+
+use axum::body::HttpBody;
+use bytes::{Buf as _, Bytes, BytesMut};
+use chefshat_proto::cost::{Cost, Excess, Field, Kind, Shape, shapes};
+use futures::future::{BoxFuture, Either};
+use http::{Request, Response};
+use http_body::Frame;
+use tokio::time::{Instant, Sleep, sleep_until};
+use tonic::body::Body;
+use tonic::{Code, Status};
+use tower::{Layer, Service};
+
+use super::limits::charged;
+use super::status::{Refusal, is_elsewhere, status};
+use chefshat_admission::access::{Call, MessageLimits};
+use chefshat_admission::limits::{
+    CallLimits, DECODED_BYTES_PER_CALL, Decoding, Held, Key, MESSAGE_TIMEOUT, Refused,
+    SMALL_DECODED, SMALL_MESSAGE,
+};
+use chefshat_wire::encoded::peer;
+
+/// Bytes before each message: a flag and its length.
+const PREFIX: usize = 5;
+
+/// A message without lists: the requests of health checks and reflection.
+static FLAT: Shape = Shape {
+    name: "",
+    size: 512,
+    fields: &[],
+};
+
+/// The messages between nodes. The rest of the protocol has its shapes in `chefshat_proto`.
+static PEER_PLAY: Shape = Shape {
+    name: "chefshat.peer.v1.PlayRequest",
+    size: size_of::<peer::PlayRequest>(),
+    fields: &[Field {
+        number: 1,
+        list: true,
+        kind: Kind::Message(&PEER_INPUT),
+    }],
+};
+static PEER_INPUT: Shape = Shape {
+    name: "chefshat.peer.v1.PlayInput",
+    size: size_of::<peer::PlayInput>(),
+    fields: &[
+        Field {
+            number: 1,
+            list: false,
+            kind: Kind::Message(&shapes::SEAT_COMMAND),
+        },
+        Field {
+            number: 2,
+            list: false,
+            kind: Kind::Message(&FLAT),
+        },
+    ],
+};
+static PEER_SHARE: Shape = Shape {
+    name: "chefshat.peer.v1.ShareRequest",
+    size: size_of::<peer::ShareRequest>(),
+    fields: &[Field {
+        number: 1,
+        list: false,
+        kind: Kind::Text,
+    }],
+};
+
+/// The shape of the requests of a call.
+fn shape(path: &str) -> &'static Shape {
+    static BY_PATH: LazyLock<HashMap<&str, &Shape>> = LazyLock::new(|| {
+        let methods = shapes::METHODS.iter();
+        let methods = methods.map(|method| (method.path, method.request));
+        let of_nodes = [
+            ("/chefshat.peer.v1.PeerService/Play", &PEER_PLAY),
+            ("/chefshat.peer.v1.PeerService/Share", &PEER_SHARE),
+        ];
+        methods.chain(of_nodes).collect()
+    });
+    BY_PATH.get(path).copied().unwrap_or(&FLAT)
+}
+
+/// Puts the costs of messages in front of the services.
+#[derive(Debug, Clone)]
+pub struct DecodingLayer {
+    limits: Arc<CallLimits>,
+}
+
+impl DecodingLayer {
+    /// Creates a layer that takes memory from `limits`.
+    pub fn new(limits: Arc<CallLimits>) -> Self {
+        Self { limits }
+    }
+}
+
+impl<S> Layer<S> for DecodingLayer {
+    type Service = WithDecoding<S>;
+
+    fn layer(&self, services: S) -> Self::Service {
+        WithDecoding {
+            limits: Arc::clone(&self.limits),
+            services,
+        }
+    }
+}
+
+/// The services with the costs of messages in front of them.
+#[derive(Debug, Clone)]
+pub struct WithDecoding<S> {
+    limits: Arc<CallLimits>,
+    services: S,
+}
+
+/// The permit of the message that a call decodes or executes.
+type Permit = Arc<Mutex<Option<Held>>>;
+
+impl<S> Service<Request<Body>> for WithDecoding<S>
+where
+    S: Service<Request<Body>, Response = Response<Body>>,
+    S::Future: Send + 'static,
+    S::Error: Send + 'static,
+{
+    type Response = Response<Body>;
+    type Error = S::Error;
+    type Future = Either<S::Future, BoxFuture<'static, Result<Self::Response, Self::Error>>>;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
+        self.services.poll_ready(context)
+    }
+
+    fn call(&mut self, request: Request<Body>) -> Self::Future {
+        let Some(call) = Call::find(request.uri().path()) else {
+            return Either::Left(self.services.call(request));
+        };
+        let permit = Permit::default();
+        let messages = Messages {
+            limits: Arc::clone(&self.limits),
+            key: charged(request.extensions()),
+            call,
+            shape: shape(call.path),
+            permit: Arc::clone(&permit),
+            input: Bytes::new(),
+            partial: BytesMut::new(),
+            state: State::Next,
+            any: false,
+            until: None,
+        };
+        let answering =
+            (self.services).call(request.map(|body| Body::new(Costed { body, messages })));
+        if call.sends_many {
+            return Either::Left(answering);
+        }
+        Either::Right(Box::pin(async move {
+            let mut response = answering.await?;
+            let held = take(&permit);
+            // The message is kept until the node that has what it is about has answered.
+            let status: Option<&Status> = response.extensions().get();
+            if let Some(held) = held
+                && status.is_some_and(|status| is_elsewhere(status).is_some())
+            {
+                response.extensions_mut().insert(Arc::new(held));
+            }
+            Ok(response)
+        }))
+    }
+}
+
+fn take(permit: &Permit) -> Option<Held> {
+    (permit.lock().expect("nothing panics under this lock")).take()
+}
+
+/// The body of a request, whose messages are costed one by one. Each leaves it whole.
+struct Costed {
+    body: Body,
+    messages: Messages,
+}
+
+struct Messages {
+    limits: Arc<CallLimits>,
+    key: Key,
+    call: &'static Call,
+    shape: &'static Shape,
+    /// Of the last message.
+    permit: Permit,
+    /// What was read and not yet looked at.
+    input: Bytes,
+    /// The beginning of the next message, if not all of it was read at once.
+    partial: BytesMut,
+    state: State,
+    /// Whether there was a message.
+    any: bool,
+    /// When what the client has begun must have arrived: the next message of a stream, or all of
+    /// another call. It begins when something does not arrive at once.
+    until: Option<Pin<Box<Sleep>>>,
+}
+
+/// Where a body is.
+enum State {
+    /// Before the next message.
+    Next,
+    /// A long message waits until it may be read.
+    MayReceive(usize, BoxFuture<'static, Result<Held, Refused>>),
+    /// A message of this many bytes with its prefix is read. One that is not small has a permit.
+    Receiving(usize, Option<Held>),
+    /// A message waits until it may be decoded.
+    MayDecode {
+        message: Bytes,
+        permit: BoxFuture<'static, Result<Held, Refused>>,
+        _received: Option<Held>,
+    },
+    /// Nothing more is read.
+    Refused,
+}
+
+/// What a body does next.
+enum Step {
+    /// It passes this on.
+    Pass(Bytes),
+    /// It reads more.
+    Read,
+}
+
+impl Messages {
+    fn poll(&mut self, context: &mut Context<'_>) -> Poll<Result<Step, Status>> {
+        loop {
+            match &mut self.state {
+                State::Refused => return Poll::Ready(Ok(Step::Read)),
+                State::Next => {
+                    if !self.has(PREFIX) {
+                        return Poll::Ready(Ok(Step::Read));
+                    }
+                    let length = self.length()?;
+                    self.state = match length <= SMALL_MESSAGE {
+                        true => State::Receiving(PREFIX + length, None),
+                        false => {
+                            let permit = self.memory().receive(self.key, length);
+                            State::MayReceive(PREFIX + length, Box::pin(permit))
+                        }
+                    };
+                }
+                State::MayReceive(length, permit) => {
+                    let permit = ready!(permit.as_mut().poll(context));
+                    let permit = permit.map_err(|refused| Status::from(Refusal::from(refused)))?;
+                    let length = *length;
+                    if self.input.len() < length {
+                        self.partial.reserve(length);
+                    }
+                    self.state = State::Receiving(length, Some(permit));
+                }
+                State::Receiving(length, _) => {
+                    let length = *length;
+                    if !self.has(length) {
+                        return Poll::Ready(Ok(Step::Read));
+                    }
+                    let State::Receiving(_, received) =
+                        std::mem::replace(&mut self.state, State::Next)
+                    else {
+                        continue;
+                    };
+                    let message = self.take(length);
+                    if self.call.sends_many {
+                        self.until = None;
+                    }
+                    let memory = self.cost(&message[PREFIX..])?;
+                    if memory <= SMALL_DECODED {
+                        return Poll::Ready(Ok(Step::Pass(message)));
+                    }
+                    let permit = self.memory().decode(self.key, memory);
+                    self.state = State::MayDecode {
+                        message,
+                        permit: Box::pin(permit),
+                        _received: received,
+                    };
+                }
+                State::MayDecode {
+                    message, permit, ..
+                } => {
+                    let held = ready!(permit.as_mut().poll(context));
+                    let held = held.map_err(|refused| Status::from(Refusal::from(refused)))?;
+                    let message = std::mem::take(message);
+                    *self.permit.lock().expect("nothing panics under this lock") = Some(held);
+                    self.state = State::Next;
+                    return Poll::Ready(Ok(Step::Pass(message)));
+                }
+            }
+        }
+    }
+
+    /// The memory from which its messages take.
+    fn memory(&self) -> &Decoding {
+        match self.call.plays() {
+            true => self.limits.playing(),
+            false => self.limits.decoding(),
+        }
+    }
+
+    /// Nothing has arrived now: ready when what the client has begun is too slow. A stream may be
+    /// silent between its messages; another call is one message and its end.
+    fn is_late(&mut self, context: &mut Context<'_>) -> Poll<Status> {
+        let is_between = matches!(self.state, State::Next) && self.partial.is_empty();
+        if self.call.sends_many && is_between {
+            self.until = None;
+            return Poll::Pending;
+        }
+        let until = (self.until)
+            .get_or_insert_with(|| Box::pin(sleep_until(Instant::now() + MESSAGE_TIMEOUT)));
+        until.as_mut().poll(context).map(|()| too_slow())
+    }
+
+    /// Refuses to read more.
+    fn refuse(&mut self) {
+        self.state = State::Refused;
+        (self.input, self.partial) = Default::default();
+    }
+
+    /// Whether the first `length` bytes of the next message were read. Moves what there is of a
+    /// message in parts.
+    fn has(&mut self, length: usize) -> bool {
+        if self.partial.is_empty() && self.input.len() >= length {
+            return true;
+        }
+        let missing = length.saturating_sub(self.partial.len());
+        let part = self.input.split_to(missing.min(self.input.len()));
+        self.partial.extend_from_slice(&part);
+        self.partial.len() >= length
+    }
+
+    /// The first `length` bytes, which were read.
+    fn take(&mut self, length: usize) -> Bytes {
+        match self.partial.is_empty() {
+            true => self.input.split_to(length),
+            false => self.partial.split_to(length).freeze(),
+        }
+    }
+
+    /// The length of the next message, whose prefix was read.
+    fn length(&mut self) -> Result<usize, Status> {
+        let mut prefix = match self.partial.is_empty() {
+            true => &self.input[..PREFIX],
+            false => &self.partial[..PREFIX],
+        };
+        if std::mem::replace(&mut self.any, true) && !self.call.sends_many {
+            return Err(malformed("this call takes one message"));
+        }
+        if prefix.get_u8() != 0 {
+            return Err(Status::unimplemented(
+                "this server reads no compressed messages",
+            ));
+        }
+        let length = usize::try_from(prefix.get_u32()).unwrap_or(usize::MAX);
+        let most = self.call.message.bytes;
+        match length > most {
+            true => Err(too_long(most, length)),
+            false => Ok(length),
+        }
+    }
+
+    /// Counts the memory of a message, and charges its caller.
+    fn cost(&self, message: &[u8]) -> Result<usize, Status> {
+        let MessageLimits {
+            elements, memory, ..
+        } = self.call.message;
+        let cost = (self.shape.cost(message, Cost { elements, memory }))
+            .map_err(|excess| refused(excess, &self.call.message))?;
+        let charge = cost.memory as u64 / DECODED_BYTES_PER_CALL;
+        if charge > 0 && !self.call.streams {
+            self.limits.charge(self.key, charge);
+        }
+        Ok(cost.memory)
+    }
+}
+
+impl HttpBody for Costed {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        let Self { body, messages } = &mut *self;
+        if messages.call.sends_many {
+            // The service asks for the next message when it has executed the last one.
+            take(&messages.permit);
+        }
+        loop {
+            match ready!(messages.poll(context)) {
+                Ok(Step::Pass(message)) => return Poll::Ready(Some(Ok(Frame::data(message)))),
+                Ok(Step::Read) => {}
+                Err(status) => {
+                    messages.refuse();
+                    return Poll::Ready(Some(Err(status)));
+                }
+            }
+            if matches!(messages.state, State::Refused) {
+                return Poll::Ready(None);
+            }
+            let Poll::Ready(frame) = Pin::new(&mut *body).poll_frame(context)? else {
+                let late = ready!(messages.is_late(context));
+                messages.refuse();
+                return Poll::Ready(Some(Err(late)));
+            };
+            let Some(frame) = frame else {
+                // The rest is not a message: the decoder refuses it.
+                let rest = std::mem::take(&mut messages.partial);
+                return Poll::Ready(match rest.is_empty() {
+                    true => None,
+                    false => Some(Ok(Frame::data(rest.freeze()))),
+                });
+            };
+            match frame.into_data() {
+                Ok(data) => messages.input = data,
+                Err(trailers) => return Poll::Ready(Some(Ok(trailers))),
+            }
+        }
+    }
+
+    fn is_end_stream(&self) -> bool {
+        let Messages { input, partial, .. } = &self.messages;
+        input.is_empty() && partial.is_empty() && self.body.is_end_stream()
+    }
+}
+
+fn too_long(most: usize, length: usize) -> Status {
+    status(
+        Code::OutOfRange,
+        "MESSAGE_TOO_LARGE",
+        format!("a message of this call has at most {most} bytes; this one has {length}"),
+        [("max_bytes", &most.to_string())],
+    )
+}
+
+fn refused(excess: Excess, most: &MessageLimits) -> Status {
+    match excess {
+        Excess::Elements => status(
+            Code::OutOfRange,
+            "TOO_MANY_ELEMENTS",
+            format!(
+                "a message of this call has at most {} submessages, texts in lists and entries of maps; send fewer at a time",
+                most.elements
+            ),
+            [("max_elements", &most.elements.to_string())],
+        ),
+        Excess::Memory => status(
+            Code::OutOfRange,
+            "MESSAGE_TOO_LARGE",
+            format!(
+                "a message of this call takes at most {} bytes once it is decoded; send fewer items at a time",
+                most.memory
+            ),
+            [("max_decoded_bytes", &most.memory.to_string())],
+        ),
+        Excess::Depth => malformed("messages are nested too deeply"),
+        Excess::Malformed => malformed("the message cannot be read: it is not encoded as its type"),
+    }
+}
+
+fn malformed(problem: &str) -> Status {
+    status(Code::InvalidArgument, "MESSAGE_MALFORMED", problem, [])
+}
+
+fn too_slow() -> Status {
+    let seconds = MESSAGE_TIMEOUT.as_secs();
+    status(
+        Code::DeadlineExceeded,
+        "MESSAGE_TOO_SLOW",
+        format!("a message did not arrive within {seconds} s"),
+        [],
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::convert::Infallible;
+    use std::time::Duration;
+
+    use chefshat_proto::cost::{Filling, Method};
+    use chefshat_proto::v1;
+    use futures::{FutureExt as _, StreamExt as _, stream};
+    use http_body_util::{BodyExt as _, StreamBody};
+    use prost::Message as _;
+    use tonic_types::StatusExt as _;
+    use tower::service_fn;
+
+    use super::*;
+    use chefshat_admission::access::CALLS;
+    use chefshat_admission::limits::Shares;
+
+    /// Longest message that is decoded here, bytes.
+    const READ: usize = 16 * 1024;
+
+    /// The fields of messages between nodes that are lists, texts or messages.
+    fn of_nodes() -> BTreeMap<String, Vec<(u32, bool, bool)>> {
+        let bytes: &[u8] = include_bytes!("../../../wire/generated/peer.bin");
+        let set = prost_types::FileDescriptorSet::decode(bytes).expect("descriptors");
+        let file = (set.file.iter()).find(|file| file.package() == "chefshat.peer.v1");
+        let messages = &file.expect("the file").message_type;
+        let fields = |message: &prost_types::DescriptorProto| {
+            let fields = message.field.iter().map(|field| {
+                use prost_types::field_descriptor_proto::{Label, Type};
+                let is_message = field.r#type() == Type::Message;
+                let is_text = matches!(field.r#type(), Type::String | Type::Bytes);
+                let list = field.label() == Label::Repeated;
+                let number = u32::try_from(field.number()).expect("positive");
+                (number, list, is_message, is_text)
+            });
+            let costly = fields.filter(|(_, list, message, text)| *list || *message || *text);
+            costly
+                .map(|(number, list, message, _)| (number, list, message))
+                .collect()
+        };
+        (messages
+            .iter()
+            .map(|message| (message.name().to_owned(), fields(message))))
+        .collect()
+    }
+
+    #[test]
+    fn every_call_has_the_shape_of_its_requests() {
+        for call in CALLS {
+            match call.path.starts_with("/chefshat.") {
+                true => assert!(Method::find(call.path).is_some(), "{}", call.path),
+                false => assert!(std::ptr::eq(shape(call.path), &raw const FLAT)),
+            }
+        }
+        let of_nodes = of_nodes();
+        for shape in [&PEER_PLAY, &PEER_INPUT, &PEER_SHARE] {
+            let name = shape.name.trim_start_matches("chefshat.peer.v1.");
+            let fields = (shape.fields.iter()).map(|field| {
+                (
+                    field.number,
+                    field.list,
+                    matches!(field.kind, Kind::Message(_)),
+                )
+            });
+            assert_eq!(of_nodes[name], fields.collect::<Vec<_>>(), "{name}");
+        }
+        assert_eq!(of_nodes["HandedOver"], [], "flat");
+        // Those of health checks and reflection have no lists.
+        for bytes in [
+            tonic_health::pb::FILE_DESCRIPTOR_SET,
+            tonic_reflection::pb::v1::FILE_DESCRIPTOR_SET,
+        ] {
+            let set = prost_types::FileDescriptorSet::decode(bytes).expect("descriptors");
+            let file = set.file.first().expect("a file");
+            let requests = file
+                .message_type
+                .iter()
+                .filter(|it| it.name().ends_with("Request"));
+            for field in requests.flat_map(|message| &message.field) {
+                use prost_types::field_descriptor_proto::Label;
+                assert_ne!(field.label(), Label::Repeated, "{}", field.name());
+            }
+        }
+    }
+
+    #[test]
+    fn the_worst_message_of_each_call_takes_no_more_than_its_permit() {
+        let remote = Key::Address([192, 0, 2, 1].into());
+        let share = Shares::default().of(remote, chefshat_admission::limits::MAX_DECODED);
+        let (mut refusals, mut most_taken) = (BTreeMap::new(), 0);
+        for call in Call::all() {
+            let limits = &call.message;
+            assert!(
+                limits.memory <= share,
+                "{}: more than one caller may have",
+                call.path
+            );
+            let (shape, most) = (
+                shape(call.path),
+                Cost {
+                    elements: limits.elements,
+                    memory: limits.memory,
+                },
+            );
+            for filling in Filling::all(shape) {
+                let message = filling.longest(limits.bytes);
+                match shape.cost(&message, most) {
+                    Ok(cost) => most_taken = most_taken.max(cost.memory),
+                    Err(excess) => {
+                        let status = refused(excess, limits);
+                        let info = status.get_details_error_info().expect("a reason");
+                        let named = info.metadata.values().any(|most| {
+                            [limits.elements, limits.memory]
+                                .iter()
+                                .any(|it| *most == it.to_string())
+                        });
+                        assert!(named, "{} {}: {status}", call.path, filling.name);
+                        *refusals.entry(info.reason).or_insert(0) += 1;
+                        // What is just allowed is readable.
+                        let message = filling.largest(shape, limits.bytes.min(READ), most);
+                        if let Some(method) = Method::find(call.path) {
+                            (method.decode)(&message).expect("readable");
+                        }
+                    }
+                }
+            }
+        }
+        assert!(
+            refusals["TOO_MANY_ELEMENTS"] > 10 && refusals["MESSAGE_TOO_LARGE"] > 10,
+            "{refusals:?}"
+        );
+        assert!(most_taken > 1024 * 1024);
+    }
+
+    fn limits() -> Arc<CallLimits> {
+        Arc::new(CallLimits::new(Shares::default()))
+    }
+
+    fn framed(message: &[u8]) -> Vec<u8> {
+        let length = u32::try_from(message.len()).expect("short").to_be_bytes();
+        [&[0], length.as_slice(), message].concat()
+    }
+
+    fn request(path: &str, body: Body) -> Request<Body> {
+        Request::post(path).body(body).expect("a request")
+    }
+
+    /// What a service receives of a body in these parts.
+    async fn received(path: &str, parts: Vec<Vec<u8>>) -> Result<Vec<u8>, Status> {
+        let (sender, receiver) = tokio::sync::oneshot::channel();
+        let mut sender = Some(sender);
+        let service = service_fn(move |request: Request<Body>| {
+            let sender = sender.take().expect("one call");
+            async move {
+                let read = request.into_body().collect().await;
+                let _ = sender.send(read.map(|body| body.to_bytes().to_vec()));
+                Ok::<_, Infallible>(Response::new(Body::empty()))
+            }
+        });
+        let parts = stream::iter(parts).map(|part| Ok::<_, Status>(Frame::data(part.into())));
+        let body = Body::new(StreamBody::new(parts));
+        let limits = limits();
+        let mut services = DecodingLayer::new(Arc::clone(&limits)).layer(service);
+        services
+            .call(request(path, body))
+            .await
+            .expect("infallible");
+        assert_eq!(limits.decoding().taken() + limits.playing().taken(), 0);
+        receiver.await.expect("read")
+    }
+
+    #[tokio::test]
+    async fn messages_pass_unchanged_however_they_are_cut() {
+        let play = v1::PlayRequest {
+            commands: vec![v1::SeatCommand::default(); 700],
+        };
+        let small = framed(&v1::PlayRequest::default().encode_to_vec());
+        let bytes = [
+            framed(&play.encode_to_vec()),
+            small.clone(),
+            framed(&play.encode_to_vec()),
+            small,
+        ]
+        .concat();
+        for size in [1, 3, 7, 1_000, 100_000] {
+            let parts = bytes.chunks(size).map(<[u8]>::to_vec).collect();
+            let read = received("/chefshat.v1.PlayService/Play", parts).await;
+            assert_eq!(read.expect("legal"), bytes, "in parts of {size} bytes");
+        }
+        // A message that breaks off reaches the decoder, which refuses it.
+        let read = received("/chefshat.v1.PlayService/Play", vec![bytes[..9].to_vec()]).await;
+        assert_eq!(read.expect("its beginning"), &bytes[..9]);
+    }
+
+    #[tokio::test]
+    async fn what_costs_too_much_is_refused_by_the_name_of_its_limit() {
+        let check = async |path: &str, bytes: Vec<u8>, reason: &str| {
+            let status = received(path, vec![bytes]).await.expect_err(reason);
+            let info = status.get_details_error_info().expect("a reason");
+            assert_eq!(info.reason, reason, "{status}");
+        };
+        let study = "/chefshat.v1.StudyService/CreateStudy";
+        // Its first 5 bytes are enough.
+        check(study, vec![0, 0, 0x20, 0, 0], "MESSAGE_TOO_LARGE").await;
+        // A million bytes of empty stages.
+        let stages = v1::StudySettings {
+            stages: vec![v1::StudyStage::default(); 500_000],
+            ..v1::StudySettings::default()
+        };
+        let create = v1::CreateStudyRequest {
+            settings: Some(stages),
+            ..v1::CreateStudyRequest::default()
+        };
+        check(study, framed(&create.encode_to_vec()), "TOO_MANY_ELEMENTS").await;
+        check(study, framed(&[0xff]), "MESSAGE_MALFORMED").await;
+        let twice = framed(&[]).repeat(2);
+        check(study, twice, "MESSAGE_MALFORMED").await;
+    }
+
+    /// A service that reads a request to its end.
+    async fn read_whole(request: Request<Body>) -> Result<Response<Body>, Infallible> {
+        Ok(match request.into_body().collect().await {
+            Ok(_) => Response::new(Body::empty()),
+            Err(status) => status.into_http(),
+        })
+    }
+
+    /// Why a call was refused, if it was.
+    fn reason_of(answer: &Response<Body>) -> Option<String> {
+        let status = Status::from_header_map(answer.headers())?;
+        Some(status.get_details_error_info()?.reason)
+    }
+
+    /// A body that sends these bytes and then nothing, and does not end.
+    fn stalled(bytes: Vec<u8>) -> Body {
+        let parts = stream::iter([Ok::<_, Status>(Frame::data(bytes.into()))]);
+        Body::new(StreamBody::new(parts.chain(stream::pending())))
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_message_waits_for_its_permit_before_it_is_read_and_ends_if_it_is_slow() {
+        let limits = limits();
+        let mut services = DecodingLayer::new(Arc::clone(&limits)).layer(service_fn(read_whole));
+        let half = [&[0, 0, 8, 0, 0], [0; 1_000].as_slice()].concat();
+        let path = "/chefshat.v1.ParticipationService/AnswerQuestionnaire";
+        let mut calls = Vec::new();
+        // Those of a local caller may have half of the memory: 16 of 1 MiB each.
+        for _ in 0..20 {
+            let mut call = Box::pin(services.call(request(path, stalled(half.clone()))));
+            assert!((&mut call).now_or_never().is_none());
+            calls.push(call);
+        }
+        assert_eq!(limits.decoding().taken(), 16 * 1024 * 1024);
+        let begun = Instant::now();
+        let mut reasons = BTreeMap::new();
+        for answer in futures::future::join_all(calls).await {
+            let answer = answer.expect("infallible");
+            let reason = reason_of(&answer).expect("a reason");
+            *reasons.entry(reason).or_insert(0) += 1;
+        }
+        let expected = [("MESSAGE_TOO_SLOW", 16), ("TOO_MANY_LARGE_MESSAGES", 4)];
+        assert_eq!(
+            reasons,
+            expected.map(|(it, count)| (it.to_owned(), count)).into()
+        );
+        assert_eq!(begun.elapsed(), MESSAGE_TIMEOUT);
+        assert_eq!(limits.decoding().taken(), 0);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_call_that_does_not_arrive_whole_ends_however_small_it_is() {
+        let limits = limits();
+        let mut services = DecodingLayer::new(limits).layer(service_fn(read_whole));
+        let unary = "/chefshat.v1.RoomService/GetRoom";
+        let stream = "/chefshat.v1.PlayService/Play";
+        let whole = framed(&[]);
+        for (path, sent) in [
+            (unary, Vec::new()),
+            (unary, vec![0, 0]),
+            (unary, vec![0, 0, 0, 0, 9, 1]),
+            // Its message has arrived, and its end has not.
+            (unary, whole.clone()),
+            (stream, vec![0, 0]),
+            (stream, [whole.as_slice(), &[0, 0, 0, 0, 9, 1]].concat()),
+        ] {
+            let begun = Instant::now();
+            let answer = services.call(request(path, stalled(sent.clone()))).await;
+            let reason = reason_of(&answer.expect("infallible"));
+            let expected = Some("MESSAGE_TOO_SLOW");
+            assert_eq!(reason.as_deref(), expected, "{path} {sent:?}");
+            assert_eq!(begun.elapsed(), MESSAGE_TIMEOUT, "{path} {sent:?}");
+        }
+        // A stream is silent as long as it likes between its messages.
+        let silent = services.call(request(stream, stalled(whole)));
+        let day = Duration::from_secs(24 * 60 * 60);
+        tokio::time::timeout(day, silent).await.expect_err("silent");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_stream_that_always_has_half_a_message_left_is_not_slow() {
+        let part = |_| async {
+            tokio::time::sleep(MESSAGE_TIMEOUT / 2).await;
+            // The second half of a message and the first half of the next.
+            Ok::<_, Status>(Frame::data(Bytes::from_static(&[0, 2, 8, 1, 0, 0, 0])))
+        };
+        let first = stream::iter([Ok(Frame::data(Bytes::from_static(&[0, 0, 0])))]);
+        let parts = first.chain(stream::iter(0..20).then(part));
+        let service = service_fn(async |request: Request<Body>| {
+            let read = request.into_body().collect().await;
+            let read = read.expect("each message arrives in time");
+            assert_eq!(read.to_bytes().len(), 20 * 7 + 3);
+            Ok::<_, Infallible>(Response::new(Body::empty()))
+        });
+        let mut services = DecodingLayer::new(limits()).layer(service);
+        let body = Body::new(StreamBody::new(parts));
+        let path = "/chefshat.v1.PlayService/Play";
+        services
+            .call(request(path, body))
+            .await
+            .expect("infallible");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn messages_of_players_do_not_wait_for_those_of_others() {
+        let limits = limits();
+        let mut taken = Vec::new();
+        for host in 0..=u8::MAX {
+            let key = Key::Address([192, 0, 2, host].into());
+            let share = Shares::default().of(key, chefshat_admission::limits::MAX_DECODED);
+            let permit = limits.decoding().decode(key, share).now_or_never();
+            taken.extend(permit.and_then(Result::ok));
+        }
+        let mut services = DecodingLayer::new(limits).layer(service_fn(read_whole));
+        let play = v1::PlayRequest {
+            commands: vec![v1::SeatCommand::default(); 700],
+        };
+        let create = v1::CreateStudyRequest {
+            settings: Some(v1::StudySettings {
+                stages: vec![v1::StudyStage::default(); 100],
+                ..v1::StudySettings::default()
+            }),
+            ..v1::CreateStudyRequest::default()
+        };
+        for (path, message, reason) in [
+            (
+                "/chefshat.v1.StudyService/CreateStudy",
+                create.encode_to_vec(),
+                Some("TOO_MANY_LARGE_MESSAGES"),
+            ),
+            ("/chefshat.v1.PlayService/Play", play.encode_to_vec(), None),
+        ] {
+            let body = Body::new(http_body_util::Full::new(Bytes::from(framed(&message))));
+            let answer = services.call(request(path, body)).await;
+            let found = reason_of(&answer.expect("infallible"));
+            assert_eq!(found.as_deref(), reason, "{path}");
+        }
+    }
+
+    #[tokio::test]
+    async fn a_permit_is_held_until_a_call_has_answered_and_a_stream_asks_for_more() {
+        let limits = limits();
+        let (release, released) = tokio::sync::oneshot::channel::<()>();
+        let mut released = Some(released);
+        let service = service_fn(move |request: Request<Body>| {
+            let released = released.take().expect("one call");
+            async move {
+                let mut body = request.into_body();
+                body.frame().await.expect("a message").expect("legal");
+                let _ = released.await;
+                Ok::<_, Infallible>(Response::new(Body::empty()))
+            }
+        });
+        let mut services = DecodingLayer::new(Arc::clone(&limits)).layer(service);
+        let play = v1::PlayRequest {
+            commands: vec![v1::SeatCommand::default(); 700],
+        };
+        let body = stalled(framed(&play.encode_to_vec()));
+        let mut call = Box::pin(services.call(request("/chefshat.v1.PlayService/Play", body)));
+        assert!((&mut call).now_or_never().is_none(), "it is executed");
+        let size = size_of::<v1::SeatCommand>();
+        assert!(limits.playing().taken() > 700 * size);
+        release.send(()).expect("waiting");
+        call.await.expect("infallible");
+        assert_eq!(limits.playing().taken(), 0);
+    }
+}

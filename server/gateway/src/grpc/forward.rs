@@ -1,0 +1,359 @@
+//! The layer that sends a call to the node that has its room or tournament. A call is first tried
+//! here; if its handler finds what it is about at another node (`status::elsewhere`), the same
+//! request goes to that node, and its answer comes back as it arrives. So no method knows anything
+//! of forwarding. Spectators share streams (`fanout`). A single server does not have this layer.
+//!
+//! The other node decides about access and charges the caller, so the headers that it needs for
+//! that pass with the request. It never passes the request on.
+
+use std::pin::Pin;
+use std::sync::{Arc, Mutex};
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use axum::body::HttpBody;
+use bytes::Bytes;
+use chefshat_proto::v1::{self, room_service_client::RoomServiceClient};
+use futures::future::{BoxFuture, Either};
+use http::{HeaderMap, HeaderName, HeaderValue, Request, Response, header};
+use http_body::{Frame, SizeHint};
+use tokio::sync::watch;
+use tokio_stream::StreamExt as _;
+use tokio_stream::wrappers::WatchStream;
+use tonic::Status;
+use tonic::body::Body;
+use tonic::metadata::MetadataMap;
+use tonic::transport::Channel;
+use tower::{Layer, Service, ServiceExt as _};
+use tracing::debug;
+
+use super::fanout::{self, Fanout};
+use super::limits::Charged;
+use super::status::{is_elsewhere, is_not_owner, owner_unreachable};
+use crate::connections::peer_address;
+use crate::peers::Peers;
+use chefshat_admission::access::{Call, MAX_STUDY_MESSAGE_BYTES, SECRET_HEADER};
+use chefshat_admission::limits::{CallLimits, Key};
+use chefshat_base::proxies::FORWARDED_FOR;
+use chefshat_base::tasks::{LongTask, named};
+use chefshat_hosting::cluster::{Directory, Peer};
+use chefshat_wire::encoded::peer::ShareRequest;
+use chefshat_wire::encoded::peer::peer_service_client::PeerServiceClient;
+
+/// How often a call looks for the node that has its room or tournament.
+const ATTEMPTS: u32 = 3;
+/// Pause before a call looks again: the node that was named is just handing over.
+const PAUSE: Duration = Duration::from_millis(100);
+/// Most bytes of a request that are kept: one message.
+const MAX_KEPT_BYTES: usize = MAX_STUDY_MESSAGE_BYTES + 1024;
+/// The headers of a request that other nodes need.
+const HEADERS: [HeaderName; 8] = [
+    header::AUTHORIZATION,
+    HeaderName::from_static(SECRET_HEADER),
+    header::CONTENT_TYPE,
+    header::TE,
+    header::USER_AGENT,
+    HeaderName::from_static("grpc-timeout"),
+    HeaderName::from_static("grpc-encoding"),
+    HeaderName::from_static("grpc-accept-encoding"),
+];
+
+/// The headers with which a request is sent to other nodes. They name its client, and contain its
+/// token and secrets.
+fn passed_headers<B>(request: &Request<B>) -> HeaderMap {
+    let mut passed = HeaderMap::new();
+    for name in HEADERS {
+        for value in request.headers().get_all(&name) {
+            passed.append(name.clone(), value.clone());
+        }
+    }
+    if let Some(client) = peer_address(request.extensions()) {
+        let client = HeaderValue::try_from(client.to_string());
+        let client = client.expect("addresses are printable");
+        passed.insert(HeaderName::from_static(FORWARDED_FOR), client);
+    }
+    passed
+}
+
+/// In the extensions of requests of other nodes.
+#[derive(Debug, Clone, Copy)]
+pub struct FromPeer;
+
+/// What a call needs to ask other nodes itself, in the extensions of its request.
+#[derive(Clone)]
+pub(super) struct Gateway {
+    layer: ForwardLayer,
+    headers: HeaderMap,
+}
+
+impl Gateway {
+    /// The connections to other nodes.
+    pub(super) fn peers(&self) -> &Peers {
+        &self.layer.peers
+    }
+
+    /// Who has which rooms and tournaments.
+    pub(super) fn directory(&self) -> &Arc<dyn Directory> {
+        &self.layer.directory
+    }
+
+    /// A request to another node, for the client of this one.
+    pub(super) fn request<T>(&self, message: T) -> tonic::Request<T> {
+        let mut headers = self.headers.clone();
+        for own in [header::CONTENT_TYPE, header::TE, header::USER_AGENT] {
+            headers.remove(own);
+        }
+        let mut request = tonic::Request::new(message);
+        *request.metadata_mut() = MetadataMap::from_headers(headers);
+        request
+    }
+}
+
+/// Puts forwarding in front of the services.
+#[derive(Debug, Clone)]
+pub struct ForwardLayer {
+    directory: Arc<dyn Directory>,
+    peers: Arc<Peers>,
+    fanout: Arc<Fanout>,
+}
+
+impl ForwardLayer {
+    /// Creates a layer that sends calls to these peers. `limits` counts the spectators that share a
+    /// stream.
+    pub fn new(directory: Arc<dyn Directory>, peers: Arc<Peers>, limits: Arc<CallLimits>) -> Self {
+        Self {
+            directory,
+            peers,
+            fanout: Arc::new(Fanout::new(limits)),
+        }
+    }
+
+    /// What a request needs to ask other nodes itself.
+    pub(super) fn gateway<B>(&self, request: &Request<B>) -> Gateway {
+        Gateway {
+            layer: self.clone(),
+            headers: passed_headers(request),
+        }
+    }
+}
+
+impl<S> Layer<S> for ForwardLayer {
+    type Service = Forwarding<S>;
+
+    fn layer(&self, services: S) -> Self::Service {
+        Forwarding {
+            layer: self.clone(),
+            services,
+        }
+    }
+}
+
+/// The services with forwarding in front of them.
+#[derive(Debug, Clone)]
+pub struct Forwarding<S> {
+    layer: ForwardLayer,
+    services: S,
+}
+
+impl<S> Service<Request<Body>> for Forwarding<S>
+where
+    S: Service<Request<Body>, Response = Response<Body>> + Clone + Send + 'static,
+    S::Future: Send + 'static,
+    S::Error: Send + 'static,
+{
+    type Response = Response<Body>;
+    type Error = S::Error;
+    type Future = Either<S::Future, BoxFuture<'static, Result<Self::Response, Self::Error>>>;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
+        self.services.poll_ready(context)
+    }
+
+    fn call(&mut self, mut request: Request<Body>) -> Self::Future {
+        // Streams of seats, lists of everything and what is about several records ask other nodes
+        // themselves.
+        let gateway = self.layer.gateway(&request);
+        request.extensions_mut().insert(gateway.clone());
+        if !Call::find(request.uri().path()).is_some_and(|call| call.forwarded) {
+            return Either::Left(self.services.call(request));
+        }
+        // The clone that is ready serves this call.
+        let clone = self.services.clone();
+        let services = std::mem::replace(&mut self.services, clone);
+        Either::Right(Box::pin(gateway.answer(services, request)))
+    }
+}
+
+impl Gateway {
+    /// Answers a call here or at the node that has what it is about.
+    async fn answer<S>(
+        self,
+        mut services: S,
+        request: Request<Body>,
+    ) -> Result<Response<Body>, S::Error>
+    where
+        S: Service<Request<Body>, Response = Response<Body>> + Clone + Send,
+        S::Future: Send,
+        S::Error: Send,
+    {
+        let (parts, body) = request.into_parts();
+        let address = Key::of_address(peer_address(&parts.extensions));
+        let kept = Kept::default();
+        let mut body = Body::new(KeepingBody {
+            body,
+            kept: kept.clone(),
+        });
+        for attempt in 1..=ATTEMPTS {
+            let request = Request::from_parts(parts.clone(), body);
+            let again = services.clone();
+            let response = services.call(request).await?;
+            let Some(elsewhere) = response.extensions().get().and_then(is_elsewhere) else {
+                return Ok(response);
+            };
+            let Some(message) = kept.message() else {
+                break;
+            };
+            let shared = fanout::key(parts.uri.path(), &self.headers, &message);
+            let mut forwarded = Request::new(Body::new(http_body_util::Full::new(message.clone())));
+            *forwarded.method_mut() = parts.method.clone();
+            *forwarded.uri_mut() = parts.uri.clone();
+            *forwarded.headers_mut() = self.headers.clone();
+            let sent = self.peers().send(&elsewhere.peer, forwarded);
+            let answered = match shared {
+                Some(key) => {
+                    let caller = response
+                        .extensions()
+                        .get()
+                        .map_or(address, |key: &Charged| key.0);
+                    let present = self.room(&elsewhere.peer, key.room.clone());
+                    let channel = self.peers().channel(&elsewhere.peer);
+                    let room_id = key.room.clone();
+                    let tell = |others| {
+                        let telling = tell_sharing(channel, room_id, others);
+                        tokio::spawn(named(LongTask::Sharing, telling));
+                    };
+                    (self.layer.fanout.answer(key, caller, present, sent, tell)).await
+                }
+                None => sent.await,
+            };
+            match answered {
+                Ok(answer) if !is_not_owner(answer.headers()) => return Ok(returned(answer)),
+                Ok(_) => self.directory().forget(&elsewhere.found_by),
+                Err(error) => {
+                    debug!(peer = %elsewhere.peer.node, %error, "a call could not be forwarded");
+                    self.directory().forget(&elsewhere.found_by);
+                    // Whether it was executed is unknown.
+                    break;
+                }
+            }
+            if attempt < ATTEMPTS {
+                tokio::time::sleep(PAUSE).await;
+            }
+            body = Body::new(http_body_util::Full::new(message));
+            services = again;
+            services.ready().await?;
+        }
+        Ok(owner_unreachable().into_http())
+    }
+}
+
+impl Gateway {
+    /// A room of another node, as its spectators see it.
+    async fn room(&self, peer: &Peer, room_id: String) -> Option<v1::Room> {
+        let mut rooms = RoomServiceClient::new(self.peers().channel(peer));
+        let request = self.request(v1::GetRoomRequest {
+            room_id,
+            join_code: String::new(),
+        });
+        let room = rooms.get_room(request).await.ok()?.into_inner().room?;
+        // The stream itself says that.
+        Some(v1::Room {
+            awaited: None,
+            ..room
+        })
+    }
+}
+
+/// Tells the node that has a room how many share a stream of it, until they have left.
+async fn tell_sharing(channel: Channel, room_id: String, mut others: watch::Receiver<u32>) {
+    // Most streams have one spectator.
+    if others.wait_for(|others| *others > 0).await.is_err() {
+        return;
+    }
+    let counts = WatchStream::new(others).map(move |others| ShareRequest {
+        room_id: room_id.clone(),
+        others,
+    });
+    if let Err(error) = PeerServiceClient::new(channel).share(counts).await {
+        debug!(%error, "the spectators who share a stream are not counted");
+    }
+}
+
+/// The answer of another node, as an answer of this one.
+fn returned(answer: Response<Body>) -> Response<Body> {
+    let (parts, body) = answer.into_parts();
+    let mut response = Response::new(body);
+    *response.status_mut() = parts.status;
+    *response.headers_mut() = parts.headers;
+    response
+}
+
+/// What has been read of the body of a request.
+#[derive(Clone, Default)]
+struct Kept(Arc<Mutex<Read>>);
+
+#[derive(Default)]
+struct Read {
+    bytes: Vec<u8>,
+    too_long: bool,
+}
+
+impl Kept {
+    fn add(&self, data: &Bytes) {
+        let mut read = (self.0.lock()).expect("nothing panics under this lock");
+        if read.bytes.len() + data.len() > MAX_KEPT_BYTES {
+            read.too_long = true;
+            read.bytes = Vec::new();
+        } else if !read.too_long {
+            read.bytes.extend_from_slice(data);
+        }
+    }
+
+    /// The message of the request, which has been read; `None` if it is too long.
+    fn message(&self) -> Option<Bytes> {
+        let read = (self.0.lock()).expect("nothing panics under this lock");
+        (!read.too_long).then(|| Bytes::copy_from_slice(&read.bytes))
+    }
+}
+
+/// The body of a request that may be sent again.
+struct KeepingBody {
+    body: Body,
+    kept: Kept,
+}
+
+impl HttpBody for KeepingBody {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        let frame = Pin::new(&mut self.body).poll_frame(context);
+        if let Poll::Ready(Some(Ok(frame))) = &frame
+            && let Some(data) = frame.data_ref()
+        {
+            self.kept.add(data);
+        }
+        frame
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}

@@ -1,0 +1,235 @@
+//! `InstrumentService`: what instruments and the researcher add to the recording of a room.
+
+use std::pin::Pin;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_engine::Seat;
+use chefshat_proto::v1::{self, instrument_service_server::InstrumentService};
+use chefshat_record::convert::{FieldProblem, check_label};
+use chefshat_room::ids::Token;
+use chefshat_room::journal::Marked;
+use chefshat_room::{MARKERS_AT_ONCE, MAX_MARKERS, MarkError};
+use futures::{Stream, stream};
+use prost::Message as _;
+use tokio::time::Instant;
+use tonic::{Code, Request, Response, Status};
+
+use super::limits::charged;
+use super::reach::Reach;
+use super::status::{
+    Refusal, field, internal, owner_token_wrong, room_gone, status, ticket_unknown,
+};
+use chefshat_admission::access::Caller;
+use chefshat_hosting::room::{Handle, MarkRequest, MarkerFollower};
+use chefshat_store::samples::SampleError;
+
+/// Why a marker is refused, if a field is.
+const REFUSED: &str = "MARKER_REFUSED";
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct Instruments {
+    reach: Reach,
+}
+
+impl Instruments {
+    /// Creates the service for the rooms that callers reach.
+    pub fn new(reach: Reach) -> Self {
+        Self { reach }
+    }
+
+    /// A room, and the secret of what may be its owner's token. The token of its study stands for
+    /// that of the room.
+    async fn find(
+        &self,
+        caller: Caller,
+        room_id: &str,
+        owner_token: &str,
+    ) -> Result<(Handle, [u8; 32]), Status> {
+        let caller = caller.showing(owner_token);
+        let room = self.reach.room(&caller, room_id).await?;
+        let header = self.reach.rooms().header(room.id());
+        let is_study =
+            |id| header.is_some_and(|it| it.study.as_ref().is_some_and(|of| of.study == id));
+        let token = match Token::parse(owner_token) {
+            Some(token) if token.room == room.id() => token,
+            Some(token) if is_study(token.room) => {
+                Token::of_tournament_room(room.id(), &token.hash())
+            }
+            _ => return Err(owner_token_wrong()),
+        };
+        Ok((room, token.secret))
+    }
+
+    /// The room and seat of a ticket, and whether its game has started.
+    async fn seat_of(&self, caller: &Caller, ticket: &str) -> Result<(Handle, Seat, bool), Status> {
+        let ticket = Token::parse(ticket).ok_or_else(ticket_unknown)?;
+        let finding = (self.reach).room_of_ticket(caller, ticket.room, ticket_unknown);
+        let room = finding.await?;
+        let seat = room.seat_of(ticket.secret).await.map_err(Refusal::from)?;
+        let (seat, has_started) = seat.ok_or_else(ticket_unknown)?;
+        Ok((room, seat, has_started))
+    }
+
+    /// The room and seat of an owner, and whether its game has started.
+    async fn owned_seat(
+        &self,
+        caller: &Caller,
+        owned: &v1::OwnedSeat,
+    ) -> Result<(Handle, Seat, bool), Status> {
+        let caller = caller.showing(&owned.owner_token);
+        let room = self.reach.room(&caller, &owned.room_id).await?;
+        let header = self.reach.rooms().header(room.id()).ok_or_else(room_gone)?;
+        if !self.reach.is_owner_token(&owned.owner_token, &header) {
+            return Err(owner_token_wrong());
+        }
+        let described = room.describe().await.map_err(Refusal::from)?;
+        let number = usize::try_from(owned.seat).ok();
+        let Some(number) = number.filter(|number| *number < described.seats.len()) else {
+            let words = format!("the room has {} seats, from 0", described.seats.len());
+            return Err(field(
+                "SAMPLES_REFUSED",
+                &FieldProblem::new("owned_seat.seat", words),
+            ));
+        };
+        let has_started = room.has_started().await.map_err(Refusal::from)?;
+        Ok((room, Seat::new(number), has_started))
+    }
+}
+
+#[tonic::async_trait]
+impl InstrumentService for Instruments {
+    type FollowMarkersStream =
+        Pin<Box<dyn Stream<Item = Result<v1::FollowMarkersResponse, Status>> + Send>>;
+
+    async fn add_marker(
+        &self,
+        request: Request<v1::AddMarkerRequest>,
+    ) -> Result<Response<v1::AddMarkerResponse>, Status> {
+        let arrived = Instant::now();
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let (room, secret) = self
+            .find(caller, &request.room_id, &request.owner_token)
+            .await?;
+        check_label(&request.label).map_err(|problem| field(REFUSED, &problem))?;
+        let moment = match request.elapsed_us {
+            Some(elapsed_us) => Duration::from_micros(elapsed_us),
+            None => room.clock().at(arrived),
+        };
+        let marked = Marked {
+            label: request.label,
+            moment,
+        };
+        let rooms = self.reach.rooms();
+        (rooms.may_store(key, marked.label.len())).map_err(Refusal::from)?;
+        let marker = room.mark(MarkRequest { secret, marked }).await;
+        let marker = marker.map_err(Refusal::from)?;
+        let marker = marker.ok_or_else(owner_token_wrong)?.map_err(refused)?;
+        Ok(Response::new(v1::AddMarkerResponse {
+            marker: Some(marker),
+        }))
+    }
+
+    async fn add_samples(
+        &self,
+        request: Request<v1::AddSamplesRequest>,
+    ) -> Result<Response<v1::AddSamplesResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let (room, seat, has_started) = match &request.owned_seat {
+            Some(owned) => self.owned_seat(&caller, owned).await?,
+            None => self.seat_of(&caller, &request.ticket).await?,
+        };
+        let rooms = self.reach.rooms();
+        let header = rooms.header(room.id()).ok_or_else(ticket_unknown)?;
+        if !has_started {
+            return Err(status(
+                Code::FailedPrecondition,
+                "GAME_NOT_STARTED",
+                "the game has not started: until then the seat may change hands",
+                [],
+            ));
+        }
+        let chunk = request.chunk.unwrap_or_default();
+        (rooms.may_store(key, chunk.encoded_len())).map_err(Refusal::from)?;
+        let now = room.clock().now();
+        let adding = Arc::clone(rooms.samples()).add(header.game_id, seat, chunk, now);
+        let recorded = adding.await.map_err(samples_refused)?;
+        Ok(Response::new(v1::AddSamplesResponse { recorded }))
+    }
+
+    async fn follow_markers(
+        &self,
+        request: Request<v1::FollowMarkersRequest>,
+    ) -> Result<Response<Self::FollowMarkersStream>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let (room, secret) = self
+            .find(caller, &request.room_id, &request.owner_token)
+            .await?;
+        let from = request.from_number.saturating_sub(1);
+        let from = usize::try_from(from).unwrap_or(usize::MAX);
+        let following = room.follow_markers(secret, from).await;
+        let following = following.map_err(Refusal::from)?;
+        let following = following.ok_or_else(owner_token_wrong)?;
+        let following = following.map_err(Refusal::from)?;
+        Ok(Response::new(Box::pin(followed(following))))
+    }
+}
+
+/// The messages of a stream that follows markers.
+fn followed(
+    follower: MarkerFollower,
+) -> impl Stream<Item = Result<v1::FollowMarkersResponse, Status>> {
+    stream::unfold(Some(follower), |follower| async move {
+        let mut follower = follower?;
+        match follower.next().await {
+            Ok(Some(markers)) => {
+                let response = v1::FollowMarkersResponse { markers };
+                Some((Ok(response), Some(follower)))
+            }
+            Ok(None) => None,
+            Err(_) => Some((Err(room_gone()), None)),
+        }
+    })
+}
+
+/// The status for refused samples.
+fn samples_refused(error: SampleError) -> Status {
+    let message = error.to_string();
+    match error {
+        SampleError::Malformed(problem) => field("SAMPLES_REFUSED", &problem),
+        SampleError::Off => status(Code::FailedPrecondition, "SAMPLES_OFF", message, []),
+        SampleError::Deleted => ticket_unknown(),
+        SampleError::TooManyStreams | SampleError::TooMany => {
+            status(Code::ResourceExhausted, "TOO_MANY_SAMPLES", message, [])
+        }
+        SampleError::Io(error) => {
+            tracing::error!(%error, "samples cannot be written");
+            internal()
+        }
+    }
+}
+
+/// The status for a refused marker.
+fn refused(error: MarkError) -> Status {
+    let too_many = |limit: &str| {
+        let metadata = [("limit", limit)];
+        status(
+            Code::ResourceExhausted,
+            "TOO_MANY_MARKERS",
+            error.to_string(),
+            metadata,
+        )
+    };
+    match error {
+        MarkError::GameOver => status(Code::FailedPrecondition, "GAME_OVER", error.to_string(), []),
+        MarkError::TooMany => too_many(&MAX_MARKERS.to_string()),
+        MarkError::TooFast => too_many(&MARKERS_AT_ONCE.to_string()),
+        MarkError::Future => field(REFUSED, &FieldProblem::new("elapsed_us", error.to_string())),
+    }
+}

@@ -1,0 +1,329 @@
+//! The layer in front of all services that holds each caller to its share: of calls, of answers
+//! that it does not read, and of streams. `limits` decides; this file keeps the places of calls
+//! until their answers have been read.
+
+use std::pin::Pin;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use axum::body::HttpBody;
+use bytes::Bytes;
+use futures::future::BoxFuture;
+use http::{Request, Response};
+use http_body::{Frame, SizeHint};
+use tokio::time::Instant;
+use tonic::body::Body;
+use tonic::{Code, Status};
+use tower::{Layer, Service};
+
+use super::status::{Refusal, is_elsewhere, status};
+use crate::connections::{Client, peer_address};
+use chefshat_admission::access::{Call, Caller};
+use chefshat_admission::limits::{Admitted, BYTES_PER_CALL, CallLimits, Key};
+
+/// Who is charged for a request.
+pub(super) fn charged(extensions: &http::Extensions) -> Key {
+    match extensions.get() {
+        Some(caller) => Key::of_caller(caller),
+        // Refused before its caller was known.
+        None => Key::of_address(peer_address(extensions)),
+    }
+}
+
+/// When a request was received, before it waited for its caller's share. In its extensions.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Arrived(Instant);
+
+impl Arrived {
+    /// When a request with these extensions was received.
+    pub(super) fn of(extensions: &http::Extensions) -> Instant {
+        let arrived: Option<&Self> = extensions.get();
+        arrived.map_or_else(Instant::now, |arrived| arrived.0)
+    }
+}
+
+/// Who was charged for a call that belongs to another node. In the extensions of its answer.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Charged(pub(super) Key);
+
+/// The client that sent a request, unless a proxy did: its connection belongs to many callers.
+fn own_client(extensions: &http::Extensions) -> Option<&Arc<Client>> {
+    let address = peer_address(extensions);
+    let is_own = |client: &&Arc<Client>| {
+        client.address.map(|address| address.ip().to_canonical()) == address
+    };
+    Client::of(extensions).filter(is_own)
+}
+
+/// Refuses a call for which no place to wait is left. Refusing costs work as well: a caller that
+/// ignores so many refusals is disconnected.
+fn too_many_waiting(client: Option<&Arc<Client>>) -> Status {
+    if let Some(client) = client {
+        client.close();
+    }
+    status(
+        Code::ResourceExhausted,
+        "TOO_MANY_WAITING_CALLS",
+        "too many calls wait; the connection is closed",
+        [],
+    )
+}
+
+/// Refuses a call that its caller may not make. It counts as a call: a caller that made too many
+/// waits for the refusal.
+pub(super) fn refuse<E: Send + 'static>(
+    limits: &CallLimits,
+    extensions: &http::Extensions,
+    status: Status,
+) -> BoxFuture<'static, Result<Response<Body>, E>> {
+    let key = charged(extensions);
+    let wait = limits.charge_refused(key);
+    let refusal = move || Ok(status.into_http());
+    if wait.is_zero() {
+        return Box::pin(async move { refusal() });
+    }
+    match limits.place_to_wait(key) {
+        None => {
+            let status = too_many_waiting(own_client(extensions));
+            Box::pin(async move { Ok(status.into_http()) })
+        }
+        Some(waiting) => Box::pin(async move {
+            let _waiting = waiting;
+            tokio::time::sleep(wait).await;
+            refusal()
+        }),
+    }
+}
+
+/// Puts the limits in front of the services.
+#[derive(Debug, Clone)]
+pub struct LimitsLayer {
+    limits: Arc<CallLimits>,
+}
+
+impl LimitsLayer {
+    /// Creates a layer that asks `limits`.
+    pub fn new(limits: Arc<CallLimits>) -> Self {
+        Self { limits }
+    }
+}
+
+impl<S> Layer<S> for LimitsLayer {
+    type Service = WithLimits<S>;
+
+    fn layer(&self, services: S) -> Self::Service {
+        WithLimits {
+            limits: Arc::clone(&self.limits),
+            services,
+        }
+    }
+}
+
+/// The services with the limits in front of them.
+#[derive(Debug, Clone)]
+pub struct WithLimits<S> {
+    limits: Arc<CallLimits>,
+    services: S,
+}
+
+impl<S, B> Service<Request<B>> for WithLimits<S>
+where
+    S: Service<Request<B>, Response = Response<Body>> + Clone + Send + 'static,
+    S::Future: Send + 'static,
+    S::Error: Send + 'static,
+    B: Send + 'static,
+{
+    type Response = Response<Body>;
+    type Error = S::Error;
+    type Future = BoxFuture<'static, Result<Self::Response, Self::Error>>;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
+        self.services.poll_ready(context)
+    }
+
+    fn call(&mut self, mut request: Request<B>) -> Self::Future {
+        request.extensions_mut().insert(Arrived(Instant::now()));
+        let key = charged(request.extensions());
+        let client = own_client(request.extensions()).cloned();
+        let caller: Option<&Caller> = request.extensions().get();
+        let token = caller.and_then(|caller| caller.token);
+        let number = (client.as_ref()).map_or(0, |client| client.called(token));
+        let call = Call::find(request.uri().path());
+        let (is_stream, cost) = call.map_or((false, 1), |call| (call.streams, call.charge));
+        let mut place = Place {
+            limits: Arc::clone(&self.limits),
+            key,
+            client,
+            number,
+            is_stream,
+            admitted: None,
+        };
+        if let Some(admitted) = self.limits.admit_now(key, is_stream, cost) {
+            place.admit(admitted, &mut request);
+            let answering = self.services.call(request);
+            return Box::pin(async move { Ok(place.keep(answering.await?)) });
+        }
+        let Some(waiting) = self.limits.place_to_wait(key) else {
+            let status = too_many_waiting(place.client.as_ref());
+            return Box::pin(async move { Ok(status.into_http()) });
+        };
+        // The clone that is ready serves this call.
+        let clone = self.services.clone();
+        let mut services = std::mem::replace(&mut self.services, clone);
+        let limits = Arc::clone(&self.limits);
+        Box::pin(async move {
+            match limits.admit(key, is_stream, cost).await {
+                Ok(admitted) => {
+                    drop(waiting);
+                    place.admit(admitted, &mut request);
+                    Ok(place.keep(services.call(request).await?))
+                }
+                Err(refused) => {
+                    limits.delay_refusal().await;
+                    Ok(Status::from(Refusal::from(refused)).into_http())
+                }
+            }
+        })
+    }
+}
+
+/// What a call has until its answer has been read.
+struct Place {
+    limits: Arc<CallLimits>,
+    key: Key,
+    client: Option<Arc<Client>>,
+    /// The number of the call on its connection.
+    number: u64,
+    is_stream: bool,
+    admitted: Option<Admitted>,
+}
+
+impl Place {
+    /// Takes the places of a call, and shows the call the one that it may give back.
+    fn admit<B>(&mut self, admitted: Admitted, request: &mut Request<B>) {
+        if let Some(executing) = admitted.executing() {
+            request.extensions_mut().insert(executing.clone());
+        }
+        self.admitted = Some(admitted);
+        if let Some(client) = self.client.as_ref().filter(|_| self.is_stream) {
+            client.count_stream(true);
+        }
+    }
+
+    /// Keeps the place until the answer has been read.
+    fn keep(self, mut response: Response<Body>) -> Response<Body> {
+        if let Some(admitted) = &self.admitted {
+            admitted.executed();
+        }
+        let status: Option<&Status> = response.extensions().get();
+        if status.is_some_and(|status| is_elsewhere(status).is_some()) {
+            response.extensions_mut().insert(Charged(self.key));
+        }
+        response.map(|body| {
+            // A refusal has no body to be read.
+            if body.is_end_stream() {
+                return body;
+            }
+            if let Some(client) = self.client.as_ref().filter(|_| !self.is_stream) {
+                client.answer_ready(self.number);
+            }
+            Body::new(KeptBody { body, place: self })
+        })
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        match &self.client {
+            Some(client) if self.is_stream && self.admitted.is_some() => {
+                client.count_stream(false);
+            }
+            Some(client) if !self.is_stream => client.answer_gone(self.number),
+            _ => {}
+        }
+    }
+}
+
+/// An answer, with the place of its call. Large answers are charged.
+struct KeptBody {
+    body: Body,
+    place: Place,
+}
+
+impl HttpBody for KeptBody {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        let frame = Pin::new(&mut self.body).poll_frame(context);
+        if !self.place.is_stream
+            && let Poll::Ready(Some(Ok(frame))) = &frame
+            && let Some(data) = frame.data_ref()
+        {
+            let cost = data.len() as u64 / BYTES_PER_CALL;
+            if cost > 0 {
+                self.place.limits.charge(self.place.key, cost);
+            }
+        }
+        frame
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.body.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.body.size_hint()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::convert::Infallible;
+
+    use futures::FutureExt as _;
+    use tower::service_fn;
+
+    use super::*;
+    use chefshat_admission::limits::{Executing, Shares};
+
+    /// More calls than may be executed at a time.
+    const MANY: usize = 100;
+
+    /// Answers at once, except a path that waits forever: with or without its place.
+    async fn served(request: Request<Body>) -> Result<Response<Body>, Infallible> {
+        match request.uri().path() {
+            "/at_once" => return Ok(Response::new(Body::empty())),
+            "/waits_without" => {
+                let executing: Option<&Executing> = request.extensions().get();
+                executing.expect("a call that is executed").give_back();
+            }
+            _ => {}
+        }
+        std::future::pending().await
+    }
+
+    /// Whether a call is answered at once after many to a path have begun.
+    fn answers_beside(path: &str) -> bool {
+        let limits = Arc::new(CallLimits::new(Shares::default()));
+        let mut services = LimitsLayer::new(limits).layer(service_fn(served));
+        let mut call = |path: &str| {
+            let request = Request::builder().uri(path).body(Body::empty());
+            services.call(request.expect("a request"))
+        };
+        let mut waiting: Vec<_> = (0..MANY).map(|_| call(path)).collect();
+        for call in &mut waiting {
+            assert!(call.now_or_never().is_none(), "{path} waits");
+        }
+        call("/at_once").now_or_never().is_some()
+    }
+
+    #[tokio::test]
+    async fn calls_that_only_wait_hold_up_no_others() {
+        assert!(answers_beside("/waits_without"));
+        assert!(!answers_beside("/waits_with"));
+    }
+}

@@ -1,0 +1,502 @@
+//! Which rooms, tournaments and recorded games a caller reaches and finds in lists: by the scope of
+//! its token, by their visibility, and by the secrets that it shows. What a caller does not reach
+//! because it is private is answered exactly like what does not exist.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use chefshat_proto::v1::{self, record_line::Line};
+use tonic::Status;
+use tracing::warn;
+
+use super::access::check;
+use super::status::{
+    elsewhere, owner_unreachable, read_failed, room_gone, room_unknown, tournament_unknown,
+};
+use super::takeover::settled;
+use chefshat_admission::access::{Caller, Role, Standing};
+use chefshat_admission::limits::Key;
+use chefshat_hosting::cluster::{Elsewhere, FoundBy, Location};
+use chefshat_hosting::room::Handle;
+use chefshat_hosting::rooms::Rooms;
+use chefshat_hosting::tournaments::{TournamentHandle, Tournaments};
+use chefshat_room::ids::{Id, RequestKey, Token};
+use chefshat_room::journal::{Change, Entry, GameHeader};
+use chefshat_room::policy::Visibility;
+use chefshat_store::{StoreError, StoredGame};
+
+/// Decides what a caller reaches.
+#[derive(Debug, Clone)]
+pub struct Reach {
+    rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
+}
+
+/// How much of a record its reader sees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sight {
+    /// Everything.
+    Whole,
+    /// What the players saw.
+    Players,
+}
+
+impl Reach {
+    /// Decides about these rooms and tournaments.
+    pub fn new(rooms: Arc<Rooms>, tournaments: Arc<Tournaments>) -> Self {
+        Self { rooms, tournaments }
+    }
+
+    /// The rooms.
+    pub(super) fn rooms(&self) -> &Arc<Rooms> {
+        &self.rooms
+    }
+
+    /// The room with this id or join code, if this node has it. If another node does, the error sends
+    /// the request there.
+    pub(super) async fn room_here(
+        &self,
+        found_by: impl Into<FoundBy>,
+        caller: Key,
+    ) -> Result<Option<Handle>, Status> {
+        let found_by = found_by.into();
+        match self.room_in_memory(&found_by) {
+            Some(handle) if !handle.is_gone() => Ok(Some(handle)),
+            stopped => {
+                let is_known =
+                    || stopped.is_some() || self.tournament_in_memory(&found_by).is_some();
+                let owned = self
+                    .check_not_elsewhere(&found_by, caller, is_known)
+                    .await?;
+                // What this node has stopped is about to be resumed.
+                let stopped = stopped.filter(|_| owned);
+                Ok(self.room_in_memory(&found_by).or(stopped))
+            }
+        }
+    }
+
+    /// The tournament with this id or join code, as [`Reach::room_here`].
+    pub(super) async fn tournament_here(
+        &self,
+        found_by: impl Into<FoundBy>,
+        caller: Key,
+    ) -> Result<Option<Arc<TournamentHandle>>, Status> {
+        let found_by = found_by.into();
+        if let Some(handle) = self.tournament_in_memory(&found_by) {
+            return Ok(Some(handle));
+        }
+        let is_known = || self.room_in_memory(&found_by).is_some();
+        self.check_not_elsewhere(&found_by, caller, is_known)
+            .await?;
+        Ok(self.tournament_in_memory(&found_by))
+    }
+
+    fn room_in_memory(&self, found_by: &FoundBy) -> Option<Handle> {
+        match found_by {
+            FoundBy::Id(id) => self.rooms.get(*id),
+            FoundBy::Code(code) => self.rooms.by_code(code),
+            FoundBy::Game(game) => self.rooms.get(self.rooms.room_of(*game)?),
+        }
+    }
+
+    fn tournament_in_memory(&self, found_by: &FoundBy) -> Option<Arc<TournamentHandle>> {
+        match found_by {
+            FoundBy::Id(id) => self.tournaments.get(*id),
+            FoundBy::Code(code) => self.tournaments.by_code(code),
+            FoundBy::Game(_) => None,
+        }
+    }
+
+    /// Checks that no other node has created a room or tournament for this request before.
+    pub(super) async fn check_not_created_elsewhere(
+        &self,
+        request: Option<RequestKey>,
+        caller: Key,
+    ) -> Result<(), Status> {
+        let Some(id) = request.map(|request| request.created_id()) else {
+            return Ok(());
+        };
+        if self.rooms.get(id).is_some() || self.tournaments.get(id).is_some() {
+            return Ok(());
+        }
+        let found_by = FoundBy::Id(id);
+        let checked = self.check_not_elsewhere(&found_by, caller, || false);
+        checked.await.map(drop)
+    }
+
+    /// Checks that what is not in memory is not at another node. Returns whether this node owns it:
+    /// then it is about to be resumed, if it is known here (`is_known`). What is over and whose node
+    /// is gone is in memory afterwards.
+    pub(super) async fn check_not_elsewhere(
+        &self,
+        found_by: &FoundBy,
+        caller: Key,
+        is_known: impl FnOnce() -> bool,
+    ) -> Result<bool, Status> {
+        match self.rooms.directory().locate(found_by, caller).await {
+            Location::Nowhere => Ok(false),
+            Location::Over(id, kind) => {
+                let shown = self.tournaments.show_ended(id, kind).await;
+                shown.map(|()| false).map_err(|error| {
+                    warn!(%error, "what is over cannot be read");
+                    owner_unreachable()
+                })
+            }
+            Location::Here if is_known() => Ok(true),
+            Location::Here | Location::Unknown => Err(owner_unreachable()),
+            Location::Node(peer) => Err(elsewhere(Elsewhere {
+                peer,
+                found_by: found_by.clone(),
+            })),
+        }
+    }
+
+    /// The room with an id from a message.
+    pub(super) async fn room(&self, caller: &Caller, id: &str) -> Result<Handle, Status> {
+        let id = Id::parse(id).ok_or_else(room_unknown)?;
+        self.room_or(caller, id, room_unknown).await
+    }
+
+    /// The room with this id. If there is none, or the caller does not see it, `unknown` says so.
+    pub(super) async fn room_or(
+        &self,
+        caller: &Caller,
+        id: Id,
+        unknown: impl Fn() -> Status,
+    ) -> Result<Handle, Status> {
+        let unknown = || match self.rooms.is_shutting_down() && caller.secrets.mention(id) {
+            // A suspended room has taken the knowledge of its tickets with it.
+            true => room_gone(),
+            false => unknown(),
+        };
+        let found = self.room_here(id, Key::of_caller(caller)).await?;
+        let handle = found.ok_or_else(unknown)?;
+        // A node that has just stopped it is about to resume it, or another is.
+        let header = self.rooms.header(id).ok_or_else(room_gone)?;
+        if header.policy.visibility == Visibility::Private
+            && self.standing_in_room(caller, &handle, &header).await == Standing::Stranger
+        {
+            return Err(unknown());
+        }
+        check(caller, |caller| reaches(caller, &header))?;
+        Ok(handle)
+    }
+
+    /// Checks that the scope of a caller who has the join code of a room includes it.
+    pub(super) fn check_joining(&self, caller: &Caller, room: Id) -> Result<(), Status> {
+        let tournament = || self.rooms.header(room)?.tournament;
+        check(caller, |caller| {
+            caller.reaches_room(room, tournament().map(|game| game.tournament))
+        })
+    }
+
+    /// The room of a ticket, which is still to be compared. A caller whose scope does not include a
+    /// private room gets the answer for an unknown ticket, whatever the ticket. Waits while the room
+    /// changes hands.
+    pub(super) async fn room_of_ticket(
+        &self,
+        caller: &Caller,
+        room: Id,
+        unknown: impl Fn() -> Status,
+    ) -> Result<Handle, Status> {
+        let look = || self.look_for_ticket(caller, room, &unknown);
+        settled(&self.rooms, look).await
+    }
+
+    /// As [`Reach::room_of_ticket`], without waiting.
+    pub(super) async fn look_for_ticket(
+        &self,
+        caller: &Caller,
+        room: Id,
+        unknown: impl Fn() -> Status,
+    ) -> Result<Handle, Status> {
+        let found = self.room_here(room, Key::of_caller(caller)).await?;
+        let handle = found.ok_or_else(&unknown)?;
+        if caller.scope.is_some() {
+            let header = self.rooms.header(room).ok_or_else(room_gone)?;
+            check(caller, |caller| reaches(caller, &header)).map_err(|refused| {
+                match header.policy.visibility {
+                    Visibility::Private => unknown(),
+                    Visibility::Public | Visibility::Unlisted => refused,
+                }
+            })?;
+        }
+        Ok(handle)
+    }
+
+    /// Whether the room or tournament of a ticket is in memory and runs, so that finding it takes no
+    /// time.
+    pub(super) fn has_in_memory(&self, id: Id) -> bool {
+        self.tournaments.get(id).is_some() || self.rooms.get(id).is_some_and(|room| !room.is_gone())
+    }
+
+    /// Whether a room is in the lists of a caller.
+    pub(super) async fn lists_room(&self, caller: &Caller, handle: &Handle) -> bool {
+        let Some(header) = self.rooms.header(handle.id()) else {
+            return false;
+        };
+        reaches(caller, &header)
+            && (header.policy.visibility == Visibility::Public
+                || self.standing_in_room(caller, handle, &header).await > Standing::Stranger)
+    }
+
+    /// The tournament with an id from a message.
+    pub(super) async fn tournament(
+        &self,
+        caller: &Caller,
+        id: &str,
+    ) -> Result<Arc<TournamentHandle>, Status> {
+        let id = Id::parse(id).ok_or_else(tournament_unknown)?;
+        let handle = self.tournament_here(id, Key::of_caller(caller)).await?;
+        let handle = handle.ok_or_else(tournament_unknown)?;
+        if handle.visibility() == Visibility::Private
+            && standing_in_tournament(caller, &handle) == Standing::Stranger
+        {
+            return Err(tournament_unknown());
+        }
+        check(caller, |caller| caller.reaches_tournament(handle.id()))?;
+        Ok(handle)
+    }
+
+    /// Whether the scope of a caller includes the tournament of a ticket, which is still to be
+    /// compared; as for rooms. `None` if this node does not have the tournament.
+    pub(super) fn tournament_of_ticket(
+        &self,
+        caller: &Caller,
+        id: Id,
+        unknown: impl Fn() -> Status,
+    ) -> Option<Result<(), Status>> {
+        let tournament = self.tournaments.get(id)?;
+        let checked = check(caller, |it| it.reaches_tournament(id));
+        Some(checked.map_err(|refused| match tournament.visibility() {
+            Visibility::Private => unknown(),
+            Visibility::Public | Visibility::Unlisted => refused,
+        }))
+    }
+
+    /// Whether a tournament is in the lists of a caller.
+    pub(super) fn lists_tournament(&self, caller: &Caller, handle: &TournamentHandle) -> bool {
+        caller.reaches_tournament(handle.id())
+            && (handle.visibility() == Visibility::Public
+                || standing_in_tournament(caller, handle) > Standing::Stranger)
+    }
+
+    /// Whether a caller may be one who sees a recorded game, by its summary alone. If not, the game is
+    /// not read at all, so that the time of the answer does not show that it exists.
+    pub(super) fn may_see_record(&self, caller: &Caller, summary: &v1::RecordSummary) -> bool {
+        let is_private = summary.visibility() == v1::Visibility::Private;
+        let ids = [&summary.room_id, &summary.tournament_id, &summary.study_id];
+        let mut ids = ids.into_iter().filter_map(|id| Id::parse(id));
+        let by_token = caller.standing() > Standing::Stranger
+            && reaches_record(caller, &summary.room_id, &summary.tournament_id);
+        !is_private || summary.added || by_token || ids.any(|id| caller.secrets.mention(id))
+    }
+
+    /// How much of a recorded game a caller sees. `unknown` answers for a game that it does not see.
+    pub(super) fn recorded(
+        &self,
+        caller: &Caller,
+        stored: &StoredGame,
+        unknown: impl Fn() -> Status,
+    ) -> Result<Sight, Status> {
+        let (visibility, standing, least) = match stored {
+            StoredGame::Hosted(header, entries, _) => {
+                let standing = self.standing_in_game(caller, header, entries);
+                (header.policy.visibility, standing, least_to_read(header))
+            }
+            // Importing it made it public.
+            StoredGame::Imported(_) => (Visibility::Public, Standing::Stranger, Standing::Stranger),
+        };
+        let is_private = visibility == Visibility::Private;
+        if is_private && standing < least {
+            return Err(unknown());
+        }
+        check(caller, |caller| match stored {
+            StoredGame::Hosted(header, ..) => reaches(caller, header),
+            StoredGame::Imported(lines) => {
+                let header = lines.first().and_then(|line| match &line.line {
+                    Some(Line::Header(header)) => Some(header),
+                    _ => None,
+                });
+                header.is_some_and(|it| reaches_record(caller, &it.room_id, &it.tournament_id))
+            }
+        })?;
+        let is_host = caller.role >= Role::Host && !is_private;
+        Ok(match is_host || standing == Standing::Owner {
+            true => Sight::Whole,
+            false => Sight::Players,
+        })
+    }
+
+    /// Whether a recorded game is in the lists of a caller.
+    pub(super) async fn lists_record(
+        &self,
+        caller: &Caller,
+        summary: &v1::RecordSummary,
+    ) -> Result<bool, Status> {
+        if !reaches_record(caller, &summary.room_id, &summary.tournament_id) {
+            return Ok(false);
+        }
+        let is_public = summary.visibility() == v1::Visibility::Unspecified;
+        if is_public || summary.added || caller.standing() > Standing::Stranger {
+            return Ok(true);
+        }
+        let tournament = Id::parse(&summary.tournament_id);
+        let kept = tournament.and_then(|id| self.tournaments.get(id));
+        let standing = kept.as_ref().map(|it| it.standing(&caller.secrets));
+        if standing > Some(Standing::Stranger) {
+            return Ok(true);
+        }
+        // Reading a game takes time: only those that a secret may be of are read. The games of a
+        // tournament may outlast it.
+        let forgotten = tournament.filter(|_| kept.is_none());
+        let study = Id::parse(&summary.study_id);
+        let mut ids = (Id::parse(&summary.room_id).into_iter())
+            .chain(forgotten)
+            .chain(study);
+        if !ids.any(|id| caller.secrets.mention(id)) {
+            return Ok(false);
+        }
+        let Some(game) = Id::parse(&summary.game_id) else {
+            return Ok(false);
+        };
+        let stored = match self.rooms.store().finished(game).await {
+            // One that cannot be read ends no list of others.
+            Err(error @ StoreError::Unreadable(_)) => {
+                read_failed(error);
+                return Ok(false);
+            }
+            stored => stored.map_err(read_failed)?,
+        };
+        Ok(match stored {
+            Some(StoredGame::Hosted(header, entries, _)) => {
+                self.standing_in_game(caller, &header, &entries) >= least_to_read(&header)
+            }
+            Some(StoredGame::Imported(_)) | None => false,
+        })
+    }
+
+    async fn standing_in_room(
+        &self,
+        caller: &Caller,
+        handle: &Handle,
+        header: &GameHeader,
+    ) -> Standing {
+        let standing = self.standing_by_header(caller, header);
+        if standing > Standing::Stranger {
+            return standing;
+        }
+        let ids = [Some(header.room_id), tournament_of(header)];
+        let secrets: Vec<_> = (ids.into_iter().flatten())
+            .flat_map(|id| caller.secrets.of_id(id))
+            .map(|token| token.secret)
+            .collect();
+        match !secrets.is_empty() && handle.has_ticket(secrets).await.unwrap_or(false) {
+            true => Standing::Participant,
+            false => Standing::Stranger,
+        }
+    }
+
+    fn standing_in_game(
+        &self,
+        caller: &Caller,
+        header: &GameHeader,
+        entries: &[Entry],
+    ) -> Standing {
+        let mut tickets = BTreeMap::new();
+        for entry in entries {
+            match &entry.change {
+                Change::Seated { seat, participant } => {
+                    tickets.insert(*seat, participant.ticket);
+                }
+                Change::Vacated(seat) => drop(tickets.remove(seat)),
+                _ => {}
+            }
+        }
+        let ids = [Some(header.room_id), tournament_of(header)];
+        let by_ticket = (ids.into_iter().flatten())
+            .map(|id| (caller.secrets).standing(id, &header.owner, tickets.values().copied()));
+        let standing = self.standing_by_header(caller, header);
+        by_ticket.max().map_or(standing, |it| it.max(standing))
+    }
+
+    /// Whether a caller shows the owner token of a room, or of its tournament or study.
+    pub(super) fn is_owner(&self, caller: &Caller, header: &GameHeader) -> bool {
+        self.standing_by_header(&caller.by_secrets(), header) == Standing::Owner
+    }
+
+    /// Whether this is the owner token of a room, or of its tournament or study.
+    pub(super) fn is_owner_token(&self, token: &str, header: &GameHeader) -> bool {
+        self.is_owner(&Caller::default().showing(token), header)
+    }
+
+    /// Whether a caller shows a ticket or the owner token of a room.
+    pub(super) async fn takes_part(&self, caller: &Caller, handle: &Handle) -> bool {
+        let Some(header) = self.rooms.header(handle.id()) else {
+            return false;
+        };
+        let caller = caller.by_secrets();
+        self.standing_in_room(&caller, handle, &header).await > Standing::Stranger
+    }
+
+    /// What a caller is to a game by its token, and by what is known before the game starts.
+    fn standing_by_header(&self, caller: &Caller, header: &GameHeader) -> Standing {
+        let by_token = match reaches(caller, header) {
+            true => caller.standing(),
+            false => Standing::Stranger,
+        };
+        let secrets = &caller.secrets;
+        let by_room = secrets.standing(header.room_id, &header.owner, header.table.into_iter());
+        // The owner token of a tournament or a study stands for that of each of its rooms.
+        let by_owner_of = |id| match secrets.of_id(id).any(|token| {
+            let owner = Token::of_tournament_room(header.room_id, &token.hash());
+            header.owner.is(&owner.hash())
+        }) {
+            true => Standing::Owner,
+            false => Standing::Stranger,
+        };
+        let by_tournament = tournament_of(header).map(|id| match self.tournaments.get(id) {
+            Some(tournament) => tournament.standing(secrets),
+            // The server keeps the games of a tournament longer than the tournament.
+            None => by_owner_of(id),
+        });
+        let by_study = header.study.as_ref().map(|game| by_owner_of(game.study));
+        by_token
+            .max(by_room)
+            .max(by_tournament.unwrap_or(Standing::Stranger))
+            .max(by_study.unwrap_or(Standing::Stranger))
+    }
+}
+
+fn standing_in_tournament(caller: &Caller, tournament: &TournamentHandle) -> Standing {
+    let by_token = match caller.reaches_tournament(tournament.id()) {
+        true => caller.standing(),
+        false => Standing::Stranger,
+    };
+    by_token.max(tournament.standing(&caller.secrets))
+}
+
+/// What a caller must be to a private game to read its record. That of a study names the condition.
+fn least_to_read(header: &GameHeader) -> Standing {
+    match header.study {
+        Some(_) => Standing::Owner,
+        None => Standing::Participant,
+    }
+}
+
+fn tournament_of(header: &GameHeader) -> Option<Id> {
+    header.tournament.map(|game| game.tournament)
+}
+
+/// Whether the scope of a caller includes a game.
+fn reaches(caller: &Caller, header: &GameHeader) -> bool {
+    caller.reaches_room(header.room_id, tournament_of(header))
+}
+
+/// Whether the scope of a caller includes the record of this room and tournament.
+fn reaches_record(caller: &Caller, room: &str, tournament: &str) -> bool {
+    match Id::parse(room) {
+        Some(room) => caller.reaches_room(room, Id::parse(tournament)),
+        None => caller.scope.is_none(),
+    }
+}

@@ -1,0 +1,436 @@
+//! `RoomService`: creates, lists, joins and closes rooms.
+
+use std::pin::pin;
+use std::sync::Arc;
+
+use chefshat_proto::v1::{
+    self, room_service_client::RoomServiceClient, room_service_server::RoomService,
+};
+use chefshat_record::convert::{FieldProblem, seat_number};
+use futures::{Stream, StreamExt as _};
+use tonic::transport::Channel;
+use tonic::{Code, Request, Response, Status};
+
+use super::forward::Gateway;
+use super::limits::charged;
+use super::lists::{self, Listing, Page, Part};
+use super::new_room::new_room;
+use super::pages;
+use super::reach::Reach;
+use super::recorded::Recorded;
+use super::status::{self, Refusal, field, name_fingerprint, request_id, ticket_unknown};
+use chefshat_admission::access::Caller;
+use chefshat_admission::limits::{COST_OF_BUILT_IN_GAME, COST_OF_ROOM, CallLimits, Key, Payer};
+use chefshat_hosting::room::{Handle, JoinRequest};
+use chefshat_hosting::rooms::{CreateError, Rooms};
+use chefshat_room::ids::{CODE_LENGTH, Id, Token, normal_code};
+use chefshat_room::journal::ParticipantKind;
+use chefshat_store::StoreError;
+use chefshat_wire::convert;
+
+/// Rooms examined for one page.
+const ROOMS_LOOKED_AT: usize = 200;
+
+/// Rooms that describe themselves at a time.
+const ROOMS_ASKED: usize = 32;
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct RoomCalls {
+    rooms: Arc<Rooms>,
+    recorded: Recorded,
+    calls: Arc<CallLimits>,
+    /// Where clients reach this server directly; empty if it is the only one.
+    endpoint: String,
+}
+
+impl RoomCalls {
+    /// Creates the service for these rooms. New ones may branch from these recorded games. Clients
+    /// reach this node of a cluster directly at `endpoint`.
+    pub fn new(
+        rooms: Arc<Rooms>,
+        recorded: Recorded,
+        calls: Arc<CallLimits>,
+        endpoint: Option<&str>,
+    ) -> Self {
+        Self {
+            rooms,
+            recorded,
+            calls,
+            endpoint: endpoint.unwrap_or_default().to_owned(),
+        }
+    }
+
+    fn reach(&self) -> &Reach {
+        self.recorded.reach()
+    }
+
+    /// The room with a join code; if an id is given too, it must match. Wrong codes are charged,
+    /// those of unknown rooms too: whether a room is private or unknown makes no difference.
+    async fn find_by_code(
+        &self,
+        caller: &Caller,
+        room_id: &str,
+        join_code: &str,
+        key: Key,
+    ) -> Result<Handle, Status> {
+        let refused = |refused| Status::from(Refusal::from(refused));
+        self.calls.may_try_code(key).map_err(refused)?;
+        let found = match room_id {
+            "" => self.reach().room_here(join_code, key).await?,
+            id => match Id::parse(id) {
+                Some(id) => self.reach().room_here(id, key).await?,
+                None => None,
+            },
+        };
+        let by_code = self.rooms.by_code(join_code);
+        let has_code =
+            |handle: &Handle| (by_code.as_ref()).is_some_and(|it| it.id() == handle.id());
+        let Some(handle) = found.filter(has_code) else {
+            self.calls.wrong_code(key);
+            if !room_id.is_empty() {
+                self.reach().room(caller, room_id).await?;
+            }
+            return Err(join_code_wrong());
+        };
+        self.reach().check_joining(caller, handle.id())?;
+        Ok(handle)
+    }
+
+    /// Whether the room with a join code is on this server, and waits for players.
+    async fn is_open(&self, join_code: &str) -> bool {
+        match self.rooms.by_code(join_code) {
+            Some(handle) => {
+                (handle.describe().await).is_ok_and(|room| room.state() == v1::RoomState::Waiting)
+            }
+            None => false,
+        }
+    }
+}
+
+/// The rooms that a caller finds.
+struct RoomList<'a> {
+    reach: &'a Reach,
+    caller: &'a Caller,
+    message: &'a v1::ListRoomsRequest,
+    /// Whether those whose games are over are listed, or the others.
+    over: Option<bool>,
+}
+
+impl Listing for RoomList<'_> {
+    type Entry = v1::Room;
+    type Response = v1::ListRoomsResponse;
+
+    async fn here(&self, before: Option<u64>) -> Result<Part<v1::Room>, Status> {
+        let page_size = pages::page_size(self.message.page_size);
+        // Rooms in other states are skipped, up to a limit for one page.
+        let looked_at = (self.reach.rooms()).newest(before, self.over, ROOMS_LOOKED_AT);
+        let mut more = looked_at.len() == ROOMS_LOOKED_AT;
+        let mut last = before;
+        let describe = |handle: Handle| async move {
+            match self.reach.lists_room(self.caller, &handle).await {
+                true => handle.describe().await.ok(),
+                false => None,
+            }
+        };
+        let mut entries = Vec::new();
+        let mut rooms = pin!(described(looked_at, describe));
+        while let Some((number, room)) = rooms.next().await {
+            if entries.len() == page_size {
+                more = true;
+                break;
+            }
+            last = Some(number);
+            // A room that has just gone, or that the caller does not see, is not listed.
+            if let Some(room) = room
+                && (self.message.state == 0 || self.message.state == room.state)
+            {
+                entries.push((number, room));
+            }
+        }
+        let rest = last.filter(|_| more);
+        Ok(Part { entries, rest })
+    }
+
+    async fn there(
+        &self,
+        gateway: &Gateway,
+        channel: Channel,
+        page_token: String,
+    ) -> Result<Response<v1::ListRoomsResponse>, Status> {
+        let request = v1::ListRoomsRequest {
+            page_token,
+            ..self.message.clone()
+        };
+        let mut service = RoomServiceClient::new(channel);
+        service.list_rooms(gateway.request(request)).await
+    }
+
+    fn page(response: v1::ListRoomsResponse) -> Page<v1::Room> {
+        Page {
+            entries: response.rooms,
+            next_page_token: response.next_page_token,
+        }
+    }
+
+    fn response(page: Page<v1::Room>) -> v1::ListRoomsResponse {
+        v1::ListRoomsResponse {
+            rooms: page.entries,
+            next_page_token: page.next_page_token,
+        }
+    }
+
+    fn created_at_ms(room: &v1::Room) -> u64 {
+        room.created_at_ms
+    }
+
+    fn id(room: &v1::Room) -> &str {
+        &room.room_id
+    }
+}
+
+/// Describes numbered rooms in order, [`ROOMS_ASKED`] of them at a time.
+fn described<H, R, D: Future<Output = R>>(
+    rooms: Vec<(u64, H)>,
+    describe: impl Fn(H) -> D,
+) -> impl Stream<Item = (u64, R)> {
+    let asked = move |(number, handle)| {
+        let described = describe(handle);
+        async move { (number, described.await) }
+    };
+    futures::stream::iter(rooms)
+        .map(asked)
+        .buffered(ROOMS_ASKED)
+}
+
+#[tonic::async_trait]
+impl RoomService for RoomCalls {
+    async fn create_room(
+        &self,
+        request: Request<v1::CreateRoomRequest>,
+    ) -> Result<Response<v1::CreateRoomResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let gateway: Option<Gateway> = request.extensions().get().cloned();
+        let reading = (&self.recorded, &caller, gateway.as_ref());
+        let new = new_room(reading, request.into_inner(), key).await?;
+        let request = new.request;
+        self.reach()
+            .check_not_created_elsewhere(request, key)
+            .await?;
+        let physical = new.physical;
+        let built_in = new.fills.iter().all(|fill| fill.is_built_in());
+        let cost = match built_in {
+            true => COST_OF_BUILT_IN_GAME,
+            false => COST_OF_ROOM,
+        };
+        self.calls.charge(key, cost);
+        let created = self.rooms.create(new).await;
+        if matches!(&created, Err(CreateError::Store(StoreError::Taken(_)))) {
+            // Another node has created it meanwhile.
+            self.reach()
+                .check_not_created_elsewhere(request, key)
+                .await?;
+        }
+        let created = created.map_err(Refusal::from)?;
+        let room = created.handle.describe().await.map_err(Refusal::from)?;
+        Ok(Response::new(v1::CreateRoomResponse {
+            room: Some(room),
+            join_code: created.join_code,
+            owner_token: created.owner.to_text(),
+            table_ticket: match physical {
+                true => Token::of_table(&created.owner).to_text(),
+                false => String::new(),
+            },
+        }))
+    }
+
+    async fn get_room(
+        &self,
+        request: Request<v1::GetRoomRequest>,
+    ) -> Result<Response<v1::GetRoomResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let handle = match request.join_code.as_str() {
+            "" => self.reach().room(&caller, &request.room_id).await?,
+            code => (self.find_by_code(&caller, &request.room_id, code, key)).await?,
+        };
+        let mut room = handle.describe().await.map_err(Refusal::from)?;
+        let next_join_code = handle.next_join_code();
+        if !next_join_code.is_empty() && self.reach().takes_part(&caller, &handle).await {
+            room.next_join_code = next_join_code;
+        }
+        Ok(Response::new(v1::GetRoomResponse { room: Some(room) }))
+    }
+
+    async fn list_rooms(
+        &self,
+        request: Request<v1::ListRoomsRequest>,
+    ) -> Result<Response<v1::ListRoomsResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let (_, extensions, message) = request.into_parts();
+        let _turn = self.calls.list(key).await;
+        let over = match v1::RoomState::try_from(message.state) {
+            Ok(v1::RoomState::Unspecified) => None,
+            Ok(v1::RoomState::Waiting | v1::RoomState::Playing) => Some(false),
+            Ok(v1::RoomState::Finished | v1::RoomState::Aborted) => Some(true),
+            Err(_) => {
+                let problem = FieldProblem::new("state", "not a value of this enum");
+                return Err(field("STATE_REFUSED", &problem));
+            }
+        };
+        let listing = RoomList {
+            reach: self.reach(),
+            caller: &caller,
+            message: &message,
+            over,
+        };
+        let size = pages::page_size(message.page_size);
+        lists::list(&listing, &extensions, &message.page_token, size).await
+    }
+
+    async fn join_room(
+        &self,
+        request: Request<v1::JoinRoomRequest>,
+    ) -> Result<Response<v1::JoinRoomResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        if self.rooms.is_shutting_down() {
+            return Err(status::shutting_down());
+        }
+        let (id, code) = (&request.room_id, &request.join_code);
+        let handle = self.find_by_code(&caller, id, code, key).await?;
+        let kind = convert::kind_from_proto("kind", request.kind)
+            .map_err(|problem| field("KIND_REFUSED", &problem))?
+            .unwrap_or(ParticipantKind::Agent);
+        let name = convert::checked_name("name", &request.name, 1)
+            .map_err(|problem| field("NAME_REFUSED", &problem))?;
+        let request_id = request_id(&request.request_id, &caller)?;
+        let name_fingerprint = name_fingerprint(&name, &request.name_key)?;
+        let joined = handle
+            .join(JoinRequest {
+                name,
+                name_fingerprint,
+                kind,
+                seat: request.seat,
+                request_id,
+                client: Some(Payer::of_caller(&caller)),
+            })
+            .await
+            .map_err(Refusal::from)?
+            .map_err(Refusal::from)?;
+        Ok(Response::new(v1::JoinRoomResponse {
+            room: Some(*joined.room),
+            seat: seat_number(joined.seat),
+            ticket: joined.ticket.to_text(),
+            preferred_endpoint: self.endpoint.clone(),
+        }))
+    }
+
+    async fn leave_room(
+        &self,
+        request: Request<v1::LeaveRoomRequest>,
+    ) -> Result<Response<v1::LeaveRoomResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let ticket = Token::parse(&request.into_inner().ticket).ok_or_else(ticket_unknown)?;
+        let reach = self.reach();
+        let handle = reach
+            .room_of_ticket(&caller, ticket.room, ticket_unknown)
+            .await?;
+        let left = handle.leave(ticket.secret).await.map_err(Refusal::from)?;
+        let room = left.ok_or_else(ticket_unknown)?.map_err(Refusal::from)?;
+        Ok(Response::new(v1::LeaveRoomResponse { room: Some(room) }))
+    }
+
+    async fn close_room(
+        &self,
+        request: Request<v1::CloseRoomRequest>,
+    ) -> Result<Response<v1::CloseRoomResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let client = Payer::of_caller(&caller);
+        let request = request.into_inner();
+        let caller = caller.showing(&request.owner_token);
+        let handle = self.reach().room(&caller, &request.room_id).await?;
+        let token = Token::parse(&request.owner_token)
+            .filter(|token| token.room == handle.id())
+            .ok_or_else(status::owner_token_wrong)?;
+        let room = handle
+            .close(token.secret, client)
+            .await
+            .map_err(Refusal::from)?
+            .ok_or_else(status::owner_token_wrong)?;
+        Ok(Response::new(v1::CloseRoomResponse { room: Some(room) }))
+    }
+
+    async fn set_next_room(
+        &self,
+        request: Request<v1::SetNextRoomRequest>,
+    ) -> Result<Response<v1::SetNextRoomResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let caller = (caller.showing(&request.owner_token)).showing(&request.ticket);
+        let handle = self.reach().room(&caller, &request.room_id).await?;
+        let header = self.rooms.header(handle.id());
+        let is_owner = |header| (self.reach()).is_owner_token(&request.owner_token, header);
+        let is_owner = header.as_deref().is_some_and(is_owner);
+        if !is_owner && request.ticket.is_empty() {
+            return Err(status::owner_token_wrong());
+        }
+        let participant = Caller::default().showing(&request.ticket);
+        if !is_owner && !self.reach().takes_part(&participant, &handle).await {
+            return Err(ticket_unknown());
+        }
+        let join_code = normal_code(&request.join_code);
+        if join_code.len() != CODE_LENGTH {
+            return Err(join_code_wrong());
+        }
+        loop {
+            let earlier = handle.next_join_code();
+            if !is_owner && earlier != join_code && self.is_open(&earlier).await {
+                return Err(status::status(
+                    Code::FailedPrecondition,
+                    "NEXT_ROOM_SET",
+                    "somebody else was faster: get the room, and join its next one",
+                    [],
+                ));
+            }
+            if handle.replace_next_join_code(&earlier, join_code.clone()) {
+                return Ok(Response::new(v1::SetNextRoomResponse {}));
+            }
+        }
+    }
+}
+
+fn join_code_wrong() -> Status {
+    status::status(
+        Code::PermissionDenied,
+        "JOIN_CODE_WRONG",
+        "no room has this join code; ask the room's creator for it, or join the tournament if the room belongs to one",
+        [("field", "join_code")],
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::sync::Barrier;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn rooms_of_a_list_are_described_concurrently() {
+        let rooms: Vec<_> = (0..64).map(|number| (number, ())).collect();
+        // No call returns before this many have started.
+        let barrier = Barrier::new(ROOMS_ASKED);
+        let barrier = &barrier;
+        let describe = |()| async move {
+            barrier.wait().await;
+        };
+        let numbers: Vec<u64> = (described(rooms, describe).map(|(number, ())| number))
+            .collect()
+            .await;
+        assert_eq!(numbers, (0..64).collect::<Vec<_>>());
+    }
+}

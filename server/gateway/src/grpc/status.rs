@@ -1,0 +1,516 @@
+//! Every error a client can see, as a gRPC status with `google.rpc.ErrorInfo`: reason in
+//! UPPER_SNAKE, domain `chefshat`, metadata with the field or limit at fault. Errors that a client
+//! cannot act on go to the log instead.
+
+use std::collections::HashMap;
+
+use chefshat_proto::v1;
+use chefshat_record::convert::FieldProblem;
+use chefshat_referee::Refusal as Unjudged;
+use chefshat_vector::RequestError;
+use tonic::{Code, Status};
+use tonic_types::{ErrorDetails, StatusExt as _};
+
+use chefshat_admission::access::Caller;
+use chefshat_admission::limits::{NotStored, Refused};
+use chefshat_hosting::cluster::Elsewhere;
+use chefshat_hosting::journaled::CreateProblem;
+use chefshat_hosting::room::{ReportRefusal, RoomGone, SpectateError};
+use chefshat_hosting::rooms::CreateError;
+use chefshat_room::ids::request_id_of;
+use chefshat_room::{ExpressError, HintError, JoinError, LeaveError, ReportError};
+use chefshat_store::StoreError;
+use chefshat_wire::convert;
+use chefshat_wire::outbox::StreamEnd;
+
+/// Domain of every `ErrorInfo`.
+const DOMAIN: &str = "chefshat";
+
+/// Creates a status with its reason and metadata.
+pub fn status<const N: usize>(
+    code: Code,
+    reason: &str,
+    message: impl Into<String>,
+    metadata: [(&str, &str); N],
+) -> Status {
+    let metadata = metadata.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    with_reason(code, reason, message, metadata.into())
+}
+
+fn with_reason(
+    code: Code,
+    reason: &str,
+    message: impl Into<String>,
+    metadata: HashMap<String, String>,
+) -> Status {
+    Status::with_error_details(
+        code,
+        message,
+        ErrorDetails::with_error_info(reason, DOMAIN, metadata),
+    )
+}
+
+/// The status for a refused request of a vector stream.
+pub fn vector_refused(error: RequestError) -> Status {
+    let code = match error.reason {
+        "RECORDS_TOO_LONG" | "STATES_TOO_LARGE" => Code::ResourceExhausted,
+        _ => Code::InvalidArgument,
+    };
+    let metadata = error.metadata.into_iter();
+    let metadata = metadata.map(|(key, value)| (key.to_owned(), value));
+    with_reason(code, error.reason, error.message, metadata.collect())
+}
+
+/// Too many calls to games wait for a stream.
+pub fn calls_not_taken() -> Status {
+    status(
+        Code::Unavailable,
+        "CALLS_NOT_TAKEN",
+        "too many calls to games are waiting for this stream; connect again and attach fewer participants to one stream",
+        [],
+    )
+}
+
+/// Whether a status has this reason.
+pub fn has_reason(status: &Status, reason: &str) -> bool {
+    (status.get_details_error_info()).is_some_and(|info| info.reason == reason)
+}
+
+/// Converts a status to the message that refuses a command on a stream.
+pub fn refused(request_id: u32, status: &Status) -> v1::Refused {
+    let (reason, metadata) = status
+        .get_details_error_info()
+        .map(|info| (info.reason, info.metadata.into_iter().collect()))
+        .unwrap_or_default();
+    v1::Refused {
+        request_id,
+        reason,
+        message: status.message().to_owned(),
+        metadata,
+        code: u32::try_from(i32::from(status.code())).unwrap_or_default(),
+    }
+}
+
+/// The status for an invalid field.
+pub fn field(reason: &str, problem: &FieldProblem) -> Status {
+    status(
+        Code::InvalidArgument,
+        reason,
+        problem.to_string(),
+        [("field", problem.field)],
+    )
+}
+
+/// The status for a client when the store cannot be read.
+pub fn read_failed(error: StoreError) -> Status {
+    tracing::error!(%error, "reading a record failed");
+    match error {
+        StoreError::Unreadable(_) => status(
+            Code::DataLoss,
+            RECORD_UNREADABLE,
+            UNREADABLE,
+            [("field", "game_id")],
+        ),
+        _ => internal(),
+    }
+}
+
+/// Reason of the error for a record that cannot be read.
+pub const RECORD_UNREADABLE: &str = "RECORD_UNREADABLE";
+/// Its message.
+pub const UNREADABLE: &str = "the server has this record but cannot read it; its log says why";
+
+/// No tournament has this id.
+pub fn tournament_unknown() -> Status {
+    status(
+        Code::NotFound,
+        "TOURNAMENT_UNKNOWN",
+        "this tournament does not exist",
+        [("field", "tournament_id")],
+    )
+}
+
+/// There is no such room.
+pub fn room_unknown() -> Status {
+    status(
+        Code::NotFound,
+        "ROOM_UNKNOWN",
+        "this room does not exist; it may have been closed",
+        [],
+    )
+}
+
+/// A token is not that of the room's creator.
+pub fn owner_token_wrong() -> Status {
+    status(
+        Code::PermissionDenied,
+        "OWNER_TOKEN_WRONG",
+        "this is not the owner token that CreateRoom returned for this room",
+        [("field", "owner_token")],
+    )
+}
+
+/// No seat has this ticket.
+pub fn ticket_unknown() -> Status {
+    status(
+        Code::Unauthenticated,
+        "TICKET_UNKNOWN",
+        "no seat has this ticket: it is mistyped, the seat was freed, or the room is gone; join again",
+        [("field", "ticket")],
+    )
+}
+
+/// No physical table has this ticket.
+pub fn table_unknown() -> Status {
+    status(
+        Code::Unauthenticated,
+        "TICKET_UNKNOWN",
+        "no physical table has this ticket: it is mistyped, or the room is gone; use `table_ticket` of CreateRoom, or of GetPhysicalTable in a tournament",
+        [("field", "table_ticket")],
+    )
+}
+
+/// The id of a request, if set, as it counts for its caller: the answer to a repeated request
+/// contains secrets, and another token does not get them. Callers without a token are not told apart
+/// by their addresses, because a client that repeats a request may have another one by then.
+pub fn request_id(bytes: &[u8], caller: &Caller) -> Result<Option<[u8; 32]>, Status> {
+    if bytes.is_empty() {
+        return Ok(None);
+    }
+    let id = bytes.try_into().map_err(|_| {
+        let message = format!("{} bytes; give 32 random ones, or none", bytes.len());
+        field(
+            "REQUEST_ID_REFUSED",
+            &FieldProblem::new("request_id", message),
+        )
+    })?;
+    Ok(Some(match &caller.token_hash {
+        Some(token) => request_id_of(id, token),
+        None => *id,
+    }))
+}
+
+/// The fingerprint of a name and its key; empty without a key.
+pub fn name_fingerprint(name: &str, key: &[u8]) -> Result<String, Status> {
+    if key.is_empty() {
+        return Ok(String::new());
+    }
+    let key = key.try_into().map_err(|_| {
+        let message = format!("{} bytes; give 32 random ones, or none", key.len());
+        field("NAME_KEY_REFUSED", &FieldProblem::new("name_key", message))
+    })?;
+    Ok(convert::name_fingerprint(name, key))
+}
+
+/// A request id was reused with other content.
+pub fn request_id_used(message: &str) -> Status {
+    status(
+        Code::AlreadyExists,
+        "REQUEST_ID_USED",
+        message,
+        [("field", "request_id")],
+    )
+}
+
+/// The disk has no space for more games.
+pub fn disk_nearly_full(message: &str) -> Status {
+    status(Code::ResourceExhausted, "DISK_NEARLY_FULL", message, [])
+}
+
+/// The server's store failed, and the server stops.
+pub fn store_failed() -> Status {
+    status(
+        Code::Unavailable,
+        "STORE_FAILED",
+        "the server's storage failed and the server is stopping; everything it has acknowledged is stored: reconnect when it is back",
+        [],
+    )
+}
+
+/// The server failed in a way that clients cannot resolve.
+pub fn internal() -> Status {
+    status(
+        Code::Internal,
+        "INTERNAL",
+        "the server failed to do this; see its log",
+        [],
+    )
+}
+
+/// The server is shutting down.
+pub fn shutting_down() -> Status {
+    status(
+        Code::Unavailable,
+        "SHUTTING_DOWN",
+        "the server is shutting down",
+        [],
+    )
+}
+
+/// A spectator was disconnected because it reads too slowly.
+pub fn spectator_too_slow() -> Status {
+    status(
+        Code::ResourceExhausted,
+        "SPECTATOR_TOO_SLOW",
+        "the stream was not read fast enough; watch again from the number after the last event received",
+        [],
+    )
+}
+
+/// The status for the end of a stream.
+pub fn stream_ended(end: StreamEnd) -> Status {
+    match end {
+        StreamEnd::Complete => Status::ok(""),
+        StreamEnd::ShuttingDown => shutting_down(),
+        StreamEnd::StoreFailed => store_failed(),
+        StreamEnd::RoomGone => room_gone(),
+        StreamEnd::SpectatorTooSlow => spectator_too_slow(),
+        StreamEnd::CallsNotTaken => calls_not_taken(),
+        StreamEnd::RequestsFailed => internal(),
+    }
+}
+
+/// A room became unreachable: it has just ended, or was suspended because the server stops.
+pub fn room_gone() -> Status {
+    status(
+        Code::Unavailable,
+        "ROOM_GONE",
+        "the room cannot be reached: it has just ended, or the server is stopping; try again",
+        [],
+    )
+}
+
+/// Reason of [`not_owner`].
+const NOT_OWNER: &str = "NOT_OWNER";
+
+/// This node does not have what a request is about. Only nodes see it: the one that has passed the
+/// request on looks for the owner again.
+fn not_owner() -> Status {
+    status(
+        Code::Unavailable,
+        NOT_OWNER,
+        "another node has this room or tournament",
+        [],
+    )
+}
+
+/// What a request is about is at another node. `forward` sends the request there.
+pub fn elsewhere(elsewhere: Elsewhere) -> Status {
+    let mut status = not_owner();
+    status.set_source(std::sync::Arc::new(elsewhere));
+    status
+}
+
+/// Where a request must go, if this status says so.
+pub fn is_elsewhere(status: &Status) -> Option<&Elsewhere> {
+    std::error::Error::source(status)?.downcast_ref()
+}
+
+/// Whether the answer of another node says that it does not have what the request is about.
+pub fn is_not_owner(headers: &http::HeaderMap) -> bool {
+    Status::from_header_map(headers).is_some_and(|status| has_reason(&status, NOT_OWNER))
+}
+
+/// Whether another node has refused a call: not if it could not be reached, or does not have what the
+/// call is about.
+pub fn is_refusal(status: &Status) -> bool {
+    (status.get_details_error_info()).is_some_and(|info| info.reason != NOT_OWNER)
+}
+
+/// The node that has a room or tournament cannot be reached, or is just handing it over.
+pub fn owner_unreachable() -> Status {
+    status(
+        Code::Unavailable,
+        "OWNER_UNREACHABLE",
+        "the server that runs this room or tournament cannot be reached, or another one is just taking over; try again",
+        [],
+    )
+}
+
+impl From<RoomGone> for Refusal {
+    fn from(_: RoomGone) -> Self {
+        Self(room_gone())
+    }
+}
+
+/// A wrapper to convert other errors to a status.
+#[derive(Debug)]
+pub struct Refusal(pub Status);
+
+impl From<Refusal> for Status {
+    fn from(refusal: Refusal) -> Self {
+        refusal.0
+    }
+}
+
+impl From<Refused> for Refusal {
+    fn from(refused: Refused) -> Self {
+        let metadata = [("limit".to_owned(), refused.limit.to_string())];
+        let mut details = ErrorDetails::with_error_info(refused.reason, DOMAIN, metadata);
+        details.set_retry_info(Some(refused.retry_after));
+        let message = refused.to_string();
+        Self(Status::with_error_details(
+            Code::ResourceExhausted,
+            message,
+            details,
+        ))
+    }
+}
+
+impl From<JoinError> for Refusal {
+    fn from(error: JoinError) -> Self {
+        let (code, reason) = match error {
+            JoinError::RoomFull => (Code::ResourceExhausted, "ROOM_FULL"),
+            JoinError::TooManySeatings => (Code::ResourceExhausted, "TOO_MANY_SEATINGS"),
+            JoinError::SeatTaken => (Code::FailedPrecondition, "SEAT_TAKEN"),
+            JoinError::NoSuchSeat => (Code::InvalidArgument, "NO_SUCH_SEAT"),
+            JoinError::ClientHasSeat => (Code::FailedPrecondition, "CLIENT_HAS_SEAT"),
+            JoinError::KindNotAdmitted => (Code::FailedPrecondition, "KIND_NOT_ADMITTED"),
+            JoinError::RequestIdUsed => (Code::AlreadyExists, "REQUEST_ID_USED"),
+            JoinError::GameStarted => (Code::FailedPrecondition, "GAME_STARTED"),
+            JoinError::GameOver => (Code::FailedPrecondition, "GAME_OVER"),
+        };
+        Self(status(code, reason, error.to_string(), []))
+    }
+}
+
+impl From<LeaveError> for Refusal {
+    fn from(error: LeaveError) -> Self {
+        let reason = match error {
+            LeaveError::GameStarted => "GAME_STARTED",
+            LeaveError::GameOver => "GAME_OVER",
+            LeaveError::Assigned => "SEAT_ASSIGNED",
+        };
+        Self(status(
+            Code::FailedPrecondition,
+            reason,
+            error.to_string(),
+            [],
+        ))
+    }
+}
+
+impl From<ExpressError> for Refusal {
+    fn from(error: ExpressError) -> Self {
+        let refused = convert::express_refused(error);
+        let code = Code::from(i32::try_from(refused.code).unwrap_or_default());
+        Self(status(code, &refused.reason, refused.message, []))
+    }
+}
+
+impl From<NotStored> for Refusal {
+    fn from(error: NotStored) -> Self {
+        match error {
+            NotStored::DiskNearlyFull => Self(disk_nearly_full(&error.to_string())),
+            NotStored::TooFast(refused) => refused.into(),
+        }
+    }
+}
+
+impl From<HintError> for Refusal {
+    fn from(error: HintError) -> Self {
+        let (code, reason) = match error {
+            HintError::Off => (Code::FailedPrecondition, "HINTS_OFF"),
+            HintError::Closed => (Code::FailedPrecondition, "DECISION_CLOSED"),
+            HintError::TooMany => (Code::ResourceExhausted, "TOO_MANY_HINTS"),
+        };
+        Self(status(code, reason, error.to_string(), []))
+    }
+}
+
+impl From<CreateError> for Refusal {
+    fn from(error: CreateError) -> Self {
+        Self(match error {
+            CreateError::TooMany(limit) => status(
+                Code::ResourceExhausted,
+                "TOO_MANY_ROOMS",
+                error.to_string(),
+                [("max_rooms", &limit.to_string())],
+            ),
+            CreateError::Refused(refused) => return refused.into(),
+            CreateError::RequestIdUsed => request_id_used(&error.to_string()),
+            CreateError::ShuttingDown => shutting_down(),
+            CreateError::DiskNearlyFull => disk_nearly_full(&error.to_string()),
+            CreateError::Store(error) => {
+                tracing::error!(%error, "creating a room failed");
+                store_failed()
+            }
+        })
+    }
+}
+
+/// A tournament or study was not created. `settings`: the status for a setting that is refused.
+pub fn not_created<P: std::error::Error>(
+    problem: CreateProblem<P>,
+    settings: impl FnOnce(P) -> Status,
+) -> Status {
+    let message = problem.to_string();
+    match problem {
+        CreateProblem::Settings(problem) => settings(problem),
+        CreateProblem::Refused(refused) => Refusal::from(refused).into(),
+        CreateProblem::RequestIdUsed(_) => request_id_used(&message),
+        CreateProblem::ShuttingDown(_) => shutting_down(),
+        CreateProblem::DiskNearlyFull => disk_nearly_full(&message),
+        CreateProblem::Store(error) => {
+            tracing::error!(%error, "creating a tournament or study failed");
+            store_failed()
+        }
+    }
+}
+
+impl From<ReportRefusal> for Refusal {
+    fn from(refusal: ReportRefusal) -> Self {
+        let error = match refusal {
+            ReportRefusal::Malformed(problem) => return Self(field("REPORT_REFUSED", &problem)),
+            ReportRefusal::Refused(error) => error,
+        };
+        let (code, reason) = match error {
+            ReportError::GameNotStarted => (Code::FailedPrecondition, "GAME_NOT_STARTED"),
+            ReportError::GameOver => (Code::FailedPrecondition, "GAME_OVER"),
+            ReportError::IdUsed => (Code::AlreadyExists, "REPORT_ID_USED"),
+            ReportError::Refused(unjudged) => match unjudged {
+                Unjudged::TooManyQuestions => (Code::ResourceExhausted, "TOO_MANY_QUESTIONS"),
+                Unjudged::ReservedQuestionId => {
+                    let problem = FieldProblem::new("question.question_id", error.to_string());
+                    return Self(field("REPORT_REFUSED", &problem));
+                }
+                Unjudged::NoSuchOption => (Code::FailedPrecondition, "NO_SUCH_OPTION"),
+                Unjudged::TooManyHeld => (Code::FailedPrecondition, "TOO_MANY_HELD_REPORTS"),
+                Unjudged::NotCorrectable => (Code::FailedPrecondition, "NOT_CORRECTABLE"),
+                Unjudged::NotOver => (Code::FailedPrecondition, "GAME_NOT_OVER"),
+            },
+        };
+        Self(status(code, reason, error.to_string(), []))
+    }
+}
+
+impl From<SpectateError> for Refusal {
+    fn from(error: SpectateError) -> Self {
+        Self(match error {
+            SpectateError::NotAdmitted => status(
+                Code::PermissionDenied,
+                "SPECTATORS_NOT_ADMITTED",
+                "this room does not admit spectators",
+                [],
+            ),
+            SpectateError::Full => status(
+                Code::ResourceExhausted,
+                "TOO_MANY_SPECTATORS",
+                "this room has no space for more spectators, or none for more of yours",
+                [],
+            ),
+            SpectateError::EventsGone(first) => status(
+                Code::OutOfRange,
+                "EVENTS_GONE",
+                "a long game of built-in agents keeps only its last events; watch with `snapshot`, or from `first_sequence` on, or read its record when it has ended",
+                [("first_sequence", &(first + 1).to_string())],
+            ),
+            SpectateError::SnapshotDelayed => status(
+                Code::FailedPrecondition,
+                "SNAPSHOT_DELAYED",
+                "this room delays its events for spectators; request events instead of a snapshot",
+                [("field", "snapshot")],
+            ),
+        })
+    }
+}

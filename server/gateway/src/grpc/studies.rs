@@ -1,0 +1,523 @@
+//! `StudyService`: checks requests of researchers, forwards them to the study, and converts the
+//! results. What participants ask for is in `participation`.
+
+mod participation;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::pin::Pin;
+use std::sync::Arc;
+
+use chefshat_proto::v1::{
+    self, study_service_client::StudyServiceClient, study_service_server::StudyService,
+};
+use chefshat_record::convert::FieldProblem;
+use chefshat_study::{Refusal as StudyRefusal, SettingsProblem};
+use futures::Stream;
+use prost::Message as _;
+use tokio::sync::mpsc;
+use tokio::time::{Instant, sleep_until};
+use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::sync::CancellationToken;
+use tonic::{Code, Request, Response, Status};
+
+use super::follow::{self, end, send};
+use super::forward::Gateway;
+use super::limits::charged;
+use super::lists;
+use super::reach::Reach;
+use super::status::{Refusal, field, not_created, read_failed, request_id, shutting_down, status};
+use chefshat_admission::access::{Caller, Role};
+use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, Key, Places, Refused};
+use chefshat_base::metrics::StreamKind;
+use chefshat_base::tasks::{LongTask, named, short};
+use chefshat_hosting::cluster::FoundBy;
+use chefshat_hosting::config::{
+    FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT, MAX_FOLLOWERS, MAX_STUDY_ADDED,
+    MAX_STUDY_PARTICIPANTS_SENT, MAX_STUDY_STREAMS,
+};
+use chefshat_hosting::studies::{
+    CreateProblem, ExportError, ExportedFile, NotAdded, Stopped, Studies, StudyHandle,
+};
+use chefshat_room::ids::{Id, RequestKey};
+use chefshat_store::StoreError;
+use chefshat_wire::convert;
+
+type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
+
+/// The services of studies.
+#[derive(Debug, Clone)]
+pub struct StudyCalls {
+    studies: Arc<Studies>,
+    reach: Reach,
+    calls: Arc<CallLimits>,
+    followers: Arc<Places>,
+    /// Places for streams of participants.
+    participants: Arc<Places>,
+    /// Cancelled when all streams must end.
+    closing: CancellationToken,
+}
+
+impl StudyCalls {
+    /// Creates the services for these studies; `closing` ends their streams.
+    pub fn new(
+        studies: Arc<Studies>,
+        reach: Reach,
+        calls: Arc<CallLimits>,
+        closing: CancellationToken,
+    ) -> Self {
+        let shares = studies.rooms().shares();
+        Self {
+            studies,
+            reach,
+            calls,
+            followers: Places::new(MAX_FOLLOWERS, shares),
+            participants: Places::new(MAX_STUDY_STREAMS, shares),
+            closing,
+        }
+    }
+
+    /// The study with this id, if this node has it. If another node does, the error sends the request
+    /// there.
+    async fn here(&self, id: Id, caller: Key) -> Result<Option<Arc<StudyHandle>>, Status> {
+        let known = self.studies.get(id);
+        if let Some(handle) = known.clone().filter(|handle| !handle.is_stopped()) {
+            return Ok(Some(handle));
+        }
+        let found_by = FoundBy::Id(id);
+        let checked = (self.reach).check_not_elsewhere(&found_by, caller, || known.is_some());
+        checked.await?;
+        Ok(self.studies.get(id))
+    }
+
+    /// The study of an owner token. A wrong one is answered like an unknown study.
+    async fn owned(
+        &self,
+        caller: &Caller,
+        id: &str,
+        token: &str,
+    ) -> Result<Arc<StudyHandle>, Status> {
+        let is_operator = caller.role == Role::Admin && caller.scope.is_none();
+        let id = Id::parse(id).ok_or_else(study_unknown)?;
+        let handle = self.here(id, Key::of_caller(caller)).await?;
+        handle
+            .filter(|handle| handle.is_owner(token) || (is_operator && token.is_empty()))
+            .ok_or_else(study_unknown)
+    }
+
+    fn links(&self, handle: &StudyHandle, from: u32, count: usize) -> Vec<v1::StudyLink> {
+        (from..).take(count).map(|it| handle.link(it)).collect()
+    }
+}
+
+#[tonic::async_trait]
+impl StudyService for StudyCalls {
+    type FollowStudyStream = Responses<v1::FollowStudyResponse>;
+    type ExportStudyStream = Responses<v1::ExportStudyResponse>;
+
+    async fn create_study(
+        &self,
+        request: Request<v1::CreateStudyRequest>,
+    ) -> Result<Response<v1::CreateStudyResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let settings = request.settings.unwrap_or_default();
+        // Levels are a map: their order differs between encodings of the same settings.
+        let content = content_of(&settings);
+        let request_key =
+            request_id(&request.request_id, &caller)?.map(|id| RequestKey::new(id, &content));
+        self.calls.charge(key, COST_OF_TOURNAMENT);
+        if let Some(request) = request_key {
+            // Another node may have created it for the same request.
+            self.here(Studies::created_id(request), key).await?;
+        }
+        let created = self.studies.create(settings, request_key, key).await;
+        if let (Err(CreateProblem::Store(StoreError::Taken(_))), Some(request)) =
+            (&created, request_key)
+        {
+            // Another node has created it meanwhile.
+            self.here(Studies::created_id(request), key).await?;
+        }
+        let refused = |problem| not_created(problem, settings_refused);
+        let (handle, owner) = created.map_err(refused)?;
+        Ok(Response::new(v1::CreateStudyResponse {
+            study: Some(handle.describe()),
+            owner_token: owner.to_text(),
+        }))
+    }
+
+    async fn get_study(
+        &self,
+        request: Request<v1::GetStudyRequest>,
+    ) -> Result<Response<v1::GetStudyResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
+        Ok(Response::new(v1::GetStudyResponse {
+            study: Some(handle.describe()),
+            participants: handle.participants(self.studies.rooms()),
+        }))
+    }
+
+    async fn list_studies(
+        &self,
+        request: Request<v1::ListStudiesRequest>,
+    ) -> Result<Response<v1::ListStudiesResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let gateway = request.extensions().get::<Gateway>().cloned();
+        // The settings of many studies are large.
+        let _turn = self.calls.list(charged(request.extensions())).await;
+        let request = request.into_inner();
+        let is_operator = caller.role == Role::Admin && caller.scope.is_none();
+        let tokens = &request.owner_tokens;
+        if tokens.len() > 100 {
+            let problem = FieldProblem::new("owner_tokens", "give at most 100");
+            return Err(field("COUNT_REFUSED", &problem));
+        }
+        let studies = self
+            .studies
+            .earlier(None)
+            .into_iter()
+            .map(|(_, handle)| handle)
+            .filter(|handle| is_operator || tokens.iter().any(|token| handle.is_owner(token)));
+        let mut studies: Vec<v1::Study> = studies.map(|handle| handle.describe()).collect();
+        if let Some(gateway) = gateway {
+            let ask = |channel| {
+                let (mut service, request) = (StudyServiceClient::new(channel), request.clone());
+                let request = gateway.request(request);
+                async move { service.list_studies(request).await }
+            };
+            let others = lists::of_others(&gateway, ask).await;
+            studies.extend(others.flat_map(|listed| listed.studies));
+            studies.sort_by_key(|study| std::cmp::Reverse(study.created_at_ms));
+            // A study that just changes hands may be listed twice.
+            let mut seen = BTreeSet::new();
+            studies.retain(|study| seen.insert(study.study_id.clone()));
+        }
+        Ok(Response::new(v1::ListStudiesResponse { studies }))
+    }
+
+    async fn add_study_participants(
+        &self,
+        request: Request<v1::AddStudyParticipantsRequest>,
+    ) -> Result<Response<v1::AddStudyParticipantsResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
+        let mut pseudonyms = Vec::new();
+        for pseudonym in &request.pseudonyms {
+            let pseudonym = convert::checked_name("pseudonyms", pseudonym, 1)
+                .map_err(|problem| field("NAME_REFUSED", &problem))?;
+            pseudonyms.push(pseudonym);
+        }
+        let count = usize::try_from(request.count).unwrap_or(usize::MAX);
+        let count = count.saturating_add(pseudonyms.len());
+        if !(1..=MAX_STUDY_ADDED).contains(&count) {
+            let words = format!("{count} participants; add 1 to {MAX_STUDY_ADDED} at a time");
+            return Err(field("COUNT_REFUSED", &FieldProblem::new("count", words)));
+        }
+        pseudonyms.resize(count, String::new());
+        let added = handle.add(key, pseudonyms).await.map_err(stopped)?;
+        let first = added.map_err(not_added)?;
+        Ok(Response::new(v1::AddStudyParticipantsResponse {
+            links: self.links(&handle, first, count),
+        }))
+    }
+
+    async fn list_study_links(
+        &self,
+        request: Request<v1::ListStudyLinksRequest>,
+    ) -> Result<Response<v1::ListStudyLinksResponse>, Status> {
+        use chefshat_study::Status::{Active, DroppedOut, Invited};
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
+        let numbers: Vec<u32> = handle.read(|study| {
+            let participants = study.participants().iter();
+            participants
+                .filter(|(_, it)| matches!(it.status, Invited | Active | DroppedOut))
+                .map(|(number, _)| *number)
+                .collect()
+        });
+        Ok(Response::new(v1::ListStudyLinksResponse {
+            links: numbers.into_iter().map(|it| handle.link(it)).collect(),
+        }))
+    }
+
+    async fn follow_study(
+        &self,
+        request: Request<v1::FollowStudyRequest>,
+    ) -> Result<Response<Self::FollowStudyStream>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
+        let place = self.followers.try_take(key).ok_or_else(|| {
+            Refusal::from(Refused {
+                reason: "TOO_MANY_FOLLOWERS",
+                what: "too many streams that follow studies",
+                limit: self.followers.share_of(key) as u64,
+                retry_after: FOLLOW_SEND_TIMEOUT,
+            })
+        })?;
+        let (sender, responses) = mpsc::channel(1);
+        let studies = Arc::clone(&self.studies);
+        let counted = studies.rooms().metrics().stream(StreamKind::Follow);
+        let following = async move {
+            let (_place, _counted) = (place, counted);
+            end(&sender, follow(&handle, &studies, &sender).await).await;
+        };
+        let closing = self.closing.clone();
+        let following = closing.run_until_cancelled_owned(following);
+        tokio::spawn(named(LongTask::FollowStudy, following));
+        Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
+    }
+
+    async fn remove_study_participant(
+        &self,
+        request: Request<v1::RemoveStudyParticipantRequest>,
+    ) -> Result<Response<v1::RemoveStudyParticipantResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
+        let removed = handle.remove(key, request.number, request.replace).await;
+        let added = removed.map_err(stopped)?.map_err(not_added)?;
+        Ok(Response::new(v1::RemoveStudyParticipantResponse {
+            participant: handle.participant(request.number, self.studies.rooms()),
+            replacement: (added > 0).then(|| handle.link(added)),
+        }))
+    }
+
+    async fn close_study(
+        &self,
+        request: Request<v1::CloseStudyRequest>,
+    ) -> Result<Response<v1::CloseStudyResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
+        handle.close().await.map_err(stopped)?;
+        let study = Some(handle.describe());
+        Ok(Response::new(v1::CloseStudyResponse { study }))
+    }
+
+    async fn export_study(
+        &self,
+        request: Request<v1::ExportStudyRequest>,
+    ) -> Result<Response<Self::ExportStudyStream>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
+        self.calls.charge(key, COST_OF_TOURNAMENT);
+        let (sender, responses) = mpsc::channel(1);
+        let (files, mut exported) = mpsc::channel::<ExportedFile>(1);
+        let studies = Arc::clone(&self.studies);
+        let exporting = async move {
+            let forwarding = async {
+                while let Some(part) = exported.recv().await {
+                    let response = v1::ExportStudyResponse {
+                        file: part.file,
+                        data: part.data,
+                    };
+                    let sent = sender.send_timeout(Ok(response), FOLLOW_SEND_TIMEOUT);
+                    if sent.await.is_err() {
+                        return;
+                    }
+                }
+            };
+            let gathering = async move {
+                let gathered = handle.export(studies.rooms(), &files).await;
+                drop(files);
+                gathered
+            };
+            let ((), gathered) = tokio::join!(forwarding, gathering);
+            if let Err(ExportError::Store(error)) = gathered {
+                let _ = sender.send(Err(read_failed(error))).await;
+            }
+        };
+        let closing = self.closing.clone();
+        tokio::spawn(short(
+            "one export",
+            closing.run_until_cancelled_owned(exporting),
+        ));
+        Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
+    }
+
+    async fn delete_study_participant(
+        &self,
+        request: Request<v1::DeleteStudyParticipantRequest>,
+    ) -> Result<Response<v1::DeleteStudyParticipantResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
+        let deleted = handle.withdraw(request.number, true).await;
+        deleted.map_err(stopped)?.map_err(refused)?;
+        let participant = handle.participant(request.number, self.studies.rooms());
+        let games = participant.as_ref().map_or(0, |it| it.games.len());
+        Ok(Response::new(v1::DeleteStudyParticipantResponse {
+            participant,
+            games: convert::number(games),
+        }))
+    }
+
+    async fn delete_study(
+        &self,
+        request: Request<v1::DeleteStudyRequest>,
+    ) -> Result<Response<v1::DeleteStudyResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let handle = self
+            .owned(&caller, &request.study_id, &request.owner_token)
+            .await?;
+        let deleted = self.studies.delete(handle, request.force).await;
+        let (participants, games) = deleted.map_err(stopped)?.map_err(study_running)?;
+        Ok(Response::new(v1::DeleteStudyResponse {
+            participants: convert::number(participants),
+            games: convert::number(games),
+        }))
+    }
+}
+
+/// Sends a study and then what changes of it, until it is over.
+async fn follow(
+    handle: &Arc<StudyHandle>,
+    studies: &Studies,
+    sender: &mpsc::Sender<Result<v1::FollowStudyResponse, Status>>,
+) -> Result<(), Status> {
+    let response = |study, participants| v1::FollowStudyResponse {
+        study,
+        participants,
+    };
+    let mut changes = handle.changes();
+    let mut sent_study = None;
+    let mut sent: BTreeMap<u32, v1::StudyParticipant> = BTreeMap::new();
+    loop {
+        changes.mark_unchanged();
+        let over = handle.is_complete();
+        let study = handle.describe();
+        let participants = handle.participants(studies.rooms());
+        let changed: Vec<_> = (participants.into_iter())
+            .filter(|it| sent.get(&it.number) != Some(it))
+            .collect();
+        sent.extend(changed.iter().map(|it| (it.number, it.clone())));
+        let study = (sent_study.as_ref() != Some(&study)).then_some(study);
+        let began = Instant::now();
+        let mut parts = changed.chunks(MAX_STUDY_PARTICIPANTS_SENT);
+        let first = parts.next().unwrap_or_default().to_vec();
+        if study.is_some() || !first.is_empty() {
+            sent_study = study.clone().or(sent_study);
+            send(sender, response(study, first)).await?;
+        }
+        for part in parts {
+            send(sender, response(None, part.to_vec())).await?;
+        }
+        if over {
+            return Ok(());
+        }
+        sleep_until(began + FOLLOW_INTERVAL).await;
+        follow::changed(&mut changes, sender).await?;
+    }
+}
+
+/// The content of a request to create a study, encoded in one way only.
+fn content_of(settings: &v1::StudySettings) -> Vec<u8> {
+    let mut settings = settings.clone();
+    let mut levels = Vec::new();
+    for condition in &mut settings.conditions {
+        let mut of_one: Vec<_> = std::mem::take(&mut condition.levels).into_iter().collect();
+        of_one.sort();
+        for (factor, level) in of_one {
+            levels.extend([factor, level].map(|word| format!("{}:{word}", word.len())));
+        }
+        levels.push(String::new());
+    }
+    let mut content = settings.encode_to_vec();
+    content.extend(levels.join("\n").into_bytes());
+    content
+}
+
+fn study_unknown() -> Status {
+    status(
+        Code::NotFound,
+        "STUDY_UNKNOWN",
+        "this server has no study with this id and owner token",
+        [("field", "study_id")],
+    )
+}
+
+fn study_running(active: usize) -> Status {
+    status(
+        Code::FailedPrecondition,
+        "STUDY_RUNNING",
+        format!(
+            "{active} participants are in the middle of the study; wait for them, or set `force` to remove them"
+        ),
+        [("participants", &active.to_string())],
+    )
+}
+
+fn stopped(_: Stopped) -> Status {
+    shutting_down()
+}
+
+fn settings_refused(problem: SettingsProblem) -> Status {
+    status(
+        Code::InvalidArgument,
+        "SETTINGS_REFUSED",
+        problem.to_string(),
+        [("field", &problem.field)],
+    )
+}
+
+/// The status for a command that would have added to a study.
+fn not_added(problem: NotAdded) -> Status {
+    match problem {
+        NotAdded::Study(refusal) => refused(refusal),
+        NotAdded::Memory(refusal) => Refusal::from(refusal).into(),
+    }
+}
+
+/// The status for a refused command.
+fn refused(refusal: StudyRefusal) -> Status {
+    let (code, reason) = match &refusal {
+        StudyRefusal::Unknown => (Code::NotFound, "PARTICIPANT_UNKNOWN"),
+        StudyRefusal::Closed => (Code::FailedPrecondition, "STUDY_CLOSED"),
+        StudyRefusal::Full => (Code::FailedPrecondition, "STUDY_FULL"),
+        StudyRefusal::Over => (Code::FailedPrecondition, "PARTICIPATION_OVER"),
+        StudyRefusal::Superseded => (Code::Aborted, "SESSION_SUPERSEDED"),
+        StudyRefusal::StepOver => (Code::FailedPrecondition, "STEP_OVER"),
+        StudyRefusal::StepMismatch => (Code::FailedPrecondition, "STEP_MISMATCH"),
+        StudyRefusal::GameNotOver => (Code::FailedPrecondition, "GAME_NOT_OVER"),
+        StudyRefusal::TooManySessions => (Code::ResourceExhausted, "TOO_MANY_SESSIONS"),
+        StudyRefusal::TooManySaves => (Code::ResourceExhausted, "TOO_MANY_SAVES"),
+        StudyRefusal::NameTaken(_) => (Code::AlreadyExists, "NAME_TAKEN"),
+        StudyRefusal::TooManyParticipants => (Code::ResourceExhausted, "TOO_MANY_PARTICIPANTS"),
+        StudyRefusal::Answers(problem) => {
+            return status(
+                Code::InvalidArgument,
+                "ANSWER_REFUSED",
+                refusal.to_string(),
+                [("item", &problem.item.to_string())],
+            );
+        }
+    };
+    status(code, reason, refusal.to_string(), [])
+}

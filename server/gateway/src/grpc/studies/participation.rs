@@ -1,0 +1,369 @@
+//! `ParticipationService`: what participants of studies ask for. Answers are made of views, which
+//! have no place for anything that names a condition.
+
+use std::sync::Arc;
+
+use chefshat_proto::v1::{self, participation_service_server::ParticipationService};
+use chefshat_record::convert::FieldProblem;
+use chefshat_study::{At, ItemAnswer, ParticipantLink, Refusal as StudyRefusal, SessionSecret};
+use prost::Message as _;
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Code, Request, Response, Status};
+
+use super::{Responses, StudyCalls, not_added, refused, stopped};
+use crate::grpc::follow::{changed, end};
+use crate::grpc::limits::charged;
+use crate::grpc::status::{Refusal, field, shutting_down, status, store_failed};
+use chefshat_admission::limits::{Key, Refused};
+use chefshat_base::clock::since_epoch_ms;
+use chefshat_base::metrics::StreamKind;
+use chefshat_base::tasks::{LongTask, named};
+use chefshat_hosting::config::FOLLOW_SEND_TIMEOUT;
+use chefshat_hosting::rooms::Rooms;
+use chefshat_hosting::studies::{Studies, StudyHandle, TraceRefusal};
+use chefshat_room::ids::Id;
+use chefshat_wire::convert;
+
+impl StudyCalls {
+    /// The study and the participant of a link. Wrong links are charged like wrong join codes.
+    async fn of_link(&self, link: &str, key: Key) -> Result<(Arc<StudyHandle>, u32), Status> {
+        self.calls.may_try_code(key).map_err(Refusal::from)?;
+        let mut found = None;
+        if let Some(link) = ParticipantLink::parse(link) {
+            let handle = self.here(Studies::full_id(link.study()), key).await?;
+            found = handle.and_then(|handle| Some((handle.number_of(&link)?, handle)));
+        }
+        let found = found.map(|(number, handle)| (handle, number));
+        found.ok_or_else(|| {
+            self.calls.wrong_code(key);
+            status(
+                Code::Unauthenticated,
+                "LINK_UNKNOWN",
+                "this is not a link of a study on this server; check that it is complete",
+                [("field", "link")],
+            )
+        })
+    }
+
+    /// The study, the participant and the session of a secret.
+    async fn of_session(
+        &self,
+        secret: &str,
+        key: Key,
+    ) -> Result<(Arc<StudyHandle>, u32, u32), Status> {
+        let mut found = None;
+        if let Some(secret) = SessionSecret::parse(secret)
+            && let Some(handle) = self.here(Studies::full_id(secret.study()), key).await?
+        {
+            let session = handle.session_of(&secret);
+            found = session.map(|(number, session)| (handle, number, session));
+        }
+        found.ok_or_else(|| {
+            status(
+                Code::Unauthenticated,
+                "SESSION_UNKNOWN",
+                "this server has no such session; open the link again",
+                [("field", "session")],
+            )
+        })
+    }
+
+    /// Reads answers, and charges a caller for storing them.
+    fn answers(
+        &self,
+        answers: Vec<v1::StudyItemAnswer>,
+        key: Key,
+    ) -> Result<Vec<ItemAnswer>, Status> {
+        let bytes = answers.iter().map(|answer| answer.encoded_len()).sum();
+        let answers = convert::answers_from_proto(answers).map_err(|item| {
+            status(
+                Code::InvalidArgument,
+                "ANSWER_REFUSED",
+                format!("item {item}: the answer is empty"),
+                [("item", &item.to_string())],
+            )
+        })?;
+        let rooms = self.studies.rooms();
+        rooms.may_store(key, bytes).map_err(Refusal::from)?;
+        Ok(answers)
+    }
+}
+
+/// What to show next.
+fn view_of(handle: &StudyHandle, number: u32, rooms: &Rooms) -> Result<v1::StudyView, Status> {
+    // It has begun, so there is something to show.
+    (handle.view(number, rooms)).ok_or_else(|| refused(StudyRefusal::Unknown))
+}
+
+fn at(number: u32, session: u32, step: u32) -> At {
+    At {
+        number,
+        session,
+        step: usize::try_from(step).unwrap_or(usize::MAX),
+    }
+}
+
+#[tonic::async_trait]
+impl ParticipationService for StudyCalls {
+    type FollowParticipationStream = Responses<v1::FollowParticipationResponse>;
+
+    async fn open_study(
+        &self,
+        request: Request<v1::OpenStudyRequest>,
+    ) -> Result<Response<v1::OpenStudyResponse>, Status> {
+        let key = charged(request.extensions());
+        let (handle, number) = self.of_link(&request.into_inner().link, key).await?;
+        let opened = handle.open(number).await.map_err(stopped)?;
+        let session = opened.map_err(refused)?;
+        let (saved_answers, step_age_ms) = handle.progress(number, since_epoch_ms());
+        Ok(Response::new(v1::OpenStudyResponse {
+            saved_answers,
+            step_age_ms,
+            session: match session {
+                0 => String::new(),
+                session => handle.session_secret(number, session),
+            },
+            view: Some(view_of(&handle, number, self.studies.rooms())?),
+        }))
+    }
+
+    async fn follow_participation(
+        &self,
+        request: Request<v1::FollowParticipationRequest>,
+    ) -> Result<Response<Self::FollowParticipationStream>, Status> {
+        let key = charged(request.extensions());
+        let (handle, number, session) = self.of_session(&request.into_inner().session, key).await?;
+        let place = self.participants.try_take(key).ok_or_else(|| {
+            Refusal::from(Refused {
+                reason: "TOO_MANY_FOLLOWERS",
+                what: "too many streams of participants",
+                limit: self.participants.share_of(key) as u64,
+                retry_after: FOLLOW_SEND_TIMEOUT,
+            })
+        })?;
+        let (sender, responses) = mpsc::channel(1);
+        let rooms = Arc::clone(self.studies.rooms());
+        let counted = rooms.metrics().stream(StreamKind::Follow);
+        let following = async move {
+            let (_place, _counted) = (place, counted);
+            let _presence = handle.present(number, session).await;
+            let following = follow(&handle, &rooms, number, session, &sender);
+            // A client that goes is absent at once.
+            let followed = tokio::select! {
+                followed = following => followed,
+                () = sender.closed() => Ok(()),
+            };
+            end(&sender, followed).await;
+        };
+        let closing = self.closing.clone();
+        let following = closing.run_until_cancelled_owned(following);
+        tokio::spawn(named(LongTask::Participation, following));
+        Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
+    }
+
+    async fn give_consent(
+        &self,
+        request: Request<v1::GiveConsentRequest>,
+    ) -> Result<Response<v1::GiveConsentResponse>, Status> {
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let (handle, number, session) = self.of_session(&request.session, key).await?;
+        let given = handle.consent(at(number, session, request.step)).await;
+        given.map_err(stopped)?.map_err(refused)?;
+        let view = Some(view_of(&handle, number, self.studies.rooms())?);
+        Ok(Response::new(v1::GiveConsentResponse { view }))
+    }
+
+    async fn answer_questionnaire(
+        &self,
+        request: Request<v1::AnswerQuestionnaireRequest>,
+    ) -> Result<Response<v1::AnswerQuestionnaireResponse>, Status> {
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let (handle, number, session) = self.of_session(&request.session, key).await?;
+        let answers = self.answers(request.answers, key)?;
+        let answered = handle.answer(key, at(number, session, request.step), answers);
+        answered.await.map_err(stopped)?.map_err(not_added)?;
+        let view = Some(view_of(&handle, number, self.studies.rooms())?);
+        Ok(Response::new(v1::AnswerQuestionnaireResponse { view }))
+    }
+
+    async fn save_answers(
+        &self,
+        request: Request<v1::SaveAnswersRequest>,
+    ) -> Result<Response<v1::SaveAnswersResponse>, Status> {
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let (handle, number, session) = self.of_session(&request.session, key).await?;
+        let answers = self.answers(request.answers, key)?;
+        let saved = handle.save(key, at(number, session, request.step), answers);
+        saved.await.map_err(stopped)?.map_err(not_added)?;
+        Ok(Response::new(v1::SaveAnswersResponse {}))
+    }
+
+    async fn continue_study(
+        &self,
+        request: Request<v1::ContinueStudyRequest>,
+    ) -> Result<Response<v1::ContinueStudyResponse>, Status> {
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let (handle, number, session) = self.of_session(&request.session, key).await?;
+        let continued = handle.proceed(at(number, session, request.step)).await;
+        continued.map_err(stopped)?.map_err(refused)?;
+        let view = Some(view_of(&handle, number, self.studies.rooms())?);
+        Ok(Response::new(v1::ContinueStudyResponse { view }))
+    }
+
+    async fn record_traces(
+        &self,
+        request: Request<v1::RecordTracesRequest>,
+    ) -> Result<Response<v1::RecordTracesResponse>, Status> {
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let (handle, number, session) = self.of_session(&request.session, key).await?;
+        let game =
+            Id::parse(&request.game_id).ok_or_else(|| traces_refused(TraceRefusal::GameUnknown))?;
+        let rooms = self.studies.rooms();
+        let bytes = (request.traces.iter())
+            .map(|trace| trace.encoded_len())
+            .sum();
+        rooms.may_store(key, bytes).map_err(Refusal::from)?;
+        let recorded = handle.record_traces((number, session), game, request.traces, rooms);
+        let recorded = recorded.await.map_err(|error| {
+            tracing::error!(%error, "interface traces could not be stored");
+            store_failed()
+        })?;
+        recorded.map_err(traces_refused)?;
+        Ok(Response::new(v1::RecordTracesResponse {}))
+    }
+
+    async fn withdraw_from_study(
+        &self,
+        request: Request<v1::WithdrawFromStudyRequest>,
+    ) -> Result<Response<v1::WithdrawFromStudyResponse>, Status> {
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let (handle, number) = self.of_link(&request.link, key).await?;
+        let withdrawn = handle.withdraw(number, request.delete_data).await;
+        withdrawn.map_err(stopped)?.map_err(refused)?;
+        let view = Some(view_of(&handle, number, self.studies.rooms())?);
+        Ok(Response::new(v1::WithdrawFromStudyResponse { view }))
+    }
+}
+
+/// Sends what a participant sees whenever it changes, until the end of its participation.
+async fn follow(
+    handle: &StudyHandle,
+    rooms: &Rooms,
+    number: u32,
+    session: u32,
+    sender: &mpsc::Sender<Result<v1::FollowParticipationResponse, Status>>,
+) -> Result<(), Status> {
+    let mut changes = handle.view_changes(number);
+    let mut sent = None;
+    loop {
+        changes.mark_unchanged();
+        if !handle.is_newest(number, session) {
+            return Err(refused(StudyRefusal::Superseded));
+        }
+        let view = view_of(handle, number, rooms)?;
+        if sent.as_ref() != Some(&view) {
+            send(sender, view.clone()).await?;
+        }
+        let ended = matches!(view.content, Some(v1::study_view::Content::End(_)));
+        sent = Some(view);
+        if ended {
+            return Ok(());
+        }
+        changed(&mut changes, sender).await?;
+    }
+}
+
+async fn send(
+    sender: &mpsc::Sender<Result<v1::FollowParticipationResponse, Status>>,
+    view: v1::StudyView,
+) -> Result<(), Status> {
+    let message = Ok(v1::FollowParticipationResponse { view: Some(view) });
+    let sent = sender.send_timeout(message, FOLLOW_SEND_TIMEOUT).await;
+    // The page follows again when it is read again.
+    sent.map_err(|_| shutting_down())
+}
+
+fn traces_refused(refusal: TraceRefusal) -> Status {
+    let (code, reason) = match refusal {
+        TraceRefusal::GameUnknown => (Code::NotFound, "GAME_UNKNOWN"),
+        TraceRefusal::TooMany => (Code::ResourceExhausted, "TOO_MANY_TRACES"),
+        TraceRefusal::Invalid(problem) => {
+            return field("TRACES_REFUSED", &FieldProblem::new("traces", problem));
+        }
+        TraceRefusal::Session(refusal) => return refused(refusal),
+    };
+    status(code, reason, refusal.to_string(), [])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::{BTreeMap, BTreeSet};
+
+    use prost::Message as _;
+    use prost_types::{DescriptorProto, FileDescriptorSet};
+
+    /// Fields that would tell participants what they must not know.
+    const FORBIDDEN: [&str; 16] = [
+        "block",
+        "condition",
+        "conditions",
+        "factor",
+        "factors",
+        "level",
+        "levels",
+        "name",
+        "order",
+        "owner_token",
+        "robot_behaviour",
+        "seats",
+        "seed",
+        "seeds",
+        "slot",
+        "study_id",
+    ];
+
+    #[test]
+    fn no_message_to_participants_has_a_place_for_a_condition() {
+        let set = FileDescriptorSet::decode(chefshat_proto::DESCRIPTORS).expect("descriptors");
+        let mut messages: BTreeMap<String, &DescriptorProto> = BTreeMap::new();
+        let mut waiting = Vec::new();
+        for file in &set.file {
+            for message in &file.message_type {
+                let path = format!(".{}.{}", file.package(), message.name());
+                messages.insert(path, message);
+            }
+            let services = file.service.iter();
+            let ours = services.filter(|service| service.name() == "ParticipationService");
+            for method in ours.flat_map(|service| &service.method) {
+                waiting.push(method.output_type().to_owned());
+            }
+        }
+        assert_eq!(waiting.len(), 8);
+        let mut seen = BTreeSet::new();
+        while let Some(path) = waiting.pop() {
+            if !seen.insert(path.clone()) {
+                continue;
+            }
+            for field in &messages[&path].field {
+                assert!(
+                    !FORBIDDEN.contains(&field.name()),
+                    "{path}.{}",
+                    field.name()
+                );
+                let is_message = field.type_name().starts_with(".chefshat");
+                if is_message && messages.contains_key(field.type_name()) {
+                    waiting.push(field.type_name().to_owned());
+                }
+            }
+        }
+        assert!(seen.contains(".chefshat.v1.StudyShownGame"));
+        assert!(!seen.contains(".chefshat.v1.StudySettings"));
+    }
+}

@@ -1,0 +1,642 @@
+//! `TournamentService`: checks requests, forwards them to the tournament, and converts the results.
+//! Changes by hand are in `by_hand`.
+
+mod by_hand;
+
+use std::pin::Pin;
+use std::sync::Arc;
+
+use chefshat_proto::v1::{
+    self, tournament_service_client::TournamentServiceClient,
+    tournament_service_server::TournamentService,
+};
+use chefshat_record::convert::FieldProblem;
+use chefshat_tournament::{BeginProblem, JoinProblem, SettingsProblem, State};
+use futures::Stream;
+use prost::Message as _;
+use tokio::sync::{Semaphore, mpsc};
+use tokio_stream::wrappers::ReceiverStream;
+use tokio_util::sync::CancellationToken;
+use tonic::transport::Channel;
+use tonic::{Code, Request, Response, Status};
+
+use super::access::check;
+use super::follow::{compute_failed, end, follow};
+use super::forward::Gateway;
+use super::limits::charged;
+use super::lists::{self, Listing, Page, Part};
+use super::new_room::{supported_policy, too_long};
+use super::pages;
+use super::recorded::Recorded;
+use super::status::{
+    Refusal, field, name_fingerprint, not_created, request_id, request_id_used, shutting_down,
+    status,
+};
+use chefshat_admission::access::Caller;
+use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, Key, Places, Refused};
+use chefshat_base::metrics::StreamKind;
+use chefshat_base::tasks::{LongTask, named};
+use chefshat_hosting::config::{
+    FOLLOW_SEND_TIMEOUT, MAX_CONCURRENT_RESULTS, MAX_FOLLOWERS, MAX_GAMES_PAGE,
+    MAX_LEADERBOARD_LINES,
+};
+use chefshat_hosting::tournaments::{
+    CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem, TournamentHandle,
+    Tournaments,
+};
+use chefshat_room::ids::{Id, RequestKey, Token, normal_code, random_bytes};
+use chefshat_room::journal::ParticipantKind;
+use chefshat_room::policy::ABSENCE_TIME_IN_TOURNAMENTS;
+use chefshat_store::StoreError;
+use chefshat_wire::convert;
+
+/// Default page size of games, and default number of rows of a leaderboard.
+const DEFAULT_LINES: u32 = 100;
+
+/// The service.
+#[derive(Debug, Clone)]
+pub struct TournamentCalls {
+    tournaments: Arc<Tournaments>,
+    recorded: Recorded,
+    leaderboard: Arc<Leaderboard>,
+    calls: Arc<CallLimits>,
+    followers: Arc<Places>,
+    /// Permits to compute updates for followers.
+    update_permits: Arc<Semaphore>,
+    /// Permits to compute results.
+    result_permits: Arc<Semaphore>,
+    /// Cancelled when all streams must end.
+    closing: CancellationToken,
+}
+
+impl TournamentCalls {
+    /// Creates the service for these tournaments; `closing` ends its streams.
+    pub fn new(
+        tournaments: Arc<Tournaments>,
+        recorded: Recorded,
+        calls: Arc<CallLimits>,
+        closing: CancellationToken,
+    ) -> Self {
+        let shares = recorded.rooms().shares();
+        Self {
+            calls,
+            tournaments,
+            leaderboard: Arc::new(Leaderboard::new(Arc::clone(recorded.rooms()))),
+            recorded,
+            followers: Places::new(MAX_FOLLOWERS, shares),
+            update_permits: Arc::new(Semaphore::new(MAX_CONCURRENT_RESULTS)),
+            result_permits: Arc::new(Semaphore::new(MAX_CONCURRENT_RESULTS)),
+            closing,
+        }
+    }
+
+    async fn find(&self, caller: &Caller, id: &str) -> Result<Arc<TournamentHandle>, Status> {
+        self.recorded.reach().tournament(caller, id).await
+    }
+
+    /// The tournament with a join code; if an id is given too, it must match. Wrong codes are
+    /// charged, those of unknown tournaments too: whether a tournament is private or unknown makes
+    /// no difference.
+    async fn find_by_code(
+        &self,
+        caller: &Caller,
+        id: &str,
+        join_code: &str,
+        key: Key,
+    ) -> Result<Arc<TournamentHandle>, Status> {
+        self.calls.may_try_code(key).map_err(Refusal::from)?;
+        let reach = self.recorded.reach();
+        let found = match id {
+            "" => reach.tournament_here(join_code, key).await?,
+            id => match Id::parse(id) {
+                Some(id) => reach.tournament_here(id, key).await?,
+                None => None,
+            },
+        };
+        let code = normal_code(join_code);
+        let has_code = |handle: &Arc<TournamentHandle>| handle.join_code() == code;
+        let Some(handle) = found.filter(has_code) else {
+            self.calls.wrong_code(key);
+            if !id.is_empty() {
+                self.find(caller, id).await?;
+            }
+            return Err(status(
+                Code::PermissionDenied,
+                "JOIN_CODE_WRONG",
+                "no tournament has this join code; ask its owner for it",
+                [("field", "join_code")],
+            ));
+        };
+        check(caller, |caller| caller.reaches_tournament(handle.id()))?;
+        Ok(handle)
+    }
+
+    async fn find_owned(
+        &self,
+        caller: &Caller,
+        id: &str,
+        owner_token: &str,
+    ) -> Result<Arc<TournamentHandle>, Status> {
+        let handle = self.find(&caller.showing(owner_token), id).await?;
+        if handle.is_owner(owner_token) {
+            return Ok(handle);
+        }
+        Err(status(
+            Code::PermissionDenied,
+            "OWNER_TOKEN_WRONG",
+            "this is not the owner token that CreateTournament returned for this tournament",
+            [("field", "owner_token")],
+        ))
+    }
+}
+
+/// The tournaments that a caller finds.
+struct TournamentList<'a> {
+    service: &'a TournamentCalls,
+    caller: &'a Caller,
+    message: &'a v1::ListTournamentsRequest,
+    /// The state of those that are listed.
+    state: Option<State>,
+}
+
+impl Listing for TournamentList<'_> {
+    type Entry = v1::Tournament;
+    type Response = v1::ListTournamentsResponse;
+
+    async fn here(&self, before: Option<u64>) -> Result<Part<v1::Tournament>, Status> {
+        let size = pages::page_size(self.message.page_size);
+        let service = self.service;
+        let mut found = (service.tournaments).newest(before, self.state, size + 1);
+        let more = found.len() > size;
+        found.truncate(size);
+        let rest = found.last().map(|(last, _)| *last).filter(|_| more);
+        let reach = service.recorded.reach();
+        let entries = (found.iter())
+            .filter(|(_, handle)| reach.lists_tournament(self.caller, handle))
+            .map(|(number, handle)| (*number, handle.describe_briefly()))
+            .collect();
+        Ok(Part { entries, rest })
+    }
+
+    async fn there(
+        &self,
+        gateway: &Gateway,
+        channel: Channel,
+        page_token: String,
+    ) -> Result<Response<v1::ListTournamentsResponse>, Status> {
+        let request = v1::ListTournamentsRequest {
+            page_token,
+            ..self.message.clone()
+        };
+        let mut service = TournamentServiceClient::new(channel);
+        service.list_tournaments(gateway.request(request)).await
+    }
+
+    fn page(response: v1::ListTournamentsResponse) -> Page<v1::Tournament> {
+        Page {
+            entries: response.tournaments,
+            next_page_token: response.next_page_token,
+        }
+    }
+
+    fn response(page: Page<v1::Tournament>) -> v1::ListTournamentsResponse {
+        v1::ListTournamentsResponse {
+            tournaments: page.entries,
+            next_page_token: page.next_page_token,
+        }
+    }
+
+    fn created_at_ms(tournament: &v1::Tournament) -> u64 {
+        tournament.created_at_ms
+    }
+
+    fn id(tournament: &v1::Tournament) -> &str {
+        &tournament.tournament_id
+    }
+}
+
+#[tonic::async_trait]
+impl TournamentService for TournamentCalls {
+    type FollowTournamentStream =
+        Pin<Box<dyn Stream<Item = Result<v1::FollowTournamentResponse, Status>> + Send>>;
+
+    async fn create_tournament(
+        &self,
+        request: Request<v1::CreateTournamentRequest>,
+    ) -> Result<Response<v1::CreateTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let settings = request.settings.unwrap_or_default();
+        let request_key = request_id(&request.request_id, &caller)?
+            .map(|id| RequestKey::new(id, &settings.encode_to_vec()));
+        let name = convert::checked_name("name", &settings.name, 1)
+            .map_err(|problem| field("NAME_REFUSED", &problem))?;
+        let mut plan = convert::tournament_plan(&settings, random_bytes())
+            .map_err(|problem| refused(&problem))?;
+        convert::check_budget("filler", plan.core.filler).map_err(|problem| refused(&problem))?;
+        for agent in &plan.built_in {
+            convert::check_budget("built_in_agents", *agent)
+                .map_err(|problem| refused(&problem))?;
+        }
+        if let Some(problem) = too_long(&plan.rules) {
+            return Err(refused_within("rules", &problem));
+        }
+        let asked = settings.policy.unwrap_or_default();
+        plan.policy.durability = supported_policy(&self.recorded, &asked)
+            .map_err(|problem| refused_within("policy", &problem))?
+            .durability;
+        convert::set_default_clock_of_models(&mut plan.policy, &asked);
+        plan.policy
+            .set_default_absence_times(ABSENCE_TIME_IN_TOURNAMENTS);
+        let reach = self.recorded.reach();
+        reach.check_not_created_elsewhere(request_key, key).await?;
+        self.calls.charge(key, COST_OF_TOURNAMENT);
+        let created = self.tournaments.create(&name, plan, request_key, key).await;
+        if matches!(&created, Err(CreateProblem::Store(StoreError::Taken(_)))) {
+            // Another node has created it meanwhile.
+            reach.check_not_created_elsewhere(request_key, key).await?;
+        }
+        let (handle, owner) = created.map_err(|problem| not_created(problem, settings_refused))?;
+        Ok(Response::new(v1::CreateTournamentResponse {
+            tournament: Some(handle.describe()),
+            join_code: handle.join_code().to_owned(),
+            owner_token: owner.to_text(),
+        }))
+    }
+
+    async fn get_tournament(
+        &self,
+        request: Request<v1::GetTournamentRequest>,
+    ) -> Result<Response<v1::GetTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let handle = match request.join_code.as_str() {
+            "" => self.find(&caller, &request.tournament_id).await?,
+            code => {
+                let id = &request.tournament_id;
+                self.find_by_code(&caller, id, code, key).await?
+            }
+        };
+        let tournament = Some(handle.describe());
+        Ok(Response::new(v1::GetTournamentResponse { tournament }))
+    }
+
+    async fn list_tournaments(
+        &self,
+        request: Request<v1::ListTournamentsRequest>,
+    ) -> Result<Response<v1::ListTournamentsResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let (_, extensions, message) = request.into_parts();
+        let state = convert::tournament_state_from_proto("state", message.state)
+            .map_err(|problem| field("STATE_REFUSED", &problem))?;
+        let listing = TournamentList {
+            service: self,
+            caller: &caller,
+            message: &message,
+            state,
+        };
+        let size = pages::page_size(message.page_size);
+        lists::list(&listing, &extensions, &message.page_token, size).await
+    }
+
+    async fn join_tournament(
+        &self,
+        request: Request<v1::JoinTournamentRequest>,
+    ) -> Result<Response<v1::JoinTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let kind = convert::kind_from_proto("kind", request.kind)
+            .map_err(|problem| field("KIND_REFUSED", &problem))?
+            .unwrap_or(ParticipantKind::Agent);
+        let (id, code) = (&request.tournament_id, &request.join_code);
+        let handle = self.find_by_code(&caller, id, code, key).await?;
+        let name = convert::checked_name("name", &request.name, 1)
+            .map_err(|problem| field("NAME_REFUSED", &problem))?;
+        if !handle.admits(kind) {
+            return Err(kind_not_admitted());
+        }
+        let entry = Entry {
+            name_fingerprint: name_fingerprint(&name, &request.name_key)?,
+            name,
+            kind,
+            max_games: usize::try_from(request.max_games.max(1)).unwrap_or(usize::MAX),
+            stateless: request.stateless,
+            at_table: false,
+            request_id: request_id(&request.request_id, &caller)?,
+        };
+        let (participant, ticket) = handle
+            .join(entry)
+            .await
+            .map_err(stopped)?
+            .map_err(join_refused)?;
+        Ok(Response::new(v1::JoinTournamentResponse {
+            tournament: Some(handle.describe()),
+            participant: convert::number(participant),
+            ticket: ticket.to_text(),
+        }))
+    }
+
+    async fn add_table_participant(
+        &self,
+        request: Request<v1::AddTableParticipantRequest>,
+    ) -> Result<Response<v1::AddTableParticipantResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(&caller, id, owner).await?;
+        let kind = convert::kind_from_proto("kind", request.kind)
+            .map_err(|problem| field("KIND_REFUSED", &problem))?
+            .unwrap_or(ParticipantKind::Human);
+        let name = convert::checked_name("name", &request.name, 1)
+            .map_err(|problem| field("NAME_REFUSED", &problem))?;
+        let entry = Entry {
+            name,
+            name_fingerprint: String::new(),
+            kind,
+            max_games: 1,
+            stateless: false,
+            at_table: true,
+            request_id: request_id(&request.request_id, &caller)?,
+        };
+        let joined = handle.join(entry).await.map_err(stopped)?;
+        let (participant, _) = joined.map_err(join_refused)?;
+        Ok(Response::new(v1::AddTableParticipantResponse {
+            tournament: Some(handle.describe()),
+            participant: convert::number(participant),
+        }))
+    }
+
+    async fn get_physical_table(
+        &self,
+        request: Request<v1::GetPhysicalTableRequest>,
+    ) -> Result<Response<v1::GetPhysicalTableResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(&caller, id, owner).await?;
+        let game = usize::try_from(request.game).unwrap_or(usize::MAX);
+        let owner = handle.physical_room(game).map_err(table_problem)?;
+        // It is created after its id is committed.
+        if self.recorded.rooms().get(owner.room).is_none() {
+            return Err(table_problem(TableProblem::NotStarted));
+        }
+        Ok(Response::new(v1::GetPhysicalTableResponse {
+            room_id: owner.room.to_string(),
+            table_ticket: Token::of_table(&owner).to_text(),
+            owner_token: owner.to_text(),
+        }))
+    }
+
+    async fn start_tournament(
+        &self,
+        request: Request<v1::StartTournamentRequest>,
+    ) -> Result<Response<v1::StartTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(&caller, id, owner).await?;
+        let started = handle.begin().await.map_err(stopped)?;
+        started.map_err(|problem| {
+            let reason = match problem {
+                BeginProblem::TooFew { .. } => "TOO_FEW_PARTICIPANTS",
+                BeginProblem::Started => "TOURNAMENT_STARTED",
+            };
+            status(Code::FailedPrecondition, reason, problem.to_string(), [])
+        })?;
+        let tournament = Some(handle.describe());
+        Ok(Response::new(v1::StartTournamentResponse { tournament }))
+    }
+
+    async fn close_tournament(
+        &self,
+        request: Request<v1::CloseTournamentRequest>,
+    ) -> Result<Response<v1::CloseTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(&caller, id, owner).await?;
+        handle.close().await.map_err(stopped)?;
+        let tournament = Some(handle.describe());
+        Ok(Response::new(v1::CloseTournamentResponse { tournament }))
+    }
+
+    async fn withdraw_participant(
+        &self,
+        request: Request<v1::WithdrawParticipantRequest>,
+    ) -> Result<Response<v1::WithdrawParticipantResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.withdraw(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn remove_participant(
+        &self,
+        request: Request<v1::RemoveParticipantRequest>,
+    ) -> Result<Response<v1::RemoveParticipantResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.remove(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn replace_participant(
+        &self,
+        request: Request<v1::ReplaceParticipantRequest>,
+    ) -> Result<Response<v1::ReplaceParticipantResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.replace(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn pause_tournament(
+        &self,
+        request: Request<v1::PauseTournamentRequest>,
+    ) -> Result<Response<v1::PauseTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.pause(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn resume_tournament(
+        &self,
+        request: Request<v1::ResumeTournamentRequest>,
+    ) -> Result<Response<v1::ResumeTournamentResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.resume(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn postpone_game(
+        &self,
+        request: Request<v1::PostponeGameRequest>,
+    ) -> Result<Response<v1::PostponeGameResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.postpone(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn call_game(
+        &self,
+        request: Request<v1::CallGameRequest>,
+    ) -> Result<Response<v1::CallGameResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let response = self.call(&caller, request.into_inner()).await?;
+        Ok(Response::new(response))
+    }
+
+    async fn follow_tournament(
+        &self,
+        request: Request<v1::FollowTournamentRequest>,
+    ) -> Result<Response<Self::FollowTournamentStream>, Status> {
+        let caller = Caller::of(request.extensions());
+        let key = charged(request.extensions());
+        let handle = self
+            .find(&caller, &request.into_inner().tournament_id)
+            .await?;
+        let place = self.followers.try_take(key).ok_or_else(|| {
+            Refusal::from(Refused {
+                reason: "TOO_MANY_FOLLOWERS",
+                what: "too many streams that follow tournaments",
+                limit: self.followers.share_of(key) as u64,
+                retry_after: FOLLOW_SEND_TIMEOUT,
+            })
+        })?;
+        let (sender, responses) = mpsc::channel(1);
+        let (closing, permits) = (self.closing.clone(), Arc::clone(&self.update_permits));
+        let counted = self.recorded.rooms().metrics().stream(StreamKind::Follow);
+        let following = async move {
+            let _counted = counted;
+            let followed = follow(&handle, &permits, &sender).await;
+            // A follower that does not read does not block the others.
+            drop(place);
+            end(&sender, followed).await;
+        };
+        let following = closing.run_until_cancelled_owned(following);
+        tokio::spawn(named(LongTask::FollowTournament, following));
+        Ok(Response::new(Box::pin(ReceiverStream::new(responses))))
+    }
+
+    async fn get_tournament_results(
+        &self,
+        request: Request<v1::GetTournamentResultsRequest>,
+    ) -> Result<Response<v1::GetTournamentResultsResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let handle = self
+            .find(&caller, &request.into_inner().tournament_id)
+            .await?;
+        let results = handle.results(&self.result_permits).await;
+        let results = results.map_err(compute_failed)?.message.clone();
+        Ok(Response::new(results))
+    }
+
+    async fn list_tournament_games(
+        &self,
+        request: Request<v1::ListTournamentGamesRequest>,
+    ) -> Result<Response<v1::ListTournamentGamesResponse>, Status> {
+        let caller = Caller::of(request.extensions());
+        let request = request.into_inner();
+        let handle = self.find(&caller, &request.tournament_id).await?;
+        let after = pages::last_shown(&request.page_token)?;
+        let from = after.map_or(0, |after| usize::try_from(after).unwrap_or(usize::MAX));
+        let size = match request.page_size {
+            0 => DEFAULT_LINES,
+            size => size.min(MAX_GAMES_PAGE),
+        };
+        let size = usize::try_from(size).unwrap_or(usize::MAX);
+        let mut games = handle.games(from, size + 1);
+        let more = games.len() > size;
+        games.truncate(size);
+        let next_page_token = match more {
+            true => (from + size).to_string(),
+            false => String::new(),
+        };
+        Ok(Response::new(v1::ListTournamentGamesResponse {
+            games,
+            next_page_token,
+        }))
+    }
+
+    async fn get_leaderboard(
+        &self,
+        request: Request<v1::GetLeaderboardRequest>,
+    ) -> Result<Response<v1::GetLeaderboardResponse>, Status> {
+        let request = request.into_inner();
+        convert::kind_from_proto("kind", request.kind)
+            .map_err(|problem| field("KIND_REFUSED", &problem))?;
+        let limit = match request.limit {
+            0 => DEFAULT_LINES,
+            limit => limit.min(MAX_LEADERBOARD_LINES),
+        };
+        let ratings = self.leaderboard.ratings().await.map_err(compute_failed)?;
+        Ok(Response::new(convert::leaderboard(
+            &ratings,
+            request.kind(),
+            request.min_games,
+            usize::try_from(limit).unwrap_or(usize::MAX),
+        )))
+    }
+}
+
+pub(super) fn stopped(_: Stopped) -> Status {
+    shutting_down()
+}
+
+/// The status for an invalid setting.
+fn refused(problem: &FieldProblem) -> Status {
+    let reason = match problem.field {
+        "rules" => "RULE_SET_REFUSED",
+        "policy" => "POLICY_REFUSED",
+        _ => "SETTINGS_REFUSED",
+    };
+    field(reason, problem)
+}
+
+/// The status for an invalid field within a setting.
+fn refused_within(outer: &'static str, problem: &FieldProblem) -> Status {
+    refused(&FieldProblem::new(outer, problem.to_string()))
+}
+
+fn settings_refused(problem: SettingsProblem) -> Status {
+    refused(&FieldProblem::new(problem.field, problem.problem))
+}
+
+fn kind_not_admitted() -> Status {
+    status(
+        Code::FailedPrecondition,
+        "KIND_NOT_ADMITTED",
+        "this tournament does not admit this kind of participant",
+        [("field", "kind")],
+    )
+}
+
+fn join_refused(refusal: JoinRefusal) -> Status {
+    match refusal {
+        JoinRefusal::Rules(problem) => join_problem(problem),
+        JoinRefusal::RequestIdUsed => request_id_used(&refusal.to_string()),
+    }
+}
+
+fn table_problem(problem: TableProblem) -> Status {
+    let (code, reason) = match problem {
+        TableProblem::Unknown => (Code::NotFound, "GAME_UNKNOWN"),
+        TableProblem::NotPhysical => (Code::FailedPrecondition, "GAME_NOT_PHYSICAL"),
+        TableProblem::NotStarted => (Code::FailedPrecondition, "GAME_NOT_STARTED"),
+        TableProblem::Over => (Code::FailedPrecondition, "GAME_OVER"),
+    };
+    status(code, reason, problem.to_string(), [("field", "game")])
+}
+
+fn join_problem(problem: JoinProblem) -> Status {
+    let (code, reason) = match problem {
+        JoinProblem::Full => (Code::ResourceExhausted, "TOURNAMENT_FULL"),
+        JoinProblem::Started => (Code::FailedPrecondition, "TOURNAMENT_STARTED"),
+        JoinProblem::NameTaken => (Code::FailedPrecondition, "NAME_TAKEN"),
+        JoinProblem::NameReserved => (Code::FailedPrecondition, "NAME_RESERVED"),
+        JoinProblem::NoTables => (Code::FailedPrecondition, "NO_PHYSICAL_TABLES"),
+        JoinProblem::NotStateless => (Code::FailedPrecondition, "NOT_STATELESS"),
+        JoinProblem::MaxGames => (Code::InvalidArgument, "MAX_GAMES_REFUSED"),
+    };
+    status(code, reason, problem.to_string(), [])
+}

@@ -1,0 +1,213 @@
+//! The calls that change a tournament by hand: withdraw, remove, replace, pause, resume, postpone,
+//! call again.
+
+use std::sync::Arc;
+
+use chefshat_proto::v1;
+use chefshat_tournament::ByHandProblem;
+use tonic::{Code, Status};
+
+use super::{TournamentCalls, join_problem, refused, stopped};
+use crate::grpc::status::{field, request_id, request_id_used, status, ticket_unknown};
+use chefshat_admission::access::Caller;
+use chefshat_admission::limits::Key;
+use chefshat_hosting::tournaments::{ByHand, ByHandRefusal, Newcomer, TournamentHandle, Who};
+use chefshat_room::ids::{SecretHash, Token};
+use chefshat_wire::convert;
+
+impl TournamentCalls {
+    pub(super) async fn withdraw(
+        &self,
+        caller: &Caller,
+        request: v1::WithdrawParticipantRequest,
+    ) -> Result<v1::WithdrawParticipantResponse, Status> {
+        let id = &request.tournament_id;
+        let (handle, by) = self
+            .find_by_ticket_or_owner(caller, id, &request.ticket, &request.owner_token)
+            .await?;
+        let who = by.map_or_else(|| Who::Number(index(request.participant)), Who::Ticket);
+        let charged = Key::of_caller(caller);
+        let what = ByHand::Withdraw { who, charged };
+        change(&handle, what).await?;
+        let tournament = Some(handle.describe());
+        Ok(v1::WithdrawParticipantResponse { tournament })
+    }
+
+    pub(super) async fn remove(
+        &self,
+        caller: &Caller,
+        request: v1::RemoveParticipantRequest,
+    ) -> Result<v1::RemoveParticipantResponse, Status> {
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(caller, id, owner).await?;
+        let what = ByHand::Remove {
+            participant: index(request.participant),
+        };
+        change(&handle, what).await?;
+        let tournament = Some(handle.describe());
+        Ok(v1::RemoveParticipantResponse { tournament })
+    }
+
+    pub(super) async fn replace(
+        &self,
+        caller: &Caller,
+        request: v1::ReplaceParticipantRequest,
+    ) -> Result<v1::ReplaceParticipantResponse, Status> {
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(caller, id, owner).await?;
+        let what = ByHand::Replace {
+            participant: index(request.participant),
+            by: newcomer(&handle, caller, &request)?,
+        };
+        let ticket = change(&handle, what).await?;
+        Ok(v1::ReplaceParticipantResponse {
+            tournament: Some(handle.describe()),
+            ticket: ticket.map_or_else(String::new, |ticket| ticket.to_text()),
+        })
+    }
+
+    pub(super) async fn pause(
+        &self,
+        caller: &Caller,
+        request: v1::PauseTournamentRequest,
+    ) -> Result<v1::PauseTournamentResponse, Status> {
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(caller, id, owner).await?;
+        change(&handle, ByHand::SetPaused(true)).await?;
+        let tournament = Some(handle.describe());
+        Ok(v1::PauseTournamentResponse { tournament })
+    }
+
+    pub(super) async fn resume(
+        &self,
+        caller: &Caller,
+        request: v1::ResumeTournamentRequest,
+    ) -> Result<v1::ResumeTournamentResponse, Status> {
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(caller, id, owner).await?;
+        change(&handle, ByHand::SetPaused(false)).await?;
+        let tournament = Some(handle.describe());
+        Ok(v1::ResumeTournamentResponse { tournament })
+    }
+
+    pub(super) async fn postpone(
+        &self,
+        caller: &Caller,
+        request: v1::PostponeGameRequest,
+    ) -> Result<v1::PostponeGameResponse, Status> {
+        let id = &request.tournament_id;
+        let (handle, by) = self
+            .find_by_ticket_or_owner(caller, id, &request.ticket, &request.owner_token)
+            .await?;
+        let game = index(request.game);
+        change(&handle, ByHand::Postpone { game, by }).await?;
+        let game = handle.game_now(game);
+        Ok(v1::PostponeGameResponse { game })
+    }
+
+    pub(super) async fn call(
+        &self,
+        caller: &Caller,
+        request: v1::CallGameRequest,
+    ) -> Result<v1::CallGameResponse, Status> {
+        let (id, owner) = (&request.tournament_id, &request.owner_token);
+        let handle = self.find_owned(caller, id, owner).await?;
+        let game = index(request.game);
+        change(&handle, ByHand::Recall { game }).await?;
+        let game = handle.game_now(game);
+        Ok(v1::CallGameResponse { game })
+    }
+
+    /// The tournament, with the ticket of a participant; without a ticket, the owner asks.
+    async fn find_by_ticket_or_owner(
+        &self,
+        caller: &Caller,
+        id: &str,
+        ticket: &str,
+        owner_token: &str,
+    ) -> Result<(Arc<TournamentHandle>, Option<SecretHash>), Status> {
+        if ticket.is_empty() {
+            let handle = self.find_owned(caller, id, owner_token).await?;
+            return Ok((handle, None));
+        }
+        let handle = self.find(&caller.showing(ticket), id).await?;
+        let token = Token::parse(ticket).filter(|token| token.room == handle.id());
+        let token = token.filter(|token| handle.participant_of(&token.secret).is_some());
+        let token = token.ok_or_else(ticket_unknown)?;
+        // Whose it is then, is decided where the change is made.
+        Ok((handle, Some(token.hash())))
+    }
+}
+
+/// Who takes the place of a participant.
+fn newcomer(
+    handle: &TournamentHandle,
+    caller: &Caller,
+    request: &v1::ReplaceParticipantRequest,
+) -> Result<Newcomer, Status> {
+    let agent = convert::agent_from_proto("built_in_agent", &request.built_in_agent)
+        .map_err(|problem| refused(&problem))?;
+    let shortest = usize::from(agent.is_none());
+    let name = convert::checked_name("name", &request.name, shortest)
+        .map_err(|problem| field("NAME_REFUSED", &problem))?;
+    if let Some(agent) = agent {
+        convert::check_budget("built_in_agent", agent).map_err(|problem| refused(&problem))?;
+        if handle.read(|core| core.settings().physical_tables) > 0 {
+            convert::check_real_cards("built_in_agent", agent)
+                .map_err(|problem| refused(&problem))?;
+        }
+        return Ok(Newcomer::BuiltIn {
+            agent,
+            name,
+            request_id: request_id(&request.request_id, caller)?,
+        });
+    }
+    let kind = convert::kind_from_proto("kind", request.kind)
+        .map_err(|problem| field("KIND_REFUSED", &problem))?;
+    let is_at_table = handle.read(|core| {
+        let former = core.participants().get(index(request.participant));
+        former.is_some_and(|former| former.at_table)
+    });
+    if !is_at_table && kind.is_some_and(|kind| !handle.admits(kind)) {
+        return Err(super::kind_not_admitted());
+    }
+    Ok(Newcomer::Somebody {
+        name,
+        kind,
+        max_games: index(request.max_games.max(1)),
+        stateless: request.stateless,
+        request_id: request_id(&request.request_id, caller)?,
+    })
+}
+
+async fn change(handle: &TournamentHandle, what: ByHand) -> Result<Option<Token>, Status> {
+    let changed = handle.change_by_hand(what).await.map_err(stopped)?;
+    changed.map_err(|refusal| match refusal {
+        ByHandRefusal::Rules(problem) => by_hand_problem(problem),
+        ByHandRefusal::RequestIdUsed => request_id_used(&refusal.to_string()),
+        ByHandRefusal::TicketUnknown => ticket_unknown(),
+    })
+}
+
+fn by_hand_problem(problem: ByHandProblem) -> Status {
+    let (code, reason) = match problem {
+        ByHandProblem::Join(problem) => return join_problem(problem),
+        ByHandProblem::NoParticipant => (Code::NotFound, "PARTICIPANT_UNKNOWN"),
+        ByHandProblem::Filler => (Code::FailedPrecondition, "PARTICIPANT_IS_FILLER"),
+        ByHandProblem::Over => (Code::FailedPrecondition, "TOURNAMENT_OVER"),
+        ByHandProblem::NotPlaying => (Code::FailedPrecondition, "TOURNAMENT_NOT_PLAYING"),
+        ByHandProblem::TooManyReplacements => (Code::FailedPrecondition, "REPLACED_TOO_OFTEN"),
+        ByHandProblem::NoGame => (Code::NotFound, "GAME_UNKNOWN"),
+        ByHandProblem::NotDue => (Code::FailedPrecondition, "GAME_NOT_DUE"),
+        ByHandProblem::NotInGame => (Code::PermissionDenied, "NOT_IN_GAME"),
+        ByHandProblem::PostponedTooOften(_) => (Code::FailedPrecondition, "POSTPONED_TOO_OFTEN"),
+        ByHandProblem::NobodyLeft => (Code::FailedPrecondition, "NOBODY_LEFT"),
+        ByHandProblem::TooMany(_) => (Code::ResourceExhausted, "TOO_MANY_CHANGES"),
+    };
+    status(code, reason, problem.to_string(), [])
+}
+
+/// A number of a message as an index; one too large finds nothing.
+fn index(number: u32) -> usize {
+    usize::try_from(number).unwrap_or(usize::MAX)
+}

@@ -1,0 +1,300 @@
+//! The connections between nodes: one HTTP/2 connection to each other node, for calls and streams
+//! of seats, and the listener for theirs. Both sides show a certificate of the cluster's own
+//! authority, so that only nodes connect.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::net::SocketAddr;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use futures::{Stream, StreamExt as _};
+use http::{Request, Response, Uri};
+use hyper_util::rt::TokioIo;
+use rayon::ThreadPoolBuildError;
+use rustls::pki_types::ServerName;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::time::Instant;
+use tokio_rustls::TlsConnector;
+use tokio_rustls::client::TlsStream;
+use tokio_util::either::Either;
+use tonic::body::Body;
+use tonic::transport::{Channel, Endpoint};
+use tower::{ServiceExt as _, service_fn};
+
+use crate::connections::{self, Connection, Connections, Limits};
+use crate::handshakes::Handshakes;
+use crate::tls::{MaybeTls, Tls, TlsError, TlsFiles};
+use chefshat_admission::limits::Shares;
+use chefshat_base::metrics::Metrics;
+use chefshat_base::proxies::TrustedProxies;
+use chefshat_hosting::cluster::Peer;
+
+/// The name that the certificate of every node has.
+pub const PEER_NAME: &str = "chefshat-node";
+/// How long connecting to another node may take.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
+/// Time between two pings of a connection between nodes, from either side.
+pub const PING_INTERVAL: Duration = Duration::from_secs(2);
+/// How long the other node may take to answer a ping. After that everything on the connection fails.
+pub const PING_TIMEOUT: Duration = Duration::from_secs(3);
+/// A connection to another node that nobody asked for during this time is closed, once its streams
+/// have ended.
+const CHANNEL_IDLE: Duration = Duration::from_secs(600);
+/// Most bytes that wait on one stream between nodes for a client that does not read.
+pub const STREAM_WINDOW: u32 = 64 * 1024;
+/// Most bytes that wait on all streams between two nodes: streams that are not read must not hold
+/// up the others.
+pub const CONNECTION_WINDOW: u32 = 1 << 30;
+
+/// Most streams that may be reset at a time. Clients that cancel their calls reset streams between
+/// nodes, whose connection must survive it.
+pub const MAX_RESET_STREAMS: usize = 1 << 20;
+
+/// Most connections from other nodes at a time: each has one, and a few that are ending.
+const MAX_PEER_CONNECTIONS: usize = 512;
+/// How much of them one machine may have. In tests and at home, it has all nodes.
+const PEER_SHARES: Shares = Shares {
+    local: 100,
+    remote: 25,
+};
+
+/// How a node receives and opens connections of other nodes.
+#[derive(Debug)]
+pub struct PeerPort {
+    listener: TcpListener,
+    tls: Option<PeerTls>,
+}
+
+/// The certificates of a node.
+#[derive(Debug, Clone)]
+struct PeerTls {
+    accepting: Arc<Tls>,
+    files: TlsFiles,
+}
+
+/// Why the settings for other nodes cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum PeerPortError {
+    /// The files for TLS cannot be used.
+    #[error(transparent)]
+    Tls(#[from] TlsError),
+    /// Without an authority, anyone could connect as a node.
+    #[error(
+        "nodes need the certificate of the cluster's own authority; set it beside the node's certificate and key"
+    )]
+    NoAuthority,
+    /// Without encryption, other machines could read and send everything.
+    #[error(
+        "without certificates nodes connect on one machine only, but {0} is not a loopback address; set the certificate, key and authority for connections between nodes"
+    )]
+    NotEncrypted(SocketAddr),
+    /// The socket has no address.
+    #[error("the socket for other nodes cannot be used: {0}")]
+    Socket(#[from] io::Error),
+}
+
+impl PeerPort {
+    /// Receives other nodes on this socket. The certificate of `files` has the name [`PEER_NAME`];
+    /// without files, connections are not encrypted and stay on this machine.
+    ///
+    /// # Errors
+    /// The files cannot be used, or are missing although the socket can be reached from elsewhere.
+    pub fn new(listener: TcpListener, files: Option<TlsFiles>) -> Result<Self, PeerPortError> {
+        let address = listener.local_addr()?;
+        let tls = match files {
+            None if address.ip().is_loopback() => None,
+            None => return Err(PeerPortError::NotEncrypted(address)),
+            Some(files) if files.client_authority.is_none() => {
+                return Err(PeerPortError::NoAuthority);
+            }
+            Some(files) => {
+                files.client_config()?;
+                let accepting = Tls::open(files.clone())?;
+                Some(PeerTls { accepting, files })
+            }
+        };
+        Ok(Self { listener, tls })
+    }
+
+    /// The certificate that other nodes see, which follows its files.
+    pub fn tls(&self) -> Option<Arc<Tls>> {
+        self.tls.as_ref().map(|tls| Arc::clone(&tls.accepting))
+    }
+
+    /// The connections to other nodes.
+    pub fn peers(&self) -> Arc<Peers> {
+        Arc::new(Peers {
+            tls: self.tls.as_ref().map(|tls| tls.files.clone()),
+            channels: Mutex::default(),
+        })
+    }
+
+    /// The connections from other nodes, within limits of their own.
+    ///
+    /// # Errors
+    /// The operating system cannot start the thread that computes handshakes.
+    pub fn incoming(
+        self,
+        metrics: &Arc<Metrics>,
+    ) -> Result<
+        impl Stream<Item = io::Result<MaybeTls<Connection>>> + Send + 'static,
+        ThreadPoolBuildError,
+    > {
+        self.incoming_within(MAX_PEER_CONNECTIONS, metrics)
+    }
+
+    fn incoming_within(
+        self,
+        max_connections: usize,
+        metrics: &Arc<Metrics>,
+    ) -> Result<
+        impl Stream<Item = io::Result<MaybeTls<Connection>>> + Send + 'static,
+        ThreadPoolBuildError,
+    > {
+        let limits = Limits {
+            max_connections,
+            shares: PEER_SHARES,
+            trusted_proxies: TrustedProxies::default(),
+        };
+        let connections = Connections::new(limits, Arc::clone(metrics));
+        let incoming = connections::accept(self.listener.into(), connections);
+        Ok(match self.tls {
+            None => incoming.map(|it| it.map(MaybeTls::Plain)).left_stream(),
+            Some(tls) => {
+                let limits = Handshakes::new(PEER_SHARES, Arc::clone(metrics))?;
+                let secured = tls.accepting.secure(incoming, limits, Connection::key);
+                secured.right_stream()
+            }
+        })
+    }
+}
+
+/// The connections to other nodes, opened when they are first needed and again when they break.
+#[derive(Debug)]
+pub struct Peers {
+    tls: Option<TlsFiles>,
+    /// By endpoint, with the time of the last use.
+    channels: Mutex<BTreeMap<Arc<str>, (Channel, Instant)>>,
+}
+
+impl Peers {
+    /// Sends a request to another node.
+    ///
+    /// # Errors
+    /// The node cannot be reached, or the connection broke before its answer.
+    pub async fn send(
+        &self,
+        peer: &Peer,
+        request: Request<Body>,
+    ) -> Result<Response<Body>, tonic::transport::Error> {
+        self.channel(peer).oneshot(request).await
+    }
+
+    /// The connection to another node.
+    pub fn channel(&self, peer: &Peer) -> Channel {
+        let now = Instant::now();
+        let mut channels = (self.channels.lock()).expect("nothing panics under this lock");
+        // Nodes come and go, often with new endpoints. Streams keep their connection.
+        channels.retain(|endpoint, (_, used)| {
+            *endpoint == peer.endpoint || now.duration_since(*used) < CHANNEL_IDLE
+        });
+        let endpoint = Arc::clone(&peer.endpoint);
+        let (channel, used) = channels.entry(endpoint).or_insert_with_key(|endpoint| {
+            let (tls, address) = (self.tls.clone(), Arc::clone(endpoint));
+            let connector = service_fn(move |_: Uri| connect(tls.clone(), Arc::clone(&address)));
+            let name = Endpoint::from_static("http://chefshat-node");
+            let channel = name
+                .http2_keep_alive_interval(PING_INTERVAL)
+                .keep_alive_timeout(PING_TIMEOUT)
+                .keep_alive_while_idle(true)
+                .initial_stream_window_size(STREAM_WINDOW)
+                .initial_connection_window_size(CONNECTION_WINDOW)
+                .http2_max_concurrent_reset_streams(MAX_RESET_STREAMS)
+                .http2_max_local_error_reset_streams(None)
+                .connect_with_connector_lazy(connector);
+            (channel, now)
+        });
+        *used = now;
+        channel.clone()
+    }
+}
+
+/// The stream of a connection to another node.
+type ToPeer = Either<TcpStream, Box<TlsStream<TcpStream>>>;
+
+/// Connects to another node.
+async fn connect(tls: Option<TlsFiles>, address: Arc<str>) -> io::Result<TokioIo<ToPeer>> {
+    let connecting = async {
+        let stream = TcpStream::connect(&*address).await?;
+        stream.set_nodelay(true)?;
+        let Some(files) = tls else {
+            return Ok(Either::Left(stream));
+        };
+        // Read for each connection: the files may have been renewed.
+        let config = files.client_config().map_err(io::Error::other)?;
+        let name = ServerName::try_from(PEER_NAME).expect("a valid name");
+        let stream = TlsConnector::from(config).connect(name, stream).await?;
+        Ok(Either::Right(Box::new(stream)))
+    };
+    let connected = tokio::time::timeout(CONNECT_TIMEOUT, connecting).await;
+    connected
+        .unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()))
+        .map(TokioIo::new)
+}
+
+#[cfg(test)]
+mod tests {
+    use futures::FutureExt as _;
+    use tokio::io::AsyncReadExt as _;
+
+    use super::*;
+
+    async fn port() -> (SocketAddr, PeerPort) {
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let address = listener.local_addr().expect("bound");
+        (
+            address,
+            PeerPort::new(listener, None).expect("on this machine"),
+        )
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn the_connections_to_nodes_that_are_gone_are_forgotten() {
+        let (_, port) = port().await;
+        let peers = port.peers();
+        let peer = |number: u32| Peer {
+            node: format!("node-{number}").into(),
+            endpoint: format!("192.0.2.1:{number}").into(),
+        };
+        for number in 0..1_000 {
+            peers.channel(&peer(number));
+            peers.channel(&peer(0));
+            tokio::time::advance(Duration::from_secs(60)).await;
+        }
+        let live = peers.channels.lock().expect("nothing panicked").len();
+        assert_eq!(live, 11, "those of ten minutes, and the one in use");
+    }
+
+    #[tokio::test]
+    async fn connections_of_nodes_are_limited() {
+        let (address, port) = port().await;
+        let incoming = port.incoming_within(2, &Arc::default());
+        let mut incoming = std::pin::pin!(incoming.expect("no thread is needed"));
+        let mut clients = Vec::new();
+        for _ in 0..3 {
+            clients.push(TcpStream::connect(address).await.expect("it listens"));
+        }
+        let _first = incoming.next().await.expect("endless").expect("one");
+        let second = incoming.next().await.expect("endless").expect("one");
+        let mut byte = [0];
+        tokio::select! {
+            _ = incoming.next() => panic!("the third one is closed"),
+            read = clients[2].read(&mut byte) => assert!(!matches!(read, Ok(1..))),
+        }
+        drop(second);
+        let _fourth = TcpStream::connect(address).await.expect("it listens");
+        assert!(incoming.next().await.is_some());
+        assert!(incoming.next().now_or_never().is_none());
+    }
+}

@@ -1,0 +1,172 @@
+//! The page for people: serves the built browser client (`clients/web`) on the port of gRPC. All
+//! gRPC calls are POST, so every GET is for the page. `clients/web/vite.config.ts` decides which
+//! files there are.
+
+mod answer;
+mod cache;
+mod files;
+mod origin;
+mod preview;
+#[cfg(test)]
+mod tests;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use bytes::Bytes;
+use futures::future::{BoxFuture, Either};
+use http::{Method, Request, Response, header};
+use rayon::ThreadPoolBuildError;
+use tonic::body::Body;
+use tower::{BoxError, Layer, Service};
+
+use answer::{DOCUMENT, absent, answer, busy, generated};
+use files::find;
+pub use origin::{OriginLayer, Origins};
+use preview::{Link, Previews, Unshown};
+pub use preview::{MAX_PREVIEWS, MAX_PREVIEWS_WAITING, PICTURE_PATIENCE};
+
+use chefshat_hosting::rooms::Rooms;
+
+/// Whether the page was built.
+pub fn is_built() -> bool {
+    find(DOCUMENT).is_some()
+}
+
+/// Puts the page in front of the services.
+#[derive(Debug, Clone)]
+pub struct PageLayer {
+    tls: bool,
+    previews: Arc<Previews>,
+}
+
+impl PageLayer {
+    /// Creates the page. `tls`: whether browsers reach this server with TLS. `rooms`: whose games it
+    /// previews. `painter`: `chefshat-lab`, which draws the previews.
+    ///
+    /// # Errors
+    /// The operating system cannot start the thread that reads their records.
+    pub fn new(
+        tls: bool,
+        rooms: Arc<Rooms>,
+        painter: Option<PathBuf>,
+    ) -> Result<Self, ThreadPoolBuildError> {
+        let previews = Arc::new(Previews::new(rooms, painter)?);
+        Ok(Self { tls, previews })
+    }
+}
+
+impl<S> Layer<S> for PageLayer {
+    type Service = WithPage<S>;
+
+    fn layer(&self, services: S) -> Self::Service {
+        WithPage {
+            layer: self.clone(),
+            services,
+        }
+    }
+}
+
+/// The services with the page in front of them.
+#[derive(Debug, Clone)]
+pub struct WithPage<S> {
+    layer: PageLayer,
+    services: S,
+}
+
+impl<S> Service<Request<Body>> for WithPage<S>
+where
+    S: Service<Request<Body>, Response = Response<Body>> + Clone + Send + 'static,
+    S::Error: Into<BoxError>,
+    S::Future: Send,
+{
+    type Response = Response<Body>;
+    type Error = S::Error;
+    type Future = Either<S::Future, BoxFuture<'static, Result<Self::Response, Self::Error>>>;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
+        self.services.poll_ready(context)
+    }
+
+    fn call(&mut self, request: Request<Body>) -> Self::Future {
+        if !is_for_page(&request) {
+            return Either::Left(self.services.call(request));
+        }
+        // The clone that is ready serves this request.
+        let clone = self.services.clone();
+        let services = std::mem::replace(&mut self.services, clone);
+        let page = self.layer.clone();
+        Either::Right(Box::pin(async move {
+            let request = request.map(drop);
+            let answer = match Link::of(request.uri().path()) {
+                None => of_files(request, |request| answer(find, request)).await,
+                Some(link) => page.previewed(link, services, &request).await,
+            };
+            Ok(answer.map(|bytes| Body::new(axum::body::Body::from(bytes))))
+        }))
+    }
+}
+
+impl PageLayer {
+    /// The answer to a request for the replay of a game or its picture.
+    async fn previewed<S>(&self, link: Link, services: S, request: &Request<()>) -> Response<Bytes>
+    where
+        S: Service<Request<Body>, Response = Response<Body>>,
+        S::Error: Into<BoxError>,
+    {
+        let (previews, extensions) = (&self.previews, request.extensions());
+        match link {
+            Link::Picture(game) => match previews.picture(game, services, extensions).await {
+                Ok(picture) => generated(picture, request),
+                Err(Unshown::Unknown) => absent(request.method()),
+                Err(Unshown::Busy) => busy(request.method()),
+            },
+            Link::Replay(game) => {
+                let title = previews.title(game, services, extensions).await.ok();
+                let tags =
+                    title.and_then(|title| Some((title, preview::origin(request, self.tls)?)));
+                let paints = previews.paints();
+                of_files(request.clone(), move |request| {
+                    let tagged = tags.and_then(|(title, origin)| {
+                        preview::document(&find(DOCUMENT)?.bytes, game, &title, &origin, paints)
+                    });
+                    match tagged {
+                        Some(tagged) => generated(tagged, request),
+                        None => answer(find, request),
+                    }
+                })
+                .await
+            }
+        }
+    }
+}
+
+/// An answer that needs files of the page, which are in this program.
+#[cfg(feature = "embedded-page")]
+#[allow(clippy::unused_async, reason = "other builds read a disk")]
+async fn of_files(
+    request: Request<()>,
+    make: impl FnOnce(&Request<()>) -> Response<Bytes>,
+) -> Response<Bytes> {
+    make(&request)
+}
+
+/// An answer that needs files of the page, which are read from a disk.
+#[cfg(not(feature = "embedded-page"))]
+async fn of_files(
+    request: Request<()>,
+    make: impl FnOnce(&Request<()>) -> Response<Bytes> + Send + 'static,
+) -> Response<Bytes> {
+    let method = request.method().clone();
+    let making = tokio::task::spawn_blocking(move || make(&request));
+    making.await.unwrap_or_else(|_| absent(&method))
+}
+
+fn is_for_page<B>(request: &Request<B>) -> bool {
+    let asks = matches!(*request.method(), Method::GET | Method::HEAD);
+    // The services answer a call with a wrong method.
+    let calls = (request.headers().get(header::CONTENT_TYPE))
+        .is_some_and(|media_type| media_type.as_bytes().starts_with(b"application/grpc"));
+    asks && !calls
+}

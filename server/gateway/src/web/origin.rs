@@ -1,0 +1,274 @@
+//! Keeps foreign web pages from using a visitor's browser against the server. A request that names
+//! a web origin must come from the server's own page or an allowed origin; this also covers
+//! requests that a browser sends without asking first. Where the server is only meant for this
+//! machine, the host of a request must be a name of this machine: otherwise a page could reach it
+//! under its own name (DNS rebinding).
+
+use std::future::{Ready, ready};
+use std::net::IpAddr;
+use std::sync::Arc;
+use std::task::{Context, Poll};
+
+use axum::body::Body as Text;
+use futures::future::Either;
+use http::uri::Authority;
+use http::{HeaderName, HeaderValue, Request, Response, StatusCode, header};
+use tonic::body::Body;
+use tower::{Layer, Service};
+use tracing::info;
+
+use crate::connections::peer_address;
+use chefshat_admission::limits::LogPace;
+
+/// Whose pages and under which names the server may be reached.
+#[derive(Debug)]
+pub struct Origins {
+    /// Web origins besides the server's own; `*` allows all.
+    origins: Vec<String>,
+    /// Names of hosts besides those of this machine; `None`: all.
+    hosts: Option<Vec<String>>,
+    logged: LogPace,
+}
+
+/// Refused requests that are logged in a minute.
+const LOGGED: u32 = 60;
+
+/// Why a request is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Foreign {
+    Origin,
+    Host,
+}
+
+impl Origins {
+    /// Allows the server's own page, these origins and, if given, only these hosts besides the
+    /// names of this machine.
+    pub fn new(origins: Vec<String>, hosts: Option<Vec<String>>) -> Self {
+        Self {
+            origins,
+            hosts,
+            logged: LogPace::new(LOGGED),
+        }
+    }
+
+    /// Checks the origin and host of a request.
+    fn check<B>(&self, request: &Request<B>) -> Result<(), Foreign> {
+        let host = host_of(request);
+        if let Some(hosts) = &self.hosts
+            && !host.as_ref().is_some_and(|host| is_named(host, hosts))
+        {
+            return Err(Foreign::Host);
+        }
+        let mut origins = request.headers().get_all(header::ORIGIN).iter();
+        match origins.all(|origin| self.is_allowed(origin, host.as_ref())) {
+            true => Ok(()),
+            false => Err(Foreign::Origin),
+        }
+    }
+
+    fn is_allowed(&self, origin: &HeaderValue, host: Option<&Authority>) -> bool {
+        let Ok(origin) = origin.to_str() else {
+            return false;
+        };
+        let listed = |allowed: &String| allowed == "*" || allowed.eq_ignore_ascii_case(origin);
+        if self.origins.iter().any(listed) {
+            return true;
+        }
+        // A proxy may have taken TLS off, so the scheme is not compared, but it decides which port
+        // is the default, which browsers leave out and proxies may not.
+        let (own, port) = match (
+            origin.strip_prefix("https://"),
+            origin.strip_prefix("http://"),
+        ) {
+            (Some(own), _) => (own, ":443"),
+            (_, Some(own)) => (own, ":80"),
+            _ => return false,
+        };
+        let host = host.map_or("", |host| host.as_str());
+        let host = host.strip_suffix(port).unwrap_or(host);
+        !own.is_empty() && own.eq_ignore_ascii_case(host)
+    }
+}
+
+/// The host and port that a request names: of its URI in HTTP/2, else of its header.
+fn host_of<B>(request: &Request<B>) -> Option<Authority> {
+    let named = request.uri().authority().cloned();
+    named.or_else(|| {
+        let host = request.headers().get(header::HOST)?;
+        Authority::try_from(host.as_bytes()).ok()
+    })
+}
+
+/// Whether a host is this machine, an address, or one of these names. No page has an address as
+/// its name unless it comes from there.
+fn is_named(host: &Authority, hosts: &[String]) -> bool {
+    let name = host.host();
+    let address = name.trim_start_matches('[').trim_end_matches(']');
+    address.parse::<IpAddr>().is_ok()
+        || name.eq_ignore_ascii_case("localhost")
+        || hosts.iter().any(|known| known.eq_ignore_ascii_case(name))
+}
+
+/// Refuses requests of foreign pages.
+#[derive(Debug, Clone)]
+pub struct OriginLayer(Arc<Origins>);
+
+impl OriginLayer {
+    /// Creates a layer that admits these origins.
+    pub fn new(origins: Origins) -> Self {
+        Self(Arc::new(origins))
+    }
+}
+
+impl<S> Layer<S> for OriginLayer {
+    type Service = WithOrigin<S>;
+
+    fn layer(&self, services: S) -> Self::Service {
+        WithOrigin {
+            origins: Arc::clone(&self.0),
+            services,
+        }
+    }
+}
+
+/// The services behind the check of origins.
+#[derive(Debug, Clone)]
+pub struct WithOrigin<S> {
+    origins: Arc<Origins>,
+    services: S,
+}
+
+impl<S, B> Service<Request<B>> for WithOrigin<S>
+where
+    S: Service<Request<B>, Response = Response<Body>>,
+{
+    type Response = Response<Body>;
+    type Error = S::Error;
+    type Future = Either<Ready<Result<Self::Response, Self::Error>>, S::Future>;
+
+    fn poll_ready(&mut self, context: &mut Context<'_>) -> Poll<Result<(), Self::Error>> {
+        self.services.poll_ready(context)
+    }
+
+    fn call(&mut self, request: Request<B>) -> Self::Future {
+        match self.origins.check(&request) {
+            Ok(()) => Either::Right(self.services.call(request)),
+            Err(foreign) => {
+                if self.origins.logged.admits() {
+                    let address = peer_address(request.extensions());
+                    let address = address.map(tracing::field::display);
+                    info!(address, ?foreign, "a request was refused");
+                }
+                Either::Left(ready(Ok(refused(foreign))))
+            }
+        }
+    }
+}
+
+/// The answer to a foreign request. gRPC clients read the status in its headers.
+fn refused(foreign: Foreign) -> Response<Body> {
+    let text = match foreign {
+        Foreign::Origin => {
+            "web pages of this origin may not use this server; its operator can allow it with --allow-origin"
+        }
+        Foreign::Host => {
+            "this server is not known by this host name; its operator can allow it with --allow-host"
+        }
+    };
+    let mut response = Response::new(Body::new(Text::from(text)));
+    *response.status_mut() = StatusCode::FORBIDDEN;
+    let headers = response.headers_mut();
+    headers.insert(
+        header::CONTENT_TYPE,
+        HeaderValue::from_static("text/plain; charset=utf-8"),
+    );
+    headers.insert(
+        HeaderName::from_static("grpc-status"),
+        HeaderValue::from(i32::from(tonic::Code::PermissionDenied)),
+    );
+    headers.insert(
+        HeaderName::from_static("grpc-message"),
+        HeaderValue::from_static(text),
+    );
+    response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn request(host: &str, origin: Option<&str>) -> Request<()> {
+        let mut request = Request::post("/chefshat.v1.RoomService/CreateRoom").header("host", host);
+        if let Some(origin) = origin {
+            request = request.header("origin", origin);
+        }
+        request.body(()).expect("a request")
+    }
+
+    #[test]
+    fn only_the_own_page_and_allowed_origins_call() {
+        let listed = vec!["https://example.org".to_owned()];
+        let some = Origins::new(listed, None);
+        let all = Origins::new(vec!["*".to_owned()], None);
+        for (origin, allowed) in [
+            (None, true),
+            (Some("http://127.0.0.1:50051"), true),
+            (Some("HTTP://127.0.0.1:50051"), false),
+            (Some("https://127.0.0.1:50051"), true),
+            (Some("https://example.org"), true),
+            (Some("https://EXAMPLE.org"), true),
+            (Some("https://example.org.evil.net"), false),
+            (Some("http://127.0.0.1:8080"), false),
+            (Some("https://evil.net"), false),
+            (Some("null"), false),
+            (Some(""), false),
+        ] {
+            let request = request("127.0.0.1:50051", origin);
+            assert_eq!(some.check(&request).is_ok(), allowed, "{origin:?}");
+            assert_eq!(all.check(&request), Ok(()), "{origin:?}");
+        }
+    }
+
+    #[test]
+    fn a_default_port_is_none() {
+        let own = Origins::new(Vec::new(), None);
+        for (host, origin, allowed) in [
+            ("chef.example.org:443", "https://chef.example.org", true),
+            ("chef.example.org:80", "http://chef.example.org", true),
+            ("chef.example.org", "https://chef.example.org", true),
+            ("chef.example.org:80", "https://chef.example.org", false),
+            ("chef.example.org", "https://chef.example.org:8443", false),
+            ("", "https://", false),
+        ] {
+            let request = request(host, Some(origin));
+            assert_eq!(own.check(&request).is_ok(), allowed, "{host} {origin}");
+        }
+    }
+
+    #[test]
+    fn a_server_for_this_machine_has_only_names_of_this_machine() {
+        let listed = vec!["chef.example.org".to_owned()];
+        let here = Origins::new(Vec::new(), Some(listed));
+        let anywhere = Origins::new(Vec::new(), None);
+        for (host, allowed) in [
+            ("localhost:50051", true),
+            ("LOCALHOST", true),
+            ("127.0.0.1:50051", true),
+            ("[::1]:50051", true),
+            ("chef.example.org:50051", true),
+            ("evil.net:50051", false),
+            ("localhost.evil.net", false),
+            ("", false),
+        ] {
+            let request = request(host, None);
+            assert_eq!(here.check(&request).is_ok(), allowed, "{host}");
+            assert_eq!(anywhere.check(&request), Ok(()), "{host}");
+        }
+        // The page of another name that was bound to this address has that name as its origin.
+        let rebound = request("evil.net:50051", Some("http://evil.net:50051"));
+        assert_eq!(here.check(&rebound), Err(Foreign::Host));
+        // HTTP/2 names the host in the URI.
+        let uri = Request::post("http://evil.net/path").body(());
+        assert_eq!(here.check(&uri.expect("a request")), Err(Foreign::Host));
+    }
+}

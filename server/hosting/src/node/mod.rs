@@ -1,0 +1,527 @@
+//! The task of a node: does what the core (`chefshat_cluster::Node`) puts out, and brings the
+//! answers in. Requests to the database run beside each other; what is done with one unit is done
+//! one after another: `turns` keeps their order, and `units` resumes and stops what the node owns.
+
+#[cfg(test)]
+mod tests;
+mod turns;
+mod units;
+
+use std::collections::BTreeMap;
+use std::panic::AssertUnwindSafe;
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_cluster::{BeatAnswer, ClaimAnswer, Input, Node, Output, Phase};
+use futures::FutureExt as _;
+use futures::future::pending;
+use tokio::sync::{Semaphore, watch};
+use tokio::task::{JoinHandle, JoinSet};
+use tokio::time::{Instant, MissedTickBehavior, interval, sleep, sleep_until, timeout};
+use tokio_util::sync::CancellationToken;
+use tracing::{error, info, warn};
+
+pub use units::Hosted;
+
+use crate::cluster::{News, NodeLease};
+use chefshat_base::tasks::{LongTask, named, short};
+use chefshat_room::ids::Id;
+use chefshat_store::StoreError;
+use chefshat_store::cluster::{ClusterStore, Epoch, NodeId, NodeInfo};
+use turns::Turns;
+use units::{Resumed, Units};
+
+/// How long an answer of the database is awaited, except to a beat. After that, the next beat says
+/// what happened.
+const ANSWER_TIME: Duration = Duration::from_secs(4);
+/// Time between two searches for units that nobody owns.
+const FIND_INTERVAL: Duration = Duration::from_millis(500);
+/// Time between two removals of what is over.
+const TIDY_INTERVAL: Duration = Duration::from_secs(30);
+/// Most orphans that are looked for at a time, so that several nodes share them.
+const ORPHANS_AT_ONCE: usize = 64;
+/// Units that are handed over at a time: each is away only from its own last commit on.
+const RELEASES_AT_ONCE: usize = 8;
+/// How long a unit that this node could not resume is left to others, such as those of another version.
+/// Then it tries again: the reason may have passed.
+const LEFT_ALONE: Duration = Duration::from_mins(10);
+/// Pause before a node that was removed from the database tries again to join.
+const REJOIN_PAUSE: Duration = Duration::from_secs(1);
+
+/// A server as a node of a cluster. Dropping it ends its task without handing anything over.
+#[derive(Debug)]
+pub struct ClusterNode {
+    drain: CancellationToken,
+    is_asked_to_drain: watch::Receiver<bool>,
+    may_publish: watch::Receiver<bool>,
+    task: JoinHandle<()>,
+}
+
+impl ClusterNode {
+    /// Starts the task of a node that has joined. When it is drained, ephemeral games may continue
+    /// for `grace`.
+    pub fn start(
+        id: NodeId,
+        info: NodeInfo,
+        grace: Duration,
+        store: Arc<dyn ClusterStore>,
+        hosted: Hosted,
+    ) -> Self {
+        let drain = CancellationToken::new();
+        let (asked, is_asked_to_drain) = watch::channel(false);
+        let (publishes, may_publish) = watch::channel(false);
+        let lease = hosted.rooms.lease();
+        let lease = Arc::clone(lease.expect("the rooms of a node have a lease"));
+        lease.joined(id);
+        let units = Units::new(Arc::clone(&store), hosted, grace);
+        let capacity = usize::try_from(info.capacity).unwrap_or(usize::MAX);
+        let task = Task {
+            node: Node::new(id, store.lease(), capacity),
+            capacity,
+            info,
+            store,
+            lease,
+            units: Arc::new(units),
+            began: Instant::now(),
+            running: BTreeMap::new(),
+            not_resumable: BTreeMap::new(),
+            nothing_to_run: BTreeMap::new(),
+            turns: Turns::default(),
+            answers: JoinSet::new(),
+            releases: Arc::new(Semaphore::new(RELEASES_AT_ONCE)),
+            search: Arc::new(Semaphore::new(1)),
+            asked,
+            publishes,
+            leaves: false,
+        };
+        Self {
+            task: tokio::spawn(named(LongTask::Node, task.run(drain.clone()))),
+            drain,
+            is_asked_to_drain,
+            may_publish,
+        }
+    }
+
+    /// Completes when somebody asks the node, in the database, to hand over what it owns.
+    pub async fn asked_to_drain(&self) {
+        let mut asked = self.is_asked_to_drain.clone();
+        if asked.wait_for(|asked| *asked).await.is_err() {
+            pending().await
+        }
+    }
+
+    /// Whether the node has a lease, and each change of that.
+    pub fn may_publish(&self) -> watch::Receiver<bool> {
+        self.may_publish.clone()
+    }
+
+    /// Takes nothing over any more, hands everything over, and leaves the cluster. The rooms and
+    /// tournaments must accept no new ones.
+    pub async fn drain(&mut self) {
+        self.drain.cancel();
+        if let Err(problem) = (&mut self.task).await {
+            error!(%problem, "the task of the node has failed");
+        }
+    }
+}
+
+impl Drop for ClusterNode {
+    fn drop(&mut self) {
+        self.task.abort();
+    }
+}
+
+/// What a request to the database, or work with a unit, comes to.
+enum Event {
+    Answer(Input<Id>),
+    /// Orphans were found.
+    Found(Vec<(Id, Epoch)>),
+    /// Claims were answered.
+    Claimed(Vec<(Id, ClaimAnswer)>),
+    /// A unit was released because this node cannot resume it.
+    GivenUp(Id),
+    /// A unit has nothing to run at this epoch.
+    NothingToRun(Id, Epoch),
+    /// A beat was answered, and the node was asked to hand over what it owns.
+    AskedToDrain(Input<Id>),
+    /// A unit was resumed or stopped, and nothing follows.
+    Nothing,
+    /// The node is removed from the database.
+    Left,
+}
+
+struct Task {
+    node: Node<Id>,
+    capacity: usize,
+    info: NodeInfo,
+    store: Arc<dyn ClusterStore>,
+    units: Arc<Units>,
+    lease: Arc<NodeLease>,
+    began: Instant,
+    /// The epochs at which units are resumed here.
+    running: BTreeMap<Id, Epoch>,
+    /// Units that this node could not resume, and when it has tried. It leaves them to others.
+    not_resumable: BTreeMap<Id, Instant>,
+    /// Units that are this node's, at these epochs, and have nothing to run: ephemeral rooms that have
+    /// stopped.
+    nothing_to_run: BTreeMap<Id, Epoch>,
+    turns: Turns,
+    answers: JoinSet<Event>,
+    releases: Arc<Semaphore>,
+    /// Held by the search for orphans.
+    search: Arc<Semaphore>,
+    asked: watch::Sender<bool>,
+    publishes: watch::Sender<bool>,
+    /// Whether it is leaving by itself, after it has handed over everything.
+    leaves: bool,
+}
+
+impl Task {
+    async fn run(mut self, drain: CancellationToken) {
+        let mut finding = interval(FIND_INTERVAL);
+        finding.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut tidying = interval(TIDY_INTERVAL);
+        tidying.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let store = Arc::clone(&self.store);
+        self.put_in(Input::Time);
+        loop {
+            let is_draining = self.node.phase() != Phase::Serving;
+            let wakes_at = self.node.wakes_at_ms();
+            let alarm = self.began + Duration::from_millis(wakes_at.unwrap_or_default());
+            tokio::select! {
+                Some(event) = self.answers.join_next() => match event {
+                    Ok(Event::Answer(input)) => self.answered(input),
+                    Ok(Event::Found(orphans)) => self.found(orphans),
+                    Ok(Event::Claimed(claims)) => self.claimed(claims),
+                    Ok(Event::GivenUp(unit)) => self.given_up(unit),
+                    Ok(Event::NothingToRun(unit, epoch)) => {
+                        self.nothing_to_run.insert(unit, epoch);
+                    }
+                    Ok(Event::AskedToDrain(input)) => {
+                        self.asked.send_replace(true);
+                        self.answered(input);
+                    }
+                    Ok(Event::Nothing) => {}
+                    Ok(Event::Left) => return,
+                    Err(problem) => error!(%problem, "work for the cluster has failed"),
+                },
+                news = self.lease.news() => {
+                    for (unit, news) in news {
+                        match news {
+                            News::Created { ephemeral } => {
+                                self.put_in(Input::Created { unit, ephemeral });
+                            }
+                            News::Stopped => self.has_stopped(unit),
+                        }
+                    }
+                }
+                () = sleep_until(alarm), if wakes_at.is_some() => self.put_in(Input::Time),
+                orphan = store.handed_over() => self.found(vec![orphan]),
+                _ = finding.tick() => self.find_orphans(ORPHANS_AT_ONCE),
+                _ = tidying.tick() => self.tidy(),
+                () = drain.cancelled(), if !is_draining => self.put_in(Input::Drain),
+            }
+            if self.node.phase() == Phase::Left && !self.leaves {
+                // The database has removed it.
+                let rejoined = drain.run_until_cancelled(self.rejoin()).await;
+                if rejoined.is_none() {
+                    // It owns nothing that it could hand over. What it has run stops.
+                    while self.answers.join_next().await.is_some() {}
+                    return;
+                }
+            }
+        }
+    }
+
+    fn now_ms(&self) -> u64 {
+        u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+
+    fn put_in(&mut self, input: Input<Id>) {
+        let now_ms = self.now_ms();
+        let mut claims = Vec::new();
+        for output in self.node.handle(input, now_ms) {
+            match output {
+                Output::Claim(unit, seen) => claims.push((unit, seen)),
+                output => self.put_out(output),
+            }
+        }
+        if !claims.is_empty() {
+            self.claim(claims);
+        }
+        let until_ms = self.node.publishes_until_ms();
+        self.lease.set(self.began + Duration::from_millis(until_ms));
+        let publishes = self.node.may_publish(now_ms);
+        self.publishes.send_if_modified(|known| {
+            let is_new = *known != publishes;
+            *known = publishes;
+            is_new
+        });
+    }
+
+    /// Takes the answer of the database to something.
+    fn answered(&mut self, input: Input<Id>) {
+        let is_beat = matches!(input, Input::Beat { .. });
+        self.put_in(input);
+        if is_beat && self.node.phase() == Phase::Serving {
+            self.resume_missing();
+        }
+    }
+
+    /// Compares what this node owns with what it runs. What it neither runs nor is about to, it resumes
+    /// after its next beat: for example a room whose creation was answered after the end of the lease,
+    /// when the rooms of the node had been stopped.
+    fn resume_missing(&mut self) {
+        let owned: BTreeMap<Id, Epoch> = self.node.owned().collect();
+        (self.nothing_to_run).retain(|unit, epoch| owned.get(unit) == Some(epoch));
+        for (unit, epoch) in owned {
+            let is_missing = !self.nothing_to_run.contains_key(&unit)
+                && self.turns.is_idle(unit)
+                && !self.units.has(unit);
+            if is_missing {
+                info!(%unit, epoch = epoch.0, "it is this node's but does not run; it is resumed");
+                self.running.remove(&unit);
+                self.put_in(Input::Fenced(unit, epoch));
+            }
+        }
+    }
+
+    fn put_out(&mut self, output: Output<Id>) {
+        let store = Arc::clone(&self.store);
+        match output {
+            Output::Beat => {
+                self.turns.forget_ended();
+                let sent_ms = self.now_ms();
+                // A beat without an answer must not take up the time of the next one, which the
+                // lease may still wait for.
+                let within = Duration::from_millis(store.lease().beat_every_ms());
+                let beating = async move { beat(&*store, within, sent_ms).await };
+                let answer = BeatAnswer::None;
+                self.spawn(beating, Event::Answer(Input::Beat { sent_ms, answer }));
+            }
+            Output::FindOrphans(count) => self.find_orphans(count),
+            Output::Claim(unit, seen) => self.claim(vec![(unit, seen)]),
+            Output::Serve(unit, epoch) => {
+                self.units.want(unit, epoch);
+                // One of its rooms may stop before all are resumed.
+                self.running.insert(unit, epoch);
+                let units = Arc::clone(&self.units);
+                let resuming = async move {
+                    match units.resume(unit, epoch).await {
+                        Resumed::Runs => Event::Nothing,
+                        Resumed::Nothing => Event::NothingToRun(unit, epoch),
+                        Resumed::Impossible => match units.give_up(unit, epoch).await {
+                            true => Event::GivenUp(unit),
+                            false => Event::Nothing,
+                        },
+                    }
+                };
+                // After the next beat it is missed, and resumed again.
+                self.queue(unit, resuming, Event::Nothing);
+            }
+            Output::Stop(unit) => self.stop(unit),
+            Output::Suspend => warn!("the node has no lease; it publishes nothing until it has"),
+            Output::Resume => info!("the node has a lease"),
+            Output::Release(unit, epoch) => {
+                self.units.unwant(unit);
+                let (units, releases) = (Arc::clone(&self.units), Arc::clone(&self.releases));
+                let releasing = async move {
+                    units.until_ephemeral_over(unit).await;
+                    let _permit = releases.acquire().await.expect("it is never closed");
+                    let is_released = units.release(unit, epoch).await;
+                    Event::Answer(Input::Released(unit, is_released))
+                };
+                let not_released = Event::Answer(Input::Released(unit, false));
+                self.queue(unit, releasing, not_released);
+            }
+            Output::Leave => {
+                self.leaves = true;
+                let leaving = async move {
+                    // If no answer comes, the node is removed when its lease has expired.
+                    answer("leave", ANSWER_TIME, store.leave()).await;
+                    Event::Left
+                };
+                self.spawn(leaving, Event::Left);
+            }
+        }
+    }
+
+    /// Claims units together.
+    fn claim(&mut self, orphans: Vec<(Id, Epoch)>) {
+        let store = Arc::clone(&self.store);
+        let units: Vec<Id> = orphans.iter().map(|(unit, _)| *unit).collect();
+        let unanswered = units.iter().map(|unit| (*unit, ClaimAnswer::None));
+        let unanswered = Event::Claimed(unanswered.collect());
+        let claiming = async move {
+            let claimed = answer("claim", ANSWER_TIME, store.claim_all(orphans)).await;
+            let answers = match claimed {
+                Some(claimed) => (claimed.into_iter())
+                    .map(|epoch| epoch.map_or(ClaimAnswer::Lost, ClaimAnswer::Won))
+                    .collect(),
+                None => vec![ClaimAnswer::None; units.len()],
+            };
+            Event::Claimed(units.into_iter().zip(answers).collect())
+        };
+        self.spawn(claiming, unanswered);
+    }
+
+    fn claimed(&mut self, claims: Vec<(Id, ClaimAnswer)>) {
+        let is_any_won = (claims.iter()).any(|(_, it)| matches!(it, ClaimAnswer::Won(_)));
+        for (unit, answer) in claims {
+            self.put_in(Input::Claimed(unit, answer));
+        }
+        if is_any_won {
+            // There may be more than are looked for at a time.
+            self.find_orphans(ORPHANS_AT_ONCE);
+        }
+    }
+
+    fn found(&mut self, mut orphans: Vec<(Id, Epoch)>) {
+        orphans.retain(|(unit, _)| !self.not_resumable.contains_key(unit));
+        self.put_in(Input::Orphans(orphans));
+    }
+
+    fn given_up(&mut self, unit: Id) {
+        let minutes = LEFT_ALONE.as_secs() / 60;
+        error!(%unit, minutes, "nothing of it can be resumed here; for some time it is left to other nodes");
+        self.not_resumable.insert(unit, Instant::now());
+        self.running.remove(&unit);
+        self.put_in(Input::Released(unit, true));
+    }
+
+    fn tidy(&mut self) {
+        // After an outage of the database, other nodes get time to renew their leases.
+        if !self.node.may_claim(self.now_ms()) {
+            return;
+        }
+        let store = Arc::clone(&self.store);
+        let tidying = async move {
+            answer("tidy up", TIDY_INTERVAL, store.tidy()).await;
+            Event::Nothing
+        };
+        self.spawn(tidying, Event::Nothing);
+    }
+
+    fn find_orphans(&mut self, count: usize) {
+        if !self.node.may_claim(self.now_ms()) {
+            return;
+        }
+        // A database that is slow is asked once at a time.
+        let Ok(search) = Arc::clone(&self.search).try_acquire_owned() else {
+            return;
+        };
+        // Those that it could not resume are found as well.
+        self.not_resumable
+            .retain(|_, tried| tried.elapsed() < LEFT_ALONE);
+        let count = count + self.not_resumable.len();
+        let store = Arc::clone(&self.store);
+        let finding = async move {
+            let orphans = answer("look for orphans", ANSWER_TIME, store.orphans(count)).await;
+            drop(search);
+            Event::Found(orphans.unwrap_or_default())
+        };
+        self.spawn(finding, Event::Nothing);
+    }
+
+    /// Stops a unit at once.
+    fn stop(&mut self, unit: Id) {
+        self.units.fence(unit);
+        self.running.remove(&unit);
+        let units = Arc::clone(&self.units);
+        let stopping = async move {
+            units.stop(unit).await;
+            Event::Nothing
+        };
+        self.queue(unit, stopping, Event::Nothing);
+    }
+
+    /// Something of a unit has stopped by itself, so all of it stops. If the node still owns it, it
+    /// resumes it after its next beat.
+    fn has_stopped(&mut self, unit: Id) {
+        // What was created here is at the first epoch.
+        let epoch = self.running.get(&unit).copied().unwrap_or(Epoch::FIRST);
+        self.stop(unit);
+        self.put_in(Input::Fenced(unit, epoch));
+    }
+
+    /// Does something with a unit after what is done with it already.
+    fn queue(
+        &mut self,
+        unit: Id,
+        work: impl Future<Output = Event> + Send + 'static,
+        if_it_panics: Event,
+    ) {
+        let mut turn = self.turns.take(unit);
+        let in_turn = async move {
+            turn.comes().await;
+            work.await
+        };
+        self.spawn(in_turn, if_it_panics);
+    }
+
+    /// Starts work whose event comes in any case: the core keeps a mark for what it waits for, and
+    /// without an answer it would wait forever.
+    fn spawn(&mut self, work: impl Future<Output = Event> + Send + 'static, if_it_panics: Event) {
+        self.answers.spawn(short(
+            "one request to the database, within its time limit",
+            async move {
+                // Nothing that it leaves behind is used again, but by locks that say so.
+                let worked = AssertUnwindSafe(work).catch_unwind().await;
+                worked.unwrap_or_else(|_| {
+                    error!("work for the cluster has failed");
+                    if_it_panics
+                })
+            },
+        ));
+    }
+
+    /// Joins as a new node: the database has removed this one, which was away for long.
+    async fn rejoin(&mut self) {
+        warn!("the node was removed from the database; it joins again");
+        let id = loop {
+            match self.store.join(self.info.clone()).await {
+                Ok(id) => break id,
+                Err(error) => {
+                    warn!(%error, "joining failed; trying again");
+                    sleep(REJOIN_PAUSE).await;
+                }
+            }
+        };
+        self.lease.joined(id);
+        self.node = Node::new(id, self.store.lease(), self.capacity);
+        self.put_in(Input::Time);
+    }
+}
+
+/// Beats, and reads what the node owns.
+async fn beat(store: &dyn ClusterStore, within: Duration, sent_ms: u64) -> Event {
+    let (answer, drain) = match answer("beat", within, store.beat()).await {
+        Some(Some(beat)) => (BeatAnswer::Renewed(beat.owned), beat.drain),
+        Some(None) => (BeatAnswer::Unknown, false),
+        None => (BeatAnswer::None, false),
+    };
+    let input = Input::Beat { sent_ms, answer };
+    match drain {
+        true => Event::AskedToDrain(input),
+        false => Event::Answer(input),
+    }
+}
+
+/// The answer of the database; `None` if it failed or none came in time.
+async fn answer<T>(
+    what: &str,
+    within: Duration,
+    asked: impl Future<Output = Result<T, StoreError>>,
+) -> Option<T> {
+    match timeout(within, asked).await {
+        Ok(Ok(answer)) => Some(answer),
+        Ok(Err(error)) => {
+            warn!(what, %error, "the database did not do what the cluster needs");
+            None
+        }
+        Err(_) => {
+            warn!(what, "the database did not answer");
+            None
+        }
+    }
+}

@@ -1,0 +1,661 @@
+//! Two nodes on a database in memory, under tokio's paused clock: takeover, fencing, suspension and
+//! drain, of rooms and of a tournament.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use chefshat_proto::v1;
+use chefshat_room::ids::Id;
+use chefshat_room::journal::ParticipantKind;
+use chefshat_room::policy::{Durability, Policy};
+use futures::FutureExt as _;
+use tokio::time::{Instant, sleep, timeout};
+use tokio_util::task::TaskTracker;
+
+use super::units::LOADS_AT_ONCE;
+use super::{ClusterNode, Hosted, LEFT_ALONE};
+use crate::cluster::{FoundBy, LOOK_LIMIT, Location, News, NodeLease, StoreDirectory};
+use crate::config::ServerConfig;
+use crate::room::{Handle, JoinRequest, RoomGone};
+use crate::rooms::{NewRoom, Rooms};
+use crate::studies::Studies;
+use crate::tournaments::{Entry, TournamentHandle, Tournaments};
+use chefshat_admission::limits::Key;
+use chefshat_base::tasks::{LongTask, polls};
+use chefshat_store::Store;
+use chefshat_store::cluster::{ClusterStore, Kind, NodeInfo};
+use chefshat_store::testing::{Database, FakeStore};
+use chefshat_wire::convert;
+
+/// Longest time that anything takes, on the paused clock.
+const SOON: Duration = Duration::from_secs(60);
+
+/// A server without sockets.
+struct TestNode {
+    store: Arc<FakeStore>,
+    rooms: Arc<Rooms>,
+    tournaments: Arc<Tournaments>,
+    node: ClusterNode,
+}
+
+impl TestNode {
+    async fn start(database: &Arc<Database>) -> Self {
+        let store = FakeStore::new(database);
+        let tracker = TaskTracker::new();
+        let lease = Arc::new(NodeLease::new());
+        let stored: Arc<dyn Store> = Arc::clone(&store) as Arc<dyn Store>;
+        let shared: Arc<dyn ClusterStore> = Arc::clone(&store) as Arc<dyn ClusterStore>;
+        let config = ServerConfig::default();
+        let directory = StoreDirectory::new(Arc::clone(&shared), Arc::clone(&lease), config.shares);
+        let directory = Arc::new(directory);
+        let rooms = Rooms::of_node(&config, stored, directory, Some(lease), tracker.clone());
+        let rooms = rooms.expect("threads");
+        let tournaments = Tournaments::new(Arc::clone(&rooms), tracker.clone());
+        let studies = Studies::new(Arc::clone(&rooms), tracker);
+        let info = NodeInfo {
+            capacity: 1_000,
+            ..NodeInfo::default()
+        };
+        let id = store
+            .join(info.clone())
+            .await
+            .expect("the database is there");
+        let node = ClusterNode::start(
+            id,
+            info,
+            Duration::ZERO,
+            shared,
+            Hosted {
+                rooms: Arc::clone(&rooms),
+                tournaments: Arc::clone(&tournaments),
+                studies,
+            },
+        );
+        let mut publishes = node.may_publish();
+        soon(publishes.wait_for(|it| *it)).await.expect("it runs");
+        Self {
+            store,
+            rooms,
+            tournaments,
+            node,
+        }
+    }
+
+    /// Creates a durable room for four.
+    async fn create_room(&self) -> Handle {
+        self.create(Durability::Durable).await
+    }
+
+    async fn create(&self, durability: Durability) -> Handle {
+        let made = self.rooms.create(NewRoom {
+            policy: Policy {
+                durability,
+                ..Policy::default()
+            },
+            ..NewRoom::for_tests()
+        });
+        made.await.expect("a room").handle
+    }
+
+    /// Waits until a room runs here.
+    async fn has(&self, room: Id) -> Handle {
+        let found = async {
+            loop {
+                match self.rooms.get(room) {
+                    Some(handle) => return handle,
+                    None => sleep(Duration::from_millis(10)).await,
+                }
+            }
+        };
+        soon(found).await
+    }
+
+    /// Waits until a room does not run here any more.
+    async fn loses(&self, room: Id) {
+        let lost = async {
+            while self.rooms.get(room).is_some() {
+                sleep(Duration::from_millis(10)).await;
+            }
+        };
+        soon(lost).await;
+    }
+
+    /// Waits until a tournament runs here.
+    async fn has_tournament(&self, id: Id) -> Arc<TournamentHandle> {
+        let found = async {
+            loop {
+                match self.tournaments.get(id) {
+                    Some(handle) => return handle,
+                    None => sleep(Duration::from_millis(10)).await,
+                }
+            }
+        };
+        soon(found).await
+    }
+}
+
+async fn soon<T>(future: impl Future<Output = T>) -> T {
+    timeout(SOON, future)
+        .await
+        .expect("it does not take that long")
+}
+
+/// Takes a seat. The answer says that this is committed.
+async fn join(room: &Handle, name: &str) -> Result<(), RoomGone> {
+    let request = JoinRequest {
+        name: name.into(),
+        name_fingerprint: String::new(),
+        kind: ParticipantKind::Agent,
+        seat: None,
+        request_id: None,
+        client: None,
+    };
+    room.join(request).await.map(|joined| {
+        joined.expect("a free seat");
+    })
+}
+
+/// The names on the seats of a room.
+async fn names(room: &Handle) -> Vec<String> {
+    let room = room.describe().await.expect("it runs");
+    let names = room.seats.into_iter().map(|seat| seat.name);
+    names.filter(|name| !name.is_empty()).collect()
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_room_of_a_dead_node_continues_at_another() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = first.create_room().await;
+    soon(join(&room, "Ada")).await.expect("it runs");
+    let id = room.id();
+    let died = Instant::now();
+    drop(first);
+
+    let room = second.has(id).await;
+    assert!(
+        died.elapsed() <= Duration::from_secs(10),
+        "{:?}",
+        died.elapsed()
+    );
+    assert_eq!(names(&room).await, ["Ada"]);
+    soon(join(&room, "Bo")).await.expect("it runs");
+    assert_eq!(database.seated(id), ["Ada", "Bo"]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_many_rooms_of_a_dead_node_are_read_a_few_at_a_time() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let mut rooms = Vec::new();
+    for _ in 0..3 * LOADS_AT_ONCE {
+        rooms.push(first.create_room().await.id());
+    }
+    second.store.loads_held.send_replace(true);
+    drop(first);
+    let all_claimed = async {
+        let node = second.store.node();
+        while !rooms.iter().all(|room| database.owner(*room) == Some(node)) {
+            sleep(Duration::from_millis(10)).await;
+        }
+    };
+    soon(all_claimed).await;
+    // Until everything waits for the store.
+    sleep(Duration::from_millis(1)).await;
+    assert_eq!(*second.store.loads.borrow() as usize, LOADS_AT_ONCE);
+    second.store.loads_held.send_replace(false);
+    for room in rooms {
+        second.has(room).await;
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_node_that_returns_too_late_publishes_nothing() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let old = first.create_room().await;
+    let id = old.id();
+    first.store.cut_off.send_replace(true);
+    let late = tokio::spawn({
+        let old = old.clone();
+        async move { join(&old, "Ada").await }
+    });
+
+    let new = second.has(id).await;
+    soon(join(&new, "Bo")).await.expect("it runs");
+    // Its clients reconnect before it reaches the database again.
+    let late = soon(late).await.expect("no panic");
+    assert_eq!(late, Err(RoomGone));
+    first.store.cut_off.send_replace(false);
+    first.loses(id).await;
+    soon(first.node.may_publish().wait_for(|it| *it))
+        .await
+        .expect("it runs");
+    assert_eq!(database.seated(id), ["Bo"]);
+    assert_eq!(names(&new).await, ["Bo"]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_fenced_room_stops_alone() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = FakeStore::new(&database);
+    let other = second.join(NodeInfo::default()).await.expect("it joins");
+    let (taken, kept) = (first.create_room().await, first.create_room().await);
+    database.take_away(taken.id(), other);
+
+    assert_eq!(soon(join(&taken, "Ada")).await, Err(RoomGone));
+    first.loses(taken.id()).await;
+    soon(join(&kept, "Bo")).await.expect("it runs");
+    assert_eq!(database.seated(taken.id()), [""; 0]);
+    assert_eq!(database.owner(kept.id()), Some(first.store.node()));
+}
+
+#[tokio::test(start_paused = true)]
+async fn without_a_lease_nothing_is_published_until_it_is_back() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let room = first.create_room().await;
+    let mut publishes = first.node.may_publish();
+    first.store.beats_lost.send_replace(true);
+    soon(publishes.wait_for(|it| !it)).await.expect("it runs");
+
+    let joining = join(&room, "Ada");
+    tokio::pin!(joining);
+    let mut committed = false;
+    while !committed {
+        assert_eq!(joining.as_mut().now_or_never(), None, "it is not published");
+        sleep(Duration::from_millis(1)).await;
+        committed = database.seated(room.id()) == ["Ada"];
+    }
+    for _ in 0..100 {
+        assert_eq!(joining.as_mut().now_or_never(), None, "it is not published");
+        sleep(Duration::from_millis(1)).await;
+    }
+    first.store.beats_lost.send_replace(false);
+    soon(joining).await.expect("the room continues");
+    assert_eq!(names(&room).await, ["Ada"]);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_beat_without_an_answer_costs_no_lease() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let room = first.create_room().await;
+    let mut publishes = first.node.may_publish();
+    first.store.beats_unanswered.send_replace(1);
+    let suspended = timeout(SOON, publishes.wait_for(|it| !it));
+    assert!(suspended.await.is_err(), "the node keeps its lease");
+    assert_eq!(*first.store.beats_unanswered.borrow(), 0, "a beat was lost");
+    soon(join(&room, "Ada")).await.expect("it runs");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_unit_whose_room_stops_while_others_are_resumed_runs_after_the_next_beat() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = first.create_room().await.id();
+    second.store.loads_held.send_replace(true);
+    drop(first);
+    let mut loads = second.store.loads.subscribe();
+    soon(loads.wait_for(|loads| *loads == 1))
+        .await
+        .expect("the store is here");
+    let lease = second.rooms.lease().expect("a node");
+    lease.report(room, News::Stopped);
+    // Until everything waits for the store.
+    sleep(Duration::from_millis(1)).await;
+    second.store.loads_held.send_replace(false);
+
+    soon(loads.wait_for(|loads| *loads == 2))
+        .await
+        .expect("it is resumed again");
+    let room = second.has(room).await;
+    soon(join(&room, "Ada")).await.expect("it runs");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_room_whose_creation_is_answered_after_the_lease_has_ended_runs_when_it_is_back() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    first.store.creations_unanswered.send_replace(true);
+    let creating = first.create_room();
+    tokio::pin!(creating);
+    // Beats say meanwhile that the node owns it.
+    let beaten = timeout(Duration::from_secs(10), creating.as_mut());
+    assert!(beaten.await.is_err(), "no answer comes");
+    first.store.beats_lost.send_replace(true);
+    let expired = timeout(Duration::from_secs(20), creating.as_mut());
+    assert!(expired.await.is_err(), "no answer comes");
+    first.store.creations_unanswered.send_replace(false);
+    let room = soon(creating).await.id();
+    first.loses(room).await;
+    first.store.beats_lost.send_replace(false);
+
+    let resumed = first.has(room).await;
+    soon(join(&resumed, "Ada")).await.expect("it runs");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_database_that_was_away_for_long_ends_no_node() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let room = first.create_room().await;
+    soon(join(&room, "Ada")).await.expect("it runs");
+    first.store.cut_off.send_replace(true);
+    sleep(Duration::from_secs(300)).await;
+    assert!(
+        first.rooms.get(room.id()).is_none(),
+        "its clients reconnect"
+    );
+    first.store.cut_off.send_replace(false);
+
+    let room = first.has(room.id()).await;
+    assert_eq!(names(&room).await, ["Ada"]);
+    soon(join(&room, "Bo")).await.expect("it runs");
+}
+
+#[tokio::test(start_paused = true)]
+async fn ephemeral_rooms_outlive_an_outage_of_the_database_but_not_of_their_node() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = second.create(Durability::Ephemeral).await;
+    first.store.cut_off.send_replace(true);
+    second.store.cut_off.send_replace(true);
+    sleep(Duration::from_secs(300)).await;
+    first.store.cut_off.send_replace(false);
+    soon(first.node.may_publish().wait_for(|it| *it))
+        .await
+        .expect("it runs");
+    // Within the time that is left to the other nodes.
+    sleep(Duration::from_secs(3)).await;
+    second.store.cut_off.send_replace(false);
+    soon(join(&room, "Ada")).await.expect("it continues");
+    soon(second.node.may_publish().wait_for(|it| *it))
+        .await
+        .expect("it runs");
+    soon(join(&room, "Bo")).await.expect("it continues");
+
+    // The other node continues, so it removes the room.
+    second.store.cut_off.send_replace(true);
+    sleep(Duration::from_secs(300)).await;
+    second.store.cut_off.send_replace(false);
+    second.loses(room.id()).await;
+    assert_eq!(soon(join(&room, "Cy")).await, Err(RoomGone));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_node_that_was_removed_joins_again() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = first.create_room().await.id();
+    let before = first.store.node();
+    first.store.cut_off.send_replace(true);
+    second.has(room).await;
+    database.remove_expired();
+    assert!(!database.knows(before));
+    first.store.cut_off.send_replace(false);
+
+    soon(first.node.may_publish().wait_for(|it| *it))
+        .await
+        .expect("it runs");
+    assert_ne!(first.store.node(), before);
+    let created = first.create_room().await.id();
+    assert_eq!(database.owner(created), Some(first.store.node()));
+}
+
+/// What a node waits for comes also if its work panics: no claim, release or beat stays open.
+#[tokio::test(start_paused = true)]
+async fn a_node_whose_work_panics_goes_on() {
+    let database = Database::new();
+    for what in ["orphans", "claim", "load", "tidy", "beat"] {
+        let first = TestNode::start(&database).await;
+        let room = first.create_room().await.id();
+        let second = TestNode::start(&database).await;
+        second.store.panics_at.send_replace(what);
+        drop(first);
+        let mut planted = second.store.panics_at.subscribe();
+        let seen = soon(planted.wait_for(|at| at.is_empty())).await;
+        drop(seen.expect("the sender is here"));
+        second.has(room).await;
+        let publishes = second.node.may_publish();
+        let beats = async {
+            // Longer than a lease holds without a beat.
+            sleep(SOON / 2).await;
+            *publishes.borrow()
+        };
+        assert!(soon(beats).await, "{what}");
+    }
+    for what in ["release", "leave"] {
+        let mut first = TestNode::start(&database).await;
+        let second = TestNode::start(&database).await;
+        let room = first.create_room().await.id();
+        first.store.panics_at.send_replace(what);
+        first.rooms.refuse_new();
+        soon(first.node.drain()).await;
+        assert_eq!(*first.store.panics_at.borrow(), "", "{what}");
+        second.has(room).await;
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_node_that_is_removed_while_it_hands_over_has_left() {
+    let database = Database::new();
+    let mut first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = first.create_room().await.id();
+    first.store.cut_off.send_replace(true);
+    second.has(room).await;
+    database.remove_expired();
+    let drained = async {
+        let drained = first.node.drain();
+        tokio::pin!(drained);
+        // It is away from the database.
+        let hour = Duration::from_secs(3_600);
+        assert!(timeout(hour, &mut drained).await.is_err());
+        first.store.cut_off.send_replace(false);
+        soon(drained).await;
+    };
+    drained.await;
+    let (nodes, per_second) = (2, 10);
+    assert!(
+        polls()[&LongTask::Node] < 3_600 * nodes * per_second,
+        "{:?}",
+        polls()
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_drained_node_hands_over_and_leaves() {
+    let database = Database::new();
+    let mut first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let mut rooms = Vec::new();
+    for _ in 0..20 {
+        let room = first.create_room().await;
+        soon(join(&room, "Ada")).await.expect("it runs");
+        rooms.push(room);
+    }
+    database.ask_to_drain(first.store.node());
+    soon(first.node.asked_to_drain()).await;
+    let began = Instant::now();
+    first.rooms.refuse_new();
+    soon(first.node.drain()).await;
+
+    assert!(!database.knows(first.store.node()), "it has left");
+    for old in rooms {
+        assert_eq!(old.describe().await.err(), Some(RoomGone));
+        let new = second.has(old.id()).await;
+        assert_eq!(names(&new).await, ["Ada"]);
+        soon(join(&new, "Bo")).await.expect("it runs");
+    }
+    // Nobody had to search for them, let alone to wait for the end of a lease.
+    assert!(
+        began.elapsed() < Duration::from_millis(400),
+        "{:?}",
+        began.elapsed()
+    );
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_room_that_a_node_cannot_resume_is_left_to_others() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = first.create_room().await.id();
+    database.make_foreign(room);
+    drop(first);
+    let mut loads = second.store.loads.subscribe();
+    soon(loads.wait_for(|loads| *loads == 1))
+        .await
+        .expect("the store is here");
+    sleep(SOON).await;
+    assert_eq!(database.owner(room), None);
+    assert_eq!(*loads.borrow(), 1, "it does not try again");
+    let other = second.create_room().await;
+    soon(join(&other, "Ada")).await.expect("it runs");
+    // What prevented it has passed.
+    database.make_native(room);
+    sleep(LEFT_ALONE).await;
+    let resumed = second.has(room).await;
+    soon(join(&resumed, "Bo")).await.expect("it runs");
+}
+
+#[tokio::test(start_paused = true)]
+async fn looking_for_rooms_takes_no_longer_if_the_database_hangs_and_many_look() {
+    let database = Database::new();
+    let node = TestNode::start(&database).await;
+    node.store.cut_off.send_replace(true);
+    let began = Instant::now();
+    let rooms: Vec<_> = (0..100)
+        .map(|number| FoundBy::Id(Id([number; 16])))
+        .collect();
+    let looks = (rooms.iter()).map(|room| node.rooms.directory().locate(room, Key::Local));
+    for location in futures::future::join_all(looks).await {
+        assert_eq!(location, Location::Unknown);
+    }
+    assert!(began.elapsed() < 2 * LOOK_LIMIT, "{:?}", began.elapsed());
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_tournament_changes_hands_with_its_rooms() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let settings = v1::TournamentSettings {
+        format: v1::TournamentFormat::Swiss.into(),
+        rounds: 1,
+        physical_tables: 1,
+        ..Default::default()
+    };
+    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+    let made = (first.tournaments).create("Coppa", plan, None, Key::Local);
+    let (old, _) = made.await.expect("made");
+    for name in ["Ada", "Bo", "Cy", "Di"] {
+        let entry = Entry {
+            name: name.into(),
+            name_fingerprint: String::new(),
+            kind: ParticipantKind::Human,
+            max_games: 1,
+            stateless: false,
+            at_table: true,
+            request_id: None,
+        };
+        soon(old.join(entry))
+            .await
+            .expect("it runs")
+            .expect("joined");
+    }
+    soon(old.begin()).await.expect("it runs").expect("begun");
+    let playing = async {
+        while first.rooms.open_count() == 0 {
+            sleep(Duration::from_millis(10)).await;
+        }
+    };
+    soon(playing).await;
+    let room = first.rooms.newest(None, None, 1)[0].1.id();
+    first.store.cut_off.send_replace(true);
+
+    let new = second.has_tournament(old.id()).await;
+    assert_eq!(new.describe().participants.len(), 4);
+    let taken = second.has(room).await;
+    assert_eq!(names(&taken).await.len(), 4);
+    first.store.cut_off.send_replace(false);
+    first.loses(room).await;
+    assert!(first.tournaments.get(old.id()).is_none());
+    assert_eq!(second.rooms.open_count(), 1, "no game is played twice");
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_end_of_a_game_is_shown_although_its_answer_comes_after_the_next_beats() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let room = first.create_room().await;
+    soon(join(&room, "Ada")).await.expect("it runs");
+    first.store.ends_unanswered.send_replace(true);
+    room.close_without_token().await;
+    // Beats say that the node does not own it any more.
+    sleep(Duration::from_secs(10)).await;
+    assert_eq!(database.owner(room.id()), None);
+    first.store.ends_unanswered.send_replace(false);
+
+    let shown = soon(room.describe()).await.expect("it is shown");
+    assert_eq!(shown.state(), v1::RoomState::Aborted);
+}
+
+#[tokio::test(start_paused = true)]
+async fn the_end_of_a_game_is_read_once_for_all_who_ask_when_its_node_is_gone() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start(&database).await;
+    let room = first.create_room().await;
+    soon(join(&room, "Ada")).await.expect("it runs");
+    room.close_without_token().await;
+    let over = async {
+        while first.rooms.is_over(room.id()) != Some(true) {
+            sleep(Duration::from_millis(10)).await;
+        }
+    };
+    soon(over).await;
+    drop(first);
+
+    second.store.ends_unreadable.send_replace(true);
+    let asked = second.tournaments.show_ended(room.id(), Kind::Room);
+    soon(asked).await.expect_err("it cannot be read now");
+    second.store.ends_unreadable.send_replace(false);
+    second.store.ends_read.send_replace(0);
+    let asked = (0..10).map(|_| second.tournaments.show_ended(room.id(), Kind::Room));
+    for shown in soon(futures::future::join_all(asked)).await {
+        shown.expect("readable");
+    }
+    assert_eq!(*second.store.ends_read.borrow(), 1);
+    let shown = second.rooms.get(room.id()).expect("it is shown");
+    assert_eq!(names(&shown).await, ["Ada"]);
+    let shown = soon(shown.describe()).await.expect("it is shown");
+    assert_eq!(shown.state(), v1::RoomState::Aborted);
+    let listed = second.rooms.newest(None, None, 9);
+    assert!(listed.is_empty(), "others may list it");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_room_whose_join_code_is_taken_gets_another_one() {
+    let database = Database::new();
+    let node = TestNode::start(&database).await;
+    node.store.codes_taken.lock().expect("no panic").0 = 2;
+    let room = node.create_room().await;
+    let code = node
+        .rooms
+        .header(room.id())
+        .expect("a room")
+        .join_code
+        .clone();
+    let taken = node.store.codes_taken.lock().expect("no panic").1.clone();
+    assert_eq!(taken.len(), 2);
+    assert!(!taken.contains(&code) && taken[0] != taken[1]);
+}

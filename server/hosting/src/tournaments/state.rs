@@ -1,0 +1,136 @@
+//! The state of a tournament, and what is shared besides it.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use chefshat_proto::v1;
+use chefshat_record::convert::FieldProblem;
+use chefshat_tournament::{Change, State, Tournament};
+use tokio::sync::Mutex as AsyncMutex;
+
+use super::message::{Entry, JoinRefusal};
+use super::shared::{AsOf, Shared};
+use chefshat_room::ids::{Id, SecretHash, Token};
+use chefshat_store::tournaments::{StoredTournament, TournamentEntry};
+use chefshat_wire::convert::{self, TournamentPlan};
+
+/// Most rooms and tournaments that are over and are read at a time.
+const READ_AT_ONCE: usize = 4;
+
+/// What all tournaments of a server share.
+#[derive(Debug, Default)]
+pub struct Common {
+    /// Locked while something that is over is read.
+    pub(super) reading: [AsyncMutex<()>; READ_AT_ONCE],
+}
+
+/// The state of a tournament. Its task has one with pending changes; the handle has one with only
+/// committed changes, for readers.
+#[derive(Debug, Clone)]
+pub struct TournamentState {
+    pub(crate) core: Tournament,
+    /// Hashed tickets of participants; built-in ones have none.
+    pub(super) tickets: BTreeMap<usize, SecretHash>,
+    /// Rooms and game ids of the tournament's games.
+    pub(super) placed: BTreeMap<usize, (Id, Id)>,
+    /// Ids of the connections that have participants now.
+    pub(super) connected: BTreeMap<usize, u64>,
+}
+
+impl TournamentState {
+    /// The initial state.
+    pub(super) fn new(core: Tournament) -> Self {
+        Self {
+            core,
+            tickets: BTreeMap::new(),
+            placed: BTreeMap::new(),
+            connected: BTreeMap::new(),
+        }
+    }
+
+    /// The participant with this ticket, in constant time for each.
+    pub(super) fn participant_of(&self, ticket: &SecretHash) -> Option<usize> {
+        let mut tickets = self.tickets.iter();
+        tickets
+            .find(|(_, known)| known.is(ticket))
+            .map(|(participant, _)| *participant)
+    }
+
+    /// The answer to an earlier request with the same id; `None` if the request is new.
+    pub(super) fn joined_before(
+        &self,
+        entry: &Entry,
+        ticket: Token,
+    ) -> Option<Result<(usize, Token), JoinRefusal>> {
+        let participant = self.participant_of(&ticket.hash())?;
+        Some(
+            match self.core.participants()[participant] == entry.entrant() {
+                true => Ok((participant, ticket)),
+                false => Err(JoinRefusal::RequestIdUsed),
+            },
+        )
+    }
+
+    /// Applies an entry of the tournament's journal.
+    pub(super) fn apply(&mut self, entry: &TournamentEntry) {
+        match entry {
+            TournamentEntry::Change(change) => {
+                match change {
+                    Change::Withdrawn {
+                        participant,
+                        removed,
+                    } if *removed || self.core.state() == State::Open => {
+                        self.tickets.remove(participant);
+                    }
+                    Change::Replaced { participant, .. } => {
+                        self.tickets.remove(participant);
+                    }
+                    _ => {}
+                }
+                self.core.fold(change);
+            }
+            TournamentEntry::Ticket {
+                participant,
+                ticket,
+            } => drop(self.tickets.insert(*participant, *ticket)),
+            TournamentEntry::Placed {
+                game,
+                room_id,
+                game_id,
+            } => drop(self.placed.insert(*game, (*room_id, *game_id))),
+        }
+    }
+
+    /// Sets or clears the connection of a participant. Connections are not part of the journal.
+    pub(super) fn set_connection(&mut self, participant: usize, connection: Option<u64>) {
+        match connection {
+            Some(number) => drop(self.connected.insert(participant, number)),
+            None => drop(self.connected.remove(&participant)),
+        }
+        self.core.set_present(participant, connection.is_some());
+    }
+
+    /// All deals that several games share.
+    pub(super) fn deals(&self) -> BTreeSet<u32> {
+        let games = self.core.games().iter();
+        games.filter_map(|game| game.deal).collect()
+    }
+}
+
+/// What readers of a tournament share besides its state: what is expensive to compute.
+#[derive(Debug, Default)]
+pub struct TournamentShared {
+    pub(super) follower_update: Shared<AsOf<v1::FollowTournamentResponse>>,
+    pub(super) results: Shared<AsOf<v1::GetTournamentResultsResponse>>,
+}
+
+/// Restores the state of a stored tournament.
+pub(crate) fn restored(
+    stored: &StoredTournament,
+) -> Result<(TournamentPlan, TournamentState), String> {
+    let plan = convert::tournament_plan(&stored.header.settings, [0; 32])
+        .map_err(|problem: FieldProblem| problem.to_string())?;
+    let core = Tournament::new(plan.core.clone()).map_err(|problem| problem.to_string())?;
+    let mut state = TournamentState::new(core);
+    stored.entries.iter().for_each(|entry| state.apply(entry));
+    Ok((plan, state))
+}
