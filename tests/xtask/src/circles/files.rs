@@ -179,39 +179,71 @@ impl Files {
             })
     }
 
-    /// The shortest circle through each dependency, shortest first. Paths are relative to `root`.
+    /// The shortest circle of files through each dependency, shortest first. Paths are relative to
+    /// `root`.
     pub(super) fn circles(&self, root: &Path) -> Vec<String> {
-        let dependencies = self.dependencies();
-        let name = |file: usize| {
-            let path = &self.paths[file];
-            let path = path.strip_prefix(root).unwrap_or(path);
-            path.to_string_lossy().replace('\\', "/")
-        };
-        let mut circles = BTreeSet::new();
-        for to in 0..dependencies.len() {
-            let before = search(&dependencies, to);
-            for from in (0..dependencies.len()).filter(|from| dependencies[*from].contains(&to)) {
-                // From `to` back to `from`, read backwards.
-                let mut way = vec![from];
-                while let Some(&file) = way.last()
-                    && file != to
-                    && let Some(file) = before[file]
-                {
-                    way.push(file);
-                }
-                if way.last() != Some(&to) {
-                    continue;
-                }
-                way.reverse();
-                let smallest = (0..way.len()).min_by_key(|&at| name(way[at]));
-                way.rotate_left(smallest.unwrap_or_default());
-                way.push(way[0]);
-                let names: Vec<String> = way.into_iter().map(name).collect();
-                circles.insert((names.len(), names.join(" → ")));
-            }
-        }
-        circles.into_iter().map(|(_, circle)| circle).collect()
+        let name = |file: usize| relative(&self.paths[file], root);
+        circles(&self.dependencies(), &name)
     }
+
+    /// The same of the folders directly below the root file: a file there and the folder with its
+    /// children count as one. The root file itself only passes names on.
+    pub(super) fn circles_of_folders(&self, root: &Path) -> Vec<String> {
+        let top = self.paths[0].parent().unwrap_or(Path::new(""));
+        let folder_of = |path: &PathBuf| {
+            let below = path.strip_prefix(top).unwrap_or(path);
+            let first = below.iter().next().map(Path::new).unwrap_or(path);
+            top.join(first.file_stem().unwrap_or(first.as_os_str()))
+        };
+        let folders: BTreeSet<PathBuf> = self.paths[1..].iter().map(folder_of).collect();
+        let folders: Vec<PathBuf> = folders.into_iter().collect();
+        let number_of = |file: usize| {
+            let folder = folder_of(&self.paths[file]);
+            folders.binary_search(&folder).ok().filter(|_| file > 0)
+        };
+        let mut arrows = vec![BTreeSet::new(); folders.len()];
+        for (file, others) in self.dependencies().into_iter().enumerate() {
+            let Some(from) = number_of(file) else {
+                continue;
+            };
+            let others = others.into_iter().filter_map(number_of);
+            arrows[from].extend(others.filter(|to| *to != from));
+        }
+        circles(&arrows, &|folder| relative(&folders[folder], root) + "/")
+    }
+}
+
+fn relative(path: &Path, root: &Path) -> String {
+    let path = path.strip_prefix(root).unwrap_or(path);
+    path.to_string_lossy().replace('\\', "/")
+}
+
+/// The shortest circle through each dependency, shortest first, by the names of its parts.
+fn circles(dependencies: &[BTreeSet<usize>], name: &dyn Fn(usize) -> String) -> Vec<String> {
+    let mut circles = BTreeSet::new();
+    for to in 0..dependencies.len() {
+        let before = search(dependencies, to);
+        for from in (0..dependencies.len()).filter(|from| dependencies[*from].contains(&to)) {
+            // From `to` back to `from`, read backwards.
+            let mut way = vec![from];
+            while let Some(&file) = way.last()
+                && file != to
+                && let Some(file) = before[file]
+            {
+                way.push(file);
+            }
+            if way.last() != Some(&to) {
+                continue;
+            }
+            way.reverse();
+            let smallest = (0..way.len()).min_by_key(|&at| name(way[at]));
+            way.rotate_left(smallest.unwrap_or_default());
+            way.push(way[0]);
+            let names: Vec<String> = way.into_iter().map(name).collect();
+            circles.insert((names.len(), names.join(" → ")));
+        }
+    }
+    circles.into_iter().map(|(_, circle)| circle).collect()
 }
 
 /// For every file that can be reached from one, the previous file on a shortest path.

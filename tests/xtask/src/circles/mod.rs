@@ -1,4 +1,4 @@
-//! Circles between the files of a crate.
+//! Circles between the files of a crate, and between its folders.
 //!
 //! A file depends on another if its code, except tests, names an item that the other defines:
 //! - Every path that starts with `crate`, `self`, `super`, a child module or an imported name
@@ -23,12 +23,14 @@ use crate::failure::Failure;
 use crate::places::Places;
 use files::Files;
 
-/// Refuses circles between the files of a crate, for every crate of the workspace.
+/// Refuses circles between the files of a crate, and between the folders of its root, for every crate
+/// of the workspace.
 pub(crate) fn check(places: &Places) -> Result<(), Failure> {
     let mut circles = Vec::new();
     for root in crate_roots(&arrows::metadata(places)?) {
         let files = Files::of_crate(&root, &|path| std::fs::read_to_string(path).ok())?;
         circles.extend(files.circles(&places.root));
+        circles.extend(files.circles_of_folders(&places.root));
     }
     if circles.is_empty() {
         return Ok(());
