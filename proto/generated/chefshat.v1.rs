@@ -1765,7 +1765,7 @@ pub mod admin_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.AdminService/ListClients",
             );
@@ -1790,7 +1790,7 @@ pub mod admin_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.AdminService/DisconnectClient",
             );
@@ -1816,7 +1816,7 @@ pub mod admin_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.AdminService/CloseRoom",
             );
@@ -1842,7 +1842,7 @@ pub mod admin_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.AdminService/CloseTournament",
             );
@@ -1867,7 +1867,7 @@ pub mod admin_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.AdminService/GetStorage",
             );
@@ -1893,7 +1893,7 @@ pub mod admin_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.AdminService/PruneRecords",
             );
@@ -1921,7 +1921,7 @@ pub mod admin_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.AdminService/ExportParticipant",
             );
@@ -1956,7 +1956,7 @@ pub mod admin_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.AdminService/DeleteParticipant",
             );
@@ -2179,7 +2179,7 @@ pub mod admin_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ListClientsSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -2225,7 +2225,7 @@ pub mod admin_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = DisconnectClientSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -2270,7 +2270,7 @@ pub mod admin_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = CloseRoomSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -2318,7 +2318,7 @@ pub mod admin_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = CloseTournamentSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -2363,7 +2363,7 @@ pub mod admin_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = GetStorageSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -2408,7 +2408,7 @@ pub mod admin_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = PruneRecordsSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -2456,7 +2456,7 @@ pub mod admin_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ExportParticipantSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -2502,7 +2502,7 @@ pub mod admin_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = DeleteParticipantSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -3832,7 +3832,7 @@ pub mod analysis_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.AnalysisService/Evaluate",
             );
@@ -3857,7 +3857,7 @@ pub mod analysis_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.AnalysisService/LegalActions",
             );
@@ -4014,7 +4014,7 @@ pub mod analysis_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = EvaluateSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -4059,7 +4059,7 @@ pub mod analysis_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = LegalActionsSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -4616,7 +4616,7 @@ pub mod instrument_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.InstrumentService/AddMarker",
             );
@@ -4643,7 +4643,7 @@ pub mod instrument_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.InstrumentService/FollowMarkers",
             );
@@ -4678,7 +4678,7 @@ pub mod instrument_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.InstrumentService/AddSamples",
             );
@@ -4855,7 +4855,7 @@ pub mod instrument_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = AddMarkerSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -4902,7 +4902,7 @@ pub mod instrument_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = FollowMarkersSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -4947,7 +4947,7 @@ pub mod instrument_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = AddSamplesSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -5507,7 +5507,7 @@ pub mod play_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.PlayService/Play",
             );
@@ -5535,7 +5535,7 @@ pub mod play_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.PlayService/Watch",
             );
@@ -5560,7 +5560,7 @@ pub mod play_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.PlayService/Act",
             );
@@ -5736,7 +5736,7 @@ pub mod play_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = PlaySvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -5783,7 +5783,7 @@ pub mod play_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = WatchSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -5826,7 +5826,7 @@ pub mod play_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ActSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -6175,7 +6175,7 @@ pub mod record_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.RecordService/ListRecords",
             );
@@ -6205,7 +6205,7 @@ pub mod record_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.RecordService/GetRecord",
             );
@@ -6233,7 +6233,7 @@ pub mod record_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.RecordService/StreamRecords",
             );
@@ -6264,7 +6264,7 @@ pub mod record_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.RecordService/ImportRecord",
             );
@@ -6453,7 +6453,7 @@ pub mod record_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ListRecordsSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -6499,7 +6499,7 @@ pub mod record_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = GetRecordSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -6545,7 +6545,7 @@ pub mod record_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = StreamRecordsSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -6592,7 +6592,7 @@ pub mod record_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ImportRecordSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -6968,7 +6968,7 @@ pub mod room_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.RoomService/CreateRoom",
             );
@@ -6995,7 +6995,7 @@ pub mod room_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.RoomService/GetRoom",
             );
@@ -7023,7 +7023,7 @@ pub mod room_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.RoomService/ListRooms",
             );
@@ -7053,7 +7053,7 @@ pub mod room_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.RoomService/JoinRoom",
             );
@@ -7081,7 +7081,7 @@ pub mod room_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.RoomService/LeaveRoom",
             );
@@ -7107,7 +7107,7 @@ pub mod room_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.RoomService/CloseRoom",
             );
@@ -7136,7 +7136,7 @@ pub mod room_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.RoomService/SetNextRoom",
             );
@@ -7344,7 +7344,7 @@ pub mod room_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = CreateRoomSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -7389,7 +7389,7 @@ pub mod room_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = GetRoomSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -7434,7 +7434,7 @@ pub mod room_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ListRoomsSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -7479,7 +7479,7 @@ pub mod room_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = JoinRoomSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -7524,7 +7524,7 @@ pub mod room_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = LeaveRoomSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -7569,7 +7569,7 @@ pub mod room_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = CloseRoomSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -7614,7 +7614,7 @@ pub mod room_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = SetNextRoomSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -7879,7 +7879,7 @@ pub mod server_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.ServerService/GetServerInfo",
             );
@@ -7904,7 +7904,7 @@ pub mod server_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.ServerService/GetActionTable",
             );
@@ -7933,7 +7933,7 @@ pub mod server_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.ServerService/GetClock",
             );
@@ -8094,7 +8094,7 @@ pub mod server_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = GetServerInfoSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -8140,7 +8140,7 @@ pub mod server_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = GetActionTableSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -8185,7 +8185,7 @@ pub mod server_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = GetClockSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -8388,7 +8388,7 @@ pub mod spectator_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.SpectatorService/Watch",
             );
@@ -8543,7 +8543,7 @@ pub mod spectator_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = WatchSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -10022,7 +10022,7 @@ pub mod study_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.StudyService/CreateStudy",
             );
@@ -10047,7 +10047,7 @@ pub mod study_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.StudyService/GetStudy",
             );
@@ -10072,7 +10072,7 @@ pub mod study_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.StudyService/ListStudies",
             );
@@ -10100,7 +10100,7 @@ pub mod study_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.StudyService/AddStudyParticipants",
             );
@@ -10128,7 +10128,7 @@ pub mod study_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.StudyService/ListStudyLinks",
             );
@@ -10156,7 +10156,7 @@ pub mod study_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.StudyService/FollowStudy",
             );
@@ -10184,7 +10184,7 @@ pub mod study_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.StudyService/RemoveStudyParticipant",
             );
@@ -10212,7 +10212,7 @@ pub mod study_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.StudyService/CloseStudy",
             );
@@ -10239,7 +10239,7 @@ pub mod study_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.StudyService/ExportStudy",
             );
@@ -10268,7 +10268,7 @@ pub mod study_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.StudyService/DeleteStudyParticipant",
             );
@@ -10298,7 +10298,7 @@ pub mod study_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.StudyService/DeleteStudy",
             );
@@ -10554,7 +10554,7 @@ pub mod study_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = CreateStudySvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -10599,7 +10599,7 @@ pub mod study_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = GetStudySvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -10644,7 +10644,7 @@ pub mod study_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ListStudiesSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -10690,7 +10690,7 @@ pub mod study_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = AddStudyParticipantsSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -10735,7 +10735,7 @@ pub mod study_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ListStudyLinksSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -10781,7 +10781,7 @@ pub mod study_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = FollowStudySvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -10830,7 +10830,7 @@ pub mod study_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = RemoveStudyParticipantSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -10875,7 +10875,7 @@ pub mod study_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = CloseStudySvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -10921,7 +10921,7 @@ pub mod study_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ExportStudySvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -10970,7 +10970,7 @@ pub mod study_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = DeleteStudyParticipantSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -11015,7 +11015,7 @@ pub mod study_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = DeleteStudySvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -11185,7 +11185,7 @@ pub mod participation_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.ParticipationService/OpenStudy",
             );
@@ -11215,7 +11215,7 @@ pub mod participation_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.ParticipationService/FollowParticipation",
             );
@@ -11247,7 +11247,7 @@ pub mod participation_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.ParticipationService/GiveConsent",
             );
@@ -11276,7 +11276,7 @@ pub mod participation_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.ParticipationService/AnswerQuestionnaire",
             );
@@ -11308,7 +11308,7 @@ pub mod participation_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.ParticipationService/SaveAnswers",
             );
@@ -11336,7 +11336,7 @@ pub mod participation_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.ParticipationService/ContinueStudy",
             );
@@ -11367,7 +11367,7 @@ pub mod participation_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.ParticipationService/RecordTraces",
             );
@@ -11395,7 +11395,7 @@ pub mod participation_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.ParticipationService/WithdrawFromStudy",
             );
@@ -11629,7 +11629,7 @@ pub mod participation_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = OpenStudySvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -11680,7 +11680,7 @@ pub mod participation_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = FollowParticipationSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -11726,7 +11726,7 @@ pub mod participation_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = GiveConsentSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -11775,7 +11775,7 @@ pub mod participation_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = AnswerQuestionnaireSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -11821,7 +11821,7 @@ pub mod participation_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = SaveAnswersSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -11867,7 +11867,7 @@ pub mod participation_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ContinueStudySvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -11913,7 +11913,7 @@ pub mod participation_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = RecordTracesSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -11962,7 +11962,7 @@ pub mod participation_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = WithdrawFromStudySvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -12630,7 +12630,7 @@ pub mod table_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TableService/Report",
             );
@@ -12657,7 +12657,7 @@ pub mod table_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TableService/Watch",
             );
@@ -12821,7 +12821,7 @@ pub mod table_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ReportSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -12868,7 +12868,7 @@ pub mod table_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = WatchSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -13507,7 +13507,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/CreateTournament",
             );
@@ -13535,7 +13535,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/GetTournament",
             );
@@ -13565,7 +13565,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/ListTournaments",
             );
@@ -13597,7 +13597,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/JoinTournament",
             );
@@ -13629,7 +13629,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/AddTableParticipant",
             );
@@ -13662,7 +13662,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/GetPhysicalTable",
             );
@@ -13690,7 +13690,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/StartTournament",
             );
@@ -13718,7 +13718,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/CloseTournament",
             );
@@ -13752,7 +13752,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/WithdrawParticipant",
             );
@@ -13785,7 +13785,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/RemoveParticipant",
             );
@@ -13818,7 +13818,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/ReplaceParticipant",
             );
@@ -13851,7 +13851,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/PauseTournament",
             );
@@ -13879,7 +13879,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/ResumeTournament",
             );
@@ -13911,7 +13911,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/PostponeGame",
             );
@@ -13946,7 +13946,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/CallGame",
             );
@@ -13974,7 +13974,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/FollowTournament",
             );
@@ -14002,7 +14002,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/GetTournamentResults",
             );
@@ -14033,7 +14033,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/ListTournamentGames",
             );
@@ -14067,7 +14067,7 @@ pub mod tournament_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.TournamentService/GetLeaderboard",
             );
@@ -14434,7 +14434,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = CreateTournamentSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -14480,7 +14480,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = GetTournamentSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -14526,7 +14526,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ListTournamentsSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -14572,7 +14572,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = JoinTournamentSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -14621,7 +14621,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = AddTableParticipantSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -14670,7 +14670,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = GetPhysicalTableSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -14716,7 +14716,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = StartTournamentSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -14762,7 +14762,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = CloseTournamentSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -14811,7 +14811,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = WithdrawParticipantSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -14860,7 +14860,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = RemoveParticipantSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -14909,7 +14909,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ReplaceParticipantSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -14955,7 +14955,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = PauseTournamentSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -15001,7 +15001,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ResumeTournamentSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -15047,7 +15047,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = PostponeGameSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -15092,7 +15092,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = CallGameSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -15140,7 +15140,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = FollowTournamentSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -15189,7 +15189,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = GetTournamentResultsSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -15238,7 +15238,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = ListTournamentGamesSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -15284,7 +15284,7 @@ pub mod tournament_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = GetLeaderboardSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,
@@ -16159,7 +16159,7 @@ pub mod vector_service_client {
                         format!("Service was not ready: {}", e.into()),
                     )
                 })?;
-            let codec = tonic_prost::ProstCodec::default();
+            let codec = crate::codec::CallCodec::default();
             let path = http::uri::PathAndQuery::from_static(
                 "/chefshat.v1.VectorService/Run",
             );
@@ -16314,7 +16314,7 @@ pub mod vector_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = RunSvc(inner);
-                        let codec = tonic_prost::ProstCodec::default();
+                        let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(
                                 accept_compression_encodings,

@@ -2,6 +2,8 @@
 //! with the feature `services` the service traits and clients, generated from the `.proto` files
 //! beside this crate. The documentation of each item is the comment in its `.proto` file.
 
+#[cfg(feature = "services")]
+pub mod codec;
 pub mod cost;
 mod timestamp;
 

@@ -92,6 +92,7 @@ fn messages(out: &Path, descriptors: FileDescriptorSet) -> Generated {
     builder(out)
         .client_mod_attribute(".", services)
         .server_mod_attribute(".", services)
+        .codec_path("crate::codec::CallCodec")
         // Records are signed as they are written: the same message has the same bytes and text.
         .btree_map(".")
         // Rare and large: boxed, so that the frequent variants beside them stay small.

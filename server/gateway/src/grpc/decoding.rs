@@ -10,6 +10,7 @@ use std::task::{Context, Poll, ready};
 
 use axum::body::HttpBody;
 use bytes::{Buf as _, Bytes, BytesMut};
+use chefshat_proto::codec::beside_tasks;
 use chefshat_proto::cost::{Cost, Excess, Field, Kind, Shape, shapes};
 use futures::future::{BoxFuture, Either};
 use http::{Request, Response};
@@ -269,7 +270,8 @@ impl Messages {
                     if self.call.sends_many {
                         self.until = None;
                     }
-                    let memory = self.cost(&message[PREFIX..])?;
+                    let cost = || self.cost(&message[PREFIX..]);
+                    let memory = beside_tasks(message.len(), cost)?;
                     if memory <= SMALL_DECODED {
                         return Poll::Ready(Ok(Step::Pass(message)));
                     }
