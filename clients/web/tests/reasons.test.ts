@@ -7,7 +7,9 @@ import { expect, test } from "vitest";
 import { en } from "../src/i18n/en";
 
 /** The crates of the server that name reasons. */
-const SERVER = ["server/src", "server/vector/src"].map((folder) => join(import.meta.dirname, "../../..", folder));
+const SERVER = ["admission", "gateway", "hosting", "store", "vector", "wire"].map((part) =>
+  join(import.meta.dirname, "../../../server", part, "src"),
+);
 
 /** Reasons without a text on the page. */
 const WITHOUT_TEXT: Record<string, readonly string[]> = {
