@@ -163,13 +163,17 @@ impl<U: Journaled> Registry<U> {
     /// over. One that cannot be read is logged and left unchanged.
     ///
     /// # Errors
-    /// The store failed.
+    /// The store cannot list them.
     pub async fn restore(&self) -> Result<usize, StoreError> {
         let store = self.rooms.store();
         let mut count = 0;
         for id in store.units(U::KIND, U::MOST).await? {
-            if let Some(stored) = store.unit(U::KIND.id(id)).await? {
-                count += usize::from(self.resume(id, stored).await && self.runs(id));
+            match store.unit(U::KIND.id(id)).await {
+                Ok(Some(stored)) => {
+                    count += usize::from(self.resume(id, stored).await && self.runs(id));
+                }
+                Ok(None) => {}
+                Err(problem) => self.leave_unchanged(id, &problem.to_string()),
             }
         }
         if count > 0 {
@@ -184,8 +188,14 @@ impl<U: Journaled> Registry<U> {
         // A long one takes a while, and others are played meanwhile.
         let folding = tokio::task::spawn_blocking(move || U::fold(id, &stored));
         match (folding.await).unwrap_or_else(|problem| Err(problem.to_string())) {
-            // Another request has shown its end meanwhile.
-            Ok(_) if self.get(id).is_some_and(|handle| handle.is_over()) => true,
+            // Another request has shown its end meanwhile, or it is running.
+            Ok(_)
+                if self
+                    .get(id)
+                    .is_some_and(|it| it.is_over() || !it.is_stopped()) =>
+            {
+                true
+            }
             Ok(folded) => {
                 // It counts among those of the server; who created it is unknown.
                 let charged = U::key_of(id);
@@ -195,12 +205,15 @@ impl<U: Journaled> Registry<U> {
                 true
             }
             Err(problem) => {
-                U::set_unreadable(id, &self.rooms);
-                let kind = U::KIND;
-                error!(%id, %problem, "a {kind} cannot be resumed; it is left unchanged");
+                self.leave_unchanged(id, &problem);
                 false
             }
         }
+    }
+
+    fn leave_unchanged(&self, id: Id, problem: &str) {
+        U::set_unreadable(id, &self.rooms);
+        error!(%id, problem, "a {} cannot be resumed; it is left unchanged", U::KIND);
     }
 
     /// Adds a unit to the table and starts its task, unless it is over.

@@ -53,9 +53,9 @@ impl<U: Journaled> Table<U> {
         self.in_creation.contains(&id)
     }
 
-    /// Notes that a unit is being created; `false` if it was.
-    pub(super) fn reserve(&mut self, id: Id) -> bool {
-        self.in_creation.insert(id)
+    /// Notes that a unit is being created.
+    pub(super) fn reserve(&mut self, id: Id) {
+        self.in_creation.insert(id);
     }
 
     /// Notes that a unit is not being created any more.

@@ -29,7 +29,8 @@ pub trait UnitHeader: Send + Sync {
 }
 
 /// A kind of unit, and the effects that its entries have. The actor decides when each method is
-/// called; until the server stops, in the order in which they stand here.
+/// called. Until the server stops, that is the order in which they stand here;
+/// `conclude` is also asked first.
 pub trait Journaled: Sized + Send + Sync + 'static {
     /// What does not change.
     type Header: UnitHeader;

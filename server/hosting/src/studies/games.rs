@@ -93,7 +93,11 @@ impl StudyTask {
 
     /// Creates the rooms of placed games.
     pub(super) async fn make_rooms(&mut self) -> Result<(), StoreError> {
-        if self.without_room.is_empty() || self.retry.is_some_and(|retry| Instant::now() < retry) {
+        if self.without_room.is_empty() {
+            // What waited for a room has ended without one.
+            self.retry = None;
+        }
+        if self.retry.is_some_and(|retry| Instant::now() < retry) {
             return Ok(());
         }
         self.retry = None;

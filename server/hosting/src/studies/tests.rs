@@ -63,17 +63,24 @@ struct Lab {
 
 /// The studies of a server with this store.
 fn server(store: &Arc<dyn Store>) -> Arc<Studies> {
+    server_of(&ServerConfig::default(), store)
+}
+
+fn server_of(config: &ServerConfig, store: &Arc<dyn Store>) -> Arc<Studies> {
     let tracker = TaskTracker::new();
-    let config = ServerConfig::default();
-    let rooms = Rooms::new(&config, Arc::clone(store), tracker.clone()).expect("threads");
+    let rooms = Rooms::new(config, Arc::clone(store), tracker.clone()).expect("threads");
     Studies::at(stopped_clock, rooms, tracker)
 }
 
 impl Lab {
     /// A new study with two participants.
     async fn new() -> Self {
+        Self::of(&ServerConfig::default()).await
+    }
+
+    async fn of(config: &ServerConfig) -> Self {
         let store: Arc<dyn Store> = Arc::new(MemoryStore::default());
-        let studies = server(&store);
+        let studies = server_of(config, &store);
         let created = studies.create(settings(), None, Key::Local).await;
         let (study, _) = created.expect("valid settings");
         let added = study.add(Key::Local, vec![String::new(); 2]).await;
@@ -168,6 +175,48 @@ async fn a_study_sleeps_while_the_server_ends_although_something_is_due() {
     tokio::time::sleep(LIMIT * 60).await;
     assert!(polls()[&LongTask::Study] <= before + 1);
     assert_eq!(lab.status(1), Status::Active, "the next start decides");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_study_sleeps_when_the_one_who_waited_for_a_room_has_left() {
+    let lab = Lab::of(&ServerConfig {
+        max_rooms: 0,
+        ..ServerConfig::default()
+    })
+    .await;
+    assert_eq!(lab.study.open(1).await.expect("it runs"), Ok(1));
+    let _present = lab.study.present(1, 1).await;
+    let at = At {
+        number: 1,
+        session: 1,
+        step: 0,
+    };
+    assert_eq!(lab.study.consent(at).await.expect("it runs"), Ok(0));
+    lab.settled().await;
+    let games = |study: &Study| study.participants()[&1].games.len();
+    assert_eq!(lab.study.read(games), 1, "it waits for a room");
+    let withdrawn = lab.study.withdraw(1, false).await;
+    assert_eq!(withdrawn.expect("it runs"), Ok(()));
+    tokio::time::sleep(LIMIT).await;
+    let before = polls()[&LongTask::Study];
+    tokio::time::sleep(LIMIT * 60).await;
+    assert!(polls()[&LongTask::Study] <= before + 1);
+}
+
+/// What is in the store twice is run once.
+#[tokio::test(start_paused = true)]
+async fn a_study_that_runs_is_not_resumed_beside_itself() {
+    let lab = Lab::new().await;
+    let id = lab.study.id();
+    let stored = lab
+        .store
+        .unit(StudyTask::KIND.id(id))
+        .await
+        .expect("readable");
+    let stored = stored.expect("stored");
+    assert!(lab.studies.resume(id, stored).await);
+    let found = lab.studies.get(id).expect("it runs");
+    assert!(Arc::ptr_eq(&found, &lab.study));
 }
 
 #[tokio::test(start_paused = true)]
