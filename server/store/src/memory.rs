@@ -29,7 +29,8 @@ pub const MAX_FINISHED_ENTRIES: usize = 10_000_000;
 #[derive(Debug, Default)]
 pub struct MemoryStore {
     finished: Arc<Mutex<Finished>>,
-    /// Those that are not over.
+    /// Those that are not over: what a study needs to be resumed, and of a tournament, which its
+    /// server has in memory, that it is there.
     units: Mutex<BTreeMap<UnitId, UnitInMemory>>,
     /// The ids of running games.
     reserved: Reservations,
@@ -61,7 +62,8 @@ impl MemoryStore {
 
 #[derive(Debug)]
 struct UnitInMemory {
-    stored: StoredUnit,
+    /// `None`: it is a tournament.
+    stored: Option<StoredUnit>,
     traces: Vec<StoredTraces>,
 }
 
@@ -77,17 +79,24 @@ fn write_in(
         (UnitWrite::Create { header, first, .. }, None) => {
             if !first.as_ref().is_some_and(|row| row.over) {
                 let rows = first.into_iter().map(|row| row.entries).collect();
-                let stored = StoredUnit::new(header, rows);
+                let is_study = unit.kind == UnitKind::Study;
+                let stored = is_study.then(|| StoredUnit::new(header, rows));
                 let traces = Vec::new();
                 units.insert(unit, UnitInMemory { stored, traces });
             }
         }
         (UnitWrite::Append(row), Some(known)) => match row.over {
             true => drop(units.remove(&unit)),
-            false => known.stored.rows.push(row.entries),
+            false => {
+                if let Some(stored) = &mut known.stored {
+                    stored.rows.push(row.entries);
+                }
+            }
         },
         (UnitWrite::Rewrite { entries, forgotten }, Some(known)) => {
-            known.stored.rows = vec![entries];
+            if let Some(stored) = &mut known.stored {
+                stored.rows = vec![entries];
+            }
             (known.traces).retain(|traces| !forgotten.contains(&traces.number));
         }
         (UnitWrite::Traces(traces), Some(known)) => known.traces.push(traces),
@@ -305,19 +314,21 @@ impl Store for MemoryStore {
     }
 
     fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
-        let stored = lock(&self.units).get(&unit).map(|it| it.stored.clone());
+        let units = lock(&self.units);
+        let stored = units.get(&unit).and_then(|it| it.stored.clone());
         ready(Ok(stored)).boxed()
     }
 
-    /// None of them is over.
+    /// Studies alone.
     fn units(
         &self,
         kind: UnitKind,
         _newest_over: usize,
     ) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
         let units = lock(&self.units);
-        let ids = (units.keys()).filter(|unit| unit.kind == kind);
-        ready(Ok(ids.map(|unit| unit.id).collect())).boxed()
+        let stored = units.iter().filter(|(_, it)| it.stored.is_some());
+        let ids = stored.filter(|(unit, _)| unit.kind == kind);
+        ready(Ok(ids.map(|(unit, _)| unit.id).collect())).boxed()
     }
 
     fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {

@@ -220,8 +220,8 @@ async fn rewrite(
          ), later AS (
              DELETE FROM {rows} USING unit WHERE {rows}.{unit} = unit.number AND position > 0
          ), traces AS (
-             DELETE FROM study_traces USING unit
-             WHERE study_traces.study = unit.number AND participant = ANY ($3)
+             DELETE FROM study_traces USING owner JOIN studies ON study_id = id
+             WHERE study_traces.study = studies.number AND participant = ANY ($3)
          )
          INSERT INTO {rows} ({unit}, position, epoch, {entries})
          SELECT number, 0, $2, $4 FROM unit
@@ -274,7 +274,8 @@ async fn delete(connection: &mut PgConnection, kind: UnitKind, owned: Owned) -> 
          ), rows AS (
              DELETE FROM {rows} USING unit WHERE {rows}.{unit} = unit.number
          ), traces AS (
-             DELETE FROM study_traces USING unit WHERE study_traces.study = unit.number
+             DELETE FROM study_traces USING owner JOIN studies ON study_id = id
+             WHERE study_traces.study = studies.number
          )
          DELETE FROM owned USING owner WHERE owned.id = owner.id RETURNING owned.id",
     ))

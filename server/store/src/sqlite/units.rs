@@ -3,7 +3,7 @@
 use sqlx::sqlite::SqliteConnection;
 
 use crate::form::{self, FORM};
-use crate::units::{UnitId, UnitRow, UnitWrite};
+use crate::units::{UnitId, UnitKind, UnitRow, UnitWrite};
 
 const CREATE: &str = "INSERT INTO {units} ({unit_id}, form, header) VALUES ($1, $2, $3)
      ON CONFLICT ({unit_id}) DO NOTHING";
@@ -84,12 +84,16 @@ async fn append(
     unit: UnitId,
     row: &UnitRow,
 ) -> sqlx::Result<()> {
-    sqlx::query(unit.kind.sql(APPEND))
+    let added = sqlx::query(unit.kind.sql(APPEND))
         .bind(unit.id.0.as_slice())
         .bind(i64::try_from(row.position).unwrap_or(i64::MAX))
         .bind(row.entries.as_slice())
         .execute(&mut *connection)
         .await?;
+    if added.rows_affected() == 0 && unit.kind == UnitKind::Tournament {
+        // Nothing deletes a tournament: what is to be committed would be lost.
+        return Err(sqlx::Error::RowNotFound);
+    }
     match row.over {
         true => run(connection, unit, END).await,
         false => Ok(()),
