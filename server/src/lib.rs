@@ -1,23 +1,24 @@
-//! The Chef's Hat game server as a library: tasks of rooms, tournaments and studies, stores, gRPC services
-//! and the page. The core of a room is `chefshat-room`, the rules are `chefshat-engine`; the
-//! command line is `chefshat`, in `server/cli` and `server/lab`.
+//! The Chef's Hat game server as a library: wires its parts together, starts and stops it. Programs and
+//! tests reach the parts through it. The core of a room is `chefshat-room`, the rules are
+//! `chefshat-engine`; the command line is `chefshat`, in `server/cli` and `server/lab`.
 
 pub mod host;
 #[cfg(test)]
 mod limits_page;
 pub mod serve;
 
-pub use chefshat_base::{clock, file_watch, metrics, post, proxies, tasks, threads, tls_files};
-
-pub use chefshat_store as store;
-pub use chefshat_store::samples;
-pub use chefshat_wire::{convert, encoded as wire, outbox};
-
 pub use chefshat_admission::{access, limits};
-
+pub use chefshat_base::{clock, post, proxies};
+pub use chefshat_gateway::{connections, peers, scrape, tls, web};
 pub use chefshat_hosting::{
-    cluster, config, journaled, node, participants, record_writer, retention, room, rooms, signing,
-    studies, tournaments, webhooks,
+    cluster, config, participants, rooms, signing, studies, tournaments, webhooks,
 };
+pub use chefshat_store as store;
+pub use chefshat_wire::{convert, outbox};
 
-pub use chefshat_gateway::{connections, forwarded, grpc, handshakes, peers, scrape, tls, web};
+use chefshat_base::{metrics, tasks};
+use chefshat_gateway::{forwarded, grpc, handshakes};
+#[cfg(test)]
+use chefshat_hosting::room;
+use chefshat_hosting::{node, retention};
+use chefshat_wire::encoded as wire;

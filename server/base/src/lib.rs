@@ -1,4 +1,5 @@
-//! What all parts of the server use and that knows neither rooms nor the protocol: clocks, threads, named tasks, watched files, proxies, posting, metrics.
+//! What all parts of the server use: clocks, threads, named tasks, watched files, proxies, posting, and
+//! metrics, which name the states of rooms. Nothing here runs a room or knows the protocol.
 
 pub mod clock;
 pub mod file_watch;

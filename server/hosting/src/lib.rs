@@ -1,4 +1,5 @@
-//! Rooms, tournaments and studies that live, what happens when their games end, and which node of a cluster has them.
+//! Rooms, tournaments and studies that live, what happens when their games end, and the node of a
+//! cluster that has them.
 
 pub mod cluster;
 pub mod config;

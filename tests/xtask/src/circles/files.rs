@@ -209,7 +209,7 @@ impl Files {
             let others = others.into_iter().filter_map(number_of);
             arrows[from].extend(others.filter(|to| *to != from));
         }
-        circles(&arrows, &|folder| relative(&folders[folder], root) + "/")
+        circles(&arrows, &|folder| relative(&folders[folder], root))
     }
 }
 

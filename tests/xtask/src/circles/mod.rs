@@ -68,6 +68,40 @@ mod tests {
         files.circles(Path::new(""))
     }
 
+    /// The circles between the folders of a crate of these files.
+    fn ways_of_folders(files: &[(&str, &str)]) -> Vec<String> {
+        let files: BTreeMap<&Path, &str> = files
+            .iter()
+            .map(|(path, text)| (Path::new(*path), *text))
+            .collect();
+        let read = |path: &Path| files.get(path).map(|text| (*text).to_owned());
+        let files = Files::of_crate(Path::new("lib.rs"), &read).unwrap();
+        files.circles_of_folders(Path::new(""))
+    }
+
+    #[test]
+    fn folders_need_each_other_although_no_files_do() {
+        let files = [
+            ("lib.rs", "mod a; mod b;"),
+            ("a/mod.rs", "pub mod x; pub mod w;"),
+            ("a/x.rs", "use crate::b::y::Y; struct X(Y);"),
+            ("a/w.rs", "pub struct W;"),
+            ("b.rs", "pub mod y; pub mod z;"),
+            ("b/y.rs", "pub struct Y;"),
+            ("b/z.rs", "use crate::a::w::W; struct Z(W);"),
+        ];
+        assert_eq!(ways(&files), [""; 0]);
+        assert_eq!(ways_of_folders(&files), ["a → b → a"]);
+        // A file and its children are one, and what all pass through is none.
+        let files = [
+            ("lib.rs", "mod a; mod b; pub struct Top(a::A);"),
+            ("a.rs", "mod x; pub struct A(x::X);"),
+            ("a/x.rs", "use crate::b::B; pub struct X(B);"),
+            ("b.rs", "pub struct B;"),
+        ];
+        assert_eq!(ways_of_folders(&files), [""; 0]);
+    }
+
     const TWO: &str = "mod a; mod b;";
 
     #[test]
