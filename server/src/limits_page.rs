@@ -17,7 +17,7 @@ use crate::convert::{MAX_SEARCH_BUDGET, MAX_SEARCH_ROLLOUTS};
 use crate::handshakes::{
     COST_OF_FAILED, HANDSHAKES_AT_ONCE, HANDSHAKES_PER_SECOND, MAX_HANDSHAKES,
 };
-use crate::limits::{background, calls, decoding, frames, places};
+use crate::limits::{background, calls, decoding, fair_semaphore, frames};
 use crate::room::MAX_SPECTATORS;
 use crate::store::MAX_CONCURRENT_RECORDS;
 use crate::web::{MAX_PREVIEWS, MAX_PREVIEWS_WAITING, PICTURE_PATIENCE};
@@ -121,7 +121,7 @@ fn of_all() -> String {
             format!(
                 "{}; others wait for {}",
                 number(calls::MAX_EXECUTED),
-                seconds(places::MAX_WAIT)
+                seconds(fair_semaphore::MAX_WAIT)
             ),
             "",
         ),
@@ -130,7 +130,7 @@ fn of_all() -> String {
             format!(
                 "{} MiB, and as much for those of players; others wait for {}",
                 decoding::MAX_RECEIVED >> 20,
-                seconds(places::MAX_WAIT)
+                seconds(fair_semaphore::MAX_WAIT)
             ),
             "",
         ),
@@ -139,7 +139,7 @@ fn of_all() -> String {
             format!(
                 "{} MiB, and as much for those of players; others wait for {}",
                 decoding::MAX_DECODED >> 20,
-                seconds(places::MAX_WAIT)
+                seconds(fair_semaphore::MAX_WAIT)
             ),
             "",
         ),

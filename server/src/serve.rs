@@ -564,12 +564,12 @@ fn routes(
     use v1::table_service_server::TableServiceServer;
     use v1::tournament_service_server::TournamentServiceServer;
     use v1::vector_service_server::VectorServiceServer;
-    let reach = grpc::Reach::new(Arc::clone(rooms), Arc::clone(tournaments));
-    let recorded = grpc::Recorded::new(reach.clone(), config.access.records)?;
+    let lookup = grpc::Lookup::new(Arc::clone(rooms), Arc::clone(tournaments));
+    let recorded = grpc::Recorded::new(lookup.clone(), config.access.records)?;
     let retention = Retention::new(Arc::clone(rooms));
     let study_calls = grpc::StudyCalls::new(
         Arc::clone(studies),
-        reach.clone(),
+        lookup.clone(),
         Arc::clone(calls),
         closing.clone(),
     );
@@ -579,7 +579,7 @@ fn routes(
         Arc::clone(studies),
     );
     let admin = grpc::AdminCalls::new(
-        reach.clone(),
+        lookup.clone(),
         Arc::clone(connections),
         retention,
         Arc::new(participants),
@@ -621,15 +621,15 @@ fn routes(
         .max_decoding_message_size(longest("chefshat.v1.RoomService")),
     )
     .add_service(
-        SpectatorServiceServer::new(grpc::Spectate::new(reach.clone(), closing.clone()))
+        SpectatorServiceServer::new(grpc::Spectate::new(lookup.clone(), closing.clone()))
             .max_decoding_message_size(longest("chefshat.v1.SpectatorService")),
     )
     .add_service(
-        TableServiceServer::new(grpc::TableCalls::new(reach.clone()))
+        TableServiceServer::new(grpc::TableCalls::new(lookup.clone()))
             .max_decoding_message_size(longest("chefshat.v1.TableService")),
     )
     .add_service(
-        InstrumentServiceServer::new(grpc::Instruments::new(reach.clone()))
+        InstrumentServiceServer::new(grpc::Instruments::new(lookup.clone()))
             .max_decoding_message_size(longest("chefshat.v1.InstrumentService")),
     )
     .add_service(
@@ -653,7 +653,7 @@ fn routes(
             .max_decoding_message_size(longest("chefshat.v1.AdminService")),
     )
     .add_service(
-        ServerServiceServer::new(grpc::Info::new(reach, calls, config))
+        ServerServiceServer::new(grpc::Info::new(lookup, calls, config))
             .max_decoding_message_size(longest("chefshat.v1.ServerService")),
     );
     Ok(routes)

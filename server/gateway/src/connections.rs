@@ -26,7 +26,7 @@ use tonic::transport::server::{Connected, TcpConnectInfo};
 use tracing::{debug, warn};
 
 use chefshat_admission::access::TokenId;
-use chefshat_admission::limits::{Held, Key, LogPace, Places, Shares};
+use chefshat_admission::limits::{FairSemaphore, Key, LogPace, Permit, Shares};
 use chefshat_base::metrics::{Counted, Metrics};
 use chefshat_base::proxies::TrustedProxies;
 
@@ -113,7 +113,7 @@ pub struct Limits {
 /// The connections of a server.
 #[derive(Debug)]
 pub struct Connections {
-    places: Arc<Places>,
+    places: Arc<FairSemaphore>,
     trusted_proxies: TrustedProxies,
     clients: Mutex<BTreeMap<u64, Weak<Client>>>,
     next: AtomicU64,
@@ -136,7 +136,7 @@ impl Connections {
             );
         }
         Arc::new(Self {
-            places: Places::new(max_connections, limits.shares),
+            places: FairSemaphore::new(max_connections, limits.shares),
             trusted_proxies: limits.trusted_proxies,
             clients: Mutex::default(),
             next: AtomicU64::new(1),
@@ -243,7 +243,7 @@ pub struct Client {
     waker: AtomicWaker,
     connections: Weak<Connections>,
     _counted: Counted,
-    _place: Held,
+    _place: Permit,
 }
 
 impl Client {

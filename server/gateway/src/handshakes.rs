@@ -11,7 +11,7 @@ use rayon::ThreadPoolBuildError;
 use tokio::sync::Notify;
 use tracing::warn;
 
-use chefshat_admission::limits::{Held, Key, LogPace, Places, Rate, Shares};
+use chefshat_admission::limits::{FairSemaphore, Key, LogPace, Permit, Rate, Shares};
 use chefshat_base::metrics::Metrics;
 use chefshat_base::threads::{Priority, Threads};
 
@@ -29,7 +29,7 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Admits handshakes and computes them.
 #[derive(Debug)]
 pub struct Handshakes {
-    places: Arc<Places>,
+    places: Arc<FairSemaphore>,
     rate: Rate,
     thread: Threads,
     metrics: Arc<Metrics>,
@@ -43,7 +43,7 @@ impl Handshakes {
     /// The operating system cannot start it.
     pub fn new(shares: Shares, metrics: Arc<Metrics>) -> Result<Arc<Self>, ThreadPoolBuildError> {
         Ok(Arc::new(Self {
-            places: Places::new(MAX_HANDSHAKES, shares),
+            places: FairSemaphore::new(MAX_HANDSHAKES, shares),
             rate: Rate::new(HANDSHAKES_PER_SECOND, HANDSHAKES_AT_ONCE),
             thread: Threads::new("handshakes", 1, Priority::Searches)?,
             metrics,
@@ -87,7 +87,7 @@ pub struct Handshake {
     limits: Arc<Handshakes>,
     key: Key,
     has_succeeded: bool,
-    _place: Held,
+    _place: Permit,
 }
 
 impl Handshake {

@@ -47,10 +47,10 @@ impl Drop for Reserved {
 }
 
 /// Stores one game when it has ended.
-pub(super) trait StoreWhole: Send + Sync + 'static {
+pub(super) trait StoreFinished: Send + Sync + 'static {
     /// Stores its header and encoded entries. A game without a summary has no record; only that it
     /// is over counts.
-    fn store_whole<'a>(
+    fn store_finished<'a>(
         &'a self,
         header: &'a GameHeader,
         entries: Vec<u8>,
@@ -77,7 +77,7 @@ impl<W> EphemeralJournal<W> {
     }
 }
 
-impl<W: StoreWhole> Journal for EphemeralJournal<W> {
+impl<W: StoreFinished> Journal for EphemeralJournal<W> {
     fn append_now(&mut self, entries: &mut Vec<Entry>) -> bool {
         form::put_entries(entries, &mut self.encoded);
         true
@@ -106,7 +106,7 @@ impl<W: StoreWhole> Journal for EphemeralJournal<W> {
         let entries = std::mem::take(&mut self.encoded);
         let signature = signature.as_ref().map(form::signature_to_bytes);
         async move {
-            let stored = (self.whole).store_whole(&self.header, entries, summary, signature);
+            let stored = (self.whole).store_finished(&self.header, entries, summary, signature);
             match stored.await {
                 // The game was played anyway; the record that was stored first stays.
                 Err(StoreError::Taken(game)) => {

@@ -2,7 +2,7 @@
 //! the store has committed it.
 
 pub mod cluster;
-mod codec;
+mod decode_pool;
 mod ephemeral;
 mod error;
 mod forget;
@@ -28,7 +28,7 @@ use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 use prost::Message as _;
 
-pub use codec::MAX_CONCURRENT_RECORDS;
+pub use decode_pool::MAX_CONCURRENT_RECORDS;
 pub use error::StoreError;
 pub use memory::{MAX_FINISHED_ENTRIES, MAX_FINISHED_GAMES, MemoryStore};
 pub use postgres::{

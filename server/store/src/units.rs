@@ -21,6 +21,14 @@ impl UnitKind {
         UnitId { kind: self, id }
     }
 
+    /// Its name in the plural.
+    pub fn plural(self) -> &'static str {
+        match self {
+            Self::Tournament => "tournaments",
+            Self::Study => "studies",
+        }
+    }
+
     /// A statement about units of this kind. Its text has the names of tables and columns in braces:
     /// `{units}` with `{unit_id}`, and `{rows}` with `{unit}` and `{entries}`.
     pub(super) fn sql(self, text: &'static str) -> AssertSqlSafe<String> {

@@ -7,7 +7,7 @@ use std::str::FromStr;
 use chefshat_room::ids::{Id, SecretHash};
 use serde::{Deserialize, Serialize};
 
-use super::secrets::{Secrets, Standing};
+use super::secrets::{Relation, Secrets};
 use super::token::TokenId;
 
 /// What a caller may do. Each role may do everything that lower ones may.
@@ -142,11 +142,11 @@ impl Caller {
 
     /// What its token makes of it where its scope reaches: the operator is like the owner of
     /// everything, and so is a host in the scope of its token.
-    pub fn standing(&self) -> Standing {
+    pub fn relation(&self) -> Relation {
         match (self.role, self.scope) {
-            (Role::Admin, _) | (Role::Host, Some(_)) => Standing::Owner,
-            (_, Some(_)) => Standing::Participant,
-            (_, None) => Standing::Stranger,
+            (Role::Admin, _) | (Role::Host, Some(_)) => Relation::Owner,
+            (_, Some(_)) => Relation::Participant,
+            (_, None) => Relation::Stranger,
         }
     }
 }

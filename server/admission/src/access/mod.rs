@@ -19,5 +19,5 @@ pub use calls::{
 };
 pub use file::{NewToken, StoredToken, TOKENS_FILE, TokenFile, TokenFileError};
 pub use guard::{Access, AccessSettings, Ended, Granted, Mode, Refusal};
-pub use secrets::{MAX_SECRETS, SECRET_HEADER, Secrets, SecretsRefused, Standing};
+pub use secrets::{MAX_SECRETS, Relation, SECRET_HEADER, Secrets, SecretsRefused};
 pub use token::{AccessToken, TokenId};

@@ -26,7 +26,7 @@ pub enum SecretsRefused {
 
 /// What a caller is to a room, a tournament or a recorded game.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Standing {
+pub enum Relation {
     /// It has shown no secret.
     Stranger,
     /// It has shown a ticket.
@@ -80,23 +80,23 @@ impl Secrets {
 
     /// What the secrets of a room or tournament make of their caller, if its owner token and its
     /// tickets have these hashes. In constant time for each.
-    pub fn standing(
+    pub fn relation(
         &self,
         id: Id,
         owner: &SecretHash,
         tickets: impl Iterator<Item = SecretHash> + Clone,
-    ) -> Standing {
-        let standings = self.of_id(id).map(|token| {
+    ) -> Relation {
+        let relations = self.of_id(id).map(|token| {
             let hash = token.hash();
             if owner.is(&hash) {
-                Standing::Owner
+                Relation::Owner
             } else if tickets.clone().any(|ticket| ticket.is(&hash)) {
-                Standing::Participant
+                Relation::Participant
             } else {
-                Standing::Stranger
+                Relation::Stranger
             }
         });
-        standings.max().unwrap_or(Standing::Stranger)
+        relations.max().unwrap_or(Relation::Stranger)
     }
 
     fn all(&self) -> &[Token] {
@@ -143,19 +143,19 @@ mod tests {
     fn the_best_secret_of_a_room_counts() {
         let (room, other) = (Id([1; 16]), Id([2; 16]));
         let (owner, ticket) = (Token::random(room), Token::random(room));
-        let standing = |tokens: Vec<Token>| {
+        let relation = |tokens: Vec<Token>| {
             let tickets = [ticket.hash()].into_iter();
-            Secrets::of(tokens).standing(room, &owner.hash(), tickets)
+            Secrets::of(tokens).relation(room, &owner.hash(), tickets)
         };
         let elsewhere = |token: Token| Token {
             room: other,
             ..token
         };
-        assert_eq!(standing(vec![]), Standing::Stranger);
-        assert_eq!(standing(vec![Token::random(room)]), Standing::Stranger);
-        assert_eq!(standing(vec![ticket]), Standing::Participant);
-        assert_eq!(standing(vec![ticket, owner]), Standing::Owner);
-        assert_eq!(standing(vec![elsewhere(owner)]), Standing::Stranger);
+        assert_eq!(relation(vec![]), Relation::Stranger);
+        assert_eq!(relation(vec![Token::random(room)]), Relation::Stranger);
+        assert_eq!(relation(vec![ticket]), Relation::Participant);
+        assert_eq!(relation(vec![ticket, owner]), Relation::Owner);
+        assert_eq!(relation(vec![elsewhere(owner)]), Relation::Stranger);
         let shown = Secrets::default().with(&owner.to_text()).with("");
         assert_eq!(shown.of_id(room).count(), 1);
     }

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use rayon::ThreadPoolBuildError;
 
-use super::{Held, Key, Places, Rate, Shares};
+use super::{FairSemaphore, Key, Permit, Rate, Shares};
 use chefshat_base::tasks::short;
 use chefshat_base::threads::{Priority, Threads};
 
@@ -22,18 +22,18 @@ pub const BURST: Duration = Duration::from_secs(60);
 /// Plays the games of built-in agents.
 #[derive(Debug)]
 pub struct Background {
-    games: Arc<Places>,
-    slices: Arc<Places>,
+    games: Arc<FairSemaphore>,
+    slices: Arc<FairSemaphore>,
     rate: Arc<Rate>,
     threads: Threads,
 }
 
 /// The right to play one slice of a game.
 #[derive(Debug)]
-pub struct Turn {
+pub struct TimeSlice {
     /// The place of the game, kept until its end.
-    pub game: Held,
-    slice: Held,
+    pub game: Permit,
+    slice: Permit,
 }
 
 impl Background {
@@ -45,9 +45,9 @@ impl Background {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = (cores / CORES).max(1);
         Ok(Self {
-            games: Places::new(MAX_GAMES, shares),
+            games: FairSemaphore::new(MAX_GAMES, shares),
             // A caller alone may use all threads: those of others come next.
-            slices: Places::new(threads, Shares::ALL),
+            slices: FairSemaphore::new(threads, Shares::ALL),
             rate: Arc::new(Rate::new(
                 decisions_per_second,
                 decisions_per_second.saturating_mul(BURST.as_secs()),
@@ -58,12 +58,12 @@ impl Background {
 
     /// Waits for the next slice of a game, and before its first one for a place among the games
     /// that are played.
-    pub async fn turn(self: Arc<Self>, key: Key, game: Option<Held>) -> Turn {
+    pub async fn turn(self: Arc<Self>, key: Key, game: Option<Permit>) -> TimeSlice {
         let game = match game {
             Some(game) => game,
             None => self.games.take(key).await,
         };
-        Turn {
+        TimeSlice {
             game,
             slice: self.slices.take(key).await,
         }
@@ -73,10 +73,10 @@ impl Background {
     /// panicked.
     pub async fn play<T: Send + 'static>(
         &self,
-        turn: Turn,
+        turn: TimeSlice,
         work: impl FnOnce() -> (T, u64) + Send + 'static,
-    ) -> Option<(T, Held)> {
-        let Turn { game, slice } = turn;
+    ) -> Option<(T, Permit)> {
+        let TimeSlice { game, slice } = turn;
         let (result, decisions) = self.run(work).await?;
         // All games share one rate, so it has one bucket.
         let all = Key::Local;
@@ -95,7 +95,7 @@ impl Background {
 
     /// Waits for the right to do other work of the same kind, such as writing the record of a long
     /// game. Kept until the work has ended.
-    pub async fn slice(&self, key: Key) -> Held {
+    pub async fn slice(&self, key: Key) -> Permit {
         self.slices.take(key).await
     }
 

@@ -4,8 +4,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use super::places::{MAX_WAIT, within};
-use super::{Decoding, Held, Key, Places, Rate, Refused, Shares};
+use super::fair_semaphore::{MAX_WAIT, within};
+use super::{Decoding, FairSemaphore, Key, Permit, Rate, Refused, Shares};
 
 /// Most streams of all callers, except those that have limits of their own.
 pub const MAX_STREAMS: usize = 20_000;
@@ -50,12 +50,12 @@ pub const ALL_WRONG_CODES_AT_ONCE: u64 = 5_000;
 /// What the calls of all callers take.
 #[derive(Debug)]
 pub struct CallLimits {
-    streams: Arc<Places>,
-    answers: Arc<Places>,
-    executed: Arc<Places>,
-    lists: Arc<Places>,
-    histories: Arc<Places>,
-    waiting: Arc<Places>,
+    streams: Arc<FairSemaphore>,
+    answers: Arc<FairSemaphore>,
+    executed: Arc<FairSemaphore>,
+    lists: Arc<FairSemaphore>,
+    histories: Arc<FairSemaphore>,
+    waiting: Arc<FairSemaphore>,
     decoding: Decoding,
     playing: Decoding,
     calls: Rate,
@@ -68,7 +68,7 @@ pub struct CallLimits {
 pub struct Admitted {
     /// `None` for a stream: it may wait for a long time before it begins.
     executing: Option<Executing>,
-    _kept: Held,
+    _kept: Permit,
 }
 
 impl Admitted {
@@ -94,10 +94,10 @@ impl Drop for Admitted {
 /// The place of a call among those that are executed. The call finds it in the extensions of its
 /// request.
 #[derive(Debug, Clone)]
-pub struct Executing(Arc<Mutex<Option<Held>>>);
+pub struct Executing(Arc<Mutex<Option<Permit>>>);
 
 impl Executing {
-    fn new(place: Held) -> Self {
+    fn new(place: Permit) -> Self {
         Self(Arc::new(Mutex::new(Some(place))))
     }
 
@@ -112,12 +112,12 @@ impl CallLimits {
     /// No calls yet.
     pub fn new(shares: Shares) -> Self {
         Self {
-            streams: Places::new(MAX_STREAMS, shares),
-            answers: Places::new(MAX_ANSWERS, shares),
-            executed: Places::new(MAX_EXECUTED, shares),
-            lists: Places::new(MAX_LISTS, shares),
-            histories: Places::new(MAX_HISTORY / HISTORY_STEP, shares),
-            waiting: Places::new(MAX_WAITING, shares),
+            streams: FairSemaphore::new(MAX_STREAMS, shares),
+            answers: FairSemaphore::new(MAX_ANSWERS, shares),
+            executed: FairSemaphore::new(MAX_EXECUTED, shares),
+            lists: FairSemaphore::new(MAX_LISTS, shares),
+            histories: FairSemaphore::new(MAX_HISTORY / HISTORY_STEP, shares),
+            waiting: FairSemaphore::new(MAX_WAITING, shares),
             decoding: Decoding::new(shares),
             playing: Decoding::new(shares),
             calls: Rate::new(CALLS_PER_SECOND, CALLS_AT_ONCE),
@@ -217,13 +217,13 @@ impl CallLimits {
     }
 
     /// Waits for the right to make a list of rooms or studies.
-    pub async fn list(&self, key: Key) -> Held {
+    pub async fn list(&self, key: Key) -> Permit {
         self.lists.take(key).await
     }
 
     /// A place to wait in, for a call or for a refusal; `None` if its caller has too many calls
     /// that wait.
-    pub fn place_to_wait(&self, key: Key) -> Option<Held> {
+    pub fn place_to_wait(&self, key: Key) -> Option<Permit> {
         self.waiting.try_take(key)
     }
 
@@ -245,13 +245,13 @@ impl CallLimits {
     }
 
     /// Takes the place of a stream that is already open for others; `None` if the caller has too many.
-    pub fn share_stream(&self, key: Key) -> Option<Held> {
+    pub fn share_stream(&self, key: Key) -> Option<Permit> {
         self.streams.try_take(key)
     }
 
     /// Takes memory for the next [`HISTORY_STEP`] bytes of a stream that spectators share; `None` if
     /// its caller has too much of it.
-    pub fn keep_history(&self, key: Key) -> Option<Held> {
+    pub fn keep_history(&self, key: Key) -> Option<Permit> {
         self.histories.try_take(key)
     }
 

@@ -5,8 +5,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::places::{MAX_WAIT, within};
-use super::{Held, Key, Places, Refused, Shares};
+use super::fair_semaphore::{MAX_WAIT, within};
+use super::{FairSemaphore, Key, Permit, Refused, Shares};
 
 /// Most bytes of messages that are received at a time, beyond small ones.
 pub const MAX_RECEIVED: usize = 32 * 1024 * 1024;
@@ -27,15 +27,15 @@ const COPIES: usize = 2;
 /// The memory for messages of all callers.
 #[derive(Debug)]
 pub struct Decoding {
-    received: Arc<Places>,
-    decoded: Arc<Places>,
+    received: Arc<FairSemaphore>,
+    decoded: Arc<FairSemaphore>,
 }
 
 impl Decoding {
     pub(super) fn new(shares: Shares) -> Self {
         Self {
-            received: Places::new(MAX_RECEIVED / PLACE, shares),
-            decoded: Places::new(MAX_DECODED / PLACE, shares),
+            received: FairSemaphore::new(MAX_RECEIVED / PLACE, shares),
+            decoded: FairSemaphore::new(MAX_DECODED / PLACE, shares),
         }
     }
 
@@ -47,7 +47,7 @@ impl Decoding {
         &self,
         key: Key,
         bytes: usize,
-    ) -> impl Future<Output = Result<Held, Refused>> + Send + use<> {
+    ) -> impl Future<Output = Result<Permit, Refused>> + Send + use<> {
         permit(&self.received, key, COPIES * bytes)
     }
 
@@ -59,7 +59,7 @@ impl Decoding {
         &self,
         key: Key,
         bytes: usize,
-    ) -> impl Future<Output = Result<Held, Refused>> + Send + use<> {
+    ) -> impl Future<Output = Result<Permit, Refused>> + Send + use<> {
         permit(&self.decoded, key, bytes)
     }
 
@@ -71,10 +71,10 @@ impl Decoding {
 }
 
 fn permit(
-    places: &Arc<Places>,
+    places: &Arc<FairSemaphore>,
     key: Key,
     bytes: usize,
-) -> impl Future<Output = Result<Held, Refused>> + Send + use<> {
+) -> impl Future<Output = Result<Permit, Refused>> + Send + use<> {
     let places = Arc::clone(places);
     async move {
         let taken = within(places.take_many(key, bytes.div_ceil(PLACE))).await;

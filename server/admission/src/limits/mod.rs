@@ -1,15 +1,15 @@
 //! What one caller may take of the server, so that its load neither refuses nor delays others: who
-//! is charged ([`Key`]), places that are shared fairly ([`Places`]), rates ([`Rate`]), long
+//! is charged ([`Key`]), permits that are shared fairly ([`FairSemaphore`]), rates ([`Rate`]), long
 //! computations with deadlines ([`WorkQueue`]), and the games and searches of built-in agents, on
 //! threads of their own ([`Background`], [`Searches`]).
 
 pub mod background;
 pub mod calls;
 pub mod decoding;
+pub mod fair_semaphore;
 pub mod frames;
 mod key;
 mod log_pace;
-pub mod places;
 mod rate;
 mod searches;
 mod stored;
@@ -17,16 +17,16 @@ mod work_queue;
 
 use std::time::Duration;
 
-pub use background::{Background, Turn};
+pub use background::{Background, TimeSlice};
 pub use calls::{
     Admitted, BYTES_PER_CALL, COST_OF_BUILT_IN_GAME, COST_OF_ROOM, COST_OF_TOURNAMENT, CallLimits,
     DECODED_BYTES_PER_CALL, Executing, HISTORY_STEP,
 };
 pub use decoding::{Decoding, MAX_DECODED, MESSAGE_TIMEOUT, SMALL_DECODED, SMALL_MESSAGE};
+pub use fair_semaphore::{FairSemaphore, Permit};
 pub use frames::Metered;
 pub use key::{Key, Payer, Shares};
 pub use log_pace::LogPace;
-pub use places::{Held, Places};
 pub use rate::Rate;
 pub use searches::{Hint, Searches};
 pub use stored::{NotStored, StoredBytes};

@@ -17,7 +17,7 @@ use rayon::ThreadPoolBuildError;
 use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 
-use super::{Key, Places, Shares};
+use super::{FairSemaphore, Key, Shares};
 use chefshat_base::metrics::{Metrics, SearchOutcome};
 use chefshat_base::threads::{Priority, Threads};
 
@@ -32,7 +32,7 @@ const CORES: usize = 2;
 #[derive(Debug)]
 pub struct Searches {
     /// One for each thread.
-    turns: Arc<Places>,
+    turns: Arc<FairSemaphore>,
     threads: Threads,
     metrics: Arc<Metrics>,
 }
@@ -47,7 +47,7 @@ impl Searches {
         let threads = (cores / CORES).max(1);
         Ok(Self {
             // A caller alone may use all threads: those of others come next.
-            turns: Places::new(threads, Shares::ALL),
+            turns: FairSemaphore::new(threads, Shares::ALL),
             threads: Threads::new("search", threads, Priority::Searches)?,
             metrics,
         })

@@ -23,7 +23,7 @@ use crate::connections::peer_address;
 use chefshat_admission::access::{
     Access, Call, Caller, Ended, Granted, Refusal, SECRET_HEADER, Secrets, SecretsRefused,
 };
-use chefshat_admission::limits::{CallLimits, Held, Key, LogPace};
+use chefshat_admission::limits::{CallLimits, Key, LogPace, Permit};
 
 /// Where the services of this project are.
 const OWN_PACKAGE: &str = "/chefshat.";
@@ -134,7 +134,7 @@ where
 
     /// A place to wait in for a look at the tokens file, if this request has a token that may have
     /// just been created.
-    fn place_to_look(&self, request: &Request<Body>) -> Option<Held> {
+    fn place_to_look(&self, request: &Request<Body>) -> Option<Permit> {
         let authorization = authorization(request);
         if !self.layer.access.may_be_new(authorization) {
             return None;

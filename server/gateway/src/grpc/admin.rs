@@ -21,8 +21,8 @@ use tracing::info;
 
 use super::forward::{FromPeer, Gateway};
 use super::limits::charged;
+use super::lookup::Lookup;
 use super::pages;
-use super::reach::Reach;
 use super::status::{
     Refusal, field, owner_unreachable, room_unknown, shutting_down, status, store_failed,
     tournament_unknown,
@@ -49,7 +49,7 @@ const PSEUDONYM: &str = "chefshat-pseudonym-bin";
 /// The service.
 #[derive(Debug, Clone)]
 pub struct AdminCalls {
-    reach: Reach,
+    lookup: Lookup,
     connections: Arc<Connections>,
     retention: Retention,
     participants: Arc<Participants>,
@@ -58,13 +58,13 @@ pub struct AdminCalls {
 impl AdminCalls {
     /// Creates the service for this server.
     pub fn new(
-        reach: Reach,
+        lookup: Lookup,
         connections: Arc<Connections>,
         retention: Retention,
         participants: Arc<Participants>,
     ) -> Self {
         Self {
-            reach,
+            lookup,
             connections,
             retention,
             participants,
@@ -125,7 +125,7 @@ impl AdminService for AdminCalls {
     ) -> Result<Response<v1::AdminServiceCloseRoomResponse>, Status> {
         let key = charged(request.extensions());
         let id = Id::parse(&request.into_inner().room_id).ok_or_else(room_unknown)?;
-        let handle = self.reach.room_here(id, key).await?;
+        let handle = self.lookup.room_here(id, key).await?;
         let handle = handle.ok_or_else(room_unknown)?;
         info!(room = %handle.id(), "an operator closes a room");
         handle.close_without_token().await;
@@ -140,7 +140,7 @@ impl AdminService for AdminCalls {
     ) -> Result<Response<v1::AdminServiceCloseTournamentResponse>, Status> {
         let key = charged(request.extensions());
         let id = Id::parse(&request.into_inner().tournament_id).ok_or_else(tournament_unknown)?;
-        let handle = self.reach.tournament_here(id, key).await?;
+        let handle = self.lookup.tournament_here(id, key).await?;
         let handle = handle.ok_or_else(tournament_unknown)?;
         info!(tournament = %handle.id(), "an operator closes a tournament");
         handle.close().await.map_err(tournaments::stopped)?;
@@ -161,7 +161,7 @@ impl AdminService for AdminCalls {
             record_files: usage.record_files,
             free_bytes: usage.disk.free_bytes,
             finished_games: usage.finished_games,
-            open_rooms: self.reach.rooms().open_count() as u64,
+            open_rooms: self.lookup.rooms().open_count() as u64,
             connections: self.connections.clients().len() as u64,
         }))
     }

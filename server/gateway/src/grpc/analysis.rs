@@ -28,7 +28,7 @@ use super::pool::on_pool;
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down};
 use chefshat_admission::access::Caller;
-use chefshat_admission::limits::{Payer, Places, Queued, Refused, SLICE, WorkQueue};
+use chefshat_admission::limits::{FairSemaphore, Payer, Queued, Refused, SLICE, WorkQueue};
 use chefshat_base::tasks::short;
 use chefshat_base::threads::{Priority, Threads};
 use chefshat_hosting::config::{
@@ -51,9 +51,9 @@ pub struct Analyses {
     /// Each analysis takes one thread at a time.
     pool: Arc<Threads>,
     queue: Arc<WorkQueue>,
-    places: Arc<Places>,
+    places: Arc<FairSemaphore>,
     /// Those of the tokens of an address together.
-    of_addresses: Arc<Places>,
+    of_addresses: Arc<FairSemaphore>,
     closing: CancellationToken,
 }
 
@@ -79,8 +79,8 @@ impl Analyses {
         closing: CancellationToken,
     ) -> Result<Self, ThreadPoolBuildError> {
         let shares = recorded.rooms().shares();
-        let places = Places::new(MAX_ANALYSES, shares);
-        let of_addresses = Places::new(MAX_ANALYSES, shares.of_addresses());
+        let places = FairSemaphore::new(MAX_ANALYSES, shares);
+        let of_addresses = FairSemaphore::new(MAX_ANALYSES, shares.of_addresses());
         let pool = Threads::new("analysis", threads, Priority::Batches)?;
         Ok(Self {
             recorded,
@@ -153,7 +153,7 @@ impl AnalysisService for Analyses {
     ) -> Result<Response<Self::EvaluateStream>, Status> {
         let caller = Caller::of(request.extensions());
         let payer = Payer::of_caller(&caller);
-        let place = |places: &Arc<Places>, key| {
+        let place = |places: &Arc<FairSemaphore>, key| {
             let refused = || Refusal::from(too_many(places.share_of(key)));
             places.try_take(key).ok_or_else(refused)
         };

@@ -24,7 +24,7 @@ use super::limits::charged;
 use super::status::{Refusal, is_elsewhere, status};
 use chefshat_admission::access::{Call, MessageLimits};
 use chefshat_admission::limits::{
-    CallLimits, DECODED_BYTES_PER_CALL, Decoding, Held, Key, MESSAGE_TIMEOUT, Refused,
+    CallLimits, DECODED_BYTES_PER_CALL, Decoding, Key, MESSAGE_TIMEOUT, Permit, Refused,
     SMALL_DECODED, SMALL_MESSAGE,
 };
 use chefshat_wire::encoded::peer;
@@ -121,7 +121,7 @@ pub struct WithDecoding<S> {
 }
 
 /// The permit of the message that a call decodes or executes.
-type Permit = Arc<Mutex<Option<Held>>>;
+type HeldPermit = Arc<Mutex<Option<Permit>>>;
 
 impl<S> Service<Request<Body>> for WithDecoding<S>
 where
@@ -141,7 +141,7 @@ where
         let Some(call) = Call::find(request.uri().path()) else {
             return Either::Left(self.services.call(request));
         };
-        let permit = Permit::default();
+        let permit = HeldPermit::default();
         let messages = Messages {
             limits: Arc::clone(&self.limits),
             key: charged(request.extensions()),
@@ -174,7 +174,7 @@ where
     }
 }
 
-fn take(permit: &Permit) -> Option<Held> {
+fn take(permit: &HeldPermit) -> Option<Permit> {
     (permit.lock().expect("nothing panics under this lock")).take()
 }
 
@@ -190,7 +190,7 @@ struct Messages {
     call: &'static Call,
     shape: &'static Shape,
     /// Of the last message.
-    permit: Permit,
+    permit: HeldPermit,
     /// What was read and not yet looked at.
     input: Bytes,
     /// The beginning of the next message, if not all of it was read at once.
@@ -208,14 +208,14 @@ enum State {
     /// Before the next message.
     Next,
     /// A long message waits until it may be read.
-    MayReceive(usize, BoxFuture<'static, Result<Held, Refused>>),
+    MayReceive(usize, BoxFuture<'static, Result<Permit, Refused>>),
     /// A message of this many bytes with its prefix is read. One that is not small has a permit.
-    Receiving(usize, Option<Held>),
+    Receiving(usize, Option<Permit>),
     /// A message waits until it may be decoded.
     MayDecode {
         message: Bytes,
-        permit: BoxFuture<'static, Result<Held, Refused>>,
-        _received: Option<Held>,
+        permit: BoxFuture<'static, Result<Permit, Refused>>,
+        _received: Option<Permit>,
     },
     /// Nothing more is read.
     Refused,

@@ -15,7 +15,7 @@ use tonic::{Request, Response, Status};
 
 use super::forward::Gateway;
 use super::lists;
-use super::reach::Reach;
+use super::lookup::Lookup;
 use super::status::{field, room_unknown};
 use chefshat_admission::access::{Caller, MAX_MESSAGE_BYTES, MAX_VECTOR_MESSAGE_BYTES};
 use chefshat_admission::limits::CallLimits;
@@ -37,13 +37,13 @@ const STANDARD_FACES: u32 = 11;
 /// The service.
 #[derive(Debug, Clone)]
 pub struct Info {
-    reach: Reach,
+    lookup: Lookup,
     limits: BTreeMap<String, u64>,
 }
 
 impl Info {
     /// Creates the service for the rooms that callers reach.
-    pub fn new(reach: Reach, calls: &CallLimits, config: &ServerConfig) -> Self {
+    pub fn new(lookup: Lookup, calls: &CallLimits, config: &ServerConfig) -> Self {
         let limits = [
             ("max_rooms", config.max_rooms),
             ("max_connections", config.max_connections),
@@ -94,7 +94,7 @@ impl Info {
         ])
         .map(|(name, limit)| (name.to_owned(), limit))
         .collect();
-        Self { reach, limits }
+        Self { lookup, limits }
     }
 }
 
@@ -104,7 +104,7 @@ impl ServerService for Info {
         &self,
         request: Request<v1::GetServerInfoRequest>,
     ) -> Result<Response<v1::GetServerInfoResponse>, Status> {
-        let mut open_rooms = convert::number(self.reach.rooms().open_count());
+        let mut open_rooms = convert::number(self.lookup.rooms().open_count());
         if let Some(gateway) = request.extensions().get::<Gateway>() {
             let ask = |channel| async move {
                 let request = gateway.request(v1::GetServerInfoRequest {});
@@ -137,8 +137,8 @@ impl ServerService for Info {
                 .collect(),
             limits: self.limits.clone(),
             open_rooms,
-            shutting_down: self.reach.rooms().is_shutting_down(),
-            signing_key: (self.reach.rooms().signing_key())
+            shutting_down: self.lookup.rooms().is_shutting_down(),
+            signing_key: (self.lookup.rooms().signing_key())
                 .map_or_else(String::new, |key| key.to_string()),
         }))
     }
@@ -177,8 +177,8 @@ impl ServerService for Info {
         let room = match room_id.as_str() {
             "" => None,
             id => {
-                let handle = self.reach.room(&caller, id).await?;
-                let header = self.reach.rooms().header(handle.id());
+                let handle = self.lookup.room(&caller, id).await?;
+                let header = self.lookup.rooms().header(handle.id());
                 Some((handle, header.ok_or_else(room_unknown)?))
             }
         };

@@ -16,7 +16,7 @@ use tokio::time::Instant;
 use tonic::{Code, Request, Response, Status};
 
 use super::limits::charged;
-use super::reach::Reach;
+use super::lookup::Lookup;
 use super::status::{
     Refusal, field, internal, owner_token_wrong, room_gone, status, ticket_unknown,
 };
@@ -30,13 +30,13 @@ const REFUSED: &str = "MARKER_REFUSED";
 /// The service.
 #[derive(Debug, Clone)]
 pub struct Instruments {
-    reach: Reach,
+    lookup: Lookup,
 }
 
 impl Instruments {
     /// Creates the service for the rooms that callers reach.
-    pub fn new(reach: Reach) -> Self {
-        Self { reach }
+    pub fn new(lookup: Lookup) -> Self {
+        Self { lookup }
     }
 
     /// A room, and the secret of what may be its owner's token. The token of its study stands for
@@ -48,8 +48,8 @@ impl Instruments {
         owner_token: &str,
     ) -> Result<(Handle, [u8; 32]), Status> {
         let caller = caller.showing(owner_token);
-        let room = self.reach.room(&caller, room_id).await?;
-        let header = self.reach.rooms().header(room.id());
+        let room = self.lookup.room(&caller, room_id).await?;
+        let header = self.lookup.rooms().header(room.id());
         let is_study =
             |id| header.is_some_and(|it| it.study.as_ref().is_some_and(|of| of.study == id));
         let token = match Token::parse(owner_token) {
@@ -65,7 +65,7 @@ impl Instruments {
     /// The room and seat of a ticket, and whether its game has started.
     async fn seat_of(&self, caller: &Caller, ticket: &str) -> Result<(Handle, Seat, bool), Status> {
         let ticket = Token::parse(ticket).ok_or_else(ticket_unknown)?;
-        let finding = (self.reach).room_of_ticket(caller, ticket.room, ticket_unknown);
+        let finding = (self.lookup).room_of_ticket(caller, ticket.room, ticket_unknown);
         let room = finding.await?;
         let seat = room.seat_of(ticket.secret).await.map_err(Refusal::from)?;
         let (seat, has_started) = seat.ok_or_else(ticket_unknown)?;
@@ -79,9 +79,13 @@ impl Instruments {
         owned: &v1::OwnedSeat,
     ) -> Result<(Handle, Seat, bool), Status> {
         let caller = caller.showing(&owned.owner_token);
-        let room = self.reach.room(&caller, &owned.room_id).await?;
-        let header = self.reach.rooms().header(room.id()).ok_or_else(room_gone)?;
-        if !self.reach.is_owner_token(&owned.owner_token, &header) {
+        let room = self.lookup.room(&caller, &owned.room_id).await?;
+        let header = self
+            .lookup
+            .rooms()
+            .header(room.id())
+            .ok_or_else(room_gone)?;
+        if !self.lookup.is_owner_token(&owned.owner_token, &header) {
             return Err(owner_token_wrong());
         }
         let described = room.describe().await.map_err(Refusal::from)?;
@@ -123,7 +127,7 @@ impl InstrumentService for Instruments {
             label: request.label,
             moment,
         };
-        let rooms = self.reach.rooms();
+        let rooms = self.lookup.rooms();
         (rooms.may_store(key, marked.label.len())).map_err(Refusal::from)?;
         let marker = room.mark(MarkRequest { secret, marked }).await;
         let marker = marker.map_err(Refusal::from)?;
@@ -144,7 +148,7 @@ impl InstrumentService for Instruments {
             Some(owned) => self.owned_seat(&caller, owned).await?,
             None => self.seat_of(&caller, &request.ticket).await?,
         };
-        let rooms = self.reach.rooms();
+        let rooms = self.lookup.rooms();
         let header = rooms.header(room.id()).ok_or_else(ticket_unknown)?;
         if !has_started {
             return Err(status(

@@ -26,7 +26,7 @@ use tonic::{Request, Response, Status, Streaming};
 use super::analysis::estimate_to_proto;
 use super::forward::Gateway;
 use super::limits::Arrived;
-use super::reach::Reach;
+use super::lookup::Lookup;
 use super::status::{Refusal, field, request_id, room_unknown, stream_ended, ticket_unknown};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{Executing, Hint, Key};
@@ -50,7 +50,7 @@ use reader::{Reader, Requests, express_action};
 pub struct Play {
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
-    reach: Reach,
+    lookup: Lookup,
     /// Cancelled when all streams must end.
     closing: CancellationToken,
 }
@@ -63,7 +63,7 @@ impl Play {
         closing: CancellationToken,
     ) -> Self {
         Self {
-            reach: Reach::new(Arc::clone(&rooms), Arc::clone(&tournaments)),
+            lookup: Lookup::new(Arc::clone(&rooms), Arc::clone(&tournaments)),
             rooms,
             tournaments,
             closing,
@@ -222,12 +222,12 @@ impl PlayService for Play {
         let command = Command::of(request.command)?;
         if let Some(executing) = executing
             .as_ref()
-            .filter(|_| !self.reach.has_in_memory(token.room))
+            .filter(|_| !self.lookup.has_in_memory(token.room))
         {
             // Others are not delayed while it is looked for.
             executing.give_back();
         }
-        let room = (self.reach).room_of_ticket(&caller, token.room, ticket_unknown);
+        let room = (self.lookup).room_of_ticket(&caller, token.room, ticket_unknown);
         let room = room.await?;
         let action = match command {
             Command::Perform(action) => action,

@@ -10,10 +10,10 @@ use tonic::{Code, Status};
 
 use super::access::refused;
 use super::forward::Gateway;
-use super::reach::{Reach, Sight};
+use super::lookup::{Lookup, RecordView};
 use super::status::{self, is_elsewhere, is_refusal, owner_unreachable, status};
 use chefshat_admission::access::{Caller, Refusal, Role};
-use chefshat_admission::limits::{Held, Key, Places};
+use chefshat_admission::limits::{FairSemaphore, Key, Permit};
 use chefshat_base::threads::{Priority, Threads};
 use chefshat_hosting::cluster::{FoundBy, Peer};
 use chefshat_hosting::config::MAX_PEER_MESSAGE_BYTES;
@@ -28,11 +28,11 @@ pub(super) const SERIES_OPEN: &str = "SERIES_OPEN";
 /// The recorded games of a server.
 #[derive(Debug, Clone)]
 pub struct Recorded {
-    reach: Reach,
+    lookup: Lookup,
     /// The role that is required to read records.
     required: Role,
     /// Limits how many records are assembled at a time, because they are large.
-    places: Arc<Places>,
+    places: Arc<FairSemaphore>,
     threads: Arc<Threads>,
 }
 
@@ -41,11 +41,11 @@ impl Recorded {
     ///
     /// # Errors
     /// The operating system cannot start its threads.
-    pub fn new(reach: Reach, required: Role) -> Result<Self, ThreadPoolBuildError> {
-        let places = Places::new(MAX_CONCURRENT_RECORDS, reach.rooms().shares());
+    pub fn new(lookup: Lookup, required: Role) -> Result<Self, ThreadPoolBuildError> {
+        let places = FairSemaphore::new(MAX_CONCURRENT_RECORDS, lookup.rooms().shares());
         let threads = Threads::new("records", MAX_CONCURRENT_RECORDS, Priority::Batches)?;
         Ok(Self {
-            reach,
+            lookup,
             required,
             places,
             threads: Arc::new(threads),
@@ -54,12 +54,12 @@ impl Recorded {
 
     /// The rooms.
     pub(super) fn rooms(&self) -> &Arc<Rooms> {
-        self.reach.rooms()
+        self.lookup.rooms()
     }
 
     /// What callers reach.
-    pub(super) fn reach(&self) -> &Reach {
-        &self.reach
+    pub(super) fn lookup(&self) -> &Lookup {
+        &self.lookup
     }
 
     /// Runs `work` on the record of a finished game that a caller may read, with how much of it the
@@ -68,7 +68,7 @@ impl Recorded {
         &self,
         caller: &Caller,
         game_id: &str,
-        work: impl FnOnce(Vec<v1::RecordLine>, Sight) -> T + Send + 'static,
+        work: impl FnOnce(Vec<v1::RecordLine>, RecordView) -> T + Send + 'static,
     ) -> Result<T, Status> {
         Refusal::of_role(caller, self.required).map_err(refused)?;
         let unknown = || {
@@ -92,7 +92,7 @@ impl Recorded {
             summary => summary.map_err(status::read_failed)?,
         };
         if let Some(room) = room {
-            self.reach.room_or(caller, room, unknown).await?;
+            self.lookup.room_or(caller, room, unknown).await?;
             return Err(status(
                 Code::FailedPrecondition,
                 "GAME_RUNNING",
@@ -101,11 +101,11 @@ impl Recorded {
             ));
         }
         let key = Key::of_caller(caller);
-        let may_see = |it: &v1::RecordSummary| self.reach.may_see_record(caller, it);
+        let may_see = |it: &v1::RecordSummary| self.lookup.may_see_record(caller, it);
         let Some(summary) = summary.filter(may_see) else {
             // It may be running at another node.
             let found_by = FoundBy::Game(game);
-            let running = self.reach.check_not_elsewhere(&found_by, key, || false);
+            let running = self.lookup.check_not_elsewhere(&found_by, key, || false);
             return running.await.and(Err(unknown()));
         };
         let place = self.places.take(key).await;
@@ -113,7 +113,7 @@ impl Recorded {
             // Its header, which says who sees it, cannot be read.
             Err(error @ StoreError::Unreadable(_)) => {
                 let status = status::read_failed(error);
-                let is_listed = self.reach.lists_record(caller, &summary).await?;
+                let is_listed = self.lookup.lists_record(caller, &summary).await?;
                 return Err(if is_listed { status } else { unknown() });
             }
             stored => stored.map_err(status::read_failed)?,
@@ -122,16 +122,16 @@ impl Recorded {
         // While its tournament runs, only the node that has it knows its tickets and which records
         // it withholds.
         if let Some(game) = stored.tournament()
-            && let Err(elsewhere) = self.reach.tournament_here(game.tournament, key).await
+            && let Err(elsewhere) = self.lookup.tournament_here(game.tournament, key).await
             && !self.rooms().directory().is_over(game.tournament).await
         {
             return Err(elsewhere);
         }
-        let sight = self.reach.recorded(caller, &stored, unknown)?;
+        let view = self.lookup.recorded(caller, &stored, unknown)?;
         if (stored.tournament()).is_some_and(|game| self.rooms().is_withheld(game)) {
             return Err(series_open());
         }
-        let working = move || work(stored.lines().into_owned(), sight);
+        let working = move || work(stored.lines().into_owned(), view);
         self.in_background(place, working).await
     }
 
@@ -142,7 +142,7 @@ impl Recorded {
         caller: &Caller,
         gateway: Option<&Gateway>,
         game_id: &str,
-        seen: impl FnOnce(Vec<v1::RecordLine>, Sight) -> Vec<v1::RecordLine> + Send + 'static,
+        seen: impl FnOnce(Vec<v1::RecordLine>, RecordView) -> Vec<v1::RecordLine> + Send + 'static,
     ) -> Result<Vec<v1::RecordLine>, Status> {
         let here = self.of_game(caller, game_id, seen).await;
         let (Err(status), Some(gateway)) = (&here, gateway) else {
@@ -173,7 +173,7 @@ impl Recorded {
     /// Runs work that takes milliseconds on a thread. The place is free when it ends.
     async fn in_background<T: Send + 'static>(
         &self,
-        place: Held,
+        place: Permit,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Status> {
         let working = self.threads.run(move || {

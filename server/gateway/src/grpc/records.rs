@@ -22,15 +22,15 @@ use tonic::{Code, Request, Response, Status, Streaming};
 
 use super::forward::Gateway;
 use super::limits::charged;
+use super::lookup::RecordView;
 use super::pages;
-use super::reach::Sight;
 use super::recorded::{Recorded, SERIES_OPEN};
 use super::status::{
     RECORD_UNREADABLE, Refusal, UNREADABLE, disk_nearly_full, field, has_reason, read_failed,
     status,
 };
 use chefshat_admission::access::Caller;
-use chefshat_admission::limits::{Held, Key, Places, Shares};
+use chefshat_admission::limits::{FairSemaphore, Key, Permit, Shares};
 use chefshat_base::tasks::short;
 use chefshat_hosting::config::{
     IMPORT_IDLE_TIMEOUT, IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORT_MEMORY,
@@ -55,10 +55,10 @@ pub struct Records {
     recorded: Recorded,
     tournaments: Arc<Tournaments>,
     /// Limits the records in memory while clients receive them.
-    sending: Arc<Places>,
-    receiving: Arc<Places>,
+    sending: Arc<FairSemaphore>,
+    receiving: Arc<FairSemaphore>,
     /// The memory of records that are being imported, in KiB.
-    imported: Arc<Places>,
+    imported: Arc<FairSemaphore>,
     allow_import: bool,
     /// Signs records of which parts are left out.
     key: Option<Arc<SigningKey>>,
@@ -71,9 +71,9 @@ impl Records {
         Self {
             recorded,
             tournaments,
-            sending: Places::new(MAX_RECORDS_SENT, shares),
-            receiving: Places::new(MAX_IMPORTS, shares),
-            imported: Places::new(MAX_IMPORT_MEMORY / 1024, Shares::ALL),
+            sending: FairSemaphore::new(MAX_RECORDS_SENT, shares),
+            receiving: FairSemaphore::new(MAX_IMPORTS, shares),
+            imported: FairSemaphore::new(MAX_IMPORT_MEMORY / 1024, Shares::ALL),
             allow_import: config.allow_import,
             key: config.signing_key.clone(),
         }
@@ -114,7 +114,8 @@ impl Records {
             for (_, summary) in page {
                 let (game, is_listed) = match &summary {
                     Ok(summary) => {
-                        let is_listed = self.recorded.reach().lists_record(caller, summary).await?;
+                        let is_listed =
+                            self.recorded.lookup().lists_record(caller, summary).await?;
                         (summary.game_id.clone(), is_listed)
                     }
                     Err(unreadable) => (unreadable.game.to_string(), caller.is_operator()),
@@ -132,7 +133,7 @@ impl Records {
                 let lines = match summary {
                     Ok(_) => {
                         let key = self.key.clone();
-                        let shown = move |lines, sight| seen(sight, key.as_deref(), lines);
+                        let shown = move |lines, view| seen(view, key.as_deref(), lines);
                         self.recorded.lines(caller, gateway, &game, shown).await
                     }
                     Err(unreadable) => {
@@ -200,7 +201,7 @@ impl RecordService for Records {
         let filter = checked(request.filter)?;
         let mut last = pages::last_shown(&request.page_token)?;
         let size = pages::page_size(request.page_size);
-        let reach = self.recorded.reach();
+        let lookup = self.recorded.lookup();
         let mut response = v1::ListRecordsResponse::default();
         let (mut rest, mut looked_at) = (true, 0);
         // Records that the caller does not see are skipped, up to a limit for one page.
@@ -220,7 +221,7 @@ impl RecordService for Records {
                 }
                 last = Some(number);
                 match summary {
-                    Ok(summary) if reach.lists_record(&caller, &summary).await? => {
+                    Ok(summary) if lookup.lists_record(&caller, &summary).await? => {
                         response.records.push(summary);
                     }
                     Err(bad) if caller.is_operator() => {
@@ -245,7 +246,7 @@ impl RecordService for Records {
         let place = self.sending.take(charged(request.extensions())).await;
         let game_id = request.into_inner().game_id;
         let key = self.key.clone();
-        let shown = move |lines, sight| seen(sight, key.as_deref(), lines);
+        let shown = move |lines, view| seen(view, key.as_deref(), lines);
         let lines = self.recorded.of_game(&caller, &game_id, shown).await?;
         let (sender, responses) = channel();
         tokio::spawn(short("one call", async move {
@@ -331,11 +332,11 @@ impl RecordService for Records {
 /// A record as its reader sees it: players do not see what was only for the record, nor references to
 /// media. If anything is left out of a record that this server signed, it signs what remains.
 fn seen(
-    sight: Sight,
+    view: RecordView,
     key: Option<&SigningKey>,
     mut lines: Vec<v1::RecordLine>,
 ) -> Vec<v1::RecordLine> {
-    if sight == Sight::Whole || !lines.iter().any(is_withheld_in) {
+    if view == RecordView::Whole || !lines.iter().any(is_withheld_in) {
         return lines;
     }
     let vouches = key.filter(|key| key.has_signed(&lines));
@@ -403,9 +404,9 @@ fn checked(filter: Option<v1::RecordFilter>) -> Result<v1::RecordFilter, Status>
 /// The lines of a record, and the memory that they take.
 async fn received(
     mut requests: Streaming<v1::ImportRecordRequest>,
-    memory: &Arc<Places>,
+    memory: &Arc<FairSemaphore>,
     key: Key,
-) -> Result<(Vec<v1::RecordLine>, Vec<Held>), Status> {
+) -> Result<(Vec<v1::RecordLine>, Vec<Permit>), Status> {
     let mut received = Received::default();
     loop {
         let next = timeout(IMPORT_IDLE_TIMEOUT, requests.message());
@@ -423,7 +424,7 @@ struct Received {
     lines: usize,
     bytes: usize,
     /// The memory of each part.
-    memory: Vec<Held>,
+    memory: Vec<Permit>,
 }
 
 impl Received {
@@ -431,7 +432,7 @@ impl Received {
     fn add(
         &mut self,
         request: v1::ImportRecordRequest,
-        memory: &Arc<Places>,
+        memory: &Arc<FairSemaphore>,
         key: Key,
     ) -> Result<(), Status> {
         self.bytes += request.encoded_len();
@@ -466,7 +467,7 @@ impl Received {
         Ok(())
     }
 
-    fn put_together(self) -> (Vec<v1::RecordLine>, Vec<Held>) {
+    fn put_together(self) -> (Vec<v1::RecordLine>, Vec<Permit>) {
         // At once: a list that grows takes up to three times the memory.
         let mut lines = Vec::with_capacity(self.lines);
         lines.extend(self.parts.into_iter().flatten());
@@ -597,7 +598,7 @@ mod tests {
     use futures::FutureExt as _;
     use tokio_util::task::TaskTracker;
 
-    use super::super::reach::Reach;
+    use super::super::lookup::Lookup;
     use super::*;
     use chefshat_admission::access::Role;
     use chefshat_hosting::rooms::Rooms;
@@ -651,7 +652,7 @@ mod tests {
 
     #[test]
     fn imports_take_a_bounded_memory_together() {
-        let memory = Places::new(MAX_IMPORT_MEMORY / 1024, Shares::ALL);
+        let memory = FairSemaphore::new(MAX_IMPORT_MEMORY / 1024, Shares::ALL);
         let part = || v1::ImportRecordRequest {
             lines: vec![large_decision(); 100],
         };
@@ -694,8 +695,8 @@ mod tests {
         let config = ServerConfig::default();
         let rooms = Rooms::new(&config, store.clone(), TaskTracker::new()).expect("threads");
         let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
-        let reach = Reach::new(rooms, Arc::clone(&tournaments));
-        let recorded = Recorded::new(reach, Role::Spectator).expect("threads");
+        let lookup = Lookup::new(rooms, Arc::clone(&tournaments));
+        let recorded = Recorded::new(lookup, Role::Spectator).expect("threads");
         let records = Records::new(recorded, tournaments, &config);
         let caller = Caller {
             role: Role::Admin,

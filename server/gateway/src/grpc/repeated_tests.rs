@@ -12,7 +12,7 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tonic::Request;
 
-use super::{Reach, Recorded, StudyCalls, TournamentCalls};
+use super::{Lookup, Recorded, StudyCalls, TournamentCalls};
 use chefshat_admission::access::{Caller, Role};
 use chefshat_admission::limits::CallLimits;
 use chefshat_hosting::config::ServerConfig;
@@ -32,12 +32,12 @@ fn calls() -> (TournamentCalls, StudyCalls) {
     let tournaments = Tournaments::new(Arc::clone(&rooms), tracker.clone());
     let studies = Studies::new(Arc::clone(&rooms), tracker);
     let limits = Arc::new(CallLimits::new(config.shares));
-    let reach = Reach::new(rooms, Arc::clone(&tournaments));
-    let recorded = Recorded::new(reach.clone(), Role::Spectator).expect("threads");
+    let lookup = Lookup::new(rooms, Arc::clone(&tournaments));
+    let recorded = Recorded::new(lookup.clone(), Role::Spectator).expect("threads");
     let closing = CancellationToken::new();
     (
         TournamentCalls::new(tournaments, recorded, Arc::clone(&limits), closing.clone()),
-        StudyCalls::new(studies, reach, limits, closing),
+        StudyCalls::new(studies, lookup, limits, closing),
     )
 }
 

@@ -14,9 +14,9 @@ use tonic::{Code, Request, Response, Status};
 use super::forward::Gateway;
 use super::limits::charged;
 use super::lists::{self, Listing, Page, Part};
+use super::lookup::Lookup;
 use super::new_room::new_room;
 use super::pages;
-use super::reach::Reach;
 use super::recorded::Recorded;
 use super::status::{self, Refusal, field, name_fingerprint, request_id, ticket_unknown};
 use chefshat_admission::access::Caller;
@@ -61,8 +61,8 @@ impl RoomCalls {
         }
     }
 
-    fn reach(&self) -> &Reach {
-        self.recorded.reach()
+    fn lookup(&self) -> &Lookup {
+        self.recorded.lookup()
     }
 
     /// The room with a join code; if an id is given too, it must match. Wrong codes are charged,
@@ -77,9 +77,9 @@ impl RoomCalls {
         let refused = |refused| Status::from(Refusal::from(refused));
         self.calls.may_try_code(key).map_err(refused)?;
         let found = match room_id {
-            "" => self.reach().room_here(join_code, key).await?,
+            "" => self.lookup().room_here(join_code, key).await?,
             id => match Id::parse(id) {
-                Some(id) => self.reach().room_here(id, key).await?,
+                Some(id) => self.lookup().room_here(id, key).await?,
                 None => None,
             },
         };
@@ -89,11 +89,11 @@ impl RoomCalls {
         let Some(handle) = found.filter(has_code) else {
             self.calls.wrong_code(key);
             if !room_id.is_empty() {
-                self.reach().room(caller, room_id).await?;
+                self.lookup().room(caller, room_id).await?;
             }
             return Err(join_code_wrong());
         };
-        self.reach().check_joining(caller, handle.id())?;
+        self.lookup().check_joining(caller, handle.id())?;
         Ok(handle)
     }
 
@@ -110,7 +110,7 @@ impl RoomCalls {
 
 /// The rooms that a caller finds.
 struct RoomList<'a> {
-    reach: &'a Reach,
+    lookup: &'a Lookup,
     caller: &'a Caller,
     message: &'a v1::ListRoomsRequest,
     /// Whether those whose games are over are listed, or the others.
@@ -124,11 +124,11 @@ impl Listing for RoomList<'_> {
     async fn here(&self, before: Option<u64>) -> Result<Part<v1::Room>, Status> {
         let page_size = pages::page_size(self.message.page_size);
         // Rooms in other states are skipped, up to a limit for one page.
-        let looked_at = (self.reach.rooms()).newest(before, self.over, ROOMS_LOOKED_AT);
+        let looked_at = (self.lookup.rooms()).newest(before, self.over, ROOMS_LOOKED_AT);
         let mut more = looked_at.len() == ROOMS_LOOKED_AT;
         let mut last = before;
         let describe = |handle: Handle| async move {
-            match self.reach.lists_room(self.caller, &handle).await {
+            match self.lookup.lists_room(self.caller, &handle).await {
                 true => handle.describe().await.ok(),
                 false => None,
             }
@@ -215,7 +215,7 @@ impl RoomService for RoomCalls {
         let reading = (&self.recorded, &caller, gateway.as_ref());
         let new = new_room(reading, request.into_inner(), key).await?;
         let request = new.request;
-        self.reach()
+        self.lookup()
             .check_not_created_elsewhere(request, key)
             .await?;
         let physical = new.physical;
@@ -228,7 +228,7 @@ impl RoomService for RoomCalls {
         let created = self.rooms.create(new).await;
         if matches!(&created, Err(CreateError::Store(StoreError::Taken(_)))) {
             // Another node has created it meanwhile.
-            self.reach()
+            self.lookup()
                 .check_not_created_elsewhere(request, key)
                 .await?;
         }
@@ -253,12 +253,12 @@ impl RoomService for RoomCalls {
         let key = charged(request.extensions());
         let request = request.into_inner();
         let handle = match request.join_code.as_str() {
-            "" => self.reach().room(&caller, &request.room_id).await?,
+            "" => self.lookup().room(&caller, &request.room_id).await?,
             code => (self.find_by_code(&caller, &request.room_id, code, key)).await?,
         };
         let mut room = handle.describe().await.map_err(Refusal::from)?;
         let next_join_code = handle.next_join_code();
-        if !next_join_code.is_empty() && self.reach().takes_part(&caller, &handle).await {
+        if !next_join_code.is_empty() && self.lookup().takes_part(&caller, &handle).await {
             room.next_join_code = next_join_code;
         }
         Ok(Response::new(v1::GetRoomResponse { room: Some(room) }))
@@ -282,7 +282,7 @@ impl RoomService for RoomCalls {
             }
         };
         let listing = RoomList {
-            reach: self.reach(),
+            lookup: self.lookup(),
             caller: &caller,
             message: &message,
             over,
@@ -336,8 +336,8 @@ impl RoomService for RoomCalls {
     ) -> Result<Response<v1::LeaveRoomResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let ticket = Token::parse(&request.into_inner().ticket).ok_or_else(ticket_unknown)?;
-        let reach = self.reach();
-        let handle = reach
+        let lookup = self.lookup();
+        let handle = lookup
             .room_of_ticket(&caller, ticket.room, ticket_unknown)
             .await?;
         let left = handle.leave(ticket.secret).await.map_err(Refusal::from)?;
@@ -353,7 +353,7 @@ impl RoomService for RoomCalls {
         let client = Payer::of_caller(&caller);
         let request = request.into_inner();
         let caller = caller.showing(&request.owner_token);
-        let handle = self.reach().room(&caller, &request.room_id).await?;
+        let handle = self.lookup().room(&caller, &request.room_id).await?;
         let token = Token::parse(&request.owner_token)
             .filter(|token| token.room == handle.id())
             .ok_or_else(status::owner_token_wrong)?;
@@ -372,15 +372,15 @@ impl RoomService for RoomCalls {
         let caller = Caller::of(request.extensions());
         let request = request.into_inner();
         let caller = (caller.showing(&request.owner_token)).showing(&request.ticket);
-        let handle = self.reach().room(&caller, &request.room_id).await?;
+        let handle = self.lookup().room(&caller, &request.room_id).await?;
         let header = self.rooms.header(handle.id());
-        let is_owner = |header| (self.reach()).is_owner_token(&request.owner_token, header);
+        let is_owner = |header| (self.lookup()).is_owner_token(&request.owner_token, header);
         let is_owner = header.as_deref().is_some_and(is_owner);
         if !is_owner && request.ticket.is_empty() {
             return Err(status::owner_token_wrong());
         }
         let participant = Caller::default().showing(&request.ticket);
-        if !is_owner && !self.reach().takes_part(&participant, &handle).await {
+        if !is_owner && !self.lookup().takes_part(&participant, &handle).await {
             return Err(ticket_unknown());
         }
         let join_code = normal_code(&request.join_code);

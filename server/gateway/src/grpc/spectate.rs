@@ -8,7 +8,7 @@ use futures::{Stream, TryStreamExt as _};
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
-use super::reach::Reach;
+use super::lookup::Lookup;
 use super::status::{Refusal, stream_ended};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::Key;
@@ -22,14 +22,14 @@ use chefshat_wire::outbox::{Outbox, SPECTATOR_CAPACITY, StreamEnd};
 /// The service.
 #[derive(Debug, Clone)]
 pub struct Spectate {
-    reach: Reach,
+    lookup: Lookup,
     closing: CancellationToken,
 }
 
 impl Spectate {
     /// Creates the service for the rooms that callers reach; `closing` ends its streams.
-    pub fn new(reach: Reach, closing: CancellationToken) -> Self {
-        Self { reach, closing }
+    pub fn new(lookup: Lookup, closing: CancellationToken) -> Self {
+        Self { lookup, closing }
     }
 }
 
@@ -44,9 +44,9 @@ impl SpectatorService for Spectate {
         let caller = Caller::of(request.extensions());
         let charged = Key::of_caller(&caller);
         let request = request.into_inner();
-        let room = self.reach.room(&caller, &request.room_id).await?;
-        let header = self.reach.rooms().header(room.id());
-        let is_owner = header.is_some_and(|it| self.reach.is_owner(&caller, &it));
+        let room = self.lookup.room(&caller, &request.room_id).await?;
+        let header = self.lookup.rooms().header(room.id());
+        let is_owner = header.is_some_and(|it| self.lookup.is_owner(&caller, &it));
         let (outbox, messages) = Outbox::with_capacity(SPECTATOR_CAPACITY);
         let from = request.from_sequence.saturating_sub(1);
         room.spectate(SpectateRequest {
@@ -60,7 +60,7 @@ impl SpectatorService for Spectate {
         .map_err(Refusal::from)?
         .map_err(Refusal::from)?;
         let closing = self.closing.clone();
-        let metrics = self.reach.rooms().metrics();
+        let metrics = self.lookup.rooms().metrics();
         metrics.add_outbox(&outbox);
         let counted = metrics.stream(StreamKind::Spectate);
         tokio::spawn(named(LongTask::Spectate, async move {

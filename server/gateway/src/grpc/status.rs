@@ -6,7 +6,7 @@ use std::collections::HashMap;
 
 use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
-use chefshat_referee::Refusal as Unjudged;
+use chefshat_referee::Refusal as TableRefusal;
 use chefshat_vector::RequestError;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
@@ -469,15 +469,15 @@ impl From<ReportRefusal> for Refusal {
             ReportError::GameOver => (Code::FailedPrecondition, "GAME_OVER"),
             ReportError::IdUsed => (Code::AlreadyExists, "REPORT_ID_USED"),
             ReportError::Refused(unjudged) => match unjudged {
-                Unjudged::TooManyQuestions => (Code::ResourceExhausted, "TOO_MANY_QUESTIONS"),
-                Unjudged::ReservedQuestionId => {
+                TableRefusal::TooManyQuestions => (Code::ResourceExhausted, "TOO_MANY_QUESTIONS"),
+                TableRefusal::ReservedQuestionId => {
                     let problem = FieldProblem::new("question.question_id", error.to_string());
                     return Self(field("REPORT_REFUSED", &problem));
                 }
-                Unjudged::NoSuchOption => (Code::FailedPrecondition, "NO_SUCH_OPTION"),
-                Unjudged::TooManyHeld => (Code::FailedPrecondition, "TOO_MANY_HELD_REPORTS"),
-                Unjudged::NotCorrectable => (Code::FailedPrecondition, "NOT_CORRECTABLE"),
-                Unjudged::NotOver => (Code::FailedPrecondition, "GAME_NOT_OVER"),
+                TableRefusal::NoSuchOption => (Code::FailedPrecondition, "NO_SUCH_OPTION"),
+                TableRefusal::TooManyHeld => (Code::FailedPrecondition, "TOO_MANY_HELD_REPORTS"),
+                TableRefusal::NotCorrectable => (Code::FailedPrecondition, "NOT_CORRECTABLE"),
+                TableRefusal::NotOver => (Code::FailedPrecondition, "GAME_NOT_OVER"),
             },
         };
         Self(status(code, reason, error.to_string(), []))

@@ -24,10 +24,10 @@ use super::follow::{self, end, send};
 use super::forward::Gateway;
 use super::limits::charged;
 use super::lists;
-use super::reach::Reach;
+use super::lookup::Lookup;
 use super::status::{Refusal, field, not_created, read_failed, request_id, shutting_down, status};
 use chefshat_admission::access::{Caller, Role};
-use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, Key, Places, Refused};
+use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key, Refused};
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named, short};
 use chefshat_hosting::cluster::FoundBy;
@@ -48,11 +48,11 @@ type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 #[derive(Debug, Clone)]
 pub struct StudyCalls {
     studies: Arc<Studies>,
-    reach: Reach,
+    lookup: Lookup,
     calls: Arc<CallLimits>,
-    followers: Arc<Places>,
-    /// Places for streams of participants.
-    participants: Arc<Places>,
+    followers: Arc<FairSemaphore>,
+    /// Permits for streams of participants.
+    participants: Arc<FairSemaphore>,
     /// Cancelled when all streams must end.
     closing: CancellationToken,
 }
@@ -61,17 +61,17 @@ impl StudyCalls {
     /// Creates the services for these studies; `closing` ends their streams.
     pub fn new(
         studies: Arc<Studies>,
-        reach: Reach,
+        lookup: Lookup,
         calls: Arc<CallLimits>,
         closing: CancellationToken,
     ) -> Self {
         let shares = studies.rooms().shares();
         Self {
             studies,
-            reach,
+            lookup,
             calls,
-            followers: Places::new(MAX_FOLLOWERS, shares),
-            participants: Places::new(MAX_STUDY_STREAMS, shares),
+            followers: FairSemaphore::new(MAX_FOLLOWERS, shares),
+            participants: FairSemaphore::new(MAX_STUDY_STREAMS, shares),
             closing,
         }
     }
@@ -84,7 +84,7 @@ impl StudyCalls {
             return Ok(Some(handle));
         }
         let found_by = FoundBy::Id(id);
-        let checked = (self.reach).check_not_elsewhere(&found_by, caller, || known.is_some());
+        let checked = (self.lookup).check_not_elsewhere(&found_by, caller, || known.is_some());
         checked.await?;
         Ok(self.studies.get(id))
     }

@@ -7,7 +7,7 @@ use futures::{Stream, stream};
 use tokio::sync::watch;
 use tonic::{Request, Response, Status};
 
-use super::reach::Reach;
+use super::lookup::Lookup;
 use super::status::{Refusal, room_gone, table_unknown};
 use chefshat_admission::access::Caller;
 use chefshat_hosting::room::{Handle, SentState};
@@ -16,19 +16,19 @@ use chefshat_room::ids::Token;
 /// The service.
 #[derive(Debug, Clone)]
 pub struct TableCalls {
-    reach: Reach,
+    lookup: Lookup,
 }
 
 impl TableCalls {
     /// Creates the service for the tables of these rooms.
-    pub fn new(reach: Reach) -> Self {
-        Self { reach }
+    pub fn new(lookup: Lookup) -> Self {
+        Self { lookup }
     }
 
     /// The room of a table's ticket, and the ticket's secret.
     async fn find(&self, caller: &Caller, ticket: &str) -> Result<(Handle, [u8; 32]), Status> {
         let token = Token::parse(ticket).ok_or_else(table_unknown)?;
-        let room = (self.reach).room_of_ticket(caller, token.room, table_unknown);
+        let room = (self.lookup).room_of_ticket(caller, token.room, table_unknown);
         let room = room.await?;
         Ok((room, token.secret))
     }

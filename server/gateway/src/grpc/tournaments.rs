@@ -33,7 +33,7 @@ use super::status::{
     status,
 };
 use chefshat_admission::access::Caller;
-use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, Key, Places, Refused};
+use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key, Refused};
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named};
 use chefshat_hosting::config::{
@@ -60,7 +60,7 @@ pub struct TournamentCalls {
     recorded: Recorded,
     leaderboard: Arc<Leaderboard>,
     calls: Arc<CallLimits>,
-    followers: Arc<Places>,
+    followers: Arc<FairSemaphore>,
     /// Permits to compute updates for followers.
     update_permits: Arc<Semaphore>,
     /// Permits to compute results.
@@ -83,7 +83,7 @@ impl TournamentCalls {
             tournaments,
             leaderboard: Arc::new(Leaderboard::new(Arc::clone(recorded.rooms()))),
             recorded,
-            followers: Places::new(MAX_FOLLOWERS, shares),
+            followers: FairSemaphore::new(MAX_FOLLOWERS, shares),
             update_permits: Arc::new(Semaphore::new(MAX_CONCURRENT_RESULTS)),
             result_permits: Arc::new(Semaphore::new(MAX_CONCURRENT_RESULTS)),
             closing,
@@ -91,7 +91,7 @@ impl TournamentCalls {
     }
 
     async fn find(&self, caller: &Caller, id: &str) -> Result<Arc<TournamentHandle>, Status> {
-        self.recorded.reach().tournament(caller, id).await
+        self.recorded.lookup().tournament(caller, id).await
     }
 
     /// The tournament with a join code; if an id is given too, it must match. Wrong codes are
@@ -105,11 +105,11 @@ impl TournamentCalls {
         key: Key,
     ) -> Result<Arc<TournamentHandle>, Status> {
         self.calls.may_try_code(key).map_err(Refusal::from)?;
-        let reach = self.recorded.reach();
+        let lookup = self.recorded.lookup();
         let found = match id {
-            "" => reach.tournament_here(join_code, key).await?,
+            "" => lookup.tournament_here(join_code, key).await?,
             id => match Id::parse(id) {
-                Some(id) => reach.tournament_here(id, key).await?,
+                Some(id) => lookup.tournament_here(id, key).await?,
                 None => None,
             },
         };
@@ -170,9 +170,9 @@ impl Listing for TournamentList<'_> {
         let more = found.len() > size;
         found.truncate(size);
         let rest = found.last().map(|(last, _)| *last).filter(|_| more);
-        let reach = service.recorded.reach();
+        let lookup = service.recorded.lookup();
         let entries = (found.iter())
-            .filter(|(_, handle)| reach.lists_tournament(self.caller, handle))
+            .filter(|(_, handle)| lookup.lists_tournament(self.caller, handle))
             .map(|(number, handle)| (*number, handle.describe_briefly()))
             .collect();
         Ok(Part { entries, rest })
@@ -249,13 +249,13 @@ impl TournamentService for TournamentCalls {
         convert::set_default_clock_of_models(&mut plan.policy, &asked);
         plan.policy
             .set_default_absence_times(ABSENCE_TIME_IN_TOURNAMENTS);
-        let reach = self.recorded.reach();
-        reach.check_not_created_elsewhere(request_key, key).await?;
+        let lookup = self.recorded.lookup();
+        lookup.check_not_created_elsewhere(request_key, key).await?;
         self.calls.charge(key, COST_OF_TOURNAMENT);
         let created = self.tournaments.create(&name, plan, request_key, key).await;
         if matches!(&created, Err(CreateProblem::Store(StoreError::Taken(_)))) {
             // Another node has created it meanwhile.
-            reach.check_not_created_elsewhere(request_key, key).await?;
+            lookup.check_not_created_elsewhere(request_key, key).await?;
         }
         let (handle, owner) = created.map_err(|problem| not_created(problem, settings_refused))?;
         Ok(Response::new(v1::CreateTournamentResponse {

@@ -32,7 +32,7 @@ use super::pool::on_pool;
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down, status, vector_refused};
 use chefshat_admission::access::Caller;
-use chefshat_admission::limits::{Held, Key, Places, Refused};
+use chefshat_admission::limits::{FairSemaphore, Key, Permit, Refused};
 use chefshat_base::metrics::{Counted, Metrics, StreamKind};
 use chefshat_base::tasks::short;
 use chefshat_base::threads::{Priority, Threads, caught};
@@ -54,9 +54,9 @@ const MAX_GAMES_IN_PLACE_WITH_BUILT_IN: u32 = 2;
 pub struct Vectors {
     recorded: Recorded,
     pool: Arc<Threads>,
-    streams: Arc<Places>,
-    /// Places for games times seats that clients play.
-    seats: Arc<Places>,
+    streams: Arc<FairSemaphore>,
+    /// Permits for games times seats that clients play.
+    seats: Arc<FairSemaphore>,
     closing: CancellationToken,
 }
 
@@ -75,8 +75,8 @@ impl Vectors {
         Ok(Self {
             recorded,
             pool: Arc::new(Threads::new("vector", threads, Priority::Batches)?),
-            streams: Places::new(MAX_VECTOR_STREAMS, shares),
-            seats: Places::new(MAX_VECTOR_SEATS_IN_ALL, shares),
+            streams: FairSemaphore::new(MAX_VECTOR_STREAMS, shares),
+            seats: FairSemaphore::new(MAX_VECTOR_SEATS_IN_ALL, shares),
             closing,
         })
     }
@@ -120,7 +120,7 @@ struct Runner {
     caller: Caller,
     gateway: Option<Gateway>,
     responses: mpsc::Sender<Result<v1::RunResponse, Status>>,
-    _place: Held,
+    _place: Permit,
     _counted: Counted,
 }
 
@@ -270,7 +270,7 @@ impl Runner {
     }
 
     /// Reserves the seats of these games among those of all streams, until they are dropped.
-    fn reserve(&self, setup: &VectorSetup) -> Result<Held, Status> {
+    fn reserve(&self, setup: &VectorSetup) -> Result<Permit, Status> {
         let key = Key::of_caller(&self.caller);
         let games = usize::try_from(setup.games()).unwrap_or(usize::MAX);
         let seats = &self.service.seats;

@@ -32,7 +32,7 @@ use tracing::warn;
 use super::answer::File;
 use super::cache::Cache;
 use crate::connections::peer_address;
-use chefshat_admission::limits::{Key, Places};
+use chefshat_admission::limits::{FairSemaphore, Key};
 use chefshat_base::threads::{Priority, Threads};
 use chefshat_hosting::rooms::Rooms;
 
@@ -98,8 +98,8 @@ pub(super) struct Title {
 #[derive(Debug)]
 pub(super) struct Previews {
     rooms: Arc<Rooms>,
-    places: Arc<Places>,
-    waiting: Arc<Places>,
+    places: Arc<FairSemaphore>,
+    waiting: Arc<FairSemaphore>,
     threads: Threads,
     /// The program that paints, `chefshat-lab`; without it there are no pictures.
     painter: Option<PathBuf>,
@@ -119,8 +119,8 @@ impl Previews {
         let shares = rooms.shares();
         Ok(Self {
             rooms,
-            places: Places::new(MAX_PREVIEWS, shares),
-            waiting: Places::new(MAX_PREVIEWS_WAITING, shares),
+            places: FairSemaphore::new(MAX_PREVIEWS, shares),
+            waiting: FairSemaphore::new(MAX_PREVIEWS_WAITING, shares),
             threads: Threads::new("previews", 1, Priority::Batches)?,
             painter,
             pictures: Cache::new(PICTURES_KEPT),

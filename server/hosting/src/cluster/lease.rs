@@ -21,13 +21,13 @@ use chefshat_store::StoreError;
 pub struct NodeLease {
     until: watch::Sender<Instant>,
     node: Mutex<Option<NodeId>>,
-    news: Mutex<BTreeSet<(Id, News)>>,
+    news: Mutex<BTreeSet<(Id, UnitEvent)>>,
     has_news: Notify,
 }
 
 /// What the task of a node learns about a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum News {
+pub enum UnitEvent {
     /// It was created here.
     Created {
         /// Whether it is a room that no other node can resume.
@@ -111,13 +111,13 @@ impl NodeLease {
     }
 
     /// Tells the task of the node about a unit.
-    pub fn report(&self, unit: Id, news: News) {
+    pub fn report(&self, unit: Id, news: UnitEvent) {
         self.all_news().insert((unit, news));
         self.has_news.notify_one();
     }
 
     /// Waits until there is news, and returns it.
-    pub(crate) async fn news(&self) -> BTreeSet<(Id, News)> {
+    pub(crate) async fn news(&self) -> BTreeSet<(Id, UnitEvent)> {
         loop {
             let news = std::mem::take(&mut *self.all_news());
             if !news.is_empty() {
@@ -127,7 +127,7 @@ impl NodeLease {
         }
     }
 
-    fn all_news(&self) -> MutexGuard<'_, BTreeSet<(Id, News)>> {
+    fn all_news(&self) -> MutexGuard<'_, BTreeSet<(Id, UnitEvent)>> {
         (self.news.lock()).expect("nothing panics under this lock")
     }
 }

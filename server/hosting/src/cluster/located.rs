@@ -12,7 +12,7 @@ use tracing::{debug, warn};
 
 use super::directory::{Directory, FoundBy, Location, Peer};
 use super::lease::NodeLease;
-use chefshat_admission::limits::{Key, Places, Shares};
+use chefshat_admission::limits::{FairSemaphore, Key, Shares};
 use chefshat_room::ids::Id;
 use chefshat_store::cluster::{self, ClusterStore, NodeId};
 use chefshat_store::{ResumableGame, StoreError};
@@ -34,7 +34,7 @@ pub struct StoreDirectory {
     lease: Arc<NodeLease>,
     /// Owners among the other nodes.
     known: Mutex<BTreeMap<FoundBy, Peer>>,
-    looking: Arc<Places>,
+    looking: Arc<FairSemaphore>,
     /// Locked while they are read, so that one request reads them for all.
     nodes: AsyncMutex<Option<Nodes>>,
 }
@@ -53,7 +53,7 @@ impl StoreDirectory {
             store,
             lease,
             known: Mutex::default(),
-            looking: Places::new(LOOKED_FOR_AT_ONCE, shares),
+            looking: FairSemaphore::new(LOOKED_FOR_AT_ONCE, shares),
             nodes: AsyncMutex::default(),
         }
     }

@@ -9,7 +9,7 @@ mod located;
 
 pub use chefshat_cluster::LeaseTimes;
 pub use directory::{Directory, Elsewhere, FoundBy, Location, Peer, SingleServer};
-pub use lease::{News, NodeLease};
+pub use lease::{NodeLease, UnitEvent};
 #[cfg(test)]
 pub(crate) use located::LOOK_LIMIT;
 pub use located::StoreDirectory;

@@ -9,7 +9,7 @@ use tokio_util::sync::CancellationToken;
 use tracing::{error, info, warn};
 
 use super::unit::Journaled;
-use crate::cluster::News;
+use crate::cluster::UnitEvent;
 use chefshat_store::StoreError;
 
 /// Messages that are processed before their consequences are computed.
@@ -126,7 +126,7 @@ fn fail<U: Journaled>(unit: &mut U, error: &StoreError) {
     if let Some(lease) = core.rooms.lease()
         && !core.handle.end.is_cancelled()
     {
-        lease.report(id, News::Stopped);
+        lease.report(id, UnitEvent::Stopped);
     }
     unit.end_streams();
 }

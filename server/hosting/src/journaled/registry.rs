@@ -9,9 +9,9 @@ use tracing::{error, info};
 use super::actor::{self, Stop};
 use super::table::Table;
 use super::unit::{Handle, Journaled, New, Unit, UnitHeader as _};
-use crate::cluster::News;
+use crate::cluster::UnitEvent;
 use crate::rooms::Rooms;
-use chefshat_admission::limits::{Held, Key, Places, Refused};
+use chefshat_admission::limits::{FairSemaphore, Key, Permit, Refused};
 use chefshat_base::tasks::{named, short};
 use chefshat_room::ids::{Id, RequestKey, Token, normal_code};
 use chefshat_store::StoreError;
@@ -30,8 +30,8 @@ pub enum CreateProblem<P: std::error::Error> {
     #[error("this request id was used to create another {0}; draw a new one")]
     RequestIdUsed(UnitKind),
     /// The server is shutting down.
-    #[error("the server is shutting down and accepts no new {0}")]
-    ShuttingDown(&'static str),
+    #[error("the server is shutting down and accepts no new {}", .0.plural())]
+    ShuttingDown(UnitKind),
     /// The disk has no space for more games.
     #[error("the server's disk is nearly full; the rest is reserved for running games")]
     DiskNearlyFull,
@@ -57,19 +57,19 @@ pub struct Registry<U: Journaled> {
     table: Mutex<Table<U>>,
     /// Notified when the creation of a unit has ended.
     created: Notify,
-    places: Arc<Places>,
+    places: Arc<FairSemaphore>,
 }
 
 impl<U: Journaled> std::fmt::Debug for Registry<U> {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(formatter, "{}", U::NAMES)
+        write!(formatter, "{}", U::KIND.plural())
     }
 }
 
 impl<U: Journaled> Registry<U> {
     /// Creates an empty set. A shutdown waits for the tasks in `tracker`.
     pub(crate) fn empty(rooms: Arc<Rooms>, tracker: TaskTracker, common: U::Common) -> Arc<Self> {
-        let places = Places::new(U::MOST, rooms.shares());
+        let places = FairSemaphore::new(U::MOST, rooms.shares());
         Arc::new(Self {
             rooms,
             tracker,
@@ -92,7 +92,7 @@ impl<U: Journaled> Registry<U> {
     /// They are not.
     pub(crate) fn check_accepting(&self) -> Result<(), Problem<U>> {
         if self.stop.no_more_games.is_cancelled() || self.rooms.is_shutting_down() {
-            return Err(CreateProblem::ShuttingDown(U::NAMES));
+            return Err(CreateProblem::ShuttingDown(U::KIND));
         }
         match self.rooms.store().has_space() {
             true => Ok(()),
@@ -127,10 +127,12 @@ impl<U: Journaled> Registry<U> {
         };
         // Runs to completion even if the caller is cancelled: a half-created unit would be stored
         // without running.
-        let creating = self.tracker.spawn(short(U::CREATION, async move {
-            let new = make.await?;
-            Ok(reservation.start(new, charged))
-        }));
+        let creating = self
+            .tracker
+            .spawn(short("one tournament or study", async move {
+                let new = make.await?;
+                Ok(reservation.start(new, charged))
+            }));
         (creating.await).map_err(|error| {
             StoreError::Failed(format!("creating a {} failed: {error}", U::KIND))
         })?
@@ -177,7 +179,7 @@ impl<U: Journaled> Registry<U> {
             }
         }
         if count > 0 {
-            info!(count, "{} resumed", U::NAMES);
+            info!(count, "{} resumed", U::KIND.plural());
         }
         Ok(count)
     }
@@ -217,7 +219,7 @@ impl<U: Journaled> Registry<U> {
     }
 
     /// Adds a unit to the table and starts its task, unless it is over.
-    fn start(&self, new: New<U>, charged: Key, place: Held) -> Arc<Handle<U>> {
+    fn start(&self, new: New<U>, charged: Key, place: Permit) -> Arc<Handle<U>> {
         let stop = Stop {
             end: self.stop.end.child_token(),
             ..self.stop.clone()
@@ -307,7 +309,7 @@ impl<U: Journaled> Registry<U> {
 struct Reservation<U: Journaled> {
     registry: Arc<Registry<U>>,
     id: Id,
-    place: Option<Held>,
+    place: Option<Permit>,
 }
 
 impl<U: Journaled> Reservation<U> {
@@ -333,7 +335,7 @@ impl<U: Journaled> Reservation<U> {
     fn start(mut self, new: New<U>, charged: Key) -> Arc<Handle<U>> {
         let place = self.place.take().expect("it is started once");
         if let Some(lease) = self.registry.rooms.lease() {
-            lease.report(self.id, News::Created { ephemeral: false });
+            lease.report(self.id, UnitEvent::Created { ephemeral: false });
         }
         self.registry.start(new, charged, place)
     }

@@ -8,7 +8,7 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
 use crate::rooms::Rooms;
-use chefshat_admission::limits::{Held, Key, Refused};
+use chefshat_admission::limits::{Key, Permit, Refused};
 use chefshat_base::tasks::LongTask;
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_store::StoreError;
@@ -51,12 +51,8 @@ pub trait Journaled: Sized + Send + Sync + 'static {
 
     /// The kind.
     const KIND: UnitKind;
-    /// Its name in messages, in the plural.
-    const NAMES: &'static str;
     /// Its task.
     const TASK: LongTask;
-    /// What creates one.
-    const CREATION: &'static str;
     /// Messages that wait for the task, at most.
     const MAILBOX: usize;
     /// Most units of the kind that are not over.
@@ -265,11 +261,11 @@ pub struct Unit<U: Journaled> {
     /// What is done after the next commit.
     replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
     /// Its place among its creator's units.
-    _place: Held,
+    _place: Permit,
 }
 
 impl<U: Journaled> Unit<U> {
-    pub(super) fn new(handle: Arc<Handle<U>>, rooms: Arc<Rooms>, rows: u64, place: Held) -> Self {
+    pub(super) fn new(handle: Arc<Handle<U>>, rooms: Arc<Rooms>, rows: u64, place: Permit) -> Self {
         let state = handle.committed().clone();
         Self {
             handle,

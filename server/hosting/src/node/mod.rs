@@ -1,10 +1,10 @@
 //! The task of a node: does what the core (`chefshat_cluster::Node`) puts out, and brings the
 //! answers in. Requests to the database run beside each other; what is done with one unit is done
-//! one after another: `turns` keeps their order, and `units` resumes and stops what the node owns.
+//! one after another: `keyed_queue` keeps their order, and `units` resumes and stops what the node owns.
 
+mod keyed_queue;
 #[cfg(test)]
 mod tests;
-mod turns;
 mod units;
 
 use std::collections::BTreeMap;
@@ -23,12 +23,12 @@ use tracing::{error, info, warn};
 
 pub use units::Hosted;
 
-use crate::cluster::{News, NodeLease};
+use crate::cluster::{NodeLease, UnitEvent};
 use chefshat_base::tasks::{LongTask, named, short};
 use chefshat_room::ids::Id;
 use chefshat_store::StoreError;
 use chefshat_store::cluster::{ClusterStore, Epoch, NodeId, NodeInfo};
-use turns::Turns;
+use keyed_queue::KeyedQueue;
 use units::{Resumed, Units};
 
 /// How long an answer of the database is awaited, except to a beat. After that, the next beat says
@@ -86,7 +86,7 @@ impl ClusterNode {
             running: BTreeMap::new(),
             not_resumable: BTreeMap::new(),
             nothing_to_run: BTreeMap::new(),
-            turns: Turns::default(),
+            queue: KeyedQueue::default(),
             answers: JoinSet::new(),
             releases: Arc::new(Semaphore::new(RELEASES_AT_ONCE)),
             search: Arc::new(Semaphore::new(1)),
@@ -165,7 +165,7 @@ struct Task {
     /// Units that are this node's, at these epochs, and have nothing to run: ephemeral rooms that have
     /// stopped.
     nothing_to_run: BTreeMap<Id, Epoch>,
-    turns: Turns,
+    queue: KeyedQueue,
     answers: JoinSet<Event>,
     releases: Arc<Semaphore>,
     /// Held by the search for orphans.
@@ -208,10 +208,10 @@ impl Task {
                 news = self.lease.news() => {
                     for (unit, news) in news {
                         match news {
-                            News::Created { ephemeral } => {
+                            UnitEvent::Created { ephemeral } => {
                                 self.put_in(Input::Created { unit, ephemeral });
                             }
-                            News::Stopped => self.has_stopped(unit),
+                            UnitEvent::Stopped => self.has_stopped(unit),
                         }
                     }
                 }
@@ -276,7 +276,7 @@ impl Task {
         (self.nothing_to_run).retain(|unit, epoch| owned.get(unit) == Some(epoch));
         for (unit, epoch) in owned {
             let is_missing = !self.nothing_to_run.contains_key(&unit)
-                && self.turns.is_idle(unit)
+                && self.queue.is_idle(unit)
                 && !self.units.has(unit);
             if is_missing {
                 info!(%unit, epoch = epoch.0, "it is this node's but does not run; it is resumed");
@@ -290,7 +290,7 @@ impl Task {
         let store = Arc::clone(&self.store);
         match output {
             Output::Beat => {
-                self.turns.forget_ended();
+                self.queue.forget_ended();
                 let sent_ms = self.now_ms();
                 // A beat without an answer must not take up the time of the next one, which the
                 // lease may still wait for.
@@ -451,7 +451,7 @@ impl Task {
         work: impl Future<Output = Event> + Send + 'static,
         if_it_panics: Event,
     ) {
-        let mut turn = self.turns.take(unit);
+        let mut turn = self.queue.take(unit);
         let in_turn = async move {
             turn.comes().await;
             work.await

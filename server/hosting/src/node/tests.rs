@@ -14,7 +14,7 @@ use tokio_util::task::TaskTracker;
 
 use super::units::LOADS_AT_ONCE;
 use super::{ClusterNode, Hosted, LEFT_ALONE};
-use crate::cluster::{FoundBy, LOOK_LIMIT, Location, News, NodeLease, StoreDirectory};
+use crate::cluster::{FoundBy, LOOK_LIMIT, Location, NodeLease, StoreDirectory, UnitEvent};
 use crate::config::ServerConfig;
 use crate::room::{Handle, JoinRequest, RoomGone};
 use crate::rooms::{NewRoom, Rooms};
@@ -306,7 +306,7 @@ async fn a_unit_whose_room_stops_while_others_are_resumed_runs_after_the_next_be
         .await
         .expect("the store is here");
     let lease = second.rooms.lease().expect("a node");
-    lease.report(room, News::Stopped);
+    lease.report(room, UnitEvent::Stopped);
     // Until everything waits for the store.
     sleep(Duration::from_millis(1)).await;
     second.store.loads_held.send_replace(false);

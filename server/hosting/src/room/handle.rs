@@ -14,7 +14,7 @@ use super::message::{
     Acted, AttachRequest, AttachedSeat, Following, Hinted, JoinRequest, Joined, MarkOutcome,
     MarkRequest, Message, NotAttached, Ruled, SeatAction, SpectateError, SpectateRequest, Watching,
 };
-use super::resting::Resting;
+use super::shared::SharedRoom;
 use super::task::{self, Room, TaskContext};
 use chefshat_admission::limits::{Key, Payer};
 use chefshat_base::clock::RoomClock;
@@ -33,7 +33,7 @@ pub struct RoomGone;
 pub struct Handle {
     id: Id,
     mailbox: mpsc::Sender<Message>,
-    resting: Arc<Resting<Room>>,
+    shared: Arc<SharedRoom<Room>>,
     fence: CancellationToken,
     clock: RoomClock,
     sharing: Arc<AtomicU32>,
@@ -75,7 +75,7 @@ pub fn spawn_room(
     let id = core.header().room_id;
     let fence = CancellationToken::new();
     let room_clock = clock.clone();
-    let (mailbox, resting) = task::spawn(
+    let (mailbox, shared) = task::spawn(
         core,
         room_clock,
         over_since,
@@ -86,7 +86,7 @@ pub fn spawn_room(
     Handle {
         id,
         mailbox,
-        resting,
+        shared,
         fence,
         clock,
         sharing: Arc::default(),
@@ -167,7 +167,7 @@ impl Handle {
     ) -> Result<(), Answer> {
         // Messages that wait come first.
         let is_first = || self.mailbox.capacity() == self.mailbox.max_capacity();
-        let needs_task = self.resting.handle(
+        let needs_task = self.shared.handle(
             answer,
             |room| is_first() && room.may_answer_in_place(),
             |room, answer| room.answer_in_place(seat, connection, answer, arrived),

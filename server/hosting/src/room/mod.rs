@@ -1,6 +1,6 @@
 //! Rooms. Each is a task that owns one game. `chefshat-room` decides; `task` commits and publishes;
 //! `subscriber` sends to the streams of seats and spectators; `handle` is the interface to a room,
-//! which sends it the messages in `message`, or handles an answer in place through `resting`;
+//! which sends it the messages in `message`, or handles an answer in place through `shared`;
 //! `clients` are those that took seats; `observed` counts and traces; `table_view` is what those who
 //! attend to a physical table see, `markers` what the owner follows, `hints` the latest hint.
 
@@ -11,11 +11,11 @@ mod hints;
 mod label_tests;
 mod markers;
 mod message;
-mod observed;
-mod resting;
+mod shared;
 pub mod subscriber;
 mod table_view;
 mod task;
+mod telemetry;
 #[cfg(test)]
 mod tests;
 

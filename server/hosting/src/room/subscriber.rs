@@ -17,7 +17,7 @@ use chefshat_room::ids::Token;
 use chefshat_room::log::RoomEvent;
 use chefshat_room::{Awaited, ConnectionId, Core};
 
-use chefshat_admission::limits::{Held, Payer};
+use chefshat_admission::limits::{Payer, Permit};
 use chefshat_base::metrics::Counted;
 use chefshat_wire::convert;
 use chefshat_wire::encoded::{Events, Updates, encode_decision, put_event};
@@ -66,7 +66,7 @@ pub struct Subscriber {
 enum Role {
     Seat(SeatConnection),
     Spectator {
-        _counted: (Counted, Held),
+        _counted: (Counted, Permit),
         /// Number of events it could see when its stream last had space.
         kept_up_at: usize,
     },
@@ -149,7 +149,7 @@ impl Subscriber {
         on_space: Arc<dyn OnSpace>,
         from: usize,
         with_snapshot: bool,
-        counted: (Counted, Held),
+        counted: (Counted, Permit),
     ) -> Self {
         let visible = core.visible_to_spectators();
         let position = if with_snapshot {

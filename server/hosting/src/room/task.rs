@@ -35,17 +35,18 @@ use super::message::{
     Acted, AttachRequest, AttachedSeat, Following, Joined, MarkOutcome, Message, NotAttached,
     NotifySpace, Ruled, SeatAction, SpectateError, SpectateRequest, Watching,
 };
-use super::observed::Observed;
-use super::resting::Resting;
+use super::shared::SharedRoom;
 use super::subscriber::{MAX_SPECTATORS, PublicEvents, Subscriber};
 use super::table_view::TableView;
-use crate::cluster::{News, NodeLease};
+use super::telemetry::RoomTelemetry;
+use crate::cluster::{NodeLease, UnitEvent};
 use crate::config::{HINT_TIME, ROOM_MAILBOX};
 use crate::record_writer::RecordWriter;
 use crate::signing::Signer;
 use crate::webhooks::Webhooks;
 use chefshat_admission::limits::{
-    Background, Held, Hint, Key, NotStored, Payer, Places, Searches, Shares, StoredBytes, Turn,
+    Background, FairSemaphore, Hint, Key, NotStored, Payer, Permit, Searches, Shares, StoredBytes,
+    TimeSlice,
 };
 use chefshat_base::clock::{ProcessClock, RoomClock};
 use chefshat_base::metrics::Metrics;
@@ -118,7 +119,7 @@ pub trait RoomWatcher: Send + Sync {
     fn gone(&self, room: Id);
 }
 
-/// Spawns the task of a room and returns the sender of its mailbox and its resting place.
+/// Spawns the task of a room and returns the sender of its mailbox and where readers share it.
 /// `over_since`: the game is already over, and its end has been processed.
 pub(super) fn spawn(
     core: Core,
@@ -127,13 +128,13 @@ pub(super) fn spawn(
     journal: Box<dyn Journal>,
     fence: CancellationToken,
     context: TaskContext,
-) -> (mpsc::Sender<Message>, Arc<Resting<Room>>) {
+) -> (mpsc::Sender<Message>, Arc<SharedRoom<Room>>) {
     let (mailbox, inbox) = mpsc::channel(ROOM_MAILBOX);
-    let resting = Arc::new(Resting::default());
+    let shared = Arc::new(SharedRoom::default());
     let seats = core.header().fills.len();
     let physical = core.header().is_physical();
-    let observed = Observed::new(&core, &context.metrics);
-    let span = observed.span().clone();
+    let telemetry = RoomTelemetry::new(&core, &context.metrics);
+    let span = telemetry.span().clone();
     let room = Box::new(Room {
         core,
         journal,
@@ -141,9 +142,9 @@ pub(super) fn spawn(
         clock,
         connections: (0..seats).map(|_| None).collect(),
         spectators: Vec::new(),
-        spectator_places: Places::new(MAX_SPECTATORS, context.shares),
+        spectator_places: FairSemaphore::new(MAX_SPECTATORS, context.shares),
         on_space: Arc::new(NotifySpace(mailbox.downgrade())),
-        releases: Vec::new(),
+        after_commit: Vec::new(),
         hints: FuturesUnordered::new(),
         latest_hint: LatestHint::default(),
         public: PublicEvents::default(),
@@ -159,16 +160,16 @@ pub(super) fn spawn(
         answers_in_place: false,
         table: physical.then(|| Box::new(TableView::new())),
         markers: None,
-        observed,
+        telemetry,
         context: context.clone(),
     });
-    let running = run(room, Arc::clone(&resting), inbox).instrument(span);
+    let running = run(room, Arc::clone(&shared), inbox).instrument(span);
     context.tracker.spawn(named(LongTask::Room, running));
-    (mailbox, resting)
+    (mailbox, shared)
 }
 
 /// An answer or update that is sent once the changes are committed.
-enum Release {
+enum AfterCommit {
     Join(
         oneshot::Sender<Result<Joined, JoinError>>,
         Result<Joined, JoinError>,
@@ -209,9 +210,9 @@ pub(super) struct Room {
     now: Duration,
     connections: Vec<Option<Subscriber>>,
     spectators: Vec<Subscriber>,
-    spectator_places: Arc<Places>,
+    spectator_places: Arc<FairSemaphore>,
     on_space: Arc<dyn OnSpace>,
-    releases: Vec<Release>,
+    after_commit: Vec<AfterCommit>,
     /// The hints that are being computed.
     hints: FuturesUnordered<BoxFuture<'static, HintEnded>>,
     latest_hint: LatestHint,
@@ -230,7 +231,7 @@ pub(super) struct Room {
     /// Cancelled when another node of the cluster may have the room.
     fence: CancellationToken,
     /// The place among the games that built-in agents play.
-    place: Option<Held>,
+    place: Option<Permit>,
     /// When the timer of the task fires.
     timer_at: Option<Duration>,
     answers_in_place: bool,
@@ -238,7 +239,7 @@ pub(super) struct Room {
     table: Option<Box<TableView>>,
     /// The markers, if anybody has followed them.
     markers: Option<Box<MarkerLog>>,
-    observed: Observed,
+    telemetry: RoomTelemetry,
     context: TaskContext,
 }
 
@@ -253,7 +254,7 @@ enum Next {
     /// Reads this number of messages; 0: nobody has a handle any more.
     Messages(usize),
     /// Plays a slice of a game of built-in agents.
-    Turn(Turn),
+    Turn(TimeSlice),
     /// Takes the result of a search.
     Searched(Found),
     /// Gives a hint.
@@ -263,14 +264,18 @@ enum Next {
 }
 
 /// Runs a room until it is gone.
-async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::Receiver<Message>) {
+async fn run(
+    mut room: Box<Room>,
+    shared: Arc<SharedRoom<Room>>,
+    mut inbox: mpsc::Receiver<Message>,
+) {
     let id = room.core.header().room_id;
     room.core.begin_if_all_built_in(room.now);
     let mut messages = Vec::with_capacity(INPUTS_PER_COMMIT);
     let timer = tokio::time::sleep_until(room.clock.instant(room.now));
     tokio::pin!(timer);
     // The next slice of a game that nobody plays.
-    let mut turn: Option<BoxFuture<'static, Turn>> = None;
+    let mut turn: Option<BoxFuture<'static, TimeSlice>> = None;
     // The search for the open decision.
     let mut search: Option<BoxFuture<'static, Found>> = None;
     while room.commit_and_publish().await {
@@ -299,30 +304,30 @@ async fn run(mut room: Box<Room>, resting: Arc<Resting<Room>>, mut inbox: mpsc::
         room.set_timer(timer.as_mut(), turn.is_some());
         room.answers_in_place = room.core.awaits_participants_only();
         let armed = room.timer_at.is_some();
-        *resting.lock() = Some(room);
+        *shared.lock() = Some(room);
         let (room_or_none, next) = poll_fn(|context| {
             // Under the lock, so that no answer in place overtakes a message.
-            let mut resting = resting.lock();
+            let mut shared = shared.lock();
             // Before the mailbox, which may never be empty: a decision has few of these.
             if let Some(Poll::Ready(found)) = search.as_mut().map(|it| it.poll_unpin(context)) {
-                return Poll::Ready((resting.take(), Next::Searched(found)));
+                return Poll::Ready((shared.take(), Next::Searched(found)));
             }
-            let hints = resting.as_mut().map(|room| &mut room.hints);
+            let hints = shared.as_mut().map(|room| &mut room.hints);
             if let Some(hints) = hints.filter(|hints| !hints.is_empty())
                 && let Poll::Ready(Some(hint)) = hints.poll_next_unpin(context)
             {
-                return Poll::Ready((resting.take(), Next::Hint(hint)));
+                return Poll::Ready((shared.take(), Next::Hint(hint)));
             }
             let received = inbox.poll_recv_many(context, &mut messages, INPUTS_PER_COMMIT);
             if let Poll::Ready(count) = received {
-                return Poll::Ready((resting.take(), Next::Messages(count)));
+                return Poll::Ready((shared.take(), Next::Messages(count)));
             }
             if let Some(Poll::Ready(granted)) = turn.as_mut().map(|turn| turn.poll_unpin(context)) {
-                return Poll::Ready((resting.take(), Next::Turn(granted)));
+                return Poll::Ready((shared.take(), Next::Turn(granted)));
             }
             let fired = armed && timer.as_mut().poll(context).is_ready();
             if fired {
-                Poll::Ready((resting.take(), Next::Timer))
+                Poll::Ready((shared.take(), Next::Timer))
             } else {
                 Poll::Pending
             }
@@ -375,7 +380,7 @@ impl Room {
         answer: Answer,
         arrived: Instant,
     ) -> bool {
-        let span = self.observed.span().clone();
+        let span = self.telemetry.span().clone();
         let _entered = span.enter();
         self.now = self.now.max(self.clock.at(arrived));
         self.execute(seat, connection, SeatAction::Answer(answer), arrived);
@@ -441,8 +446,8 @@ impl Room {
         let reply = match self.latest_hint.repeat(request, reply) {
             Err(reply) => reply,
             Ok(given) => {
-                let given = given.map(|(reply, hint)| Release::Hint(reply, hint));
-                return self.releases.extend(given);
+                let given = given.map(|(reply, hint)| AfterCommit::Hint(reply, hint));
+                return self.after_commit.extend(given);
             }
         };
         let plays = MonteCarlo {
@@ -469,8 +474,8 @@ impl Room {
             None => Ok(()),
         };
         let waiting = self.latest_hint.ended(request, hint, given);
-        let release = waiting.map(|(reply, hint)| Release::Hint(reply, hint));
-        self.releases.extend(release);
+        let release = waiting.map(|(reply, hint)| AfterCommit::Hint(reply, hint));
+        self.after_commit.extend(release);
     }
 
     /// Plays a slice of a game that nobody plays, and returns the number of decisions.
@@ -534,7 +539,7 @@ impl Drop for Room {
             && !is_expected
             && self.over_since.is_none()
         {
-            lease.report(header.unit(), News::Stopped);
+            lease.report(header.unit(), UnitEvent::Stopped);
         }
     }
 }

@@ -10,9 +10,9 @@ use chefshat_engine::{RULES_VERSION, RuleSet, Seat, SeedPlan};
 
 use super::table::{CreateError, Entry};
 use super::{CODES_TRIED, Rooms};
-use crate::cluster::News;
+use crate::cluster::UnitEvent;
 use crate::room::{Handle, TaskContext, spawn_room};
-use chefshat_admission::limits::{Held, Key, Payer, Refused};
+use chefshat_admission::limits::{Key, Payer, Permit, Refused};
 use chefshat_base::SERVER_VERSION;
 use chefshat_base::clock::{RoomClock, since_epoch_ms};
 use chefshat_base::tasks::short;
@@ -227,7 +227,7 @@ enum Claim {
 struct Reservation {
     rooms: Arc<Rooms>,
     owner: Token,
-    place: Option<Held>,
+    place: Option<Permit>,
 }
 
 impl Reservation {
@@ -331,7 +331,7 @@ impl Reservation {
             let durable = rooms.is_durable(&header);
             if let Some(lease) = rooms.lease().filter(|_| header.unit() == room_id) {
                 let ephemeral = !durable;
-                lease.report(header.unit(), News::Created { ephemeral });
+                lease.report(header.unit(), UnitEvent::Created { ephemeral });
             }
             table.enter(Entry {
                 handle: handle.clone(),

@@ -25,7 +25,7 @@ use crate::record_writer::RecordWriter;
 use crate::room::{Handle, RoomWatcher, TaskContext};
 use crate::signing::Signer;
 use crate::webhooks::Webhooks;
-use chefshat_admission::limits::{Background, Key, NotStored, Places, Searches, Shares};
+use chefshat_admission::limits::{Background, FairSemaphore, Key, NotStored, Searches, Shares};
 use chefshat_base::clock::ProcessClock;
 use chefshat_base::metrics::Metrics;
 use chefshat_room::ids::{Id, normal_code};
@@ -55,7 +55,7 @@ pub struct Rooms {
     /// Where the rooms and tournaments of other nodes are.
     directory: Arc<dyn Directory>,
     max_rooms: usize,
-    places: Arc<Places>,
+    places: Arc<FairSemaphore>,
     shares: Shares,
     samples: Arc<Samples>,
 }
@@ -130,7 +130,7 @@ impl Rooms {
             },
             directory,
             max_rooms: config.max_rooms,
-            places: Places::new(config.max_rooms, config.shares),
+            places: FairSemaphore::new(config.max_rooms, config.shares),
             shares: config.shares,
             samples,
         }))

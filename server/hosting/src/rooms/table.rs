@@ -5,7 +5,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use crate::room::Handle;
-use chefshat_admission::limits::{Held, Refused};
+use chefshat_admission::limits::{Permit, Refused};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::GameHeader;
 use chefshat_store::StoreError;
@@ -97,7 +97,7 @@ pub(super) struct Entry {
     /// Whether lists show it.
     pub(super) listed: bool,
     /// Its place among its creator's rooms, until its game is over.
-    pub(super) place: Option<Held>,
+    pub(super) place: Option<Permit>,
 }
 
 impl Entry {

@@ -2,8 +2,7 @@
 //! a budget of the whole server, of which each caller may use its share. Settings have a budget of
 //! their own.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::atomic::AtomicU64;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
@@ -11,10 +10,8 @@ use chefshat_proto::cost::{Cost, shapes};
 use chefshat_proto::v1;
 use chefshat_study::{ItemAnswer, Participant, Study};
 use prost::Message as _;
-use tokio::sync::{Mutex as AsyncMutex, watch};
 
-use chefshat_admission::limits::{Held, Key, Places, Refused};
-use chefshat_base::clock::TimeOfDay;
+use chefshat_admission::limits::{FairSemaphore, Key, Permit, Refused};
 use chefshat_room::ids::Id;
 
 /// When it is worth trying again to create a study, or to add to one.
@@ -22,52 +19,12 @@ pub(super) const RETRY_STUDIES: Duration = Duration::from_secs(3_600);
 /// Bytes that the answers of a questionnaire take besides their content.
 const OVERHEAD_OF_ANSWERS: usize = 256;
 
-/// What readers of a study share besides its state.
-#[derive(Debug)]
-pub struct StudyShared {
-    /// The memory of its settings.
-    pub(super) _memory: Held,
-    /// The memory of its participants and answers.
-    pub(super) data: Arc<StudyData>,
-    /// Counts the changes of each participant to whom somebody has listened.
-    pub(super) views: Mutex<BTreeMap<u32, watch::Sender<u64>>>,
-    /// Participants whose data are being deleted.
-    pub(super) deleting: Mutex<BTreeSet<u32>>,
-    /// Number of interface traces by game, since the server was started. Locked while traces are
-    /// added or deleted.
-    pub(super) traces: AsyncMutex<BTreeMap<Id, usize>>,
-    pub(super) streams: AtomicU64,
-}
-
-impl StudyShared {
-    pub(super) fn new(memory: Held, data: Arc<StudyData>) -> Self {
-        Self {
-            _memory: memory,
-            data,
-            views: Mutex::default(),
-            deleting: Mutex::default(),
-            traces: AsyncMutex::default(),
-            streams: AtomicU64::new(0),
-        }
-    }
-}
-
-/// What all studies of a server share.
-#[derive(Debug)]
-pub struct Budgets {
-    pub(super) now: TimeOfDay,
-    /// The memory of their settings, in KiB.
-    pub(super) memory: Arc<Places>,
-    /// The memory of their participants and answers, in bytes.
-    pub(super) data: Arc<Places>,
-}
-
 /// The memory that one study has taken, until it is dropped.
 #[derive(Debug)]
 pub(super) struct StudyData {
     /// One place is one byte.
-    budget: Arc<Places>,
-    participants: Mutex<Vec<Held>>,
+    budget: Arc<FairSemaphore>,
+    participants: Mutex<Vec<Permit>>,
     /// By number of the participant.
     answers: Mutex<BTreeMap<u32, Answers>>,
 }
@@ -75,15 +32,15 @@ pub(super) struct StudyData {
 /// The memory of the answers of a participant.
 #[derive(Debug, Default)]
 struct Answers {
-    given: Vec<Held>,
+    given: Vec<Permit>,
     /// Of those that were saved while they are entered.
-    saved: Option<Held>,
+    saved: Option<Permit>,
 }
 
 impl StudyData {
     /// Takes what a study has, even beyond the budget: a study that was stored is always resumed.
     /// Who sent it is unknown.
-    pub(super) fn of(study: &Study, id: Id, budget: &Arc<Places>) -> Self {
+    pub(super) fn of(study: &Study, id: Id, budget: &Arc<FairSemaphore>) -> Self {
         let take = |bytes| budget.take_many_anyway(Key::Study(id), bytes);
         let participants = study.participants();
         let bytes: usize = (participants.values())
@@ -108,7 +65,7 @@ impl StudyData {
     ///
     /// # Errors
     /// The caller, or the server, has too much.
-    pub(super) fn for_participants(&self, key: Key, names: &[String]) -> Result<Held, Refused> {
+    pub(super) fn for_participants(&self, key: Key, names: &[String]) -> Result<Permit, Refused> {
         let bytes = names.iter().map(|name| memory_of_participant(name.len()));
         self.take(key, bytes.sum()).ok_or_else(|| Refused {
             reason: "TOO_MANY_PARTICIPANTS",
@@ -121,20 +78,20 @@ impl StudyData {
     ///
     /// # Errors
     /// The caller, or the server, has too much.
-    pub(super) fn for_answers(&self, key: Key, answers: &[ItemAnswer]) -> Result<Held, Refused> {
+    pub(super) fn for_answers(&self, key: Key, answers: &[ItemAnswer]) -> Result<Permit, Refused> {
         let taken = self.take(key, memory_of_answers(answers));
         taken.ok_or_else(|| self.refused(key))
     }
 
     /// Keeps the memory of participants that were added.
-    pub(super) fn keep_participants(&self, held: Held) {
+    pub(super) fn keep_participants(&self, held: Permit) {
         (self.participants.lock())
             .expect("no code that holds this lock can panic")
             .push(held);
     }
 
     /// Keeps the memory of answers that a participant gave, and no longer that of those it had saved.
-    pub(super) fn keep_answers(&self, number: u32, held: Held) {
+    pub(super) fn keep_answers(&self, number: u32, held: Permit) {
         let mut answers = self.lock_answers();
         let answers = answers.entry(number).or_default();
         answers.given.push(held);
@@ -142,7 +99,7 @@ impl StudyData {
     }
 
     /// Keeps the memory of answers that a participant saved, in place of those it had saved before.
-    pub(super) fn keep_saved_answers(&self, number: u32, held: Held) {
+    pub(super) fn keep_saved_answers(&self, number: u32, held: Permit) {
         self.lock_answers().entry(number).or_default().saved = Some(held);
     }
 
@@ -152,7 +109,7 @@ impl StudyData {
         drop(forgotten);
     }
 
-    fn take(&self, key: Key, bytes: usize) -> Option<Held> {
+    fn take(&self, key: Key, bytes: usize) -> Option<Permit> {
         self.budget.try_take_many(key, bytes)
     }
 

@@ -15,7 +15,7 @@ use super::message::{Command, Message};
 use super::task::StudyTask;
 use crate::journaled::{Handle, Stopped};
 use crate::rooms::Rooms;
-use chefshat_admission::limits::{Held, Key, Refused};
+use chefshat_admission::limits::{Key, Permit, Refused};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_store::StoreError;
@@ -266,7 +266,7 @@ impl StudyHandle {
         + Send
         + Sync
         + 'static,
-        kept: fn(&StudyData, u32, Held),
+        kept: fn(&StudyData, u32, Permit),
     ) -> Result<Result<u32, NotAdded>, Stopped> {
         let memory = match self.shared.data.for_answers(key, &answers) {
             Ok(memory) => memory,
@@ -432,7 +432,7 @@ impl StudyHandle {
     /// is present.
     pub async fn present(self: &Arc<Self>, number: u32, session: u32) -> Presence {
         let stream = self.shared.streams.fetch_add(1, Ordering::Relaxed);
-        let message = Message::Present {
+        let message = Message::Connected {
             number,
             session,
             stream,
@@ -505,7 +505,10 @@ impl Drop for Presence {
         // ended.
         if let Ok(runtime) = tokio::runtime::Handle::try_current() {
             runtime.spawn(short("one message", async move {
-                let _ = handle.mailbox.send(Message::Gone { number, stream }).await;
+                let _ = handle
+                    .mailbox
+                    .send(Message::Disconnected { number, stream })
+                    .await;
             }));
         }
     }

@@ -22,7 +22,7 @@ pub enum Message {
         reply: oneshot::Sender<Result<usize, usize>>,
     },
     /// A stream shows the study to a participant.
-    Present {
+    Connected {
         /// The participant.
         number: u32,
         /// Its session.
@@ -31,7 +31,7 @@ pub enum Message {
         stream: u64,
     },
     /// A stream has ended.
-    Gone {
+    Disconnected {
         /// The participant.
         number: u32,
         /// Number of the stream.

@@ -6,6 +6,7 @@ mod export;
 mod games;
 mod handle;
 mod message;
+mod state;
 mod task;
 #[cfg(test)]
 mod tests;
@@ -24,14 +25,15 @@ pub use crate::journaled::Stopped;
 use crate::config::{MAX_STUDY_DATA, MAX_STUDY_MEMORY};
 use crate::journaled::{self, Folded, Journaled as _, New, Registry, owner_of};
 use crate::rooms::Rooms;
-use chefshat_admission::limits::{Key, Places, Refused};
+use chefshat_admission::limits::{FairSemaphore, Key, Refused};
 use chefshat_base::clock::{TimeOfDay, since_epoch_ms};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{Id, RequestKey, Token, random_bytes};
 use chefshat_store::StoreError;
 use chefshat_store::studies::StudyHeader;
 use chefshat_wire::convert::{self, StudyPlan};
-use data::{Budgets, StudyData, StudyShared, memory_of};
+use data::{StudyData, memory_of};
+use state::{Budgets, StudyShared};
 use task::StudyTask;
 
 /// Why a study was not created.
@@ -57,8 +59,8 @@ impl Studies {
 
     /// As [`Studies::new`], with this clock.
     pub fn at(now: TimeOfDay, rooms: Arc<Rooms>, tracker: TaskTracker) -> Arc<Self> {
-        let memory = Places::new(MAX_STUDY_MEMORY / 1024, rooms.shares());
-        let data = Places::new(MAX_STUDY_DATA, rooms.shares());
+        let memory = FairSemaphore::new(MAX_STUDY_MEMORY / 1024, rooms.shares());
+        let data = FairSemaphore::new(MAX_STUDY_DATA, rooms.shares());
         Self::empty(rooms, tracker, Budgets { now, memory, data })
     }
 
@@ -138,15 +140,17 @@ impl Studies {
     ) -> Result<Result<(usize, usize), usize>, Stopped> {
         let studies = Arc::clone(self);
         // Runs to completion even if the caller is cancelled.
-        let deleting = self.tracker.spawn(short("one study", async move {
-            let games = match handle.delete(force).await? {
-                Ok(games) => games,
-                Err(active) => return Ok(Err(active)),
-            };
-            studies.forget_one(handle.id());
-            let participants = handle.read(|study| study.participants().len());
-            Ok(Ok((participants, games)))
-        }));
+        let deleting = self
+            .tracker
+            .spawn(short("one tournament or study", async move {
+                let games = match handle.delete(force).await? {
+                    Ok(games) => games,
+                    Err(active) => return Ok(Err(active)),
+                };
+                studies.forget_one(handle.id());
+                let participants = handle.read(|study| study.participants().len());
+                Ok(Ok((participants, games)))
+            }));
         deleting.await.map_err(|_| Stopped)?
     }
 

@@ -9,8 +9,9 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::time::Instant;
 use tracing::info;
 
-use super::data::{Budgets, RETRY_STUDIES, StudyData, StudyShared, memory_of};
+use super::data::{RETRY_STUDIES, StudyData, memory_of};
 use super::message::{Command, Message};
+use super::state::{Budgets, StudyShared};
 use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
 use crate::journaled::{Folded, Journaled, Unit, UnitHeader};
 use chefshat_admission::limits::{Key, Refused};
@@ -67,9 +68,7 @@ impl Journaled for StudyTask {
     type SettingsProblem = SettingsProblem;
 
     const KIND: UnitKind = UnitKind::Study;
-    const NAMES: &'static str = "studies";
     const TASK: LongTask = LongTask::Study;
-    const CREATION: &'static str = "one study";
     const MAILBOX: usize = STUDY_MAILBOX;
     const MOST: usize = MAX_STUDIES;
 
@@ -175,7 +174,7 @@ impl Journaled for StudyTask {
                 }
                 self.deletion.push(reply);
             }
-            Message::Present {
+            Message::Connected {
                 number,
                 session,
                 stream,
@@ -186,7 +185,7 @@ impl Journaled for StudyTask {
                     self.set_connected(number, true);
                 }
             }
-            Message::Gone { number, stream } => {
+            Message::Disconnected { number, stream } => {
                 if self.streams.get(&number) == Some(&stream) {
                     self.streams.remove(&number);
                     self.set_connected(number, false);

@@ -9,7 +9,7 @@ use tokio::time::advance;
 use super::*;
 use crate::config::{MAX_STUDIES, ServerConfig};
 use chefshat_base::tasks::{LongTask, polls};
-use chefshat_store::testing::TypedUnits as _;
+use chefshat_store::testing::{FailingStore, TypedUnits as _};
 use chefshat_store::{MemoryStore, Store};
 
 /// How long a participant may be away.
@@ -201,6 +201,22 @@ async fn a_study_sleeps_when_the_one_who_waited_for_a_room_has_left() {
     let before = polls()[&LongTask::Study];
     tokio::time::sleep(LIMIT * 60).await;
     assert!(polls()[&LongTask::Study] <= before + 1);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_study_that_cannot_be_read_keeps_no_other_from_being_resumed() {
+    let failing = Arc::new(FailingStore::after(u64::MAX));
+    let store: Arc<dyn Store> = Arc::clone(&failing) as Arc<dyn Store>;
+    let studies = server(&store);
+    let create = async || {
+        let created = studies.create(settings(), None, Key::Local).await;
+        created.expect("valid settings").0.id()
+    };
+    let [broken, readable] = [create().await, create().await];
+    failing.unreadable.lock().expect("no panic").insert(broken);
+    let studies = server(&store);
+    assert_eq!(studies.restore().await, Ok(1));
+    assert!(studies.get(broken).is_none() && studies.get(readable).is_some());
 }
 
 /// What is in the store twice is run once.

@@ -13,7 +13,7 @@ use super::state::TournamentState;
 use super::task::TournamentTask;
 use crate::journaled::{Handle, Stopped};
 use crate::rooms::Rooms;
-use chefshat_admission::access::{Secrets, Standing};
+use chefshat_admission::access::{Relation, Secrets};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::ParticipantKind;
@@ -59,10 +59,10 @@ impl TournamentHandle {
     }
 
     /// What the secrets that a caller shows make of it.
-    pub fn standing(&self, secrets: &Secrets) -> Standing {
+    pub fn relation(&self, secrets: &Secrets) -> Relation {
         let state = self.committed();
         let tickets = state.tickets.values().copied();
-        secrets.standing(self.header.id, &self.header.owner, tickets)
+        secrets.relation(self.header.id, &self.header.owner, tickets)
     }
 
     /// The participant with this ticket, in constant time for each.

@@ -84,9 +84,7 @@ impl Journaled for TournamentTask {
     type SettingsProblem = SettingsProblem;
 
     const KIND: UnitKind = UnitKind::Tournament;
-    const NAMES: &'static str = "tournaments";
     const TASK: LongTask = LongTask::Tournament;
-    const CREATION: &'static str = "one tournament";
     const MAILBOX: usize = TOURNAMENT_MAILBOX;
     const MOST: usize = MAX_TOURNAMENTS;
 

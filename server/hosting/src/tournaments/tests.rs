@@ -3,7 +3,7 @@
 use futures::FutureExt as _;
 
 use super::*;
-use crate::config::ServerConfig;
+use crate::config::{MAX_TOURNAMENTS, ServerConfig};
 use chefshat_admission::limits::Key;
 use chefshat_store::testing::TypedUnits as _;
 use chefshat_store::{SqliteStore, Store};
@@ -483,4 +483,36 @@ async fn one_caller_cannot_join_and_withdraw_for_ever() {
     let removed = handle.change_by_hand(removed).await.expect("the task runs");
     assert_eq!(removed, Ok(None));
     handle.begin().await.expect("the task runs").expect("begun");
+}
+
+#[tokio::test]
+async fn tournaments_count_after_a_restart_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = SqliteStore::open(folder.path()).await.expect("a new one");
+    let store: Arc<dyn Store> = Arc::new(store);
+    let start = || {
+        let config = ServerConfig::default();
+        let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new()).expect("threads");
+        Tournaments::new(rooms, TaskTracker::new())
+    };
+    let settings = chefshat_proto::v1::TournamentSettings {
+        format: chefshat_proto::v1::TournamentFormat::Swiss.into(),
+        ..Default::default()
+    };
+    let create = async |tournaments: &Arc<Tournaments>, caller| {
+        let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+        tournaments.create("Coppa", plan, None, caller).await
+    };
+    let first = start();
+    create(&first, Key::Local).await.expect("there is space");
+    let tournaments = start();
+    assert_eq!(tournaments.restore().await, Ok(1));
+    let mut created = 1;
+    // Two callers, because none may have all places.
+    for caller in [Key::Local, Key::Resumed] {
+        while create(&tournaments, caller).await.is_ok() {
+            created += 1;
+        }
+    }
+    assert_eq!(created, MAX_TOURNAMENTS);
 }

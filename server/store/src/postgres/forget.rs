@@ -27,7 +27,9 @@ impl Reader {
             if let Some(rows) = self.game_rows(number).await? {
                 let bytes: usize = rows.journal.iter().map(|(_, bytes)| bytes.len()).sum();
                 let bytes = bytes + rows.record.as_ref().map_or(0, Vec::len);
-                let redacting = self.codec.run(bytes / 64, move || rewrite.with_game(rows));
+                let redacting = self
+                    .decoding
+                    .run(bytes / 64, move || rewrite.with_game(rows));
                 rewrite = redacting.await??;
             }
         }

@@ -12,7 +12,7 @@ use super::ends::{End, WholeGame};
 use super::reader::Reader;
 use super::values::Owned;
 use super::writer::Queue;
-use crate::ephemeral::StoreWhole;
+use crate::ephemeral::StoreFinished;
 use crate::form;
 use crate::{Journal, StoreError};
 use chefshat_room::journal::{Entry, GameHeader};
@@ -97,8 +97,8 @@ pub(super) struct Whole {
     pub(super) commands: Queue<Command>,
 }
 
-impl StoreWhole for Whole {
-    fn store_whole<'a>(
+impl StoreFinished for Whole {
+    fn store_finished<'a>(
         &'a self,
         header: &'a GameHeader,
         entries: Vec<u8>,

@@ -42,7 +42,7 @@ use tracing::error;
 pub use open::{DatabaseError, migrate};
 pub use transfer::{TransferError, Transferred, transfer};
 
-use super::codec::Codec;
+use super::decode_pool::DecodePool;
 use super::ephemeral::EphemeralJournal;
 use super::form;
 use super::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
@@ -59,7 +59,6 @@ use commands::Command;
 use handover::Handed;
 use journals::{DurableJournal, Whole};
 use reader::{Reader, StoredRoom};
-use units::Writer;
 use values::{FIRST_EPOCH, Owned};
 use writer::{Queue, Shared};
 
@@ -113,7 +112,7 @@ pub struct PostgresStore {
     sessions: PgConnectOptions,
     /// Listens from when it is first asked.
     handed: AsyncMutex<Option<Handed>>,
-    codec: Codec,
+    decoding: DecodePool,
     rows: Queue<Row>,
     commands: Queue<Command>,
     /// The node; 0: none has joined.
@@ -134,13 +133,13 @@ impl PostgresStore {
         let address = open::address(url)?;
         open::check(&address).await?;
         let sessions = open::sessions(address);
-        let codec = Codec::new();
+        let decoding = DecodePool::new();
         let reader = |connections| Reader {
             pool: PgPoolOptions::new()
                 .max_connections(connections)
                 .acquire_timeout(ACQUIRE_LIMIT)
                 .connect_lazy_with(sessions.clone()),
-            codec: codec.clone(),
+            decoding: decoding.clone(),
         };
         let [readers, control, beats] = [READERS, CONTROLLERS, BEATERS].map(reader);
         let metrics = StoreMetrics::default();
@@ -159,7 +158,7 @@ impl PostgresStore {
             beats,
             sessions,
             handed: AsyncMutex::default(),
-            codec,
+            decoding,
             rows: writer::start(&shared, APPENDERS, &mut writing),
             commands: writer::start(&shared, COMMANDERS, &mut writing),
             node: AtomicI64::new(0),
@@ -186,17 +185,32 @@ impl PostgresStore {
         epoch.ok_or(StoreError::Fenced(unit))
     }
 
-    /// Who writes this for a tournament or study.
-    fn writer_of(&self, unit: Id, write: &UnitWrite) -> Result<Writer, StoreError> {
-        if matches!(write, UnitWrite::Create { .. }) {
-            return self.node().map(Writer::Node);
-        }
-        let epoch = self.epoch_of(unit)?;
-        Ok(Writer::Owner(Owned {
-            id: unit,
-            unit,
-            epoch,
-        }))
+    /// What is written for a tournament or study, and by whom.
+    fn change(&self, unit: UnitId, write: UnitWrite) -> Result<units::Change, StoreError> {
+        let owned = || {
+            let (unit, epoch) = (unit.id, self.epoch_of(unit.id)?);
+            let id = unit;
+            Ok::<_, StoreError>(Owned { id, unit, epoch })
+        };
+        Ok(match write {
+            UnitWrite::Create {
+                join_code,
+                header,
+                first,
+            } => units::Change::Create {
+                unit,
+                node: self.node()?,
+                join_code,
+                header,
+                first,
+            },
+            UnitWrite::Append(row) => units::Change::Append(unit.kind, owned()?, row),
+            UnitWrite::Rewrite { entries, forgotten } => {
+                units::Change::Rewrite(unit.kind, owned()?, entries, forgotten)
+            }
+            UnitWrite::Traces(traces) => units::Change::Traces(owned()?, Id::random(), traces),
+            UnitWrite::Delete => units::Change::Delete(unit.kind, owned()?),
+        })
     }
 
     /// A room to be created: what its journals are written as.
@@ -336,7 +350,9 @@ impl Store for PostgresStore {
         summary.added = true;
         async move {
             let count = lines.len();
-            let encoding = self.codec.run(count, move || form::lines_to_bytes(&lines));
+            let encoding = self
+                .decoding
+                .run(count, move || form::lines_to_bytes(&lines));
             let import = Command::Import {
                 game_id,
                 record: encoding.await?,
@@ -413,12 +429,7 @@ impl Store for PostgresStore {
         async move {
             let is_new = matches!(write, UnitWrite::Create { .. });
             let is_deletion = matches!(write, UnitWrite::Delete);
-            let change = units::Change {
-                unit,
-                by: self.writer_of(unit.id, &write)?,
-                id: Id::random(),
-                write,
-            };
+            let change = self.change(unit, write)?;
             self.commands
                 .commit(Arc::new(Command::Unit(change)))
                 .await?;

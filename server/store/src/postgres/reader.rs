@@ -17,7 +17,7 @@ use tracing::error;
 use super::errors::failure;
 use super::retained::{divided, old};
 use super::values::{integer, text};
-use crate::codec::Codec;
+use crate::decode_pool::DecodePool;
 use crate::form::{self, Unreadable, check_form, stored_header};
 use crate::{Keep, Listed, Part, StoreError, StoredGame, listed};
 use chefshat_base::tasks::short;
@@ -54,7 +54,7 @@ macro_rules! list_query {
 #[derive(Clone)]
 pub(super) struct Reader {
     pub(super) pool: PgPool,
-    pub(super) codec: Codec,
+    pub(super) decoding: DecodePool,
 }
 
 /// A connection of the pool, which waits for its answer without limit when it is given back: one that
@@ -176,7 +176,7 @@ impl Reader {
         rows: Vec<(i64, Vec<u8>)>,
     ) -> Result<Result<(Vec<Entry>, i64), Unreadable>, StoreError> {
         let bytes: usize = rows.iter().map(|(_, entries)| entries.len()).sum();
-        let decoding = self.codec.run(bytes / 64, move || {
+        let decoding = self.decoding.run(bytes / 64, move || {
             let mut entries = Vec::new();
             let mut next = 0;
             for (position, bytes) in &rows {
@@ -258,7 +258,7 @@ impl Reader {
         let record: Option<Vec<u8>> = row.get(3);
         if let Some(record) = record {
             let decoding = self
-                .codec
+                .decoding
                 .run(record.len() / 64, move || form::lines_from_bytes(&record));
             let lines = decoding.await?.map_err(unreadable)?;
             return Ok(Some(StoredGame::Imported(lines.into())));

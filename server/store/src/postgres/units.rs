@@ -11,26 +11,28 @@ use super::values::{FIRST_EPOCH, Owned, integer, number_of, text};
 use super::writer::confirming;
 use crate::StoreError;
 use crate::form::{self, FORM};
-use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitId, UnitKind, UnitRow, UnitWrite};
+use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitId, UnitKind, UnitRow};
 use chefshat_room::ids::Id;
-
-/// Who writes for a unit.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Writer {
-    /// A node that creates it.
-    Node(i64),
-    /// Its owner.
-    Owner(Owned),
-}
 
 /// What is written for a unit.
 #[derive(Debug)]
-pub(super) struct Change {
-    pub(super) unit: UnitId,
-    pub(super) by: Writer,
-    /// Identifies interface traces, so that they are added once.
-    pub(super) id: Id,
-    pub(super) write: UnitWrite,
+pub(super) enum Change {
+    /// A node creates it.
+    Create {
+        unit: UnitId,
+        node: i64,
+        join_code: Option<String>,
+        header: Vec<u8>,
+        first: Option<UnitRow>,
+    },
+    /// Its owner adds a row to its journal.
+    Append(UnitKind, Owned, UnitRow),
+    /// Its owner replaces its journal by one row, and deletes the interface traces of participants.
+    Rewrite(UnitKind, Owned, Vec<u8>, Vec<u32>),
+    /// Its owner adds interface traces; the id identifies them, so that they are added once.
+    Traces(Owned, Id, StoredTraces),
+    /// Its owner deletes it.
+    Delete(UnitKind, Owned),
 }
 
 impl Change {
@@ -40,49 +42,37 @@ impl Change {
         connection: &mut PgConnection,
         again: bool,
     ) -> sqlx::Result<Result<i64, StoreError>> {
-        let unit = self.unit;
-        let (owned, write) = match (self.by, &self.write) {
-            (
-                Writer::Node(node),
-                UnitWrite::Create {
-                    join_code,
-                    header,
-                    first,
-                },
-            ) => {
-                let created = create(
-                    connection,
-                    unit,
-                    node,
-                    (join_code.as_deref(), header),
-                    again,
-                );
-                return match (created.await?, first) {
-                    (Ok(Created::Now), Some(row)) => {
-                        let owned = Owned {
-                            id: unit.id,
-                            unit: unit.id,
-                            epoch: FIRST_EPOCH,
-                        };
-                        append(connection, unit.kind, owned, row)
-                            .await
-                            .map(|_| Ok(0))
-                    }
-                    (Ok(_), _) => Ok(Ok(0)),
-                    (Err(error), _) => Ok(Err(error)),
-                };
+        let (owned, written) = match self {
+            Self::Create {
+                unit,
+                node,
+                join_code,
+                header,
+                first,
+            } => {
+                let names = (join_code.as_deref(), header.as_slice());
+                let created = create(connection, *unit, *node, names, again).await?;
+                if let (Ok(Created::Now), Some(row)) = (&created, first) {
+                    let owned = Owned {
+                        id: unit.id,
+                        unit: unit.id,
+                        epoch: FIRST_EPOCH,
+                    };
+                    append(connection, unit.kind, owned, row).await?;
+                }
+                return Ok(created.map(|_| 0));
             }
-            (Writer::Owner(owned), write) => (owned, write),
-            (Writer::Node(_), _) => return Ok(Err(StoreError::Fenced(unit.id))),
-        };
-        let written = match write {
-            UnitWrite::Create { .. } => return Ok(Err(StoreError::Taken(unit.id))),
-            UnitWrite::Append(row) => append(connection, unit.kind, owned, row).await?,
-            UnitWrite::Rewrite { entries, forgotten } => {
-                rewrite(connection, unit.kind, owned, entries, forgotten).await?
+            Self::Append(kind, owned, row) => {
+                (owned, append(connection, *kind, *owned, row).await?)
             }
-            UnitWrite::Traces(traces) => add_traces(connection, owned, self.id, traces).await?,
-            UnitWrite::Delete => delete(connection, unit.kind, owned).await?,
+            Self::Rewrite(kind, owned, entries, forgotten) => {
+                let written = rewrite(connection, *kind, *owned, entries, forgotten);
+                (owned, written.await?)
+            }
+            Self::Traces(owned, id, traces) => {
+                (owned, add_traces(connection, *owned, *id, traces).await?)
+            }
+            Self::Delete(kind, owned) => (owned, delete(connection, *kind, *owned).await?),
         };
         Ok(match written {
             true => Ok(0),

@@ -13,8 +13,8 @@ use tracing::error;
 use super::rows;
 use super::space::{RunningGame, Space};
 use super::writer::{Pending, Row, WriteCommand};
-use crate::codec::Codec;
-use crate::ephemeral::{Reserved, StoreWhole};
+use crate::decode_pool::DecodePool;
+use crate::ephemeral::{Reserved, StoreFinished};
 use crate::form;
 use crate::{Journal, StoreError};
 use chefshat_room::journal::{Entry, GameHeader};
@@ -64,7 +64,7 @@ pub(super) struct DurableJournal {
     pub(super) last_row: Option<i64>,
     pub(super) queue: WriteQueue,
     pub(super) readers: SqlitePool,
-    pub(super) codec: Codec,
+    pub(super) decoding: DecodePool,
 }
 
 impl DurableJournal {
@@ -113,7 +113,7 @@ impl Journal for DurableJournal {
 
     fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
         async move {
-            let read = rows::journal(&self.readers, &self.codec, self.number, self.last_row);
+            let read = rows::journal(&self.readers, &self.decoding, self.number, self.last_row);
             match read.await? {
                 Ok(read) => Ok(read.entries),
                 Err(problem) => Err(StoreError::Failed(format!(
@@ -155,8 +155,8 @@ pub(super) struct Whole {
     pub(super) _running: RunningGame,
 }
 
-impl StoreWhole for Whole {
-    fn store_whole<'a>(
+impl StoreFinished for Whole {
+    fn store_finished<'a>(
         &'a self,
         header: &'a GameHeader,
         entries: Vec<u8>,

@@ -39,7 +39,7 @@ pub use former::LOCK_FILE;
 pub use open::OpenError;
 use open::{FolderLock, IfGone};
 
-use super::codec::Codec;
+use super::decode_pool::DecodePool;
 use super::ephemeral::{EphemeralJournal, Reservations};
 use super::form;
 use super::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
@@ -63,7 +63,7 @@ use writer::WriteCommand;
 pub struct SqliteStore {
     data_dir: PathBuf,
     reader: Reader,
-    codec: Codec,
+    decoding: DecodePool,
     commands: WriteQueue,
     failed: watch::Receiver<Option<StoreError>>,
     numbers: Arc<AtomicI64>,
@@ -106,7 +106,7 @@ impl SqliteStore {
         .map_err(|error| OpenError::Other(data_dir.join(DATABASE_FILE), explain(&error)))?;
         let (commands, queue) = mpsc::channel(writer::QUEUE);
         let (has_failed, failed) = watch::channel(None);
-        let codec = Codec::new();
+        let decoding = DecodePool::new();
         let metrics = StoreMetrics::default();
         let space = Space::new(data_dir);
         if space.has_some() {
@@ -131,9 +131,9 @@ impl SqliteStore {
             data_dir: data_dir.to_path_buf(),
             reader: Reader {
                 pool: opened.readers,
-                codec: codec.clone(),
+                decoding: decoding.clone(),
             },
-            codec,
+            decoding,
             commands: WriteQueue {
                 queue: commands,
                 next_row: Arc::new(AtomicI64::new(last_row + 1)),
@@ -179,7 +179,7 @@ impl Store for SqliteStore {
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
         let number = self.numbers.fetch_add(1, Ordering::Relaxed);
         let (commands, readers) = (self.commands.clone(), self.reader.pool.clone());
-        let codec = self.codec.clone();
+        let decoding = self.decoding.clone();
         async move {
             let game = header.game_id;
             let taken = StoreError::Taken(game);
@@ -206,7 +206,7 @@ impl Store for SqliteStore {
                 running: Some(commands.space.game()),
                 queue: commands,
                 readers,
-                codec,
+                decoding,
             };
             journal.begin(&header, &mut entries).await?;
             Ok(Box::new(journal) as Box<dyn Journal>)
@@ -253,7 +253,9 @@ impl Store for SqliteStore {
             };
             let number = self.numbers.fetch_add(1, Ordering::Relaxed);
             let count = lines.len();
-            let encoding = self.codec.run(count, move || form::lines_to_bytes(&lines));
+            let encoding = self
+                .decoding
+                .run(count, move || form::lines_to_bytes(&lines));
             let record = encoding.await?;
             let import = WriteCommand::Import {
                 number,

@@ -15,7 +15,7 @@ use super::journals::{DurableJournal, WriteQueue};
 use super::retained::Units;
 use super::rows::{self, Read};
 use crate::Keep;
-use crate::codec::Codec;
+use crate::decode_pool::DecodePool;
 use crate::form::{self, Unreadable, check_form, stored_header};
 use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitId, UnitKind};
 use crate::{Listed, Part, ResumableGame, StoreError, StoredGame, listed};
@@ -49,7 +49,7 @@ macro_rules! list_query {
 /// Reads stored games.
 pub(super) struct Reader {
     pub(super) pool: SqlitePool,
-    pub(super) codec: Codec,
+    pub(super) decoding: DecodePool,
 }
 
 impl Reader {
@@ -94,7 +94,7 @@ impl Reader {
                         running: (!concluded).then(|| commands.space.game()),
                         queue: commands.clone(),
                         readers: self.pool.clone(),
-                        codec: self.codec.clone(),
+                        decoding: self.decoding.clone(),
                     }),
                     entries: read.entries,
                     concluded,
@@ -144,7 +144,7 @@ impl Reader {
         let record: Option<Vec<u8>> = row.get(3);
         if let Some(record) = record {
             let decoding = self
-                .codec
+                .decoding
                 .run(record.len() / 64, move || form::lines_from_bytes(&record));
             let lines = decoding.await?.map_err(unreadable)?;
             return Ok(Some(StoredGame::Imported(lines.into())));
@@ -258,7 +258,7 @@ impl Reader {
         number: i64,
         last_row: Option<i64>,
     ) -> Result<Result<Read, Unreadable>, StoreError> {
-        rows::journal(&self.pool, &self.codec, number, last_row).await
+        rows::journal(&self.pool, &self.decoding, number, last_row).await
     }
 
     /// See `Store::list`.

@@ -5,7 +5,7 @@ use sqlx::sqlite::{SqlitePool, SqliteRow};
 
 use super::errors::explain;
 use crate::StoreError;
-use crate::codec::Codec;
+use crate::decode_pool::DecodePool;
 use crate::form::{self, Unreadable};
 use chefshat_room::journal::Entry;
 
@@ -54,7 +54,7 @@ impl Read {
 /// cannot be read.
 pub(super) async fn journal(
     pool: &SqlitePool,
-    codec: &Codec,
+    decoding: &DecodePool,
     number: i64,
     last_row: Option<i64>,
 ) -> Result<Result<Read, Unreadable>, StoreError> {
@@ -71,7 +71,7 @@ pub(super) async fn journal(
         return Ok(Err(Unreadable("its journal is missing".into())));
     }
     let bytes: usize = rows.iter().map(|row| row.get::<&[u8], _>(2).len()).sum();
-    let decoding = codec.run(bytes / 64, move || {
+    let decoding = decoding.run(bytes / 64, move || {
         let mut read = Read::default();
         rows.iter().try_for_each(|row| read.add(row)).map(|()| read)
     });

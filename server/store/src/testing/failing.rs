@@ -1,6 +1,7 @@
 //! A store that fails on request, for tests: simulates a full disk. It also says what was read from
 //! it, so that a test sees whether a call reads more of what exists than of what does not.
 
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -27,6 +28,8 @@ pub struct FailingStore {
     reads: Mutex<Vec<Read>>,
     /// Permits for commits of tournaments; each commit uses one.
     pub tournament_commits: Arc<Semaphore>,
+    /// Tournaments and studies that cannot be read.
+    pub unreadable: Mutex<BTreeSet<Id>>,
 }
 
 impl FailingStore {
@@ -38,6 +41,7 @@ impl FailingStore {
             has_failed: watch::Sender::new(false),
             reads: Mutex::default(),
             tournament_commits: Arc::new(Semaphore::new(Semaphore::MAX_PERMITS)),
+            unreadable: Mutex::default(),
         }
     }
 }
@@ -185,7 +189,11 @@ impl Store for FailingStore {
     }
 
     fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
-        self.inner.unit(unit)
+        let unreadable = self.unreadable.lock();
+        match (unreadable.expect("no code that holds it can panic")).contains(&unit.id) {
+            true => ready(Err(injected_failure())).boxed(),
+            false => self.inner.unit(unit),
+        }
     }
 
     fn units(

@@ -11,7 +11,7 @@ use futures::future::BoxFuture;
 use tokio::sync::oneshot;
 
 use super::*;
-use crate::limits::Held;
+use crate::limits::Permit;
 
 /// Longer than any test.
 const PATIENT: Duration = Duration::from_secs(100_000);
@@ -43,7 +43,7 @@ fn searches() -> Arc<Searches> {
     Arc::new(Searches::new(Arc::default()).expect("threads"))
 }
 
-fn turns(searches: &Searches) -> Vec<Held> {
+fn turns(searches: &Searches) -> Vec<Permit> {
     let take = || searches.turns.try_take(Key::Resumed);
     std::iter::from_fn(take).collect()
 }

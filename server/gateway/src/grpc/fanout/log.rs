@@ -17,7 +17,7 @@ use tonic::body::Body;
 
 use super::message::{Message, Messages};
 use crate::grpc::status::{room_gone, spectator_too_slow};
-use chefshat_admission::limits::{CallLimits, HISTORY_STEP, Held, Key};
+use chefshat_admission::limits::{CallLimits, HISTORY_STEP, Key, Permit};
 use chefshat_wire::convert;
 
 /// Most bytes of a stream that are kept for those who read slowly or come later.
@@ -55,7 +55,7 @@ struct Log {
     /// Bytes of the pieces.
     kept: usize,
     /// The memory for them.
-    memory: Vec<Held>,
+    memory: Vec<Permit>,
     /// The number of the last piece that says whom the game waits for.
     awaited: Option<usize>,
     /// The number of the next piece of each reader.
@@ -104,7 +104,7 @@ impl Log {
         self.first + self.pieces.len()
     }
 
-    fn add(&mut self, content: Content, memory: impl Fn() -> Option<Held>) {
+    fn add(&mut self, content: Content, memory: impl Fn() -> Option<Permit>) {
         if let Content::Message(message) = &content
             && message.has_awaited()
         {
@@ -289,7 +289,7 @@ pub(super) struct Reader {
     /// The room as it was when the spectator joined.
     room: Option<v1::Room>,
     /// Its place among the streams of its caller.
-    place: Option<Held>,
+    place: Option<Permit>,
 }
 
 /// What a reader comes to.
@@ -303,7 +303,7 @@ enum Read {
 
 impl Reader {
     /// Makes it the reader of one who joins others, with the room as it is now.
-    pub(super) fn joining(mut self, room: v1::Room, place: Held) -> Self {
+    pub(super) fn joining(mut self, room: v1::Room, place: Permit) -> Self {
         (self.room, self.place) = (Some(room), Some(place));
         self
     }

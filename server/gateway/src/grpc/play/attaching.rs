@@ -16,7 +16,7 @@ use tonic::{Code, Status};
 use super::parked::{Found, Parked, Parking, search};
 use super::reader::{BoundSeat, Contested, DETACHED_KEPT, Reader};
 use super::remote::NotPassedOn;
-use crate::grpc::reach::Reach;
+use crate::grpc::lookup::Lookup;
 use crate::grpc::status::{is_elsewhere, owner_unreachable, status, ticket_unknown};
 use crate::grpc::takeover::{is_changing, waits};
 use chefshat_admission::access::Caller;
@@ -59,17 +59,17 @@ impl Reader {
         let Some(token) = Token::parse(&attach.ticket) else {
             return self.refuse(handle, request_id, &ticket_unknown());
         };
-        if !self.reach().has_in_memory(token.room) && waits(&self.rooms) {
+        if !self.lookup().has_in_memory(token.room) && waits(&self.rooms) {
             let parking = self.parked.get_or_insert_with(|| Box::new(Parking::new()));
             return parking.park(handle, attach);
         }
-        let in_scope = look(&self.reach(), &self.caller, token).await;
+        let in_scope = look(&self.lookup(), &self.caller, token).await;
         let parked = Parked::new(attach);
         self.attach_found(handle, parked, in_scope).await;
     }
 
-    fn reach(&self) -> Reach {
-        Reach::new(Arc::clone(&self.rooms), Arc::clone(&self.tournaments))
+    fn lookup(&self) -> Lookup {
+        Lookup::new(Arc::clone(&self.rooms), Arc::clone(&self.tournaments))
     }
 
     /// Attaches a seat or participant whose room or tournament has been found, here or at another
@@ -124,11 +124,11 @@ impl Reader {
         };
         let (rooms, tournaments, caller) = (&self.rooms, &self.tournaments, &self.caller);
         parking.poll_found(context, |first, all| {
-            let reach = Reach::new(Arc::clone(rooms), Arc::clone(tournaments));
+            let lookup = Lookup::new(Arc::clone(rooms), Arc::clone(tournaments));
             let caller = caller.clone();
             AbortOnDropHandle::new(tokio::spawn(short(
                 "one search for a room, within its time limit",
-                async move { search(first, all, |token| look_once(&reach, &caller, token)).await },
+                async move { search(first, all, |token| look_once(&lookup, &caller, token)).await },
             )))
         })
     }
@@ -354,22 +354,22 @@ impl Reader {
 
 /// Looks for the room or tournament of a ticket, which is still to be compared. An error says who
 /// else has it, that nobody can be asked now, or why the caller does not reach it.
-async fn look(reach: &Reach, caller: &Caller, token: Token) -> Result<(), Status> {
-    look_once(reach, caller, token)
+async fn look(lookup: &Lookup, caller: &Caller, token: Token) -> Result<(), Status> {
+    look_once(lookup, caller, token)
         .await
         .unwrap_or_else(|| Err(owner_unreachable()))
 }
 
 /// As [`look`]; `None` if it changes hands.
-async fn look_once(reach: &Reach, caller: &Caller, token: Token) -> Option<Result<(), Status>> {
-    if let Some(in_scope) = reach.tournament_of_ticket(caller, token.room, ticket_unknown) {
+async fn look_once(lookup: &Lookup, caller: &Caller, token: Token) -> Option<Result<(), Status>> {
+    if let Some(in_scope) = lookup.tournament_of_ticket(caller, token.room, ticket_unknown) {
         return Some(in_scope);
     }
-    let room = reach
+    let room = lookup
         .look_for_ticket(caller, token.room, ticket_unknown)
         .await;
     // This node may have taken a tournament over meanwhile.
-    if let Some(in_scope) = reach.tournament_of_ticket(caller, token.room, ticket_unknown) {
+    if let Some(in_scope) = lookup.tournament_of_ticket(caller, token.room, ticket_unknown) {
         return Some(in_scope);
     }
     (!is_changing(&room)).then(|| room.map(drop))

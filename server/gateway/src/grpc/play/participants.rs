@@ -8,7 +8,7 @@ use chefshat_proto::v1::{self, seat_update::Update};
 
 use super::attaching::too_many_seats;
 use super::reader::{BoundParticipant, Reader};
-use super::remote::CALLED;
+use super::remote::HANDLES_PER_NODE;
 use crate::grpc::status::ticket_unknown;
 use chefshat_hosting::room::Supersedes;
 use chefshat_hosting::tournaments::{Call, Connection, TournamentHandle};
@@ -128,7 +128,7 @@ impl Reader {
             return;
         }
         let handle = self.next_called;
-        let next = (self.next_called - self.first_called + 1) % CALLED;
+        let next = (self.next_called - self.first_called + 1) % HANDLES_PER_NODE;
         self.next_called = self.first_called + next;
         let supersedes = self.supersedes();
         self.bind(attach, handle, Some(ticket), supersedes).await;

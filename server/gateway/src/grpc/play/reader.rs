@@ -16,7 +16,7 @@ use tokio_util::sync::CancellationToken;
 use tonic::{Code, Status, Streaming};
 
 use super::parked::{Found, Parking};
-use super::remote::{FIRST_CALLED, NodeGone, RemoteSeats};
+use super::remote::{FIRST_ASSIGNED_HANDLE, NodeGone, RemoteSeats};
 use crate::grpc::forward::Gateway;
 use crate::grpc::refusals::count;
 use crate::grpc::status::{field, refused, room_gone, status};
@@ -178,8 +178,8 @@ impl Reader {
             parked: None,
             participants: BTreeMap::new(),
             next_handle: 0,
-            first_called: FIRST_CALLED,
-            next_called: FIRST_CALLED,
+            first_called: FIRST_ASSIGNED_HANDLE,
+            next_called: FIRST_ASSIGNED_HANDLE,
             remote: None,
             by_gateway: false,
             asks_gateway: false,

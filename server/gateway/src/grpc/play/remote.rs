@@ -37,13 +37,13 @@ use chefshat_wire::encoded::{Received, Updates};
 use chefshat_wire::outbox::{OnHandover, OnSpace, Outbox, StreamEnd};
 
 /// First handle of seats that the server attaches.
-pub(super) const FIRST_CALLED: u32 = 1 << 31;
+pub(super) const FIRST_ASSIGNED_HANDLE: u32 = 1 << 31;
 /// Number of handles of seats that one node attaches to a stream.
-pub(super) const CALLED: u32 = 1 << 24;
+pub(super) const HANDLES_PER_NODE: u32 = 1 << 24;
 /// Inputs that wait for one stream to another node. A client that sends more waits.
 const INPUTS_WAITING: usize = 1_024;
 /// Most nodes whose seats one stream has: each needs handles of its own, as this one does.
-const MAX_NODES: usize = ((u32::MAX - FIRST_CALLED) / CALLED) as usize;
+const MAX_NODES: usize = ((u32::MAX - FIRST_ASSIGNED_HANDLE) / HANDLES_PER_NODE) as usize;
 
 /// The seats of a client's stream that other nodes have.
 pub(super) struct RemoteSeats {
@@ -295,11 +295,13 @@ impl RemoteSeats {
     }
 
     fn stream_of(&self, handle: u32) -> Option<&PeerStream> {
-        let stream = match handle.checked_sub(FIRST_CALLED) {
+        let stream = match handle.checked_sub(FIRST_ASSIGNED_HANDLE) {
             None => self.streams.iter().find(|stream| stream.shared.has(handle)),
             // The first handles are those of this node.
             Some(offset) => {
-                let number = usize::try_from(offset / CALLED).ok()?.checked_sub(1)?;
+                let number = usize::try_from(offset / HANDLES_PER_NODE)
+                    .ok()?
+                    .checked_sub(1)?;
                 self.streams.get(number)
             }
         };
@@ -332,7 +334,7 @@ impl RemoteSeats {
             outbox: Arc::clone(&self.outbox),
             space: Arc::default(),
         };
-        let mut first_assigned_handle = FIRST_CALLED + (number + 1) * CALLED;
+        let mut first_assigned_handle = FIRST_ASSIGNED_HANDLE + (number + 1) * HANDLES_PER_NODE;
         let batches = ReceiverStream::new(waiting).ready_chunks(MAX_INPUTS_PER_MESSAGE);
         let requests = batches.map(move |inputs| {
             let first_assigned_handle = std::mem::take(&mut first_assigned_handle);

@@ -24,7 +24,7 @@ impl Room {
     /// Commits new changes if this takes no time.
     pub(super) fn commit_now(&mut self) -> bool {
         let metrics = &self.context.metrics;
-        self.observed.count_changes(&mut self.core, metrics);
+        self.telemetry.count_changes(&mut self.core, metrics);
         self.core.pending().is_empty() || self.journal.append_now(self.core.pending())
     }
 
@@ -159,7 +159,7 @@ impl Room {
     /// it.
     fn fail(&mut self, error: &StoreError) {
         let room = self.core.header().room_id;
-        self.releases.clear();
+        self.after_commit.clear();
         match (error, &self.context.lease) {
             (StoreError::Fenced(_), _) => info!(%room, %error, "the room stops here"),
             (_, Some(_)) => warn!(%room, %error, "the room stops until its node resumes it"),

@@ -12,7 +12,7 @@ use chefshat_room::{ConnectionId, ExpressError, JoinError, ReportOutcome};
 use tokio::sync::oneshot;
 use tokio::time::Instant;
 
-use super::{Release, Room, answer, is_connection};
+use super::{AfterCommit, Room, answer, is_connection};
 use crate::room::message::{
     Acted, AttachRequest, AttachedSeat, JoinRequest, Joined, MarkOutcome, MarkRequest, Message,
     NotAttached, ReportRefusal, SeatAction,
@@ -26,7 +26,7 @@ impl Room {
         match message {
             Message::Join(request, reply) => {
                 let joined = self.join(*request);
-                self.releases.push(Release::Join(reply, joined));
+                self.after_commit.push(AfterCommit::Join(reply, joined));
             }
             Message::Attach(request, reply) => self.attach(request, reply),
             Message::Lost(seat, connection, reason) => self.lost(seat, connection, reason),
@@ -37,7 +37,7 @@ impl Room {
                 match self.core.seat_of_ticket(&secret) {
                     Some(seat) => {
                         let acted = self.perform((seat, charged), action, arrived);
-                        self.releases.push(Release::Acted(reply, acted));
+                        self.after_commit.push(AfterCommit::Acted(reply, acted));
                     }
                     None => answer(reply, None),
                 }
@@ -46,9 +46,10 @@ impl Room {
                 self.start_hint(&secret, decision, id, reply);
             }
             Message::Spectate(request, reply) => {
-                self.releases.push(Release::Spectate(request, reply));
+                self.after_commit
+                    .push(AfterCommit::Spectate(request, reply));
             }
-            Message::Describe(reply) => self.releases.push(Release::Describe(reply)),
+            Message::Describe(reply) => self.after_commit.push(AfterCommit::Describe(reply)),
             Message::HasTicket(secrets, reply) => {
                 let seated = |secret: &[u8; 32]| self.core.seat_of_ticket(secret).is_some();
                 answer(reply, secrets.iter().any(seated));
@@ -67,7 +68,7 @@ impl Room {
                         .map(|connection| (connection.seat, connection.charged));
                     let seats = self.clients.seats_of(&self.core, connected, &owner);
                     self.core.close(self.now, seats);
-                    self.releases.push(Release::Closed(reply));
+                    self.after_commit.push(AfterCommit::Closed(reply));
                 } else {
                     answer(reply, None);
                 }
@@ -80,23 +81,27 @@ impl Room {
                     {
                         subscriber.detach(v1::DetachReason::Requested);
                     }
-                    self.releases.push(Release::Left(reply, left));
+                    self.after_commit.push(AfterCommit::Left(reply, left));
                 }
                 None => answer(reply, None),
             },
             Message::Report(secret, request, reply) => match self.report(&secret, *request) {
-                Some(Ok(outcome)) => self.releases.push(Release::Reported(reply, outcome)),
+                Some(Ok(outcome)) => self
+                    .after_commit
+                    .push(AfterCommit::Reported(reply, outcome)),
                 Some(Err(refusal)) => answer(reply, Some(Err(refusal))),
                 None => answer(reply, None),
             },
             Message::WatchTable(secret, reply) => match self.has_table(&secret) {
-                true => self.releases.push(Release::WatchTable(reply)),
+                true => self.after_commit.push(AfterCommit::WatchTable(reply)),
                 false => answer(reply, None),
             },
             Message::Mark(request, reply) => self.mark(*request, reply),
             Message::FollowMarkers(secret, position, reply) => {
                 match self.core.header().owner.matches(&secret) {
-                    true => self.releases.push(Release::FollowMarkers(position, reply)),
+                    true => self
+                        .after_commit
+                        .push(AfterCommit::FollowMarkers(position, reply)),
                     false => answer(reply, None),
                 }
             }
@@ -183,8 +188,8 @@ impl Room {
         if request.by_gateway {
             self.core.expect_delays(seat);
         }
-        self.releases
-            .push(Release::Attach(request, seat, connection, reply));
+        self.after_commit
+            .push(AfterCommit::Attach(request, seat, connection, reply));
     }
 
     fn lost(&mut self, seat: Seat, connection: ConnectionId, reason: Option<v1::DetachReason>) {
@@ -232,11 +237,11 @@ impl Room {
         };
         let by = (seat, current.charged.key);
         let release = match self.perform(by, action, arrived) {
-            Ok(Some(result)) => Release::Result(seat, connection, result),
+            Ok(Some(result)) => AfterCommit::Result(seat, connection, result),
             Ok(None) => return,
-            Err(error) => Release::Refuse(seat, connection, convert::express_refused(error)),
+            Err(error) => AfterCommit::Refuse(seat, connection, convert::express_refused(error)),
         };
-        self.releases.push(release);
+        self.after_commit.push(release);
     }
 
     /// Executes a command of a seat. Its sender is charged for what is stored that the game does not
@@ -251,7 +256,7 @@ impl Room {
         let may_store = |bytes: usize| context.may_store(charged, bytes);
         match action {
             SeatAction::Answer(mut answer) => {
-                self.observed.answer_read(arrived);
+                self.telemetry.answer_read(arrived);
                 // The decision counts without them.
                 answer.annotations_refused |= answer
                     .annotations
@@ -314,7 +319,7 @@ impl Room {
             return answer(reply, None);
         }
         match self.core.mark(self.now, request.marked) {
-            Ok(number) => self.releases.push(Release::Marked(reply, number)),
+            Ok(number) => self.after_commit.push(AfterCommit::Marked(reply, number)),
             Err(error) => answer(reply, Some(Err(error))),
         }
     }

@@ -9,7 +9,7 @@ use chefshat_room::ConnectionId;
 use chefshat_room::journal::ParticipantKind;
 use tokio::sync::oneshot;
 
-use super::{Release, Room, answer, is_connection};
+use super::{AfterCommit, Room, answer, is_connection};
 use crate::room::markers::MarkerLog;
 use crate::room::message::{
     AttachRequest, AttachedSeat, NotAttached, SpectateError, SpectateRequest,
@@ -64,11 +64,11 @@ impl Room {
             self.forget_unread();
         }
         self.public.follow(&self.core);
-        let mut releases = std::mem::take(&mut self.releases);
-        for release in releases.drain(..) {
+        let mut after_commit = std::mem::take(&mut self.after_commit);
+        for release in after_commit.drain(..) {
             self.release(release);
         }
-        self.releases = releases;
+        self.after_commit = after_commit;
         if let Some(table) = &self.table {
             table.follow(&self.core, self.now);
         }
@@ -76,9 +76,9 @@ impl Room {
             markers.follow(&self.core);
         }
         self.deliver();
-        self.observed.trace_decision(&self.core);
+        self.telemetry.trace_decision(&self.core);
         let metrics = &self.context.metrics;
-        self.observed.count_published(&self.core, metrics);
+        self.telemetry.count_published(&self.core, metrics);
     }
 
     /// Drops old events of a game without participants that no spectator waits for.
@@ -99,31 +99,31 @@ impl Room {
         self.core.drop_log_before(keep_from);
     }
 
-    fn release(&mut self, release: Release) {
+    fn release(&mut self, release: AfterCommit) {
         match release {
-            Release::Join(reply, joined) => answer(reply, joined),
-            Release::Attach(request, seat, connection, reply) => {
+            AfterCommit::Join(reply, joined) => answer(reply, joined),
+            AfterCommit::Attach(request, seat, connection, reply) => {
                 self.release_attach(*request, seat, connection, reply);
             }
-            Release::Result(seat, connection, result) => {
+            AfterCommit::Result(seat, connection, result) => {
                 if let Some(subscriber) = self.current(seat, connection) {
                     subscriber.send_result(result);
                     self.always_visit[seat.index()] = true;
                 }
             }
-            Release::Refuse(seat, connection, refused) => {
+            AfterCommit::Refuse(seat, connection, refused) => {
                 if let Some(subscriber) = self.current(seat, connection) {
                     subscriber.refuse(refused);
                     self.always_visit[seat.index()] = true;
                 }
             }
-            Release::Acted(reply, acted) => answer(reply, Some(acted)),
-            Release::Hint(reply, hint) => answer(reply, Some(Ok(hint))),
-            Release::Closed(reply) => answer(reply, Some(convert::describe(&self.core))),
-            Release::Left(reply, left) => {
+            AfterCommit::Acted(reply, acted) => answer(reply, Some(acted)),
+            AfterCommit::Hint(reply, hint) => answer(reply, Some(Ok(hint))),
+            AfterCommit::Closed(reply) => answer(reply, Some(convert::describe(&self.core))),
+            AfterCommit::Left(reply, left) => {
                 answer(reply, Some(left.map(|()| convert::describe(&self.core))));
             }
-            Release::Describe(reply) => {
+            AfterCommit::Describe(reply) => {
                 let watching = (self.spectators.iter())
                     .filter(|it| !it.is_abandoned())
                     .count();
@@ -133,26 +133,26 @@ impl Room {
                 };
                 answer(reply, room);
             }
-            Release::Spectate(request, reply) => answer(reply, self.spectate(*request)),
-            Release::Reported(reply, outcome) => {
+            AfterCommit::Spectate(request, reply) => answer(reply, self.spectate(*request)),
+            AfterCommit::Reported(reply, outcome) => {
                 let state = (self.table.as_ref()).map(|table| table.state(&self.core, self.now));
                 let state = state.map_or_else(v1::TableState::default, Arc::unwrap_or_clone);
                 let response = convert::report_response(&outcome, state);
                 answer(reply, Some(Ok(Box::new(response))));
             }
-            Release::Marked(reply, number) => {
+            AfterCommit::Marked(reply, number) => {
                 let marker = &self.core.markers()[number - 1];
                 let marker = convert::marker_to_proto(number - 1, marker);
                 answer(reply, Some(Ok(marker)));
             }
-            Release::FollowMarkers(position, reply) => {
+            AfterCommit::FollowMarkers(position, reply) => {
                 let core = &self.core;
                 let log = (self.markers).get_or_insert_with(|| Box::new(MarkerLog::new(core)));
                 log.follow(core);
                 let following = log.subscribe(position).ok_or(SpectateError::Full);
                 answer(reply, Some(following));
             }
-            Release::WatchTable(reply) => {
+            AfterCommit::WatchTable(reply) => {
                 let watching = (self.table.as_ref())
                     .and_then(|table| table.watch(&self.core, self.now))
                     .ok_or(SpectateError::Full);
@@ -204,11 +204,11 @@ impl Room {
     /// The number of the newest connection of a seat, attached or about to be.
     pub(super) fn holder(&self, seat: Seat) -> Option<u64> {
         let mut attaching = self
-            .releases
+            .after_commit
             .iter()
             .rev()
             .filter_map(|release| match release {
-                Release::Attach(_, of, connection, _) if *of == seat => Some(connection.0),
+                AfterCommit::Attach(_, of, connection, _) if *of == seat => Some(connection.0),
                 _ => None,
             });
         let attached = || {

@@ -12,7 +12,7 @@ use tracing::{Span, debug, debug_span, info_span};
 use chefshat_base::metrics::{Counted, Metrics, Outcome};
 
 /// What has been counted and traced of a room.
-pub(super) struct Observed {
+pub(super) struct RoomTelemetry {
     /// Number of changes that the metrics include.
     counted_changes: u64,
     /// The state as which the room is counted.
@@ -25,7 +25,7 @@ pub(super) struct Observed {
     traced: (Option<(Seat, u64)>, Span),
 }
 
-impl Observed {
+impl RoomTelemetry {
     /// Counts a room and opens its span. Its changes so far have been counted.
     pub(super) fn new(core: &Core, metrics: &Metrics) -> Self {
         let (state, header) = (core.state(), core.header());

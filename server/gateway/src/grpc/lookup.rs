@@ -14,7 +14,7 @@ use super::status::{
     elsewhere, owner_unreachable, read_failed, room_gone, room_unknown, tournament_unknown,
 };
 use super::takeover::settled;
-use chefshat_admission::access::{Caller, Role, Standing};
+use chefshat_admission::access::{Caller, Relation, Role};
 use chefshat_admission::limits::Key;
 use chefshat_hosting::cluster::{Elsewhere, FoundBy, Location};
 use chefshat_hosting::room::Handle;
@@ -27,21 +27,21 @@ use chefshat_store::{StoreError, StoredGame};
 
 /// Decides what a caller reaches.
 #[derive(Debug, Clone)]
-pub struct Reach {
+pub struct Lookup {
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
 }
 
 /// How much of a record its reader sees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Sight {
+pub(super) enum RecordView {
     /// Everything.
     Whole,
     /// What the players saw.
     Players,
 }
 
-impl Reach {
+impl Lookup {
     /// Decides about these rooms and tournaments.
     pub fn new(rooms: Arc<Rooms>, tournaments: Arc<Tournaments>) -> Self {
         Self { rooms, tournaments }
@@ -75,7 +75,7 @@ impl Reach {
         }
     }
 
-    /// The tournament with this id or join code, as [`Reach::room_here`].
+    /// The tournament with this id or join code, as [`Lookup::room_here`].
     pub(super) async fn tournament_here(
         &self,
         found_by: impl Into<FoundBy>,
@@ -174,7 +174,7 @@ impl Reach {
         // A node that has just stopped it is about to resume it, or another is.
         let header = self.rooms.header(id).ok_or_else(room_gone)?;
         if header.policy.visibility == Visibility::Private
-            && self.standing_in_room(caller, &handle, &header).await == Standing::Stranger
+            && self.standing_in_room(caller, &handle, &header).await == Relation::Stranger
         {
             return Err(unknown());
         }
@@ -203,7 +203,7 @@ impl Reach {
         settled(&self.rooms, look).await
     }
 
-    /// As [`Reach::room_of_ticket`], without waiting.
+    /// As [`Lookup::room_of_ticket`], without waiting.
     pub(super) async fn look_for_ticket(
         &self,
         caller: &Caller,
@@ -237,7 +237,7 @@ impl Reach {
         };
         reaches(caller, &header)
             && (header.policy.visibility == Visibility::Public
-                || self.standing_in_room(caller, handle, &header).await > Standing::Stranger)
+                || self.standing_in_room(caller, handle, &header).await > Relation::Stranger)
     }
 
     /// The tournament with an id from a message.
@@ -250,7 +250,7 @@ impl Reach {
         let handle = self.tournament_here(id, Key::of_caller(caller)).await?;
         let handle = handle.ok_or_else(tournament_unknown)?;
         if handle.visibility() == Visibility::Private
-            && standing_in_tournament(caller, &handle) == Standing::Stranger
+            && standing_in_tournament(caller, &handle) == Relation::Stranger
         {
             return Err(tournament_unknown());
         }
@@ -278,7 +278,7 @@ impl Reach {
     pub(super) fn lists_tournament(&self, caller: &Caller, handle: &TournamentHandle) -> bool {
         caller.reaches_tournament(handle.id())
             && (handle.visibility() == Visibility::Public
-                || standing_in_tournament(caller, handle) > Standing::Stranger)
+                || standing_in_tournament(caller, handle) > Relation::Stranger)
     }
 
     /// Whether a caller may be one who sees a recorded game, by its summary alone. If not, the game is
@@ -287,7 +287,7 @@ impl Reach {
         let is_private = summary.visibility() == v1::Visibility::Private;
         let ids = [&summary.room_id, &summary.tournament_id, &summary.study_id];
         let mut ids = ids.into_iter().filter_map(|id| Id::parse(id));
-        let by_token = caller.standing() > Standing::Stranger
+        let by_token = caller.relation() > Relation::Stranger
             && reaches_record(caller, &summary.room_id, &summary.tournament_id);
         !is_private || summary.added || by_token || ids.any(|id| caller.secrets.mention(id))
     }
@@ -298,17 +298,17 @@ impl Reach {
         caller: &Caller,
         stored: &StoredGame,
         unknown: impl Fn() -> Status,
-    ) -> Result<Sight, Status> {
-        let (visibility, standing, least) = match stored {
+    ) -> Result<RecordView, Status> {
+        let (visibility, relation, least) = match stored {
             StoredGame::Hosted(header, entries, _) => {
-                let standing = self.standing_in_game(caller, header, entries);
-                (header.policy.visibility, standing, least_to_read(header))
+                let relation = self.relation_in_game(caller, header, entries);
+                (header.policy.visibility, relation, least_to_read(header))
             }
             // Importing it made it public.
-            StoredGame::Imported(_) => (Visibility::Public, Standing::Stranger, Standing::Stranger),
+            StoredGame::Imported(_) => (Visibility::Public, Relation::Stranger, Relation::Stranger),
         };
         let is_private = visibility == Visibility::Private;
-        if is_private && standing < least {
+        if is_private && relation < least {
             return Err(unknown());
         }
         check(caller, |caller| match stored {
@@ -322,9 +322,9 @@ impl Reach {
             }
         })?;
         let is_host = caller.role >= Role::Host && !is_private;
-        Ok(match is_host || standing == Standing::Owner {
-            true => Sight::Whole,
-            false => Sight::Players,
+        Ok(match is_host || relation == Relation::Owner {
+            true => RecordView::Whole,
+            false => RecordView::Players,
         })
     }
 
@@ -338,13 +338,13 @@ impl Reach {
             return Ok(false);
         }
         let is_public = summary.visibility() == v1::Visibility::Unspecified;
-        if is_public || summary.added || caller.standing() > Standing::Stranger {
+        if is_public || summary.added || caller.relation() > Relation::Stranger {
             return Ok(true);
         }
         let tournament = Id::parse(&summary.tournament_id);
         let kept = tournament.and_then(|id| self.tournaments.get(id));
-        let standing = kept.as_ref().map(|it| it.standing(&caller.secrets));
-        if standing > Some(Standing::Stranger) {
+        let relation = kept.as_ref().map(|it| it.relation(&caller.secrets));
+        if relation > Some(Relation::Stranger) {
             return Ok(true);
         }
         // Reading a game takes time: only those that a secret may be of are read. The games of a
@@ -370,7 +370,7 @@ impl Reach {
         };
         Ok(match stored {
             Some(StoredGame::Hosted(header, entries, _)) => {
-                self.standing_in_game(caller, &header, &entries) >= least_to_read(&header)
+                self.relation_in_game(caller, &header, &entries) >= least_to_read(&header)
             }
             Some(StoredGame::Imported(_)) | None => false,
         })
@@ -381,10 +381,10 @@ impl Reach {
         caller: &Caller,
         handle: &Handle,
         header: &GameHeader,
-    ) -> Standing {
-        let standing = self.standing_by_header(caller, header);
-        if standing > Standing::Stranger {
-            return standing;
+    ) -> Relation {
+        let relation = self.relation_by_header(caller, header);
+        if relation > Relation::Stranger {
+            return relation;
         }
         let ids = [Some(header.room_id), tournament_of(header)];
         let secrets: Vec<_> = (ids.into_iter().flatten())
@@ -392,17 +392,17 @@ impl Reach {
             .map(|token| token.secret)
             .collect();
         match !secrets.is_empty() && handle.has_ticket(secrets).await.unwrap_or(false) {
-            true => Standing::Participant,
-            false => Standing::Stranger,
+            true => Relation::Participant,
+            false => Relation::Stranger,
         }
     }
 
-    fn standing_in_game(
+    fn relation_in_game(
         &self,
         caller: &Caller,
         header: &GameHeader,
         entries: &[Entry],
-    ) -> Standing {
+    ) -> Relation {
         let mut tickets = BTreeMap::new();
         for entry in entries {
             match &entry.change {
@@ -415,14 +415,14 @@ impl Reach {
         }
         let ids = [Some(header.room_id), tournament_of(header)];
         let by_ticket = (ids.into_iter().flatten())
-            .map(|id| (caller.secrets).standing(id, &header.owner, tickets.values().copied()));
-        let standing = self.standing_by_header(caller, header);
-        by_ticket.max().map_or(standing, |it| it.max(standing))
+            .map(|id| (caller.secrets).relation(id, &header.owner, tickets.values().copied()));
+        let relation = self.relation_by_header(caller, header);
+        by_ticket.max().map_or(relation, |it| it.max(relation))
     }
 
     /// Whether a caller shows the owner token of a room, or of its tournament or study.
     pub(super) fn is_owner(&self, caller: &Caller, header: &GameHeader) -> bool {
-        self.standing_by_header(&caller.by_secrets(), header) == Standing::Owner
+        self.relation_by_header(&caller.by_secrets(), header) == Relation::Owner
     }
 
     /// Whether this is the owner token of a room, or of its tournament or study.
@@ -436,51 +436,51 @@ impl Reach {
             return false;
         };
         let caller = caller.by_secrets();
-        self.standing_in_room(&caller, handle, &header).await > Standing::Stranger
+        self.standing_in_room(&caller, handle, &header).await > Relation::Stranger
     }
 
     /// What a caller is to a game by its token, and by what is known before the game starts.
-    fn standing_by_header(&self, caller: &Caller, header: &GameHeader) -> Standing {
+    fn relation_by_header(&self, caller: &Caller, header: &GameHeader) -> Relation {
         let by_token = match reaches(caller, header) {
-            true => caller.standing(),
-            false => Standing::Stranger,
+            true => caller.relation(),
+            false => Relation::Stranger,
         };
         let secrets = &caller.secrets;
-        let by_room = secrets.standing(header.room_id, &header.owner, header.table.into_iter());
+        let by_room = secrets.relation(header.room_id, &header.owner, header.table.into_iter());
         // The owner token of a tournament or a study stands for that of each of its rooms.
         let by_owner_of = |id| match secrets.of_id(id).any(|token| {
             let owner = Token::of_tournament_room(header.room_id, &token.hash());
             header.owner.is(&owner.hash())
         }) {
-            true => Standing::Owner,
-            false => Standing::Stranger,
+            true => Relation::Owner,
+            false => Relation::Stranger,
         };
         let by_tournament = tournament_of(header).map(|id| match self.tournaments.get(id) {
-            Some(tournament) => tournament.standing(secrets),
+            Some(tournament) => tournament.relation(secrets),
             // The server keeps the games of a tournament longer than the tournament.
             None => by_owner_of(id),
         });
         let by_study = header.study.as_ref().map(|game| by_owner_of(game.study));
         by_token
             .max(by_room)
-            .max(by_tournament.unwrap_or(Standing::Stranger))
-            .max(by_study.unwrap_or(Standing::Stranger))
+            .max(by_tournament.unwrap_or(Relation::Stranger))
+            .max(by_study.unwrap_or(Relation::Stranger))
     }
 }
 
-fn standing_in_tournament(caller: &Caller, tournament: &TournamentHandle) -> Standing {
+fn standing_in_tournament(caller: &Caller, tournament: &TournamentHandle) -> Relation {
     let by_token = match caller.reaches_tournament(tournament.id()) {
-        true => caller.standing(),
-        false => Standing::Stranger,
+        true => caller.relation(),
+        false => Relation::Stranger,
     };
-    by_token.max(tournament.standing(&caller.secrets))
+    by_token.max(tournament.relation(&caller.secrets))
 }
 
 /// What a caller must be to a private game to read its record. That of a study names the condition.
-fn least_to_read(header: &GameHeader) -> Standing {
+fn least_to_read(header: &GameHeader) -> Relation {
     match header.study {
-        Some(_) => Standing::Owner,
-        None => Standing::Participant,
+        Some(_) => Relation::Owner,
+        None => Relation::Participant,
     }
 }
 

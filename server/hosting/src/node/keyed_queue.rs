@@ -10,19 +10,19 @@ use tokio::sync::oneshot::error::TryRecvError;
 
 /// The end of the latest work with each unit.
 #[derive(Default)]
-pub(super) struct Turns(BTreeMap<Id, oneshot::Receiver<Infallible>>);
+pub(super) struct KeyedQueue(BTreeMap<Id, oneshot::Receiver<Infallible>>);
 
 /// A place in the order of a unit. Dropping it lets the next one come.
-pub(super) struct Turn {
+pub(super) struct Queued {
     before: Option<oneshot::Receiver<Infallible>>,
     _ends: oneshot::Sender<Infallible>,
 }
 
-impl Turns {
+impl KeyedQueue {
     /// The place after all that were taken for the unit.
-    pub(super) fn take(&mut self, unit: Id) -> Turn {
+    pub(super) fn take(&mut self, unit: Id) -> Queued {
         let (ends, ended) = oneshot::channel();
-        Turn {
+        Queued {
             before: self.0.insert(unit, ended),
             _ends: ends,
         }
@@ -48,7 +48,7 @@ impl Turns {
     }
 }
 
-impl Turn {
+impl Queued {
     /// Waits until all before it have ended.
     pub(super) async fn comes(&mut self) {
         if let Some(before) = self.before.take() {
@@ -67,24 +67,24 @@ mod tests {
     #[test]
     fn one_comes_after_another_and_units_without_work_are_forgotten() {
         let (unit, other) = (Id([1; 16]), Id([2; 16]));
-        let mut turns = Turns::default();
-        let (first, mut second) = (turns.take(unit), turns.take(unit));
-        drop(turns.take(other));
+        let mut queue = KeyedQueue::default();
+        let (first, mut second) = (queue.take(unit), queue.take(unit));
+        drop(queue.take(other));
         assert_eq!(second.comes().now_or_never(), None);
-        turns.forget_ended();
-        assert!(turns.0.keys().eq([&unit]));
-        assert!(!turns.is_idle(unit) && turns.is_idle(other));
+        queue.forget_ended();
+        assert!(queue.0.keys().eq([&unit]));
+        assert!(!queue.is_idle(unit) && queue.is_idle(other));
 
         drop(first);
         assert_eq!(second.comes().now_or_never(), Some(()));
-        turns.forget_ended();
-        assert!(turns.0.keys().eq([&unit]), "the second remains");
+        queue.forget_ended();
+        assert!(queue.0.keys().eq([&unit]), "the second remains");
         drop(second);
-        assert!(turns.is_idle(unit));
-        let mut third = turns.take(unit);
+        assert!(queue.is_idle(unit));
+        let mut third = queue.take(unit);
         assert_eq!(third.comes().now_or_never(), Some(()));
         drop(third);
-        turns.forget_ended();
-        assert!(turns.0.is_empty());
+        queue.forget_ended();
+        assert!(queue.0.is_empty());
     }
 }

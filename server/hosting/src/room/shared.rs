@@ -8,15 +8,15 @@ use tracing::error;
 /// Holds the state of a room while its task waits. Meanwhile the reader of a stream may handle an
 /// answer in place, which saves a message and waking the task: a large part of the cost of a
 /// decision.
-pub(super) struct Resting<R>(Mutex<Option<Box<R>>>);
+pub(super) struct SharedRoom<R>(Mutex<Option<Box<R>>>);
 
-impl<R> Default for Resting<R> {
+impl<R> Default for SharedRoom<R> {
     fn default() -> Self {
         Self(Mutex::default())
     }
 }
 
-impl<R> Resting<R> {
+impl<R> SharedRoom<R> {
     pub(super) fn lock(&self) -> MutexGuard<'_, Option<Box<R>>> {
         self.0
             .lock()
@@ -31,10 +31,10 @@ impl<R> Resting<R> {
         may: impl FnOnce(&R) -> bool,
         handle: impl FnOnce(&mut R, I) -> bool,
     ) -> Result<bool, I> {
-        let Ok(mut resting) = self.0.try_lock() else {
+        let Ok(mut shared) = self.0.try_lock() else {
             return Err(input);
         };
-        let Some(mut room) = resting.take_if(|room| may(room)) else {
+        let Some(mut room) = shared.take_if(|room| may(room)) else {
             return Err(input);
         };
         // A panic ends the room, but not the stream of a reader that may have seats in other rooms.
@@ -44,7 +44,7 @@ impl<R> Resting<R> {
         }));
         match handled {
             Ok((room, needs_task)) => {
-                *resting = Some(room);
+                *shared = Some(room);
                 Ok(needs_task)
             }
             Err(_) => {

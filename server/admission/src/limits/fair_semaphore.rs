@@ -1,5 +1,5 @@
-//! A limited number of places, shared by all callers: nobody has more than its share, and those
-//! that wait get the next free place in turns, one caller after another.
+//! A limited number of permits, shared by all callers: nobody has more than its share, and those
+//! that wait get the next free permit in turns, one caller after another.
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -12,9 +12,9 @@ use super::{Key, Shares};
 /// Longest time that a call waits until its caller may make another one.
 pub const MAX_WAIT: Duration = Duration::from_secs(5);
 
-/// Places for connections, streams, rooms, calls, or turns of work.
+/// Permits for connections, streams, rooms, calls, or turns of work.
 #[derive(Debug)]
-pub struct Places {
+pub struct FairSemaphore {
     total: usize,
     shares: Shares,
     state: Mutex<State>,
@@ -23,22 +23,22 @@ pub struct Places {
 #[derive(Debug, Default)]
 struct State {
     taken: usize,
-    /// Callers that have places or wait for one.
+    /// Callers that have permits or wait for one.
     callers: HashMap<Key, Caller>,
     /// Callers that wait, in the order of their next turn.
     turns: VecDeque<Key>,
     /// Number of the next one that waits.
     next: u64,
-    /// Whether the next turn needs more places than are free. Then nobody else takes any before.
+    /// Whether the next turn needs more permits than are free. Then nobody else takes any before.
     reserved: bool,
 }
 
 #[derive(Debug, Default)]
 struct Caller {
     taken: usize,
-    /// Those that wait, by number, and for how many places. A flood makes this long: nothing may
+    /// Those that wait, by number, and for how many permits. A flood makes this long: nothing may
     /// search it.
-    waiting: BTreeMap<u64, (usize, oneshot::Sender<Held>)>,
+    waiting: BTreeMap<u64, (usize, oneshot::Sender<Permit>)>,
 }
 
 impl State {
@@ -51,8 +51,8 @@ impl State {
     }
 }
 
-impl Places {
-    /// Creates places.
+impl FairSemaphore {
+    /// Creates permits.
     pub fn new(total: usize, shares: Shares) -> Arc<Self> {
         Arc::new(Self {
             total,
@@ -61,50 +61,50 @@ impl Places {
         })
     }
 
-    /// Number of places, taken or free.
+    /// Number of permits, taken or free.
     pub fn total(&self) -> usize {
         self.total
     }
 
-    /// The most places that one caller may have.
+    /// The most permits that one caller may have.
     pub fn share_of(&self, key: Key) -> usize {
         self.shares.of(key, self.total)
     }
 
-    /// Number of taken places.
+    /// Number of taken permits.
     pub fn taken(&self) -> usize {
         self.lock().taken
     }
 
-    /// Takes a place if one is free, the caller's share is not used up, and the caller does not
+    /// Takes a permit if one is free, the caller's share is not used up, and the caller does not
     /// wait for another one.
-    pub fn try_take(self: &Arc<Self>, key: Key) -> Option<Held> {
+    pub fn try_take(self: &Arc<Self>, key: Key) -> Option<Permit> {
         self.try_take_many(key, 1)
     }
 
-    /// Takes a place for what exists already, also if none is free: nobody else gets one until there
+    /// Takes a permit for what exists already, also if none is free: nobody else gets one until there
     /// are fewer.
-    pub fn take_anyway(self: &Arc<Self>, key: Key) -> Held {
+    pub fn take_anyway(self: &Arc<Self>, key: Key) -> Permit {
         self.take_many_anyway(key, 1)
     }
 
-    /// Takes this number of places in the same way.
-    pub fn take_many_anyway(self: &Arc<Self>, key: Key, count: usize) -> Held {
+    /// Takes this number of permits in the same way.
+    pub fn take_many_anyway(self: &Arc<Self>, key: Key, count: usize) -> Permit {
         self.hold(&mut self.lock(), key, count)
     }
 
-    /// Takes this number of places, or none.
-    pub fn try_take_many(self: &Arc<Self>, key: Key, count: usize) -> Option<Held> {
+    /// Takes this number of permits, or none.
+    pub fn try_take_many(self: &Arc<Self>, key: Key, count: usize) -> Option<Permit> {
         self.take_now(&mut self.lock(), key, count)
     }
 
-    /// Waits for a place.
-    pub async fn take(self: &Arc<Self>, key: Key) -> Held {
+    /// Waits for a permit.
+    pub async fn take(self: &Arc<Self>, key: Key) -> Permit {
         self.take_many(key, 1).await
     }
 
-    /// Waits for this number of places, or for as many as the caller may have at all.
-    pub async fn take_many(self: &Arc<Self>, key: Key, count: usize) -> Held {
+    /// Waits for this number of permits, or for as many as the caller may have at all.
+    pub async fn take_many(self: &Arc<Self>, key: Key, count: usize) -> Permit {
         let count = count.min(self.share_of(key));
         let (granted, _waiting) = {
             let mut state = self.lock();
@@ -131,7 +131,7 @@ impl Places {
         granted.await.expect("those that wait stay in the queue")
     }
 
-    fn take_now(self: &Arc<Self>, state: &mut State, key: Key, count: usize) -> Option<Held> {
+    fn take_now(self: &Arc<Self>, state: &mut State, key: Key, count: usize) -> Option<Permit> {
         let waits = (state.callers.get(&key)).is_some_and(|caller| !caller.waiting.is_empty());
         let free = !waits && !state.reserved && state.taken + count <= self.total;
         (free && self.has_share(state, key, count)).then(|| self.hold(state, key, count))
@@ -142,18 +142,18 @@ impl Places {
         own + count <= self.share_of(key)
     }
 
-    fn hold(self: &Arc<Self>, state: &mut State, key: Key, count: usize) -> Held {
+    fn hold(self: &Arc<Self>, state: &mut State, key: Key, count: usize) -> Permit {
         state.taken += count;
         state.callers.entry(key).or_default().taken += count;
-        Held {
+        Permit {
             places: Arc::clone(self),
             key,
             count,
         }
     }
 
-    /// Gives a free place to the next one that waits.
-    fn grant(self: &Arc<Self>, state: &mut State) -> Option<(oneshot::Sender<Held>, Held)> {
+    /// Gives a free permit to the next one that waits.
+    fn grant(self: &Arc<Self>, state: &mut State) -> Option<(oneshot::Sender<Permit>, Permit)> {
         state.reserved = false;
         let first = |key| state.callers.get(key)?.waiting.values().next();
         let mut turns = (state.turns.iter().enumerate())
@@ -174,8 +174,8 @@ impl Places {
         Some((sender, self.hold(state, key, count)))
     }
 
-    /// Grants places to those that wait as long as there are enough.
-    fn grant_all(self: &Arc<Self>, state: &mut State) -> Vec<(oneshot::Sender<Held>, Held)> {
+    /// Grants permits to those that wait as long as there are enough.
+    fn grant_all(self: &Arc<Self>, state: &mut State) -> Vec<(oneshot::Sender<Permit>, Permit)> {
         std::iter::from_fn(|| self.grant(state)).collect()
     }
 
@@ -196,23 +196,23 @@ impl Places {
     }
 }
 
-fn send(granted: Vec<(oneshot::Sender<Held>, Held)>) {
+fn send(granted: Vec<(oneshot::Sender<Permit>, Permit)>) {
     for (sender, held) in granted {
-        // If it has just given up, the places are freed again here.
+        // If it has just given up, the permits are freed again here.
         let _ = sender.send(held);
     }
 }
 
-/// Places, free again when dropped.
+/// Permits, free again when dropped.
 #[derive(Debug)]
-pub struct Held {
-    places: Arc<Places>,
+pub struct Permit {
+    places: Arc<FairSemaphore>,
     key: Key,
     count: usize,
 }
 
-impl Held {
-    /// Gives back all but `count` places.
+impl Permit {
+    /// Gives back all but `count` permits.
     pub fn keep(&mut self, count: usize) {
         let freed = self.count.saturating_sub(count);
         if freed > 0 {
@@ -222,7 +222,7 @@ impl Held {
     }
 }
 
-impl Drop for Held {
+impl Drop for Permit {
     fn drop(&mut self) {
         self.places.free(self.key, self.count);
     }
@@ -230,7 +230,7 @@ impl Drop for Held {
 
 /// One that waits. When dropped, it waits no longer.
 struct Waiting<'a> {
-    places: &'a Arc<Places>,
+    places: &'a Arc<FairSemaphore>,
     key: Key,
     number: u64,
 }
@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn nobody_has_more_than_its_share_and_a_dropped_place_is_free() {
-        let places = Places::new(4, SHARES);
+        let places = FairSemaphore::new(4, SHARES);
         let first = places.try_take(key(1)).expect("free");
         let _second = places.try_take(key(1)).expect("free");
         assert!(places.try_take(key(1)).is_none(), "its share is used up");
@@ -290,7 +290,7 @@ mod tests {
 
     #[test]
     fn several_places_are_taken_together_or_not_at_all() {
-        let places = Places::new(8, SHARES);
+        let places = FairSemaphore::new(8, SHARES);
         let first = places.try_take_many(key(1), 3).expect("free");
         assert!(
             places.try_take_many(key(1), 2).is_none(),
@@ -306,7 +306,7 @@ mod tests {
 
     #[tokio::test]
     async fn those_that_give_up_leave_nothing() {
-        let places = Places::new(2, SHARES);
+        let places = FairSemaphore::new(2, SHARES);
         let held = places.try_take_many(key(1), 1).expect("free");
         let mut waiting: Vec<_> = (0..3).map(|_| Box::pin(places.take(key(1)))).collect();
         for take in &mut waiting {
@@ -322,7 +322,7 @@ mod tests {
 
     #[tokio::test]
     async fn many_places_are_waited_for_and_nobody_overtakes() {
-        let places = Places::new(8, SHARES);
+        let places = FairSemaphore::new(8, SHARES);
         let mut first = places.try_take_many(key(1), 4).expect("free");
         let second = places.try_take_many(key(2), 2).expect("free");
         let mut third = Box::pin(places.take_many(key(3), 4));
@@ -354,7 +354,7 @@ mod tests {
 
     #[tokio::test]
     async fn those_that_wait_get_places_in_turns() {
-        let places = Places::new(1, SHARES);
+        let places = FairSemaphore::new(1, SHARES);
         let held = places.try_take(key(1)).expect("free");
         let mut waiting: Vec<_> = [(1, 'a'), (1, 'b'), (2, 'c'), (2, 'd')]
             .into_iter()

@@ -16,9 +16,9 @@ const FEW_PIECES: usize = 64;
 
 /// Runs work on blocking threads, at most [`MAX_CONCURRENT_RECORDS`] pieces at a time.
 #[derive(Clone)]
-pub(super) struct Codec(Arc<Semaphore>);
+pub(super) struct DecodePool(Arc<Semaphore>);
 
-impl Codec {
+impl DecodePool {
     pub(super) fn new() -> Self {
         Self(Arc::new(Semaphore::new(MAX_CONCURRENT_RECORDS)))
     }

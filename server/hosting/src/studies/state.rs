@@ -1,0 +1,52 @@
+//! What is shared besides the state of a study: by its readers, and by all studies of a server.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::atomic::AtomicU64;
+use std::sync::{Arc, Mutex};
+
+use tokio::sync::{Mutex as AsyncMutex, watch};
+
+use super::data::StudyData;
+use chefshat_admission::limits::{FairSemaphore, Permit};
+use chefshat_base::clock::TimeOfDay;
+use chefshat_room::ids::Id;
+
+/// What all studies of a server share.
+#[derive(Debug)]
+pub struct Budgets {
+    pub(super) now: TimeOfDay,
+    /// The memory of their settings, in KiB.
+    pub(super) memory: Arc<FairSemaphore>,
+    /// The memory of their participants and answers, in bytes.
+    pub(super) data: Arc<FairSemaphore>,
+}
+
+/// What readers of a study share besides its state.
+#[derive(Debug)]
+pub struct StudyShared {
+    /// The memory of its settings.
+    pub(super) _memory: Permit,
+    /// The memory of its participants and answers.
+    pub(super) data: Arc<StudyData>,
+    /// Counts the changes of each participant to whom somebody has listened.
+    pub(super) views: Mutex<BTreeMap<u32, watch::Sender<u64>>>,
+    /// Participants whose data are being deleted.
+    pub(super) deleting: Mutex<BTreeSet<u32>>,
+    /// Number of interface traces by game, since the server was started. Locked while traces are
+    /// added or deleted.
+    pub(super) traces: AsyncMutex<BTreeMap<Id, usize>>,
+    pub(super) streams: AtomicU64,
+}
+
+impl StudyShared {
+    pub(super) fn new(memory: Permit, data: Arc<StudyData>) -> Self {
+        Self {
+            _memory: memory,
+            data,
+            views: Mutex::default(),
+            deleting: Mutex::default(),
+            traces: AsyncMutex::default(),
+            streams: AtomicU64::new(0),
+        }
+    }
+}
