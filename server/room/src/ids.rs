@@ -85,32 +85,32 @@ impl SecretHash {
     }
 }
 
-/// A secret that belongs to a room, such as a ticket or an owner token: the room's id and 256
-/// random bits, written as 96 hexadecimal digits, so that no command line mistakes it for an
+/// A secret that belongs to a room, tournament or study, such as a ticket or an owner token: its id
+/// and 256 random bits, written as 96 hexadecimal digits, so that no command line mistakes it for an
 /// option.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Token {
-    /// The room it belongs to.
-    pub room: Id,
+    /// What it belongs to.
+    pub subject: Id,
     /// The secret.
     pub secret: [u8; 32],
 }
 
 impl Token {
-    /// A new token for a room.
-    pub fn random(room: Id) -> Self {
+    /// A new token.
+    pub fn random(subject: Id) -> Self {
         Self {
-            room,
+            subject,
             secret: random_bytes(),
         }
     }
 
     /// The ticket for a request with an id chosen by the client: the same for every repetition.
     /// Only the server knows `key`.
-    pub fn of_request(room: Id, key: &SecretHash, request_id: &[u8; 32]) -> Self {
-        let parts = [key.bytes().as_slice(), &room.0, request_id];
+    pub fn of_request(subject: Id, key: &SecretHash, request_id: &[u8; 32]) -> Self {
+        let parts = [key.bytes().as_slice(), &subject.0, request_id];
         Self {
-            room,
+            subject,
             secret: digest(b"chefshat.v1 ticket", &parts),
         }
     }
@@ -119,7 +119,7 @@ impl Token {
     /// and the tournament's owner know `key`, the hash of the tournament's owner token.
     pub fn of_tournament_room(room: Id, key: &SecretHash) -> Self {
         Self {
-            room,
+            subject: room,
             secret: digest(b"chefshat.v1 tournament room", &[key.bytes(), &room.0]),
         }
     }
@@ -127,7 +127,7 @@ impl Token {
     /// The ticket of the physical table of a room, which follows from the owner token.
     pub fn of_table(owner: &Self) -> Self {
         Self {
-            room: owner.room,
+            subject: owner.subject,
             secret: digest(b"chefshat.v1 table", &[&owner.secret]),
         }
     }
@@ -136,16 +136,16 @@ impl Token {
     pub fn parse(word: &str) -> Option<Self> {
         let mut bytes = [0; 48];
         hex::decode_to_slice(word, &mut bytes).ok()?;
-        let (room, secret) = bytes.split_at(16);
+        let (subject, secret) = bytes.split_at(16);
         Some(Self {
-            room: Id(room.try_into().ok()?),
+            subject: Id(subject.try_into().ok()?),
             secret: secret.try_into().ok()?,
         })
     }
 
     /// The token as text, for the client.
     pub fn to_text(&self) -> String {
-        hex::encode([self.room.0.as_slice(), &self.secret].concat())
+        hex::encode([self.subject.0.as_slice(), &self.secret].concat())
     }
 
     /// The hash to store.
@@ -156,7 +156,7 @@ impl Token {
 
 impl fmt::Debug for Token {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(formatter, "Token({}, secret withheld)", self.room)
+        write!(formatter, "Token({}, secret withheld)", self.subject)
     }
 }
 
@@ -191,7 +191,7 @@ impl RequestKey {
     /// other content gets another token.
     pub fn owner(&self) -> Token {
         Token {
-            room: self.created_id(),
+            subject: self.created_id(),
             secret: digest(b"chefshat.v1 owner", &[&self.id, &self.content]),
         }
     }
@@ -266,7 +266,7 @@ mod tests {
         let request = RequestKey::new([1; 32], b"content");
         let table = Token::of_table(&request.owner());
         assert_eq!(table, Token::of_table(&request.owner()));
-        assert!(table.room == request.created_id() && table != request.owner());
+        assert!(table.subject == request.created_id() && table != request.owner());
         assert_eq!(
             request.owner(),
             RequestKey::new([1; 32], b"content").owner()

@@ -70,7 +70,7 @@ impl Secrets {
 
     /// The secrets of a room or tournament.
     pub fn of_id(&self, id: Id) -> impl Iterator<Item = &Token> {
-        self.all().iter().filter(move |token| token.room == id)
+        self.all().iter().filter(move |token| token.subject == id)
     }
 
     /// Whether one of them is said to be of this room or tournament.
@@ -148,7 +148,7 @@ mod tests {
             Secrets::of(tokens).relation(room, &owner.hash(), tickets)
         };
         let elsewhere = |token: Token| Token {
-            room: other,
+            subject: other,
             ..token
         };
         assert_eq!(relation(vec![]), Relation::Stranger);

@@ -53,8 +53,8 @@ impl Instruments {
         let is_study =
             |id| header.is_some_and(|it| it.study.as_ref().is_some_and(|of| of.study == id));
         let token = match Token::parse(owner_token) {
-            Some(token) if token.room == room.id() => token,
-            Some(token) if is_study(token.room) => {
+            Some(token) if token.subject == room.id() => token,
+            Some(token) if is_study(token.subject) => {
                 Token::of_tournament_room(room.id(), &token.hash())
             }
             _ => return Err(owner_token_wrong()),
@@ -65,7 +65,7 @@ impl Instruments {
     /// The room and seat of a ticket, and whether its game has started.
     async fn seat_of(&self, caller: &Caller, ticket: &str) -> Result<(Handle, Seat, bool), Status> {
         let ticket = Token::parse(ticket).ok_or_else(ticket_unknown)?;
-        let finding = (self.lookup).room_of_ticket(caller, ticket.room, ticket_unknown);
+        let finding = (self.lookup).room_of_ticket(caller, ticket.subject, ticket_unknown);
         let room = finding.await?;
         let seat = room.seat_of(ticket.secret).await.map_err(Refusal::from)?;
         let (seat, has_started) = seat.ok_or_else(ticket_unknown)?;

@@ -222,12 +222,12 @@ impl PlayService for Play {
         let command = Command::of(request.command)?;
         if let Some(executing) = executing
             .as_ref()
-            .filter(|_| !self.lookup.has_in_memory(token.room))
+            .filter(|_| !self.lookup.has_in_memory(token.subject))
         {
             // Others are not delayed while it is looked for.
             executing.give_back();
         }
-        let room = (self.lookup).room_of_ticket(&caller, token.room, ticket_unknown);
+        let room = (self.lookup).room_of_ticket(&caller, token.subject, ticket_unknown);
         let room = room.await?;
         let action = match command {
             Command::Perform(action) => action,

@@ -338,7 +338,7 @@ impl RoomService for RoomCalls {
         let ticket = Token::parse(&request.into_inner().ticket).ok_or_else(ticket_unknown)?;
         let lookup = self.lookup();
         let handle = lookup
-            .room_of_ticket(&caller, ticket.room, ticket_unknown)
+            .room_of_ticket(&caller, ticket.subject, ticket_unknown)
             .await?;
         let left = handle.leave(ticket.secret).await.map_err(Refusal::from)?;
         let room = left.ok_or_else(ticket_unknown)?.map_err(Refusal::from)?;
@@ -355,7 +355,7 @@ impl RoomService for RoomCalls {
         let caller = caller.showing(&request.owner_token);
         let handle = self.lookup().room(&caller, &request.room_id).await?;
         let token = Token::parse(&request.owner_token)
-            .filter(|token| token.room == handle.id())
+            .filter(|token| token.subject == handle.id())
             .ok_or_else(status::owner_token_wrong)?;
         let room = handle
             .close(token.secret, client)

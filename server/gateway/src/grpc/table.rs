@@ -28,7 +28,7 @@ impl TableCalls {
     /// The room of a table's ticket, and the ticket's secret.
     async fn find(&self, caller: &Caller, ticket: &str) -> Result<(Handle, [u8; 32]), Status> {
         let token = Token::parse(ticket).ok_or_else(table_unknown)?;
-        let room = (self.lookup).room_of_ticket(caller, token.room, table_unknown);
+        let room = (self.lookup).room_of_ticket(caller, token.subject, table_unknown);
         let room = room.await?;
         Ok((room, token.secret))
     }

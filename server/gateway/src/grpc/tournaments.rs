@@ -380,11 +380,11 @@ impl TournamentService for TournamentCalls {
         let game = usize::try_from(request.game).unwrap_or(usize::MAX);
         let owner = handle.physical_room(game).map_err(table_problem)?;
         // It is created after its id is committed.
-        if self.recorded.rooms().get(owner.room).is_none() {
+        if self.recorded.rooms().get(owner.subject).is_none() {
             return Err(table_problem(TableProblem::NotStarted));
         }
         Ok(Response::new(v1::GetPhysicalTableResponse {
-            room_id: owner.room.to_string(),
+            room_id: owner.subject.to_string(),
             table_ticket: Token::of_table(&owner).to_text(),
             owner_token: owner.to_text(),
         }))

@@ -114,13 +114,13 @@ impl<U: Journaled> Registry<U> {
         let reservation = loop {
             // A repetition of a request whose unit is still being created waits for it.
             let created = self.created.notified();
-            if let Some(handle) = self.get(owner.room) {
+            if let Some(handle) = self.get(owner.subject) {
                 return match handle.is_owner(&owner.to_text()) {
                     true => Ok(handle),
                     false => Err(CreateProblem::RequestIdUsed(U::KIND)),
                 };
             }
-            match Reservation::of(self, owner.room, charged)? {
+            match Reservation::of(self, owner.subject, charged)? {
                 Some(reservation) => break reservation,
                 None => created.await,
             }

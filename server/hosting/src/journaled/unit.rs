@@ -185,7 +185,7 @@ impl<U: Journaled> Handle<U> {
     /// Whether this is its owner's token.
     pub fn is_owner(&self, token: &str) -> bool {
         let is_own =
-            |token: Token| token.room == self.id() && self.header.owner().matches(&token.secret);
+            |token: Token| token.subject == self.id() && self.header.owner().matches(&token.secret);
         Token::parse(token).is_some_and(is_own)
     }
 

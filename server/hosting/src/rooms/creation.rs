@@ -235,9 +235,9 @@ impl Reservation {
     fn of(rooms: &Arc<Rooms>, owner: Token, new: &NewRoom) -> Result<Claim, CreateError> {
         let charged = new.charged;
         let seating = new.seating.as_ref();
-        let unit = seating.map_or(owner.room, |seating| seating.part_of.unit());
+        let unit = seating.map_or(owner.subject, |seating| seating.part_of.unit());
         let mut table = rooms.lock();
-        if let Some(entry) = table.get(owner.room) {
+        if let Some(entry) = table.get(owner.subject) {
             return match entry.header.owner.matches(&owner.secret) {
                 true => Ok(Claim::Created(Created {
                     handle: entry.handle.clone(),
@@ -247,12 +247,12 @@ impl Reservation {
                 false => Err(CreateError::RequestIdUsed),
             };
         }
-        if table.in_creation.contains_key(&owner.room) {
+        if table.in_creation.contains_key(&owner.subject) {
             return Ok(Claim::InProgress);
         }
         let place = rooms.places.try_take(charged);
         let place = place.ok_or_else(|| rooms.too_many_of(charged))?;
-        table.reserve(owner.room, unit, rooms.max_rooms)?;
+        table.reserve(owner.subject, unit, rooms.max_rooms)?;
         drop(table);
         Ok(Claim::Reserved(Self {
             rooms: Arc::clone(rooms),
@@ -266,7 +266,7 @@ impl Reservation {
         let seating = new.seating.as_ref();
         let server_seed = seating.and_then(|seating| seating.server_seed);
         let owner = self.owner;
-        let room_id = owner.room;
+        let room_id = owner.subject;
         // Before the commit, which takes time: the room's clock starts at `created_at_ms`.
         let clock = RoomClock::of_age(Duration::ZERO, &rooms.context.process_clock);
         let mut header = Arc::new(GameHeader {
@@ -358,7 +358,7 @@ impl Reservation {
 
 impl Drop for Reservation {
     fn drop(&mut self) {
-        self.rooms.lock().in_creation.remove(&self.owner.room);
+        self.rooms.lock().in_creation.remove(&self.owner.subject);
         self.rooms.created.notify_waiters();
     }
 }

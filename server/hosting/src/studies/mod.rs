@@ -66,7 +66,7 @@ impl Studies {
 
     /// The id of the study that this request creates.
     pub fn created_id(request: RequestKey) -> Id {
-        shortened(request.owner().room)
+        shortened(request.owner().subject)
     }
 
     /// Creates a study. Returns it with its owner token.
@@ -88,7 +88,7 @@ impl Studies {
         self.check_accepting()?;
         let owner = owner_of(request);
         let owner = Token {
-            room: shortened(owner.room),
+            subject: shortened(owner.subject),
             ..owner
         };
         let studies = Arc::clone(self);
@@ -110,7 +110,7 @@ impl Studies {
             ..StudyTask::too_many(share as u64 * 1024)
         })?;
         let header = StudyHeader {
-            id: owner.room,
+            id: owner.subject,
             settings: checked.settings,
             created_at_ms: (self.common.now)(),
             owner: owner.hash(),

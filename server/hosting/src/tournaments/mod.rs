@@ -82,7 +82,7 @@ impl Tournaments {
     ) -> Result<New<TournamentTask>, CreateProblem> {
         check_start(plan.start_at_ms).map_err(CreateProblem::Settings)?;
         let mut header = TournamentHeader {
-            id: owner.room,
+            id: owner.subject,
             settings: convert::settings_to_proto(name, &plan),
             created_at_ms: since_epoch_ms(),
             join_code: join_code(),

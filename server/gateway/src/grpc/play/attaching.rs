@@ -59,7 +59,7 @@ impl Reader {
         let Some(token) = Token::parse(&attach.ticket) else {
             return self.refuse(handle, request_id, &ticket_unknown());
         };
-        if !self.lookup().has_in_memory(token.room) && waits(&self.rooms) {
+        if !self.lookup().has_in_memory(token.subject) && waits(&self.rooms) {
             let parking = self.parked.get_or_insert_with(|| Box::new(Parking::new()));
             return parking.park(handle, attach);
         }
@@ -94,7 +94,7 @@ impl Reader {
             };
         }
         let token = Token::parse(&attach.ticket).expect("it was parsed to find its room");
-        match self.tournaments.get(token.room) {
+        match self.tournaments.get(token.subject) {
             Some(tournament) => self.enter(tournament, token, parked.attach, handle).await,
             None => {
                 let supersedes = self.supersedes();
@@ -271,7 +271,7 @@ impl Reader {
             return Ok(false);
         };
         // It was found before. A node that has just stopped it is about to resume it, or another is.
-        let room = self.rooms.get(token.room).ok_or(RoomGone)?;
+        let room = self.rooms.get(token.subject).ok_or(RoomGone)?;
         let detached = Arc::new(AtomicBool::new(false));
         let from = attach.from_sequence.saturating_sub(1);
         let request = AttachRequest {
@@ -362,14 +362,14 @@ async fn look(lookup: &Lookup, caller: &Caller, token: Token) -> Result<(), Stat
 
 /// As [`look`]; `None` if it changes hands.
 async fn look_once(lookup: &Lookup, caller: &Caller, token: Token) -> Option<Result<(), Status>> {
-    if let Some(in_scope) = lookup.tournament_of_ticket(caller, token.room, ticket_unknown) {
+    if let Some(in_scope) = lookup.tournament_of_ticket(caller, token.subject, ticket_unknown) {
         return Some(in_scope);
     }
     let room = lookup
-        .look_for_ticket(caller, token.room, ticket_unknown)
+        .look_for_ticket(caller, token.subject, ticket_unknown)
         .await;
     // This node may have taken a tournament over meanwhile.
-    if let Some(in_scope) = lookup.tournament_of_ticket(caller, token.room, ticket_unknown) {
+    if let Some(in_scope) = lookup.tournament_of_ticket(caller, token.subject, ticket_unknown) {
         return Some(in_scope);
     }
     (!is_changing(&room)).then(|| room.map(drop))

@@ -227,7 +227,7 @@ async fn a_seat_whose_room_stops_while_the_gateway_is_asked_is_attached_on_anoth
     assert_eq!(next.questions(), [3]);
     // As a node does whose lease has ended. It, or another one, resumes the room later.
     let ticket = Token::parse(&attach.ticket).expect("a ticket");
-    server.rooms.stop_unit(ticket.room).await;
+    server.rooms.stop_unit(ticket.subject).await;
     next.read(Input::StillOpen(3)).await;
     // An agent gives up a seat that is refused, and its game would wait for it.
     let end = next.updates.next().now_or_never().flatten();
@@ -265,7 +265,7 @@ async fn a_participant_whose_tournament_stops_while_the_gateway_is_asked_enters_
     next.reader.follow_call(handle, call).await;
     assert_eq!(next.questions(), [3]);
     let ticket = Token::parse(&attach.ticket).expect("a ticket");
-    server.tournaments.stop_one(ticket.room).await;
+    server.tournaments.stop_one(ticket.subject).await;
     next.read(Input::StillOpen(3)).await;
     let end = next.updates.next().now_or_never().flatten();
     assert_eq!(end.expect("an end").err(), Some(StreamEnd::RoomGone));

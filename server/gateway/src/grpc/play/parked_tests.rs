@@ -97,7 +97,10 @@ impl Node {
 
     /// Resumes the room of a seat that another node had.
     async fn take_over(&self, former: &Self, ticket: Token) {
-        let header = former.rooms.header(ticket.room).expect("it had the room");
+        let header = former
+            .rooms
+            .header(ticket.subject)
+            .expect("it had the room");
         let participant = SeatedParticipant {
             name: "Ada".into(),
             name_fingerprint: String::new(),
@@ -343,8 +346,8 @@ async fn what_changes_hands_together_is_found_in_its_order() {
     let taken_over = Mutex::new(false);
     let look = |token: Token| {
         let mut taken_over = taken_over.lock().expect("no panic");
-        *taken_over |= token.room == participant.room;
-        let is_found = *taken_over && token.room != other.room;
+        *taken_over |= token.subject == participant.subject;
+        let is_found = *taken_over && token.subject != other.subject;
         ready(is_found.then(|| Err(owner_unreachable())))
     };
     let all = vec![(4, seat), (5, other), (6, participant)];
@@ -363,7 +366,7 @@ async fn a_participant_waits_for_the_seats_that_its_client_attached_before() {
     let mut stream = node.stream();
     let seat = Token::random(Id([1; 16]));
     let participant = Token {
-        room: Id([2; 16]),
+        subject: Id([2; 16]),
         ..seat
     };
     stream.read(0, Command::Attach(attachment(&seat)));
@@ -384,7 +387,7 @@ async fn a_participant_waits_for_a_seat_on_its_way_to_a_node_that_has_died() {
     let mut stream = stream_of_gateway(&node, &directory).await;
     let seat = Token::random(Id([1; 16]));
     let participant = Token {
-        room: Id([2; 16]),
+        subject: Id([2; 16]),
         ..seat
     };
     stream.read(0, Command::Attach(attachment(&seat)));

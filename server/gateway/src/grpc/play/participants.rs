@@ -101,7 +101,10 @@ impl Reader {
         let Some(token) = Token::parse(&bound.attach.ticket) else {
             return;
         };
-        let ticket = Token { room, ..token };
+        let ticket = Token {
+            subject: room,
+            ..token
+        };
         let attach = v1::Attach {
             ticket: ticket.to_text(),
             request_id: 0,

@@ -131,7 +131,7 @@ impl TournamentCalls {
             return Ok((handle, None));
         }
         let handle = self.find(&caller.showing(ticket), id).await?;
-        let token = Token::parse(ticket).filter(|token| token.room == handle.id());
+        let token = Token::parse(ticket).filter(|token| token.subject == handle.id());
         let token = token.filter(|token| handle.participant_of(&token.secret).is_some());
         let token = token.ok_or_else(ticket_unknown)?;
         // Whose it is then, is decided where the change is made.
