@@ -1,6 +1,8 @@
 //! Appends to the journals of running games: one statement for all that wait. The position in the
 //! journal is the fence: a takeover writes an entry at the next position, and only one of two rows
-//! can stand there.
+//! can stand there. A row follows the one before it: a database that went back in time, for example
+//! to a backup, has lost rows that were acknowledged, and their room stops and goes on from what is
+//! stored.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -8,6 +10,7 @@ use std::sync::Arc;
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
 use sqlx::postgres::PgConnection;
+use tracing::error;
 
 use super::writer::{Answers, Work, confirming};
 use crate::StoreError;
@@ -46,6 +49,8 @@ async fn append(connection: &mut PgConnection, rows: &[Arc<Row>]) -> sqlx::Resul
          FROM unnest($1::bytea[], $2::bigint[], $3::bigint[], $4::bigint[], $5::bytea[])
               AS new (room, epoch, game, position, entries)
          JOIN owned ON owned.id = new.room AND owned.epoch = new.epoch AND NOT owned.over
+         WHERE new.position = 0 OR (SELECT true FROM journal
+                                    WHERE game = new.game AND position = new.position - 1)
          ON CONFLICT DO NOTHING
          RETURNING game, position",
     )
@@ -60,6 +65,9 @@ async fn append(connection: &mut PgConnection, rows: &[Arc<Row>]) -> sqlx::Resul
     let mut answers = Vec::with_capacity(rows.len());
     for row in rows {
         let kept = inserted.contains(&(row.game, row.position)) || stands(connection, row).await?;
+        if !kept {
+            report_hole(connection, row).await?;
+        }
         answers.push(match kept {
             true => Ok(()),
             false => Err(StoreError::Fenced(row.unit)),
@@ -81,6 +89,29 @@ async fn stands(connection: &mut PgConnection, row: &Row) -> sqlx::Result<bool> 
     .fetch_optional(connection)
     .await?;
     Ok(stands.is_some())
+}
+
+/// Says so if a row was refused because the one before it is gone.
+async fn report_hole(connection: &mut PgConnection, row: &Row) -> sqlx::Result<()> {
+    let open: bool = sqlx::query_scalar(
+        "SELECT EXISTS (SELECT FROM owned WHERE id = $1 AND epoch = $2 AND NOT over)
+                AND NOT EXISTS (SELECT FROM journal WHERE game = $3 AND position >= $4)",
+    )
+    .bind(row.room.0.as_slice())
+    .bind(row.epoch)
+    .bind(row.game)
+    .bind(row.position - 1)
+    .fetch_one(connection)
+    .await?;
+    if open {
+        let (room, position) = (row.room, row.position);
+        error!(
+            %room,
+            position,
+            "the database has lost rows of a journal that it had committed: the room goes on from what is stored; was a backup put back, or synchronous_commit turned off?"
+        );
+    }
+    Ok(())
 }
 
 fn all<'a, T>(rows: &'a [Arc<Row>], value: impl Fn(&'a Row) -> T) -> Vec<T> {

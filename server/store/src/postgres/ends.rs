@@ -55,7 +55,8 @@ async fn not_ended(connection: &mut PgConnection, owned: Owned) -> sqlx::Result<
     })
 }
 
-/// Ends a durable game, whose journal has some rows, with a record.
+/// Ends a durable game, whose journal has some rows, with a record. The last of them is there, or the
+/// room is fenced: see [`super::appends`].
 pub(super) async fn finish(
     connection: &mut PgConnection,
     owned: Owned,
@@ -67,6 +68,7 @@ pub(super) async fn finish(
              SELECT id FROM owned WHERE id = $12 AND epoch = $13 AND NOT over FOR UPDATE
          ), closed AS (
              INSERT INTO journal (game, position, epoch, entries) SELECT $14, $15, $13, '' FROM open
+             WHERE $15 = 0 OR (SELECT true FROM journal WHERE game = $14 AND position = $15 - 1)
              ON CONFLICT DO NOTHING RETURNING game
          ), room AS (
              UPDATE owned SET over = true, ended_ms = clock_ms() FROM closed WHERE id = $12
@@ -111,7 +113,8 @@ pub(super) async fn give_up(
              SELECT id FROM owned WHERE id = $1 AND epoch = $2 AND NOT over FOR UPDATE
          ), closed AS (
              INSERT INTO journal (game, position, epoch, entries)
-             SELECT $4, $5, $2, '' FROM open WHERE $4 IS NOT NULL
+             SELECT $4, $5, $2, '' FROM open
+             WHERE $5 = 0 OR (SELECT true FROM journal WHERE game = $4 AND position = $5 - 1)
              ON CONFLICT DO NOTHING RETURNING game
          ), game AS (
              UPDATE games SET state = $3, ended_at_ms = clock_ms() FROM closed WHERE number = game

@@ -145,7 +145,7 @@ impl PostgresStore {
         let metrics = StoreMetrics::default();
         let closing = CancellationToken::new();
         let shared = Shared {
-            options: sessions.clone(),
+            options: open::writers(sessions.clone()),
             retry_for: options.retry_for,
             metrics: metrics.clone(),
             closing: closing.clone(),

@@ -99,6 +99,12 @@ pub(super) fn sessions(address: PgConnectOptions) -> PgConnectOptions {
     address.options(SESSION)
 }
 
+/// Sessions that write. A plan that was made while the tables were nearly empty still finds a row
+/// by its index when they are not.
+pub(super) fn writers(sessions: PgConnectOptions) -> PgConnectOptions {
+    sessions.options([("enable_seqscan", "off")])
+}
+
 /// Connects, in bounded time.
 pub(super) async fn connect(options: &PgConnectOptions) -> sqlx::Result<PgConnection> {
     let connecting = timeout(CONNECT_LIMIT, PgConnection::connect_with(options));

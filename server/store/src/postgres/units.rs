@@ -139,7 +139,7 @@ async fn create(
     }))
 }
 
-/// Adds a row; `false` if another node has the unit.
+/// Adds a row; `false` if another node has the unit, or the row before it is gone.
 async fn append(
     connection: &mut PgConnection,
     kind: UnitKind,
@@ -153,6 +153,7 @@ async fn append(
          )
          INSERT INTO {rows} ({unit}, position, epoch, {entries})
          SELECT number, $3, $2, $4 FROM owner JOIN {units} ON {unit_id} = id
+         WHERE $3 = 0 OR (SELECT true FROM {rows} WHERE {unit} = number AND position = $3 - 1)
          ON CONFLICT DO NOTHING RETURNING {unit}",
     ))
     .bind(owned.id.0.as_slice())

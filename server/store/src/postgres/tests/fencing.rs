@@ -152,6 +152,48 @@ async fn an_append_that_is_late_does_not_follow_the_end_of_its_game() {
     pair.close().await;
 }
 
+/// A backup that was put back under a running node, or a crash of a database that acknowledged too
+/// early, takes rows away that the node believes to be there.
+#[tokio::test]
+async fn nothing_is_written_over_a_hole() {
+    let database = chefshat_postgres::database();
+    let store = node(&database).await;
+    let mut journals = Vec::new();
+    for room in 1..=3 {
+        let created = store.create(durable(room), vec![entry(1)]);
+        let mut journal = created.await.expect("created");
+        append(&mut journal, 2).await.expect("committed");
+        journals.push(journal);
+    }
+    let cup_id = Id([9; 16]);
+    let created = store.create_tournament(cup(9), begun());
+    created.await.expect("created");
+    let appended = store.append_tournament(cup_id, 1, begun());
+    appended.await.expect("committed");
+
+    database.run("DELETE FROM journal WHERE position = 1");
+    database.run("DELETE FROM tournament_entries WHERE position = 1");
+    let fenced = |room: u8| Err(StoreError::Fenced(Id([room; 16])));
+    assert_eq!(append(&mut journals[0], 3).await, fenced(1));
+    let finished = journals[1].finish(Some(summary(2)), None).await;
+    assert_eq!(finished, fenced(2));
+    assert_eq!(journals[2].finish(None, None).await, fenced(3));
+    let appended = store.append_tournament(cup_id, 2, begun()).await;
+    assert_eq!(appended, fenced(9));
+
+    // What is stored is read again, and goes on.
+    for room in 1..=3 {
+        let mut game = resumed(&store, room, FIRST).await;
+        assert!(!game.concluded, "game {room}");
+        append(&mut game.journal, 4).await.expect("committed");
+        let game = resumed(&store, room, FIRST).await;
+        assert_eq!(numbers(&game.entries), [1, 4]);
+    }
+    let appended = store.append_tournament(cup_id, 1, begun());
+    appended.await.expect("committed");
+    store.close().await;
+}
+
 #[tokio::test]
 async fn of_many_claims_one_wins() {
     let pair = Pair::new().await;
