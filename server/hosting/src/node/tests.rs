@@ -142,14 +142,7 @@ async fn soon<T>(future: impl Future<Output = T>) -> T {
 
 /// Takes a seat. The answer says that this is committed.
 async fn join(room: &Handle, name: &str) -> Result<(), RoomGone> {
-    let request = JoinRequest {
-        name: name.into(),
-        name_fingerprint: String::new(),
-        kind: ParticipantKind::Agent,
-        seat: None,
-        request_id: None,
-        client: None,
-    };
+    let request = JoinRequest::for_tests(name);
     room.join(request).await.map(|joined| {
         joined.expect("a free seat");
     })

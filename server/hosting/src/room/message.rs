@@ -38,6 +38,21 @@ pub struct JoinRequest {
     pub client: Option<Payer>,
 }
 
+#[cfg(any(test, feature = "testing"))]
+impl JoinRequest {
+    /// An agent of this name that takes any seat, for tests.
+    pub fn for_tests(name: impl Into<String>) -> Self {
+        Self {
+            name: name.into(),
+            name_fingerprint: String::new(),
+            kind: ParticipantKind::Agent,
+            seat: None,
+            request_id: None,
+            client: None,
+        }
+    }
+}
+
 /// A seat that was taken.
 #[derive(Debug)]
 pub struct Joined {

@@ -30,7 +30,7 @@ use chefshat_admission::limits::{Background, Key, Payer, Searches, Shares};
 use chefshat_base::clock::RoomClock;
 use chefshat_base::metrics::{Metrics, SearchOutcome};
 use chefshat_room::ids::{Id, SecretHash, Token};
-use chefshat_room::journal::{Change, Entry, Fill, GameHeader, GameStart, ParticipantKind};
+use chefshat_room::journal::{Change, Entry, Fill, GameHeader, GameStart};
 use chefshat_room::policy::{AbortPolicy, Policy};
 use chefshat_room::{Answer, ConnectionId, Core, JoinError};
 use chefshat_store::{Journal, MemoryStore, Store as _, StoreError, StoredGame};
@@ -174,14 +174,7 @@ async fn take_seat(room: &Handle) -> AttachedSeat {
 /// Takes a seat from an address.
 async fn take_seat_from(room: &Handle, charged: Key) -> AttachedSeat {
     let joined = room
-        .join(JoinRequest {
-            request_id: None,
-            name: "somebody".into(),
-            name_fingerprint: String::new(),
-            kind: ParticipantKind::Agent,
-            seat: None,
-            client: None,
-        })
+        .join(JoinRequest::for_tests("somebody"))
         .await
         .expect("the room exists")
         .expect("a free seat");
@@ -885,12 +878,9 @@ async fn an_owner_who_closes_its_room_leaves_the_seats_that_are_its_own() {
         let mut seats = Vec::new();
         for index in 0..4_u32 {
             let joined = room.join(JoinRequest {
-                request_id: None,
-                name: format!("player {index}"),
-                name_fingerprint: String::new(),
-                kind: ParticipantKind::Agent,
                 seat: Some(index),
                 client: seated[index as usize],
+                ..JoinRequest::for_tests(format!("player {index}"))
             });
             let joined = joined.await.expect("the room exists").expect("a free seat");
             let (outbox, updates) = Outbox::new();
@@ -925,12 +915,8 @@ async fn an_owner_who_closes_its_room_leaves_the_seats_that_are_its_own() {
 #[tokio::test]
 async fn a_client_takes_one_seat_if_the_policy_says_so() {
     let request = |client: u8| JoinRequest {
-        request_id: None,
-        name: "somebody".into(),
-        name_fingerprint: String::new(),
-        kind: ParticipantKind::Agent,
-        seat: None,
         client: Some(Key::Address([10, 0, 0, client].into()).into()),
+        ..JoinRequest::for_tests("somebody")
     };
     let join = async |room: &Handle, client: u8| {
         let joined = room.join(request(client)).await.expect("the room exists");

@@ -136,14 +136,7 @@ impl Node {
     async fn seat(&self) -> v1::Attach {
         let created = self.rooms.create(NewRoom::for_tests());
         let room = created.await.expect("a room").handle;
-        let joined = room.join(JoinRequest {
-            name: "Ada".into(),
-            name_fingerprint: String::new(),
-            kind: ParticipantKind::Agent,
-            seat: None,
-            request_id: None,
-            client: None,
-        });
+        let joined = room.join(JoinRequest::for_tests("Ada"));
         let Joined { ticket, .. } = joined.await.expect("it runs").expect("a free seat");
         attachment(&ticket)
     }
