@@ -9,19 +9,18 @@ use std::sync::Arc;
 
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
+use sqlx::SqlSafeStr as _;
 use sqlx::postgres::PgConnection;
 use tracing::error;
 
+use super::values::Owned;
 use super::writer::{Answers, Work, confirming};
-use crate::StoreError;
-use chefshat_room::ids::Id;
+use crate::units::UnitKind;
 
 /// A row of a journal.
 #[derive(Debug)]
 pub(super) struct Row {
-    pub(super) room: Id,
-    pub(super) unit: Id,
-    pub(super) epoch: i64,
+    pub(super) owned: Owned,
     /// The number of the game.
     pub(super) game: i64,
     /// From 0. Only one row of a game may be on its way at a time.
@@ -54,8 +53,8 @@ async fn append(connection: &mut PgConnection, rows: &[Arc<Row>]) -> sqlx::Resul
          ON CONFLICT DO NOTHING
          RETURNING game, position",
     )
-    .bind(all(rows, |row| row.room.0.as_slice()))
-    .bind(all(rows, |row| row.epoch))
+    .bind(all(rows, |row| row.owned.id.0.as_slice()))
+    .bind(all(rows, |row| row.owned.epoch))
     .bind(all(rows, |row| row.game))
     .bind(all(rows, |row| row.position))
     .bind(all(rows, |row| row.entries.as_slice()))
@@ -66,11 +65,11 @@ async fn append(connection: &mut PgConnection, rows: &[Arc<Row>]) -> sqlx::Resul
     for row in rows {
         let kept = inserted.contains(&(row.game, row.position)) || stands(connection, row).await?;
         if !kept {
-            report_hole(connection, row).await?;
+            report_hole(connection, None, row.owned, row.position).await?;
         }
         answers.push(match kept {
             true => Ok(()),
-            false => Err(StoreError::Fenced(row.unit)),
+            false => Err(row.owned.fenced()),
         });
     }
     Ok(answers)
@@ -84,31 +83,48 @@ async fn stands(connection: &mut PgConnection, row: &Row) -> sqlx::Result<bool> 
     ))
     .bind(row.game)
     .bind(row.position)
-    .bind(row.epoch)
+    .bind(row.owned.epoch)
     .bind(row.entries.as_slice())
     .fetch_optional(connection)
     .await?;
     Ok(stands.is_some())
 }
 
-/// Says so if a row was refused because the one before it is gone.
-async fn report_hole(connection: &mut PgConnection, row: &Row) -> sqlx::Result<()> {
-    let open: bool = sqlx::query_scalar(
-        "SELECT EXISTS (SELECT FROM owned WHERE id = $1 AND epoch = $2 AND NOT over)
-                AND NOT EXISTS (SELECT FROM journal WHERE game = $3 AND position >= $4)",
-    )
-    .bind(row.room.0.as_slice())
-    .bind(row.epoch)
-    .bind(row.game)
-    .bind(row.position - 1)
-    .fetch_one(connection)
-    .await?;
-    if open {
-        let (room, position) = (row.room, row.position);
+/// Says so if a row at this position was refused because the one before it is gone. The journal is
+/// that of a unit of this kind, or else of a room.
+pub(super) async fn report_hole(
+    connection: &mut PgConnection,
+    kind: Option<UnitKind>,
+    owned: Owned,
+    position: i64,
+) -> sqlx::Result<()> {
+    let open = match kind {
+        None => "SELECT EXISTS (SELECT FROM owned WHERE id = $1 AND epoch = $2 AND NOT over)
+                    AND NOT EXISTS (SELECT FROM owned JOIN games USING (game_id)
+                                    JOIN journal ON game = number
+                                    WHERE id = $1 AND position >= $3)"
+            .into_sql_str(),
+        Some(kind) => kind
+            .sql(
+                "SELECT EXISTS (SELECT FROM owned WHERE id = $1 AND epoch = $2 AND NOT over)
+                        AND NOT EXISTS (SELECT FROM {units} JOIN {rows} ON {unit} = number
+                                        WHERE {unit_id} = $1 AND position >= $3)",
+            )
+            .into_sql_str(),
+    };
+    let is_hole: bool = sqlx::query_scalar(open)
+        .bind(owned.id.0.as_slice())
+        .bind(owned.epoch)
+        .bind(position - 1)
+        .fetch_one(connection)
+        .await?;
+    if is_hole {
+        let (id, of) = (owned.id, kind.map_or("rooms", UnitKind::plural));
         error!(
-            %room,
+            %id,
+            of,
             position,
-            "the database has lost rows of a journal that it had committed: the room goes on from what is stored; was a backup put back, or synchronous_commit turned off?"
+            "the database has lost rows of a journal that it had committed: its owner goes on from what is stored; was a backup put back, or did the database crash with fsync off?"
         );
     }
     Ok(())

@@ -7,6 +7,7 @@ use sqlx::postgres::{PgArguments, PgConnection};
 use sqlx::query::Query;
 use sqlx::{Postgres, Row as _};
 
+use super::appends::report_hole;
 use super::values::{Owned, integer, text};
 use super::writer::confirming;
 use crate::StoreError;
@@ -97,7 +98,10 @@ pub(super) async fn finish(
             number: row.get(0),
             has_record: true,
         }),
-        None => not_ended(connection, owned).await,
+        None => {
+            report_hole(connection, None, owned, rows).await?;
+            not_ended(connection, owned).await
+        }
     }
 }
 
@@ -131,7 +135,12 @@ pub(super) async fn give_up(
     .execute(&mut *connection)
     .await?;
     match over.rows_affected() {
-        0 => not_ended(connection, owned).await,
+        0 => {
+            if let Some(rows) = rows {
+                report_hole(connection, None, owned, rows).await?;
+            }
+            not_ended(connection, owned).await
+        }
         _ => Ok(Ended::Now {
             number: number.unwrap_or_default(),
             has_record: false,

@@ -52,9 +52,7 @@ impl Journal for DurableJournal {
         async move {
             self.settle().await?;
             self.unanswered = Some(Arc::new(Row {
-                room: self.owned.id,
-                unit: self.owned.unit,
-                epoch: self.owned.epoch,
+                owned: self.owned,
                 game: self.number,
                 position: self.position,
                 entries: form::entries_to_bytes(entries),

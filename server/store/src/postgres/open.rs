@@ -57,11 +57,6 @@ pub enum DatabaseError {
         "the tables of the database are of a later version that this one cannot use; nothing was changed: use the later version"
     )]
     Newer,
-    /// Commits are acknowledged before they are safe.
-    #[error(
-        "the database acknowledges commits before they are safe (synchronous_commit is off): turn it on for this user, for example with ALTER ROLE"
-    )]
-    Unsafe,
     /// Any other error.
     #[error("{0}")]
     Other(String),
@@ -108,12 +103,27 @@ pub(super) fn writers(sessions: PgConnectOptions) -> PgConnectOptions {
 /// Connects, in bounded time.
 pub(super) async fn connect(options: &PgConnectOptions) -> sqlx::Result<PgConnection> {
     let connecting = timeout(CONNECT_LIMIT, PgConnection::connect_with(options));
-    connecting.await.unwrap_or_else(|_| {
-        Err(sqlx::Error::Io(std::io::Error::new(
-            std::io::ErrorKind::TimedOut,
-            "it does not answer",
-        )))
-    })
+    connecting.await.unwrap_or_else(|_| Err(too_late()))
+}
+
+/// Connects to write. What is acknowledged is on disk, and at a synchronous standby if one is named,
+/// whatever the database is set to, now or later; a setting that waits for a standby stays.
+pub(super) async fn connect_writer(options: &PgConnectOptions) -> sqlx::Result<PgConnection> {
+    let mut connection = connect(options).await?;
+    let set = sqlx::query(
+        "SELECT set_config('synchronous_commit',
+                           CASE WHEN setting IN ('off', 'local') THEN 'on' ELSE setting END, false)
+         FROM pg_settings WHERE name = 'synchronous_commit'",
+    );
+    timeout(CONNECT_LIMIT, set.execute(&mut connection))
+        .await
+        .map_err(|_| too_late())??;
+    Ok(connection)
+}
+
+fn too_late() -> sqlx::Error {
+    let kind = std::io::ErrorKind::TimedOut;
+    sqlx::Error::Io(std::io::Error::new(kind, "it does not answer"))
 }
 
 /// What is in a database.
@@ -171,12 +181,6 @@ pub(super) const NEWEST: i64 = MIGRATIONS[MIGRATIONS.len() - 1].0;
 /// Checks that this version can use a database; creates the schema in an empty one.
 pub(super) async fn check(address: &PgConnectOptions) -> Result<(), DatabaseError> {
     let mut connection = connect(address).await?;
-    let synchronous: String = sqlx::query_scalar("SHOW synchronous_commit")
-        .fetch_one(&mut connection)
-        .await?;
-    if synchronous == "off" {
-        return Err(DatabaseError::Unsafe);
-    }
     let mut found = schema(&mut connection).await?;
     if !found.is_complete() {
         // Another node may be about to create it.

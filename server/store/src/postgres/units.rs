@@ -6,6 +6,7 @@ use futures::FutureExt as _;
 use sqlx::Row as _;
 use sqlx::postgres::{PgConnection, PgRow};
 
+use super::appends::report_hole;
 use super::reader::Reader;
 use super::values::{FIRST_EPOCH, Owned, integer, number_of, text};
 use super::writer::confirming;
@@ -176,8 +177,11 @@ async fn append(
     .bind(owned.epoch)
     .bind(position)
     .bind(row.entries.as_slice())
-    .fetch_optional(connection)
+    .fetch_optional(&mut *connection)
     .await?;
+    if own.is_none() {
+        report_hole(connection, Some(kind), owned, position).await?;
+    }
     Ok(own.is_some())
 }
 

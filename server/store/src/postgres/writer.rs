@@ -16,7 +16,7 @@ use tokio_util::sync::CancellationToken;
 use tracing::{error, info, warn};
 
 use super::errors::{failure, is_temporary};
-use super::open::connect;
+use super::open::connect_writer;
 use crate::StoreError;
 use chefshat_base::metrics::StoreMetrics;
 use chefshat_base::tasks::{LongTask, named};
@@ -222,7 +222,7 @@ impl Writer {
             .collect();
         let mut connection = match self.connection.take() {
             Some(connection) => connection,
-            None => connect(&self.shared.options).await?,
+            None => connect_writer(&self.shared.options).await?,
         };
         let committing = W::commit(&mut connection, &work, batch.again);
         let committed = timeout(COMMIT_LIMIT, committing).await;

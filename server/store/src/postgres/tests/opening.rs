@@ -62,17 +62,6 @@ async fn a_later_schema_is_used_if_it_only_adds() {
 }
 
 #[tokio::test]
-async fn a_database_that_acknowledges_too_early_is_refused() {
-    let database = chefshat_postgres::database();
-    let name = database.run("SELECT current_database()");
-    database.run(&format!(
-        "ALTER DATABASE {name} SET synchronous_commit = off"
-    ));
-    let error = refusal(&database).await;
-    assert!(matches!(error, DatabaseError::Unsafe), "{error}");
-}
-
-#[tokio::test]
 async fn addresses_are_refused_without_showing_a_password() {
     for (url, advice) in [
         ("not an address", "postgres://user@host"),

@@ -246,6 +246,38 @@ async fn what_stands_is_acknowledged_when_the_standby_has_it() {
     store.close().await;
 }
 
+/// Whatever a database is set to, by whom and when: `off` would lose what was acknowledged in a
+/// crash, and `local` with the primary.
+#[tokio::test]
+async fn commits_wait_for_the_standby_whatever_the_database_is_set_to() {
+    for setting in ["off", "local"] {
+        let mut primary = Primary::new().await;
+        let name = primary.database.run("SELECT current_database()");
+        let before = format!("ALTER DATABASE {name} SET synchronous_commit = {setting}");
+        primary.database.run(&before);
+        let store = node(&primary.database).await;
+        let created = store.create(durable(1), vec![entry(1)]).await;
+        let mut journal = created.expect("created");
+        primary
+            .database
+            .run(&format!("ALTER DATABASE {name} RESET ALL"));
+        primary.lose_standby().await;
+        let later = format!("ALTER SYSTEM SET synchronous_commit = {setting}");
+        primary.database.run(&later);
+        primary.database.run("SELECT pg_reload_conf()");
+        {
+            let mut appending = append(&mut journal, 2).boxed();
+            tokio::select! {
+                answer = &mut appending => panic!("{setting}: the standby does not have it: {answer:?}"),
+                _ = primary.wait() => {}
+            }
+            primary.regain_standby();
+            assert_eq!(appending.await, Ok(()), "{setting}");
+        }
+        store.close().await;
+    }
+}
+
 #[tokio::test]
 async fn what_stands_does_not_fail_with_what_is_refused_beside_it() {
     let mut primary = Primary::new().await;
