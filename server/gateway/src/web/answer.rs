@@ -87,6 +87,19 @@ pub(super) fn busy(method: &Method) -> Response<Bytes> {
     finished(response, method)
 }
 
+/// The answer to who asks whether the server takes new clients.
+pub(super) fn health<B>(serving: bool, request: &Request<B>) -> Response<Bytes> {
+    let response = match serving {
+        true => plain(StatusCode::OK, "text/plain", b"serving\n"),
+        false => plain(
+            StatusCode::SERVICE_UNAVAILABLE,
+            "text/plain",
+            b"not serving\n",
+        ),
+    };
+    finished(response, request.method())
+}
+
 fn finished(mut response: Response<Bytes>, method: &Method) -> Response<Bytes> {
     let length = response.body().len();
     response.headers_mut().extend(RULES);

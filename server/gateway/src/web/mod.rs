@@ -16,18 +16,25 @@ use std::task::{Context, Poll};
 
 use bytes::Bytes;
 use futures::future::{BoxFuture, Either};
-use http::{Method, Request, Response, header};
+use http::{Method, Request, Response, Uri, header};
 use rayon::ThreadPoolBuildError;
 use tonic::body::Body;
+use tonic::metadata::MetadataMap;
+use tonic_health::pb::HealthCheckRequest;
+use tonic_health::pb::health_check_response::ServingStatus;
+use tonic_health::pb::health_client::HealthClient;
 use tower::{BoxError, Layer, Service};
 
-use answer::{DOCUMENT, absent, answer, busy, generated};
+use answer::{DOCUMENT, absent, answer, busy, generated, health};
 use files::find;
 pub use origin::{OriginLayer, Origins};
 use preview::{Link, Previews, Unshown};
 pub use preview::{MAX_PREVIEWS, MAX_PREVIEWS_WAITING, PICTURE_PATIENCE};
 
 use chefshat_hosting::rooms::Rooms;
+
+/// Where proxies and monitors that speak no gRPC ask whether the server takes new clients.
+const HEALTH: &str = "/health";
 
 /// Whether the page was built.
 pub fn is_built() -> bool {
@@ -99,7 +106,9 @@ where
         let page = self.layer.clone();
         Either::Right(Box::pin(async move {
             let request = request.map(drop);
-            let answer = match Link::of(request.uri().path()) {
+            let path = request.uri().path();
+            let answer = match Link::of(path) {
+                None if path == HEALTH => health(is_serving(services, &request).await, &request),
                 None => of_files(request, |request| answer(find, request)).await,
                 Some(link) => page.previewed(link, services, &request).await,
             };
@@ -140,6 +149,19 @@ impl PageLayer {
             }
         }
     }
+}
+
+/// What the health service of gRPC says of the whole server.
+async fn is_serving<S>(services: S, request: &Request<()>) -> bool
+where
+    S: Service<Request<Body>, Response = Response<Body>>,
+    S::Error: Into<BoxError>,
+{
+    let mut health = HealthClient::with_origin(services, Uri::from_static("http://page"));
+    let (extensions, message) = (request.extensions().clone(), HealthCheckRequest::default());
+    let call = tonic::Request::from_parts(MetadataMap::new(), extensions, message);
+    let answered = health.check(call).await;
+    answered.is_ok_and(|answer| answer.into_inner().status() == ServingStatus::Serving)
 }
 
 /// An answer that needs files of the page, which are in this program.

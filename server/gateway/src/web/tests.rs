@@ -198,3 +198,28 @@ async fn who_waits_too_long_is_refused_and_gets_the_page_without_tags() {
     // The second one had the place of the first.
     assert_eq!(services.asked(), 2);
 }
+
+#[tokio::test]
+async fn monitors_without_grpc_are_told_whether_the_server_serves() {
+    let (reporter, service) = tonic_health::server::health_reporter();
+    let mut page = page().layer(tonic::service::Routes::new(service));
+    for (said, status, text) in [
+        (tonic_health::ServingStatus::Serving, 200, "serving\n"),
+        (
+            tonic_health::ServingStatus::NotServing,
+            503,
+            "not serving\n",
+        ),
+    ] {
+        reporter.set_service_status("", said).await;
+        for (method, text) in [(Method::GET, text), (Method::HEAD, "")] {
+            let request = Request::builder().method(method).uri(HEALTH);
+            let request = request.body(Body::empty()).expect("a request");
+            let answer = page.call(request).await.expect("an answer");
+            assert_eq!(answer.status().as_u16(), status);
+            assert_eq!(answer.headers()[header::CACHE_CONTROL], "no-store");
+            let body = answer.into_body().collect().await.expect("a body");
+            assert_eq!(body.to_bytes(), text);
+        }
+    }
+}
