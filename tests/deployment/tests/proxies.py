@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -34,7 +35,8 @@ class Proxy(ABC):
     def __init__(self, server: str, folder: Path, tls: Path | None = None) -> None:
         """Prepares the proxy of the server at host:port, with its files in an empty folder.
 
-        `tls` is the folder of the certificate, if that is the server's.
+        The nodes of a cluster are three of them, with spaces between them. `tls` is the folder of the certificate, if that is the
+        server's.
         """
         self._folder = folder
         self._tls = tls or folder / "tls"
@@ -45,7 +47,10 @@ class Proxy(ABC):
         self.url = f"https://{self.address}"
         for name in self.files:
             text = (CONFIGURATIONS / name).read_text()
-            for old, new in self._replacements(server, name):
+            servers = server.split()
+            if len(servers) > 1:
+                text = self._for_cluster(text)
+            for old, new in [*self._addresses(servers, name), *self._replacements(name)]:
                 assert old in text, f"{name} has no {old}"
                 text = text.replace(old, new)
             (folder / name).write_text(text)
@@ -76,9 +81,21 @@ class Proxy(ABC):
         self._reload()
         self._until_served(certificate)
 
+    def _for_cluster(self, text: str) -> str:
+        """A configuration as its comments tell to change it for a cluster: other lines instead of the one before them."""
+        single, marker, cluster = text.partition("# A cluster has these lines instead of the last one.")
+        assert marker, text
+        return single.rstrip().rpartition("\n")[0] + "\n#" + re.sub(r"^( *)#   (?=\S)", r"\1", cluster, flags=re.MULTILINE)
+
+    def _addresses(self, servers: list[str], name: str) -> list[tuple[str, str]]:
+        """What to replace by the addresses of servers in a configuration."""
+        if len(servers) == 1:
+            return [("server:50051", servers[0])]
+        return [(f"node{number}:50051", address) for number, address in enumerate(servers, 1)]
+
     @abstractmethod
-    def _replacements(self, server: str, name: str) -> list[tuple[str, str]]:
-        """What to replace in a configuration."""
+    def _replacements(self, name: str) -> list[tuple[str, str]]:
+        """What else to replace in a configuration."""
 
     @abstractmethod
     def _start(self) -> None: ...
@@ -110,11 +127,10 @@ class Nginx(Proxy):
     program = "nginx"
     files = ("nginx.conf",)
 
-    def _replacements(self, server: str, name: str) -> list[tuple[str, str]]:
+    def _replacements(self, name: str) -> list[tuple[str, str]]:
         kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
         temporary = "".join(f" {kind}_temp_path {self._folder}/{kind};" for kind in kinds)
         return [
-            ("server server:50051;", f"server {server};"),
             ("listen 443 ", f"listen {self.address} "),
             # Not every machine has IPv6.
             ("listen [::]:443 ", "# "),
@@ -136,9 +152,8 @@ class HAProxy(Proxy):
     program = "haproxy"
     files = ("haproxy.cfg",)
 
-    def _replacements(self, server: str, name: str) -> list[tuple[str, str]]:
+    def _replacements(self, name: str) -> list[tuple[str, str]]:
         return [
-            ("server chefshat server:50051 ", f"server chefshat {server} "),
             ("bind :443 ", f"bind {self.address} "),
             ("/etc/chefshat/tls", str(self._tls)),
             *self._of_this_machine(),
@@ -165,9 +180,8 @@ class HAProxyPassingThrough(HAProxy):
 
     files = ("haproxy-passing-through.cfg",)
 
-    def _replacements(self, server: str, name: str) -> list[tuple[str, str]]:
+    def _replacements(self, name: str) -> list[tuple[str, str]]:
         return [
-            ("server chefshat server:50051", f"server chefshat {server}"),
             ("bind :443", f"bind {self.address}"),
             *self._of_this_machine(),
         ]
@@ -182,12 +196,23 @@ class Envoy(Proxy):
     program = "envoy"
     files = ("envoy.yaml", "envoy-certificate.yaml")
 
-    def _replacements(self, server: str, name: str) -> list[tuple[str, str]]:
+    def _for_cluster(self, text: str) -> str:
+        return text
+
+    def _addresses(self, servers: list[str], name: str) -> list[tuple[str, str]]:
+        """Each server is an endpoint."""
+        if name != "envoy.yaml":
+            return []
+        line = "              - endpoint: { address: { socket_address: { address: server, port_value: 50051 } } }\n"
+        pairs = [address.rpartition(":") for address in servers]
+        return [
+            (line, "".join(line.replace("server, port_value: 50051", f"{host}, port_value: {port}") for host, _, port in pairs))
+        ]
+
+    def _replacements(self, name: str) -> list[tuple[str, str]]:
         if name == "envoy-certificate.yaml":
             return [("/etc/chefshat/tls", str(self._tls))]
-        host, _, port = server.rpartition(":")
         return [
-            ("address: server, port_value: 50051", f"address: {host}, port_value: {port}"),
             ("address: 0.0.0.0, port_value: 443", f"address: {self.host}, port_value: {_PORT}"),
             # Not every machine has IPv6.
             ("additional_addresses: ", "# "),

@@ -1,6 +1,7 @@
 """Servers that store their games and require tokens."""
 
 import os
+import signal
 import subprocess
 from pathlib import Path
 
@@ -35,6 +36,10 @@ class GuardedServer(LocalServer):
     def client(self, role: str, url: str | None = None) -> chefshat.Client:
         """A client with the token of a role, which reaches the server directly or at a URL."""
         return chefshat.Client(url or self.url, token=self.tokens[role])
+
+    def freeze(self) -> None:
+        """Halts the process with its connections open, like a machine that is cut off; `kill` ends it."""
+        os.kill(self.pid, signal.SIGSTOP)
 
     def _create_token(self, role: str) -> str:
         return run("token", "create", "--role", role, "--data-dir", self.data).stdout.strip()
