@@ -29,6 +29,8 @@ pub(crate) const SHORT: u32 = 2;
 pub(crate) const LONG: u32 = 1_000;
 /// How long a call or a new connection may take before the room counts it as not served.
 const CALL_LIMIT: Duration = Duration::from_secs(5);
+/// How often somebody who waits for a decision looks.
+const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// The reason of what took longer.
 const TOO_SLOW: &str = "TOO_SLOW";
 /// Pause after a call that was not served.
@@ -146,6 +148,18 @@ impl HonestRoom {
         });
         let playing = tokio::spawn(Arc::clone(&shared).play_all());
         Self { shared, playing }
+    }
+
+    /// Waits until the room has played in this phase, for `limit` at most: a busy machine may need
+    /// longer than the phase.
+    pub(crate) async fn until_played(&self, limit: Duration) {
+        let playing = async {
+            while lock(&self.shared.noticed).latencies.is_empty() {
+                tokio::time::sleep(LOOK_AGAIN).await;
+            }
+        };
+        // What was not played is told by what was noticed.
+        let _ = tokio::time::timeout(limit, playing).await;
     }
 
     /// Ends a phase and returns what was noticed in it.

@@ -108,6 +108,7 @@ async fn attacked(
     }
     let honest = HonestRoom::start(honest_access.clone(), SHORT);
     tokio::time::sleep(options.quiet).await;
+    honest.until_played(PREPARE_LIMIT).await;
     let quiet = honest.take();
     if quiet.latencies.is_empty() {
         return Err(HostileError::Quiet(honest.last_problem()));
