@@ -21,7 +21,8 @@ pub(crate) fn python_command(places: &Places, package: &str, module: &str) -> Co
         .args(["-m", module])
         .current_dir(places.root.join(package));
     command.env("RUFF_CACHE_DIR", places.own.join("ruff"));
-    command.env("MYPY_CACHE_DIR", places.own.join("mypy").join(package));
+    // Shared: the packages import the same ones.
+    command.env("MYPY_CACHE_DIR", places.own.join("mypy"));
     // Most of the time of the learning tests is spent compiling; compiled programs are cached.
     command.env("JAX_COMPILATION_CACHE_DIR", places.own.join("jax"));
     command.env("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0");
@@ -44,6 +45,15 @@ pub(crate) fn with_environment(places: &Places, mut command: Command) -> Command
     command.env("CHEFSHAT_CPP_AGENT", places.cpp_agent());
     command.env("CHEFSHAT_WEB_DIR", places.web());
     command.env("CHEFSHAT_PROTO", places.root.join("proto"));
+    // Several suites run at a time: threads of one computation would wait for each other.
+    for library in [
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "OPENCV_FOR_THREADS_NUM",
+    ] {
+        command.env(library, "1");
+    }
     // Otherwise Python would write its caches among the sources, also when a Rust test starts it.
     command.env("PYTHONPYCACHEPREFIX", places.own.join("pycache"));
     command

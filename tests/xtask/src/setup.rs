@@ -56,8 +56,11 @@ pub(crate) const FOR_DEPLOYMENT: [Program; 5] = [
 /// What runs programs for aarch64.
 pub(crate) const EMULATOR: Program = ("qemu-aarch64-static", "qemu-user-static");
 
-/// The browser.
-pub(crate) const CHROMIUM: Program = ("chromium", "chromium");
+/// The browser without windows.
+pub(crate) const CHROMIUM: Program = (
+    "/usr/bin/chromium-headless-shell",
+    "chromium-headless-shell",
+);
 
 /// A file in each created folder that lists its sources.
 const MADE_FROM: &str = ".made-from";
@@ -145,6 +148,8 @@ pub(crate) fn cpp_agent(places: &Places) -> Result<(), Failure> {
     let configure = || {
         let mut cmake = Command::new("cmake");
         cmake.arg("-S").arg(&source).arg("-B").arg(&build);
+        // Unoptimised, and without what a debugger needs.
+        cmake.args(["-DCMAKE_BUILD_TYPE=Debug", "-DCMAKE_CXX_FLAGS_DEBUG="]);
         cmake
     };
     if read(&mut configure()).is_err() {
@@ -211,10 +216,11 @@ fn is_new_enough(version: &str) -> bool {
 
 /// The browser for the tests of the page.
 pub(crate) fn chromium() -> Result<(), Failure> {
-    if succeeds("chromium", &["--version"]) {
-        return Ok(());
+    let (program, package) = CHROMIUM;
+    match is_on_path(program) {
+        true => Ok(()),
+        false => debian_package(package),
     }
-    debian_package("chromium")
 }
 
 /// strace, with which a test makes a disk fail.
@@ -336,7 +342,8 @@ fn venv(folder: &Path, made_from: &str, install: &[&str]) -> Result<(), Failure>
         .args(["-m", "venv", "--clear"])
         .arg(folder))?;
     run(Command::new(&python)
-        .args(["-m", "pip", "install", "--quiet"])
+        // Python compiles what it imports.
+        .args(["-m", "pip", "install", "--quiet", "--no-compile"])
         .args(install))?;
     note_made_from(folder, made_from)
 }

@@ -9,7 +9,7 @@ import { type Browser, type BrowserContextOptions, chromium, type Page } from "p
 import { afterAll, beforeAll, vi } from "vitest";
 import { PATIENCE_MS } from "./patience";
 
-const CHROMIUM = process.env.CHEFSHAT_CHROMIUM ?? "/usr/bin/chromium";
+const CHROMIUM = process.env.CHEFSHAT_CHROMIUM ?? "/usr/bin/chromium-headless-shell";
 const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"];
 FLAGS.push("--disable-background-networking", "--disable-component-update", "--disable-sync");
 // Proxies of the tests have certificates of an authority that Chromium does not know. The option of
