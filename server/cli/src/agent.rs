@@ -31,7 +31,7 @@ use chefshat_server::convert::recorded_player;
                   replay imitates the player who had that seat in a recorded game: where it sees exactly what the player saw, it takes the \
                   same action, otherwise the action from the most similar situation (docs/branching.md).\n\n\
                   llm lets a language model play, on any server with the usual chat API (docs/mcp.md).\n\n\
-                  Exit code: 0 when the game finished, 1 when it was aborted or the seat was lost."
+                  Exit code: 0 when the game finished, 1 when it was aborted, the seat was lost, or a model's fallback played too much of it."
 )]
 pub(super) struct AgentCommand {
     /// The agent: random, greedy, trained, monte_carlo (searches on all cores; with a budget:
@@ -92,31 +92,33 @@ impl AgentCommand {
         if self.games > 1 && !self.join_args.has_code_file() {
             return Err("a code or ticket is valid for one game; to play more --games, give a --code-file that gets new codes".into());
         }
-        let mut player = self.player()?;
+        let mut player = self.player().await?;
         let client = self.server.connect_patiently().await?;
         let mut last_code = None;
-        let mut all_finished = true;
+        let mut all_played = true;
         for _ in 0..self.games {
             let ticket = self.ticket(&client, &mut last_code).await?;
             let played = client.play(ticket, player.agent()).await;
-            all_finished &= matches!(&played, Ok(outcome) if outcome.standing().is_some());
+            all_played &= matches!(&played, Ok(outcome) if outcome.standing().is_some());
+            all_played &= player.has_played();
             match self.json {
                 true => say(player.as_json(as_json(&played)))?,
                 false => say(player.in_words(&in_words(&played)))?,
             }
         }
-        Ok(if all_finished {
+        Ok(if all_played {
             ExitCode::SUCCESS
         } else {
             ExitCode::FAILURE
         })
     }
 
-    fn player(&self) -> Result<Player, CommandError> {
+    async fn player(&self) -> Result<Player, CommandError> {
         let pace = Duration::from_millis(self.pace_ms);
         match (self.agent, &self.record, self.seat) {
             (AgentArg::Player(player), None, None) => {
                 let players = player.players(&self.llm, self.seed, pace)?;
+                players.check().await?;
                 Ok(players.player("chefshat agent"))
             }
             (AgentArg::Player(_), ..) => Err("--record and --seat are for the agent replay".into()),

@@ -80,6 +80,17 @@ enum Source<'a> {
 }
 
 impl Players<'_> {
+    /// Asks a model a first question, before it takes a seat.
+    ///
+    /// # Errors
+    /// It cannot be asked.
+    pub(super) async fn check(&self) -> Result<(), CommandError> {
+        match &self.source {
+            Source::BuiltIn(_) => Ok(()),
+            Source::Model(_, endpoint) => Ok(endpoint.check().await?),
+        }
+    }
+
     /// A player; its choices depend on `purpose` and the seed.
     pub(super) fn player(&self, purpose: &str) -> Player {
         let seed = seed_for(purpose, self.seed);
@@ -121,8 +132,12 @@ impl Player {
             Self::BuiltIn(_) => result.to_owned(),
             Self::Model(model) => {
                 let spent = model.spent();
+                let verdict = match model.has_played() {
+                    true => "",
+                    false => ": too many to call it the model's game",
+                };
                 format!(
-                    "{result}, {} tokens for {} decisions, {} of them by the fallback",
+                    "{result}, {} tokens for {} decisions, {} of them by the fallback{verdict}",
                     grouped(spent.tokens),
                     grouped(spent.decisions),
                     grouped(spent.fallbacks)
@@ -138,8 +153,17 @@ impl Player {
             result["tokens"] = spent.tokens.into();
             result["decisions"] = spent.decisions.into();
             result["fallbacks"] = spent.fallbacks.into();
+            result["played_by_model"] = model.has_played().into();
         }
         result
+    }
+
+    /// Whether the last game is that of this player, and not of a fallback.
+    pub(super) fn has_played(&self) -> bool {
+        match self {
+            Self::BuiltIn(_) => true,
+            Self::Model(model) => model.has_played(),
+        }
     }
 
     /// The agent that decides.

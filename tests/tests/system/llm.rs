@@ -30,6 +30,8 @@ type Script = fn(usize, &[Value]) -> Said;
 enum Said {
     /// A completion with this text, and the tokens that it took.
     Text(String, u64),
+    /// A body that means success.
+    Whole(Value),
     /// A status and a body.
     Other(StatusCode, Vec<u8>),
     /// None, ever.
@@ -41,6 +43,14 @@ enum Said {
 struct Asked {
     headers: HeaderMap,
     body: Value,
+}
+
+impl Asked {
+    /// Whether it is the one that is asked before a seat is taken.
+    fn is_first(&self) -> bool {
+        let first = self.body["messages"][0]["content"].as_str();
+        first.is_some_and(|words| words.starts_with("Before the game"))
+    }
 }
 
 /// Serves a script. Returns the address and what arrives.
@@ -75,6 +85,7 @@ async fn endpoint(script: Script) -> (String, Arc<Mutex<Vec<Asked>>>) {
                             })
                             .to_string(),
                         )),
+                        Said::Whole(body) => Response::new(Bytes::from(body.to_string())),
                         Said::Other(status, body) => {
                             let mut response = Response::new(Bytes::from(body));
                             *response.status_mut() = status;
@@ -155,8 +166,10 @@ impl Played {
         why.collect()
     }
 
+    /// The questions of the game: without the one before it.
     fn questions(&self) -> usize {
-        self.asked.lock().expect("no panic").len()
+        let asked = self.asked.lock().expect("no panic");
+        asked.iter().filter(|asked| !asked.is_first()).count()
     }
 
     /// Checks that the model's seat decided in time, and that the program counts as the record does.
@@ -199,6 +212,8 @@ async fn play(script: Script, decision_time: Duration, arguments: &[&str]) -> Pl
     command.args(["--code", &created.join_code, "--seed", "7"]);
     command
         .args(["--endpoint", &url, "--model", "ada/test-1"])
+        // Some of these scripts leave the game to the fallback.
+        .args(["--max-fallbacks", "1"])
         .args(arguments);
     let output = patiently("the game", command.output())
         .await
@@ -238,7 +253,9 @@ async fn a_model_plays_and_its_reasons_are_recorded() {
         );
         assert_eq!(said.get("fallback"), None);
     }
-    for asked in played.asked.lock().expect("no panic").iter() {
+    let asked = played.asked.lock().expect("no panic");
+    assert!(asked[0].is_first());
+    for asked in asked.iter().skip(1) {
         assert_eq!(asked.headers["authorization"], format!("Bearer {KEY}"));
         assert_eq!(asked.body["model"], "ada/test-1");
         assert_eq!(asked.body["temperature"], 0.5);
@@ -255,6 +272,7 @@ async fn a_model_plays_and_its_reasons_are_recorded() {
 #[tokio::test(flavor = "multi_thread")]
 async fn illegal_answers_are_told_and_counted() {
     let lies: Script = |number, messages| match messages {
+        [_] => honest(number, messages),
         [_, _] => Said::Text(r#"{"action": 77777, "reason": "trust me"}"#.to_owned(), 0),
         [.., told] => {
             let told = told["content"].as_str().expect("words");
@@ -290,11 +308,27 @@ async fn only_illegal_answers_end_with_the_fallback() {
 #[tokio::test(flavor = "multi_thread")]
 async fn without_usable_answers_the_fallback_plays_and_soon_nobody_asks_any_more() {
     let nonsense: Script = |_, _| Said::Text("I fold. {\"action\": \"fold\"}".to_owned(), 900);
-    let endless: Script = |_, _| Said::Other(StatusCode::OK, vec![b' '; 3 << 20]);
-    let forbidden: Script = |_, _| Said::Other(StatusCode::UNAUTHORIZED, b"no".to_vec());
-    let broken: Script = |_, _| Said::Other(StatusCode::OK, b"<html>".to_vec());
-    let cases: [(Script, usize, &str); 4] = [
+    // What begins after the first question.
+    let endless: Script = |number, messages| match number {
+        0 => honest(number, messages),
+        _ => Said::Other(StatusCode::OK, vec![b' '; 3 << 20]),
+    };
+    let forbidden: Script = |number, messages| match number {
+        0 => honest(number, messages),
+        _ => Said::Other(StatusCode::UNAUTHORIZED, b"no".to_vec()),
+    };
+    let broken: Script = |number, messages| match number {
+        0 => honest(number, messages),
+        _ => Said::Other(StatusCode::OK, b"<html>".to_vec()),
+    };
+    let cut: Script = |_, _| {
+        Said::Whole(json!({
+            "choices": [{"message": {"content": "<think> a 7 or"}, "finish_reason": "length"}],
+        }))
+    };
+    let cases: [(Script, usize, &str); 5] = [
         (nonsense, 2, "no action in the answer"),
+        (cut, 2, "the answer was cut before its action"),
         (endless, 2, "the answer has more than"),
         // Asking again would be the same again.
         (forbidden, 1, "the endpoint answered 401"),
@@ -316,6 +350,114 @@ async fn without_usable_answers_the_fallback_plays_and_soon_nobody_asks_any_more
     }
 }
 
+/// The forms in which servers and models answer, besides a text with an object.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_answer_in_any_usual_form_is_read() {
+    let forms: Script = |number, messages| {
+        let asked = messages.last().and_then(|it| it["content"].as_str());
+        let (_, options) = asked
+            .and_then(|it| it.rsplit_once("options\n"))
+            .expect("options");
+        let (action, cards) = options
+            .lines()
+            .next()
+            .and_then(|it| it.split_once('='))
+            .expect("one");
+        // A number alone is an id.
+        let cards = match cards.parse::<u32>() {
+            Ok(_) => action,
+            Err(_) => cards,
+        };
+        let message = match number % 5 {
+            0 => {
+                json!({"content": [{"type": "reasoning"}, {"type": "text", "text": format!("{action}.0")}]})
+            }
+            1 => json!({"content": null, "reasoning_content": "{\"action\": 0}", "tool_calls": [
+                {"function": {"name": "play", "arguments": json!({"action": cards}).to_string()}}]}),
+            2 => json!({"content": "", "tool_calls": [
+                {"function": {"name": "play", "arguments": {"action": action}}}]}),
+            3 => json!({"content": format!("I play **action {action}**.")}),
+            _ => json!({"content": cards}),
+        };
+        Said::Whole(json!({"choices": [{"message": message, "finish_reason": "stop"}]}))
+    };
+    let played = play(forms, AMPLE, &["--extra", r#"{"reasoning_effort": "low"}"#]).await;
+    let choices = played.choices();
+    // One of each form.
+    assert!(choices.len() >= 5, "{}", choices.len());
+    assert_eq!(played.questions(), choices.len());
+    for (decision, said) in &choices {
+        let first = nth_in(&decision.action_mask, 0).map(|id| id.0);
+        assert_eq!(Some(decision.action), first, "{said:?}");
+    }
+    assert_eq!(played.result["played_by_model"], true);
+    for asked in played.asked.lock().expect("no panic").iter() {
+        assert_eq!(asked.body["reasoning_effort"], "low");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_that_names_the_limit_of_an_answer_otherwise_is_understood() {
+    let later: Script = |number, messages| match number {
+        0 => {
+            let problem = "Unsupported parameter: use 'max_completion_tokens' instead.";
+            let body = json!({"error": {"message": problem}}).to_string();
+            Said::Other(StatusCode::BAD_REQUEST, body.into_bytes())
+        }
+        _ => honest(number, messages),
+    };
+    let played = play(later, AMPLE, &["--answer-tokens", "77"]).await;
+    assert_eq!(played.fallbacks().iter().flatten().count(), 0);
+    let asked = played.asked.lock().expect("no panic");
+    assert_eq!(asked[0].body["max_tokens"], 77);
+    for asked in asked.iter().skip(1) {
+        assert_eq!(asked.body["max_completion_tokens"], 77);
+        assert_eq!(asked.body.get("max_tokens"), None);
+    }
+}
+
+/// Otherwise a key that does not work would play as the fallback under the model's name.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_model_that_cannot_be_asked_takes_no_seat() {
+    let forbidden: Script = |_, _| {
+        let body = json!({"error": {"message": format!("no such key: {KEY}")}});
+        Said::Other(StatusCode::UNAUTHORIZED, body.to_string().into_bytes())
+    };
+    let unknown: Script = |_, _| Said::Other(StatusCode::NOT_FOUND, Vec::new());
+    let moved: Script = |_, _| Said::Other(StatusCode::PERMANENT_REDIRECT, Vec::new());
+    let page: Script = |_, _| Said::Other(StatusCode::OK, b"<html>".to_vec());
+    let endless: Script = |_, _| Said::Other(StatusCode::OK, vec![b' '; 3 << 20]);
+    let cases: [(Script, &str); 5] = [
+        (forbidden, "401 Unauthorized: no such key: …"),
+        (unknown, "404 Not Found"),
+        (moved, "308 Permanent Redirect, which means another address"),
+        (page, "the answer is not a chat completion"),
+        (endless, "the answer has more than"),
+    ];
+    for (script, why) in cases {
+        let (url, _) = endpoint(script).await;
+        for command in [
+            &["agent", "llm"][..],
+            &["tournament", "join", "--agent", "llm"],
+        ] {
+            // There is no server of games: it is not even asked.
+            let mut command = chefshat(command, KEY);
+            command.args(["--server", "http://127.0.0.1:1", "--code", "BCDF2345"]);
+            command.args(["--endpoint", &url, "--model", "ada/test-1"]);
+            let output = patiently("the program", command.output()).await;
+            let output = output.expect("it runs");
+            assert_eq!(output.status.code(), Some(1), "{why}");
+            let problems = String::from_utf8_lossy(&output.stderr);
+            assert!(
+                problems.contains("ada/test-1 cannot be asked"),
+                "{problems}"
+            );
+            assert!(problems.contains(why), "{problems}");
+            assert!(!problems.contains(KEY), "{problems}");
+        }
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_busy_endpoint_is_asked_again() {
     let busy: Script = |number, messages| match number % 2 {
@@ -324,12 +466,18 @@ async fn a_busy_endpoint_is_asked_again() {
     };
     let played = play(busy, AMPLE, &[]).await;
     assert_eq!(played.fallbacks().iter().flatten().count(), 0);
-    assert_eq!(played.questions(), 2 * played.choices().len());
+    // Also the first one, before the game.
+    let asked = played.asked.lock().expect("no panic").len();
+    assert_eq!(asked, 2 + 2 * played.choices().len());
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn who_does_not_answer_in_time_is_not_waited_for() {
-    let played = play(|_, _| Said::Nothing, Duration::from_secs(4), &[]).await;
+    let silent: Script = |number, messages| match number {
+        0 => honest(number, messages),
+        _ => Said::Nothing,
+    };
+    let played = play(silent, Duration::from_secs(4), &[]).await;
     let fallbacks = played.fallbacks();
     assert!(fallbacks.iter().all(Option::is_some), "{fallbacks:?}");
     assert!(played.questions() <= 9);
@@ -415,15 +563,23 @@ async fn models_agents_and_a_robot_play_a_tournament() {
         command.output()
     });
     let outputs = patiently("the tournament", futures::future::join_all(running)).await;
-    let mut told = outputs.into_iter().map(|output| {
-        let output = output.expect("it runs");
-        let problems = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{problems}");
-        let lines = serde_json::Deserializer::from_slice(&output.stdout).into_iter();
-        lines
-            .map(|line| line.expect("JSON"))
-            .collect::<Vec<Value>>()
-    });
+    let mut told = outputs
+        .into_iter()
+        .zip(PARTICIPANTS)
+        .map(|(output, (name, _))| {
+            let output = output.expect("it runs");
+            let problems = String::from_utf8_lossy(&output.stderr);
+            // A game that the fallback has played is not the model's.
+            assert_eq!(
+                output.status.success(),
+                name != "nonsense",
+                "{name}: {problems}"
+            );
+            let lines = serde_json::Deserializer::from_slice(&output.stdout).into_iter();
+            lines
+                .map(|line| line.expect("JSON"))
+                .collect::<Vec<Value>>()
+        });
     let tournament = client.tournament(tournament_id).await.expect("it is known");
     let participants = tournament.participants;
     for (name, kind) in PARTICIPANTS {
@@ -443,6 +599,9 @@ async fn models_agents_and_a_robot_play_a_tournament() {
                 asked.map(|_| 0)
             };
             assert_eq!(game["fallbacks"].as_u64(), fallbacks, "{game}");
+            if kind == model {
+                assert_eq!(game["played_by_model"], name != "nonsense", "{game}");
+            }
         }
     }
     let request = v1::GetLeaderboardRequest {

@@ -91,6 +91,14 @@ pub fn options(space: ActionSpace, request: &v1::DecisionRequest) -> String {
     legal.join("\n")
 }
 
+/// The legal action with these words, as [`options`] shows it.
+pub fn option_of(space: ActionSpace, request: &v1::DecisionRequest, words: &str) -> Option<u32> {
+    let options = options(space, request);
+    let mut named = options.lines().filter_map(|line| line.split_once('='));
+    let (id, _) = named.find(|(_, cards)| *cards == words)?;
+    id.parse().ok()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

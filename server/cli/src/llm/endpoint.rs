@@ -2,16 +2,30 @@
 //! messages, and a text with the tokens it took.
 
 use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use chefshat_server::post::{PostError, Target};
+use chefshat_server::post::{Answer, PostError, Target};
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Map, Value, json};
 
 /// Maximum bytes of an answer.
 const MAX_ANSWER_BYTES: usize = 1 << 20;
 /// Bytes of text that take at least one token, to count what a server does not.
 const MOST_BYTES_PER_TOKEN: usize = 8;
+/// Maximum characters of a server's own words about an error.
+const MAX_PROBLEM_CHARS: usize = 300;
+/// The members of a question that limit an answer: the usual one, and that of models which think
+/// first.
+const ANSWER_LIMIT: &str = "max_tokens";
+const LATER_ANSWER_LIMIT: &str = "max_completion_tokens";
+/// How long the first question may take: a server may have to load the model.
+const FIRST_ANSWER: Duration = Duration::from_secs(120);
+/// How often it is asked.
+const FIRST_ATTEMPTS: u32 = 3;
+/// The first question, which no game depends on, in the form of those that follow.
+const FIRST_QUESTION: &str = "\
+Before the game: a question to see whether you can be asked. Answer with one JSON object: {\"action\": 199}\noptions\n199=pass";
 /// What follows the address that is given.
 const PATH: &str = "/chat/completions";
 
@@ -48,6 +62,8 @@ pub(super) struct Completion {
     pub(super) text: String,
     /// Tokens of the question and the answer.
     pub(super) tokens: u64,
+    /// Whether it ends because it may not be longer.
+    pub(super) cut: bool,
 }
 
 /// Why there is no completion.
@@ -70,6 +86,10 @@ pub(crate) struct Endpoint {
     pub(super) answer_tokens: u32,
     pub(super) temperature: Option<f32>,
     pub(super) seed: Option<u64>,
+    /// Further members of each question.
+    pub(super) extra: Map<String, Value>,
+    /// Whether this server wants [`LATER_ANSWER_LIMIT`].
+    wants_later_limit: AtomicBool,
 }
 
 #[derive(Deserialize)]
@@ -83,12 +103,60 @@ struct Answered {
 #[derive(Deserialize)]
 struct Choice {
     message: Said,
+    #[serde(default)]
+    finish_reason: Option<String>,
 }
 
 #[derive(Deserialize)]
 struct Said {
     #[serde(default)]
-    content: Option<String>,
+    content: Option<Content>,
+    #[serde(default)]
+    tool_calls: Option<Vec<ToolCall>>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Content {
+    Text(String),
+    Parts(Vec<Part>),
+}
+
+/// A part of a text; those of other types have none.
+#[derive(Deserialize)]
+struct Part {
+    #[serde(default)]
+    text: String,
+}
+
+#[derive(Deserialize)]
+struct ToolCall {
+    function: Called,
+}
+
+#[derive(Deserialize)]
+struct Called {
+    arguments: Value,
+}
+
+impl Said {
+    /// What was said, or else what a tool was called with: some models answer so without being
+    /// offered one.
+    fn text(self) -> String {
+        let text = match self.content {
+            Some(Content::Text(text)) => text,
+            Some(Content::Parts(parts)) => parts.into_iter().map(|part| part.text).collect(),
+            None => String::new(),
+        };
+        let call = self.tool_calls.and_then(|calls| calls.into_iter().next());
+        match call {
+            Some(call) if text.trim().is_empty() => match call.function.arguments {
+                Value::String(arguments) => arguments,
+                arguments => arguments.to_string(),
+            },
+            _ => text,
+        }
+    }
 }
 
 #[derive(Deserialize)]
@@ -130,7 +198,31 @@ impl Endpoint {
             answer_tokens: 1_000,
             temperature: None,
             seed: None,
+            extra: Map::new(),
+            wants_later_limit: AtomicBool::new(false),
         })
+    }
+
+    /// Asks a first question, so that a wrong address, key, model or setting shows before a seat is
+    /// taken.
+    ///
+    /// # Errors
+    /// The server does not answer with a chat completion.
+    pub(crate) async fn check(&self) -> Result<(), String> {
+        let question = [Message::user(FIRST_QUESTION)];
+        let mut attempts = 0;
+        loop {
+            attempts += 1;
+            match self.complete(&question, FIRST_ANSWER).await {
+                Ok(_) => return Ok(()),
+                Err((EndpointError::Passing { pause, .. }, _)) if attempts < FIRST_ATTEMPTS => {
+                    tokio::time::sleep(pause).await;
+                }
+                Err((error, _)) => {
+                    return Err(format!("{} cannot be asked: {error}", self.model));
+                }
+            }
+        }
     }
 
     /// The model's name.
@@ -147,10 +239,37 @@ impl Endpoint {
         messages: &[Message],
         time: Duration,
     ) -> Result<Completion, (EndpointError, u64)> {
+        let asked: usize = messages.iter().map(|message| message.content.len()).sum();
+        let mut posted = self.post(messages, time).await;
+        if let Err(PostError::Status(answer)) = &posted
+            && answer.status == 400
+            && String::from_utf8_lossy(&answer.body).contains(LATER_ANSWER_LIMIT)
+            && !self.wants_later_limit.swap(true, Ordering::Relaxed)
+        {
+            posted = self.post(messages, time).await;
+        }
+        let answer = posted.map_err(|error| self.problem(error, asked))?;
+        let lasting = |problem: &str| (EndpointError::Lasting(problem.to_owned()), at_least(asked));
+        let answered: Answered = serde_json::from_slice(&answer.body)
+            .map_err(|_| lasting("the answer is not a chat completion"))?;
+        let choice = answered.choices.into_iter().next();
+        let choice = choice.ok_or_else(|| lasting("the answer has no choice"))?;
+        let cut = choice.finish_reason.as_deref() == Some("length");
+        let text = choice.message.text();
+        let reported = answered.usage.and_then(|usage| usage.total_tokens);
+        let tokens = reported.unwrap_or(0).max(at_least(asked + text.len()));
+        Ok(Completion { text, tokens, cut })
+    }
+
+    async fn post(&self, messages: &[Message], time: Duration) -> Result<Answer, PostError> {
+        let limit = match self.wants_later_limit.load(Ordering::Relaxed) {
+            true => LATER_ANSWER_LIMIT,
+            false => ANSWER_LIMIT,
+        };
         let mut question = json!({
             "model": self.model,
             "messages": messages,
-            "max_tokens": self.answer_tokens,
+            limit: self.answer_tokens,
             "stream": false,
         });
         if let Some(temperature) = self.temperature {
@@ -159,51 +278,58 @@ impl Endpoint {
         if let Some(seed) = self.seed {
             question["seed"] = json!(seed);
         }
-        let asked: usize = messages.iter().map(|message| message.content.len()).sum();
-        let body = question.to_string();
+        for (name, value) in &self.extra {
+            question[name] = value.clone();
+        }
         let key = self.key.iter();
         let headers = key.map(|key| ("authorization", format!("Bearer {key}")));
-        let answer = self
-            .target
-            .post(body, headers, time, MAX_ANSWER_BYTES)
-            .await;
-        let answer = answer.map_err(|error| problem(error, asked))?;
-        let lasting = |problem: &str| (EndpointError::Lasting(problem.to_owned()), at_least(asked));
-        let answered: Answered = serde_json::from_slice(&answer.body)
-            .map_err(|_| lasting("the answer is not a chat completion"))?;
-        let choice = answered.choices.into_iter().next();
-        let text = choice.ok_or_else(|| lasting("the answer has no choice"))?;
-        let text = text.message.content.unwrap_or_default();
-        let reported = answered.usage.and_then(|usage| usage.total_tokens);
-        let tokens = reported.unwrap_or(0).max(at_least(asked + text.len()));
-        Ok(Completion { text, tokens })
+        (self.target)
+            .post(question.to_string(), headers, time, MAX_ANSWER_BYTES)
+            .await
+    }
+
+    /// An error in words, and what the question has cost.
+    fn problem(&self, error: PostError, asked: usize) -> (EndpointError, u64) {
+        let passing = |problem: String, pause| EndpointError::Passing { problem, pause };
+        match error {
+            PostError::Status(answer) => {
+                let mut problem = format!("the endpoint answered {}", answer.status);
+                if answer.status.is_redirection() {
+                    problem += ", which means another address: give that";
+                }
+                if let Some(words) = self.words_of(&answer.body) {
+                    problem = format!("{problem}: {words}");
+                }
+                let pause = answer.retry_after.unwrap_or(Duration::from_secs(1));
+                let error = match answer.status.is_server_error() || answer.status == 429 {
+                    true => passing(problem, pause),
+                    false => EndpointError::Lasting(problem),
+                };
+                (error, 0)
+            }
+            // The model may have worked on it.
+            error @ (PostError::Timeout(_) | PostError::Body(_)) => {
+                (passing(error.to_string(), Duration::ZERO), at_least(asked))
+            }
+            error => (passing(error.to_string(), Duration::from_secs(1)), 0),
+        }
+    }
+
+    /// What a server says about an error, without the key.
+    fn words_of(&self, body: &[u8]) -> Option<String> {
+        let body: Value = serde_json::from_slice(body).ok()?;
+        let error = body.get("error").unwrap_or(&body);
+        let words = error.get("message").unwrap_or(error).as_str()?;
+        let words = match &self.key {
+            Some(key) => words.replace(key.as_str(), "…"),
+            None => words.to_owned(),
+        };
+        let words = words.chars().filter(|it| !it.is_control());
+        Some(words.take(MAX_PROBLEM_CHARS).collect())
     }
 }
 
 /// Tokens that a text with this number of bytes has at least, whatever a server reports.
 fn at_least(bytes: usize) -> u64 {
     u64::try_from(bytes.div_ceil(MOST_BYTES_PER_TOKEN)).unwrap_or(u64::MAX)
-}
-
-/// An error in words, and what the question has cost.
-fn problem(error: PostError, asked: usize) -> (EndpointError, u64) {
-    let passing = |problem: String, pause| EndpointError::Passing { problem, pause };
-    match error {
-        PostError::Status(answer) if answer.status.is_server_error() || answer.status == 429 => {
-            let pause = answer.retry_after.unwrap_or(Duration::from_secs(1));
-            (
-                passing(format!("the endpoint answered {}", answer.status), pause),
-                0,
-            )
-        }
-        PostError::Status(answer) => {
-            let problem = format!("the endpoint answered {}", answer.status);
-            (EndpointError::Lasting(problem), 0)
-        }
-        // The model may have worked on it.
-        error @ (PostError::Timeout(_) | PostError::Body(_)) => {
-            (passing(error.to_string(), Duration::ZERO), at_least(asked))
-        }
-        error => (passing(error.to_string(), Duration::from_secs(1)), 0),
-    }
 }

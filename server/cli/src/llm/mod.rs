@@ -13,6 +13,7 @@ use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_client::v1::{self, seat_update::Update};
 use chefshat_client::{ActionId, Agent, Outcome, is_legal, legal_count};
 use clap::Args;
+use serde_json::{Map, Value};
 use tokio::runtime::Handle;
 use tokio::time::Instant;
 use tracing::warn;
@@ -77,6 +78,14 @@ pub(crate) struct LlmArgs {
     /// For llm: the temperature, 0 to 2. Default: the endpoint's.
     #[arg(long, value_parser = temperature)]
     temperature: Option<f32>,
+    /// For llm: further members of each question as a JSON object, such as
+    /// '{"reasoning_effort": "low"}'.
+    #[arg(long, value_name = "JSON", value_parser = extra)]
+    extra: Option<Extra>,
+    /// For llm: the share of decisions with a choice that the fallback may take, 0 to 1. A game with
+    /// more is reported as not the model's, and the exit code is 1.
+    #[arg(long, value_name = "SHARE", default_value_t = 0.1, value_parser = share)]
+    max_fallbacks: f64,
     /// For llm: the built-in agent that decides without a usable answer; it does not search.
     #[arg(long, value_name = "AGENT", default_value_t = AgentKind::Greedy.into(), value_parser = fallback)]
     fallback: NamedAgent,
@@ -85,6 +94,18 @@ pub(crate) struct LlmArgs {
 fn temperature(text: &str) -> Result<f32, String> {
     let temperature = text.parse().ok().filter(|it| (0.0..=2.0).contains(it));
     temperature.ok_or_else(|| "a temperature is a number from 0 to 2".to_owned())
+}
+
+/// Members of a JSON object.
+type Extra = Map<String, Value>;
+
+fn extra(text: &str) -> Result<Extra, String> {
+    serde_json::from_str(text).map_err(|error| format!("give a JSON object: {error}"))
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let share = text.parse().ok().filter(|it| (0.0..=1.0).contains(it));
+    share.ok_or_else(|| "a share is a number from 0 to 1".to_owned())
 }
 
 /// An agent that decides at once: a search would need time that the model has used.
@@ -123,6 +144,7 @@ impl LlmArgs {
         endpoint.answer_tokens = self.answer_tokens;
         endpoint.temperature = self.temperature;
         endpoint.seed = seed;
+        endpoint.extra = self.extra.clone().unwrap_or_default();
         Ok(Arc::new(endpoint))
     }
 
@@ -131,6 +153,7 @@ impl LlmArgs {
         LanguageModel {
             endpoint,
             budget: self.budget,
+            max_fallbacks: self.max_fallbacks,
             retries: self.retries,
             fallback: RemoteAgent::named(self.fallback, seed, Duration::ZERO),
             fallback_name: self.fallback.name(),
@@ -161,6 +184,7 @@ pub(crate) struct Spent {
 pub(crate) struct LanguageModel {
     endpoint: Arc<Endpoint>,
     budget: u64,
+    max_fallbacks: f64,
     retries: u32,
     fallback: RemoteAgent,
     fallback_name: String,
@@ -182,6 +206,11 @@ impl LanguageModel {
     /// What the last game has taken.
     pub(crate) fn spent(&self) -> Spent {
         self.spent
+    }
+
+    /// Whether the fallback has taken so few decisions of the last game that it is the model's.
+    pub(crate) fn has_played(&self) -> bool {
+        self.spent.fallbacks as f64 <= self.max_fallbacks * self.spent.decisions as f64
     }
 
     fn now_ms(&self) -> u64 {
@@ -247,8 +276,13 @@ impl LanguageModel {
                 }
             };
             self.spent.tokens = self.spent.tokens.saturating_add(completion.tokens);
-            let Some(reply) = reply::parse(&completion.text) else {
-                problem = "no action in the answer".to_owned();
+            let by_cards = |cards: &str| cards::option_of(self.live.space(), request, cards);
+            let Some(reply) = reply::parse(&completion.text, by_cards) else {
+                problem = match completion.cut {
+                    true => "the answer was cut before its action: allow more --answer-tokens",
+                    false => "no action in the answer",
+                }
+                .to_owned();
                 messages.push(Message::assistant(completion.text));
                 messages.push(Message::user(UNREADABLE));
                 continue;

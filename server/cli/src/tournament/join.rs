@@ -2,6 +2,8 @@
 //! Rust SDK, until the tournament is over.
 
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crate::kind::KindArg;
@@ -25,7 +27,7 @@ use super::words::state;
     after_help = "Examples:\n  chefshat tournament join --agent greedy --name Gustav --code BCDF2345\n  \
                   chefshat tournament join --agent trained --games 8 --code-file ./join-code --json\n  \
                   chefshat tournament join --agent llm --endpoint http://127.0.0.1:8080/v1 --model qwen3 --code BCDF2345\n\n\
-                  Exit code: 0 when the tournament finished, 1 when it was closed or the place in it was lost."
+                  Exit code: 0 when the tournament finished, 1 when it was closed, the place in it was lost, or a model's fallback played too much of a game."
 )]
 pub(super) struct Join {
     /// The agent: random, greedy, trained, monte_carlo, or llm (a language model, which plays one
@@ -73,6 +75,7 @@ impl Join {
         }
         let pace = Duration::from_millis(self.pace_ms);
         let players = self.agent.players(&self.llm, self.seed, pace)?;
+        players.check().await?;
         let client = self.server.connect_patiently().await?;
         let (ticket, place) = match self.join_args.pass(None).await? {
             Pass::Ticket(ticket) => (ticket, None),
@@ -82,26 +85,32 @@ impl Join {
             }
         };
         let mut games = 0_u64;
+        let all_played = Arc::new(AtomicBool::new(true));
         let make = |_: &v1::Attached| {
             let player = players.player(&format!("chefshat tournament join {games}"));
             games += 1;
             Teller {
                 player,
                 json: self.json,
+                all_played: Arc::clone(&all_played),
             }
         };
         // The tournament may be private.
         let client = client.with_secrets([&ticket])?;
         let played = client.play_tournament(ticket, make).await;
         let outcomes = played.map_err(|error| format!("the place was lost: {error}"))?;
-        match place {
-            Some(place) => self.tell_end(&client, &place).await,
+        let ended = match place {
+            Some(place) => self.tell_end(&client, &place).await?,
             None => {
                 let games = counted(outcomes.len() as u64, "game");
                 anstream::eprintln!("the tournament is over; played here: {games}");
-                Ok(ExitCode::SUCCESS)
+                ExitCode::SUCCESS
             }
-        }
+        };
+        Ok(match all_played.load(Ordering::Relaxed) {
+            true => ended,
+            false => ExitCode::FAILURE,
+        })
     }
 
     async fn take_place(
@@ -167,6 +176,8 @@ impl Join {
 struct Teller {
     player: Player,
     json: bool,
+    /// Whether no game of this program was played by a fallback instead of its model.
+    all_played: Arc<AtomicBool>,
 }
 
 impl Agent for Teller {
@@ -192,6 +203,9 @@ impl Agent for Teller {
 
     fn on_game_over(&mut self, outcome: &Outcome) {
         self.player.agent().on_game_over(outcome);
+        if !self.player.has_played() {
+            self.all_played.store(false, Ordering::Relaxed);
+        }
         let printed = match self.json {
             true => say(self.player.as_json(outcome_json(outcome))),
             false => say(self.player.in_words(&outcome_in_words(outcome))),
