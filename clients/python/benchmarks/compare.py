@@ -79,7 +79,7 @@ def late(make: Callable[[], Play]) -> Play:
 
 
 def ours(address: Callable[[], str | None], games: int, opponents: str | None, seed: int) -> Play:
-    """Many games of this package; decisions of all seats count."""
+    """Many games of this package; decisions of the policy count."""
     setup: VectorOptions = {"seed": seed}
     if opponents is not None:
         setup |= {"client_seats": [0], "opponents": opponents}

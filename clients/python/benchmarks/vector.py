@@ -1,7 +1,7 @@
 """Decisions per second of this package's `VectorEnv`, with a random masked policy: in this process, and over the network.
 
-One process, one environment at a time. By default the policy has all four seats; with --opponents it has one, and decisions of the
-others count as well. The counts of the games confirm the number of decisions.
+One process, one environment at a time. By default the policy has all four seats; with --opponents it has one. Only its decisions
+count, and the counts of the games confirm their number.
 """
 
 import importlib.util
@@ -27,14 +27,11 @@ class Batches:
         self._sent = 0
 
     def step(self) -> int:
-        """Takes one decision in every game. Returns the number of decisions of all seats."""
-        before = self._env.batch
+        """Takes one decision in every game. Returns their number, without those of opponents."""
         actions = self._env.sample()
         self._sent += len(actions)
-        if len(self._env.client_seats) == self._env.players:
-            self._env.step(actions)
-            return len(actions)
-        return self._env.step(actions).totals.decisions - before.totals.decisions
+        self._env.step(actions)
+        return len(actions)
 
     def check(self) -> None:
         """Checks that the games took all decisions sent, none of them invalid."""
