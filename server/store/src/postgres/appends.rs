@@ -64,12 +64,12 @@ async fn append(connection: &mut PgConnection, rows: &[Arc<Row>]) -> sqlx::Resul
     let mut answers = Vec::with_capacity(rows.len());
     for row in rows {
         let kept = inserted.contains(&(row.game, row.position)) || stands(connection, row).await?;
-        if !kept {
-            report_hole(connection, None, row.owned, row.position).await?;
-        }
         answers.push(match kept {
             true => Ok(()),
-            false => Err(row.owned.fenced()),
+            false => {
+                report_hole(connection, None, row.owned, row.position).await?;
+                Err(row.owned.fenced())
+            }
         });
     }
     Ok(answers)

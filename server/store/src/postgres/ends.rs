@@ -41,19 +41,27 @@ pub(super) enum Ended {
     Refused(StoreError),
 }
 
-/// What a room that could not be ended is: over already, at this epoch, or another node's.
-async fn not_ended(connection: &mut PgConnection, owned: Owned) -> sqlx::Result<Ended> {
+/// What a room that could not be ended is: over already, at this epoch, or another node's, or one
+/// whose journal has lost the last of these rows.
+async fn not_ended(
+    connection: &mut PgConnection,
+    owned: Owned,
+    rows: Option<i64>,
+) -> sqlx::Result<Ended> {
     let over = sqlx::query(confirming!(
         "id FROM owned WHERE id = $1 AND epoch = $2 AND over"
     ))
     .bind(owned.id.0.as_slice())
     .bind(owned.epoch)
-    .fetch_optional(connection)
+    .fetch_optional(&mut *connection)
     .await?;
-    Ok(match over {
-        Some(_) => Ended::Before,
-        None => Ended::Refused(owned.fenced()),
-    })
+    if over.is_some() {
+        return Ok(Ended::Before);
+    }
+    if let Some(rows) = rows {
+        report_hole(connection, None, owned, rows).await?;
+    }
+    Ok(Ended::Refused(owned.fenced()))
 }
 
 /// Ends a durable game, whose journal has some rows, with a record. The last of them is there, or the
@@ -98,10 +106,7 @@ pub(super) async fn finish(
             number: row.get(0),
             has_record: true,
         }),
-        None => {
-            report_hole(connection, None, owned, rows).await?;
-            not_ended(connection, owned).await
-        }
+        None => not_ended(connection, owned, Some(rows)).await,
     }
 }
 
@@ -135,12 +140,7 @@ pub(super) async fn give_up(
     .execute(&mut *connection)
     .await?;
     match over.rows_affected() {
-        0 => {
-            if let Some(rows) = rows {
-                report_hole(connection, None, owned, rows).await?;
-            }
-            not_ended(connection, owned).await
-        }
+        0 => not_ended(connection, owned, rows).await,
         _ => Ok(Ended::Now {
             number: number.unwrap_or_default(),
             has_record: false,
@@ -192,7 +192,7 @@ pub(super) async fn whole(
             },
             None => Ended::Refused(StoreError::Taken(game.game_id)),
         }),
-        None => not_ended(connection, owned).await,
+        None => not_ended(connection, owned, None).await,
     }
 }
 
