@@ -88,7 +88,7 @@ pub(super) fn busy(method: &Method) -> Response<Bytes> {
 }
 
 /// The answer to who asks whether the server takes new clients.
-pub(super) fn health<B>(serving: bool, request: &Request<B>) -> Response<Bytes> {
+pub(super) fn health(serving: bool, method: &Method) -> Response<Bytes> {
     let response = match serving {
         true => plain(StatusCode::OK, "text/plain", b"serving\n"),
         false => plain(
@@ -97,7 +97,7 @@ pub(super) fn health<B>(serving: bool, request: &Request<B>) -> Response<Bytes> 
             b"not serving\n",
         ),
     };
-    finished(response, request.method())
+    finished(response, method)
 }
 
 fn finished(mut response: Response<Bytes>, method: &Method) -> Response<Bytes> {

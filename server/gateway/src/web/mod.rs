@@ -4,6 +4,7 @@
 
 mod answer;
 mod cache;
+mod calls;
 mod files;
 mod origin;
 mod preview;
@@ -16,16 +17,13 @@ use std::task::{Context, Poll};
 
 use bytes::Bytes;
 use futures::future::{BoxFuture, Either};
-use http::{Method, Request, Response, Uri, header};
+use http::{Method, Request, Response, header};
 use rayon::ThreadPoolBuildError;
 use tonic::body::Body;
-use tonic::metadata::MetadataMap;
-use tonic_health::pb::HealthCheckRequest;
-use tonic_health::pb::health_check_response::ServingStatus;
-use tonic_health::pb::health_client::HealthClient;
 use tower::{BoxError, Layer, Service};
 
 use answer::{DOCUMENT, absent, answer, busy, generated, health};
+use calls::is_serving;
 use files::find;
 pub use origin::{OriginLayer, Origins};
 use preview::{Link, Previews, Unshown};
@@ -108,7 +106,10 @@ where
             let request = request.map(drop);
             let path = request.uri().path();
             let answer = match Link::of(path) {
-                None if path == HEALTH => health(is_serving(services, &request).await, &request),
+                None if path == HEALTH => health(
+                    is_serving(services, request.extensions()).await,
+                    request.method(),
+                ),
                 None => of_files(request, |request| answer(find, request)).await,
                 Some(link) => page.previewed(link, services, &request).await,
             };
@@ -149,19 +150,6 @@ impl PageLayer {
             }
         }
     }
-}
-
-/// What the health service of gRPC says of the whole server.
-async fn is_serving<S>(services: S, request: &Request<()>) -> bool
-where
-    S: Service<Request<Body>, Response = Response<Body>>,
-    S::Error: Into<BoxError>,
-{
-    let mut health = HealthClient::with_origin(services, Uri::from_static("http://page"));
-    let (extensions, message) = (request.extensions().clone(), HealthCheckRequest::default());
-    let call = tonic::Request::from_parts(MetadataMap::new(), extensions, message);
-    let answered = health.check(call).await;
-    answered.is_ok_and(|answer| answer.into_inner().status() == ServingStatus::Serving)
 }
 
 /// An answer that needs files of the page, which are in this program.

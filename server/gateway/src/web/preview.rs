@@ -17,7 +17,7 @@ use chefshat_record::jsonl;
 use chefshat_record::outcome::outcome;
 use chefshat_room::ids::Id;
 use http::uri::{Authority, Scheme};
-use http::{Extensions, Request, Response, Uri, header};
+use http::{Extensions, Request, Response, header};
 use prost::Message as _;
 use rayon::ThreadPoolBuildError;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
@@ -25,12 +25,12 @@ use tokio::process::{Child, Command};
 use tokio::runtime::Handle;
 use tokio::time::timeout;
 use tonic::body::Body;
-use tonic::metadata::MetadataMap;
 use tower::{BoxError, Service};
 use tracing::warn;
 
 use super::answer::File;
 use super::cache::Cache;
+use super::calls::{own_call, own_origin};
 use crate::connections::peer_address;
 use chefshat_admission::limits::{FairSemaphore, Key};
 use chefshat_base::threads::{Priority, Threads};
@@ -211,7 +211,7 @@ impl Previews {
             // First: the game of another caller does not wait behind those of this one.
             let place = self.places.take(key).await;
             let making = async {
-                let lines = record(services, game, extensions.clone()).await;
+                let lines = record(services, game, extensions).await;
                 let lines = lines.ok_or(Unshown::Unknown)?;
                 // The work keeps its place when its request is cancelled.
                 let work = move || (make(&lines), place);
@@ -230,16 +230,16 @@ impl Previews {
 }
 
 /// The record of a game, if everybody may read it and it is not too long.
-async fn record<S>(services: S, game: Id, extensions: Extensions) -> Option<Vec<v1::RecordLine>>
+async fn record<S>(services: S, game: Id, extensions: &Extensions) -> Option<Vec<v1::RecordLine>>
 where
     S: Service<Request<Body>, Response = Response<Body>>,
     S::Error: Into<BoxError>,
 {
-    let mut service = RecordServiceClient::with_origin(services, Uri::from_static("http://page"));
+    let mut service = RecordServiceClient::with_origin(services, own_origin());
     let message = v1::GetRecordRequest {
         game_id: game.to_string(),
     };
-    let request = tonic::Request::from_parts(MetadataMap::new(), extensions, message);
+    let request = own_call(extensions, message);
     let mut responses = service.get_record(request).await.ok()?.into_inner();
     let (mut lines, mut bytes) = (Vec::new(), 0);
     while let Some(response) = responses.message().await.ok()? {
