@@ -440,7 +440,7 @@ async fn a_model_that_cannot_be_asked_takes_no_seat() {
             &["agent", "llm"][..],
             &["tournament", "join", "--agent", "llm"],
         ] {
-            // There is no server of games: it is not even asked.
+            // Nothing listens there: the program ends before it connects to the game server.
             let mut command = chefshat(command, KEY);
             command.args(["--server", "http://127.0.0.1:1", "--code", "BCDF2345"]);
             command.args(["--endpoint", &url, "--model", "ada/test-1"]);

@@ -80,23 +80,27 @@ pub fn action(space: ActionSpace, id: u32, special: v1::SpecialAction) -> String
     words.unwrap_or_else(|| "not an action".to_owned())
 }
 
-/// The legal actions of a decision, each in a line: `13=2x6`, `199=pass`.
-pub fn options(space: ActionSpace, request: &v1::DecisionRequest) -> String {
+/// The legal actions of a decision, with their words.
+fn legal(space: ActionSpace, request: &v1::DecisionRequest) -> Vec<(u32, String)> {
     let legal = Mask::from_bytes(&request.action_mask);
     let legal = legal.iter().flat_map(Mask::iter).map(|id| {
         let id = u32::from(id.index());
-        format!("{id}={}", action(space, id, request.special_action()))
+        (id, action(space, id, request.special_action()))
     });
-    let legal: Vec<String> = legal.collect();
-    legal.join("\n")
+    legal.collect()
 }
 
-/// The legal action with these words, as [`options`] shows it.
+/// The legal actions of a decision, each in a line: `13=2x6`, `199=pass`.
+pub fn options(space: ActionSpace, request: &v1::DecisionRequest) -> String {
+    let legal = legal(space, request).into_iter();
+    let lines: Vec<String> = legal.map(|(id, words)| format!("{id}={words}")).collect();
+    lines.join("\n")
+}
+
+/// The legal action with these words.
 pub fn option_of(space: ActionSpace, request: &v1::DecisionRequest, words: &str) -> Option<u32> {
-    let options = options(space, request);
-    let mut named = options.lines().filter_map(|line| line.split_once('='));
-    let (id, _) = named.find(|(_, cards)| *cards == words)?;
-    id.parse().ok()
+    let mut legal = legal(space, request).into_iter();
+    legal.find_map(|(id, option)| (option == words).then_some(id))
 }
 
 #[cfg(test)]

@@ -240,15 +240,8 @@ impl Endpoint {
         time: Duration,
     ) -> Result<Completion, (EndpointError, u64)> {
         let asked: usize = messages.iter().map(|message| message.content.len()).sum();
-        let mut posted = self.post(messages, time).await;
-        if let Err(PostError::Status(answer)) = &posted
-            && answer.status == 400
-            && String::from_utf8_lossy(&answer.body).contains(LATER_ANSWER_LIMIT)
-            && !self.wants_later_limit.swap(true, Ordering::Relaxed)
-        {
-            posted = self.post(messages, time).await;
-        }
-        let answer = posted.map_err(|error| self.problem(error, asked))?;
+        let answer = self.post(messages, time).await;
+        let answer = answer.map_err(|error| self.problem(error, asked))?;
         let lasting = |problem: &str| (EndpointError::Lasting(problem.to_owned()), at_least(asked));
         let answered: Answered = serde_json::from_slice(&answer.body)
             .map_err(|_| lasting("the answer is not a chat completion"))?;
@@ -301,7 +294,10 @@ impl Endpoint {
                     problem = format!("{problem}: {words}");
                 }
                 let pause = answer.retry_after.unwrap_or(Duration::from_secs(1));
-                let error = match answer.status.is_server_error() || answer.status == 429 {
+                let passes = answer.status.is_server_error()
+                    || answer.status == 429
+                    || self.learns_limit(&answer);
+                let error = match passes {
                     true => passing(problem, pause),
                     false => EndpointError::Lasting(problem),
                 };
@@ -313,6 +309,13 @@ impl Endpoint {
             }
             error => (passing(error.to_string(), Duration::from_secs(1)), 0),
         }
+    }
+
+    /// Whether an answer says for the first time that this server wants [`LATER_ANSWER_LIMIT`].
+    fn learns_limit(&self, answer: &Answer) -> bool {
+        answer.status == 400
+            && String::from_utf8_lossy(&answer.body).contains(LATER_ANSWER_LIMIT)
+            && !self.wants_later_limit.swap(true, Ordering::Relaxed)
     }
 
     /// What a server says about an error, without the key.
