@@ -158,7 +158,7 @@ impl HonestRoom {
                 tokio::time::sleep(LOOK_AGAIN).await;
             }
         };
-        // What was not played is told by what was noticed.
+        // If nothing was played in time, `take` shows that.
         let _ = tokio::time::timeout(limit, playing).await;
     }
 

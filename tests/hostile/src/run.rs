@@ -107,9 +107,10 @@ async fn attacked(
         }
     }
     let honest = HonestRoom::start(honest_access.clone(), SHORT);
+    let quiet_begun = Instant::now();
     tokio::time::sleep(options.quiet).await;
     honest.until_played(PREPARE_LIMIT).await;
-    let quiet = honest.take();
+    let (quiet, quiet_time) = (honest.take(), quiet_begun.elapsed());
     if quiet.latencies.is_empty() {
         return Err(HostileError::Quiet(honest.last_problem()));
     }
@@ -146,7 +147,7 @@ async fn attacked(
         attack,
         Phases {
             quiet,
-            quiet_time: options.quiet,
+            quiet_time,
             attacked,
             attack_time,
             last,
