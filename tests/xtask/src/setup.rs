@@ -216,11 +216,7 @@ fn is_new_enough(version: &str) -> bool {
 
 /// The browser for the tests of the page.
 pub(crate) fn chromium() -> Result<(), Failure> {
-    let (program, package) = CHROMIUM;
-    match is_on_path(program) {
-        true => Ok(()),
-        false => debian_package(package),
-    }
+    debian_programs(&[CHROMIUM])
 }
 
 /// strace, with which a test makes a disk fail.
