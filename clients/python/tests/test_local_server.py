@@ -39,6 +39,26 @@ if sys.argv[1] == "raise":
     raise KeyboardInterrupt
 """
 
+# Prints the number of streaming calls while an environment and a stream of responses are open, and when the interpreter ends.
+LEFT_OPEN = """
+import atexit, gc
+
+def count(when):
+    print(when, sum(isinstance(it, _MultiThreadedRendezvous) for it in gc.get_objects()), flush=True)
+
+# First, so called last.
+atexit.register(count, "left:")
+import chefshat
+from grpc._channel import _MultiThreadedRendezvous
+
+env = chefshat.make(address="local")
+env.reset()
+client = chefshat.Client(env.unwrapped.vector.server)
+events = client.watch(client.create_room(seats=["random"] * 4).room.room_id)
+next(events)
+count("open:")
+"""
+
 
 def program(path: Path, text: str) -> Path:
     """A program that is a shell script."""
@@ -152,6 +172,16 @@ def test_the_shared_server_stops_with_its_process(way: str) -> None:
     # The server's parent has ended, so the test can only wait for its absence.
     watch = f"while kill -0 {process} 2>/dev/null; do sleep 0.05; done"
     subprocess.run(["sh", "-c", watch], check=True, timeout=WAIT_S)
+
+
+@pytest.mark.server
+def test_no_call_is_left_when_the_interpreter_ends() -> None:
+    """Deleting one then can wait for ever, if a thread of gRPC was stopped at the wrong moment."""
+    if not os.environ.get(BINARY):
+        pytest.skip(f"{BINARY} is not set")
+    environment = {**os.environ, "PYTHONPATH": SOURCE}
+    done = subprocess.run([sys.executable, "-c", LEFT_OPEN], capture_output=True, text=True, timeout=WAIT_S, env=environment)
+    assert done.stdout.split() == ["open:", "2", "left:", "0"], done.stderr
 
 
 def test_the_package_of_the_server_finds_its_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,7 +4,8 @@ import ipaddress
 import os
 import ssl
 import warnings
-from collections.abc import Callable, Sequence
+import weakref
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 from urllib.parse import urlsplit
@@ -168,6 +169,34 @@ class _Calling:
         def call(*inputs: object) -> object:
             if self._closed:
                 raise closed()
-            return method(*inputs, metadata=self._metadata or None, timeout=timeout)
+            begun = method(*inputs, metadata=self._metadata or None, timeout=timeout)
+            return _Stream(begun) if isinstance(begun, Iterator) else begun
 
         return call
+
+
+class _Stream(Iterator[object]):
+    """The call of a blocking stream, cancelled and deleted before the interpreter ends.
+
+    gRPC's own object takes a lock when it is deleted. While the interpreter ends, that can wait for ever: for a thread of gRPC that
+    had the lock when it was stopped.
+    """
+
+    def __init__(self, call: Any) -> None:  # noqa: ANN401 - Its class is private to gRPC.
+        # Empty from then on.
+        self._calls = [call]
+        weakref.finalize(self, _end, self._calls)
+
+    def __next__(self) -> object:
+        return next(self._calls[0])
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - Whatever the call has.
+        return getattr(self._calls[0], name)
+
+    def cancel(self) -> None:
+        for call in self._calls:
+            call.cancel()
+
+
+def _end(calls: list[Any]) -> None:
+    calls.pop().cancel()

@@ -76,9 +76,9 @@ class Client(Calls):
             return None
         # If the call ended while an agent was deciding, its status has the error.
         call.cancel()
-        if failure is None and isinstance(call, grpc.RpcError) and call.code() is not grpc.StatusCode.OK:
-            failure = call
-        return connection_lost() if failure is None else from_rpc_error(failure)
+        if failure is None and call.code() is grpc.StatusCode.OK:
+            return connection_lost()
+        return from_rpc_error(failure or call)
 
 
 class _Pump(Iterator[pb.PlayRequest]):

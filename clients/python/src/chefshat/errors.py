@@ -88,8 +88,8 @@ def from_refused(refused: pb.Refused) -> ChefsHatError:
     return ChefsHatError(refused.reason, refused.message, refused.metadata, code)
 
 
-def from_rpc_error(error: "grpc.RpcError") -> ChefsHatError:
-    """Converts the error of a call, blocking or asyncio, with reason and metadata from google.rpc.ErrorInfo."""
+def from_rpc_error(error: "grpc.RpcError | grpc.Call") -> ChefsHatError:
+    """Converts the error of a call, or the failed call, blocking or asyncio, with reason and metadata from google.rpc.ErrorInfo."""
     from chefshat.network import grpc
 
     # Errors of calls have these methods, but their common base class does not declare them.
