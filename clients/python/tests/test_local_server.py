@@ -39,15 +39,18 @@ if sys.argv[1] == "raise":
     raise KeyboardInterrupt
 """
 
-# Prints the number of streaming calls while an environment and a stream of responses are open, and when the interpreter ends.
+# Waits for and prints the number of streaming calls while an environment and two streams of responses are open, of which a thread
+# reads one, and when the interpreter ends.
 LEFT_OPEN = """
-import atexit, gc
+import atexit, gc, threading, time
 
-def count(when):
-    print(when, sum(isinstance(it, _MultiThreadedRendezvous) for it in gc.get_objects()), flush=True)
+def show(when, number):
+    while sum(isinstance(it, _MultiThreadedRendezvous) for it in gc.get_objects()) != number:
+        time.sleep(0.01)
+    print(when, number, flush=True)
 
 # First, so called last.
-atexit.register(count, "left:")
+atexit.register(show, "left:", 0)
 import chefshat
 from grpc._channel import _MultiThreadedRendezvous
 
@@ -56,7 +59,9 @@ env.reset()
 client = chefshat.Client(env.unwrapped.vector.server)
 events = client.watch(client.create_room(seats=["random"] * 4).room.room_id)
 next(events)
-count("open:")
+waiting = client.watch(client.create_room().room.room_id)
+threading.Thread(target=next, args=(waiting,), daemon=True).start()
+show("open:", 3)
 """
 
 
@@ -181,7 +186,7 @@ def test_no_call_is_left_when_the_interpreter_ends() -> None:
         pytest.skip(f"{BINARY} is not set")
     environment = {**os.environ, "PYTHONPATH": SOURCE}
     done = subprocess.run([sys.executable, "-c", LEFT_OPEN], capture_output=True, text=True, timeout=WAIT_S, env=environment)
-    assert done.stdout.split() == ["open:", "2", "left:", "0"], done.stderr
+    assert (done.stdout.split(), done.stderr) == (["open:", "3", "left:", "0"], "")
 
 
 def test_the_package_of_the_server_finds_its_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -183,15 +183,25 @@ class _Stream(Iterator[object]):
     """
 
     def __init__(self, call: Any) -> None:  # noqa: ANN401 - Its class is private to gRPC.
-        # Empty from then on.
+        # Emptied by `_end`, because a finalizer must not refer to the stream itself.
         self._calls = [call]
         weakref.finalize(self, _end, self._calls)
 
     def __next__(self) -> object:
-        return next(self._calls[0])
+        try:
+            return next(self._call())
+        except grpc.RpcError:
+            self._call()
+            raise
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - Whatever the call has.
-        return getattr(self._calls[0], name)
+        return getattr(self._call(), name)
+
+    def _call(self) -> Any:  # noqa: ANN401 - Its class is private to gRPC.
+        if not self._calls:
+            # Ends a thread that still runs while the interpreter ends, and prints nothing.
+            raise SystemExit
+        return self._calls[0]
 
     def cancel(self) -> None:
         for call in self._calls:
