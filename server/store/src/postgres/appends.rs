@@ -23,7 +23,7 @@ pub(super) struct Row {
     pub(super) owned: Owned,
     /// The number of the game.
     pub(super) game: i64,
-    /// From 0. Only one row of a game may be on its way at a time.
+    /// From 0. Only one row of a journal may be on its way at a time.
     pub(super) position: i64,
     pub(super) entries: Vec<u8>,
 }
@@ -60,7 +60,15 @@ async fn append(connection: &mut PgConnection, rows: &[Arc<Row>]) -> sqlx::Resul
     .bind(all(rows, |row| row.entries.as_slice()))
     .fetch_all(&mut *connection)
     .await?;
-    let inserted: HashSet<(i64, i64)> = inserted.into_iter().collect();
+    let mut inserted: HashSet<(i64, i64)> = inserted.into_iter().collect();
+    // A room that has stopped while its row waited, and the one that its node has read again, may both
+    // send a row for one place.
+    let mut places = HashSet::with_capacity(rows.len());
+    for row in rows {
+        if !places.insert((row.game, row.position)) {
+            inserted.remove(&(row.game, row.position));
+        }
+    }
     let mut answers = Vec::with_capacity(rows.len());
     for row in rows {
         let kept = inserted.contains(&(row.game, row.position)) || stands(connection, row).await?;
@@ -75,8 +83,8 @@ async fn append(connection: &mut PgConnection, rows: &[Arc<Row>]) -> sqlx::Resul
     Ok(answers)
 }
 
-/// Whether a row that was not inserted stands there already, because an earlier attempt without an
-/// answer inserted it.
+/// Whether a row stands in its place: an earlier attempt without an answer inserted it, or this one,
+/// and not another row for that place.
 async fn stands(connection: &mut PgConnection, row: &Row) -> sqlx::Result<bool> {
     let stands = sqlx::query(confirming!(
         "game FROM journal WHERE game = $1 AND position = $2 AND epoch = $3 AND entries = $4"

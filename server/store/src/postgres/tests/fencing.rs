@@ -5,6 +5,8 @@ use chefshat_postgres::Server;
 use tokio::sync::watch;
 
 use super::*;
+use crate::postgres::appends::Row;
+use crate::postgres::writer::Work as _;
 
 const FIRST: Epoch = Epoch::FIRST;
 const SECOND: Epoch = Epoch(2);
@@ -130,6 +132,43 @@ async fn an_append_that_is_late_finds_its_place_taken() {
     let game = resumed(&pair.second, 1, SECOND).await;
     assert_eq!(numbers(&game.entries), [1, 0]);
     pair.close().await;
+}
+
+/// The row of a room that has stopped may still wait when its node has read the room again.
+#[tokio::test]
+async fn of_two_rows_for_one_place_in_a_batch_one_is_acknowledged() {
+    let database = chefshat_postgres::database();
+    let store = node(&database).await;
+    let created = store.create(durable(1), vec![entry(1)]);
+    created.await.expect("created");
+    let number = database.run("SELECT number FROM games");
+    let row = |entry_number| {
+        let owned = Owned {
+            id: Id([1; 16]),
+            unit: Id([1; 16]),
+            epoch: FIRST_EPOCH,
+        };
+        Arc::new(Row {
+            owned,
+            game: number.parse().expect("a number"),
+            position: 1,
+            entries: form::entries_to_bytes(&mut vec![entry(entry_number)]),
+        })
+    };
+    let mut connection = connected(&database).await;
+    for again in [false, true] {
+        let answers = Row::commit(&mut connection, &[row(2), row(3), row(2)], again).await;
+        let fenced = Err(StoreError::Fenced(Id([1; 16])));
+        let answers = answers.expect("committed");
+        let entries = numbers(&resumed(&store, 1, FIRST).await.entries);
+        let expected = match entries[..] {
+            [1, 2] => [Ok(()), fenced, Ok(())],
+            [1, 3] => [fenced.clone(), Ok(()), fenced],
+            _ => panic!("{entries:?}"),
+        };
+        assert_eq!(answers, expected);
+    }
+    store.close().await;
 }
 
 #[tokio::test]
