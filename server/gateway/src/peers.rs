@@ -29,6 +29,7 @@ use chefshat_admission::limits::Shares;
 use chefshat_base::metrics::Metrics;
 use chefshat_base::proxies::TrustedProxies;
 use chefshat_hosting::cluster::Peer;
+use chefshat_room::MAX_GATEWAY_DELAY;
 
 /// The name that the certificate of every node has.
 pub const PEER_NAME: &str = "chefshat-node";
@@ -38,6 +39,10 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 pub const PING_INTERVAL: Duration = Duration::from_secs(2);
 /// How long the other node may take to answer a ping. After that everything on the connection fails.
 pub const PING_TIMEOUT: Duration = Duration::from_secs(3);
+const _: () = assert!(
+    PING_INTERVAL.as_secs() + PING_TIMEOUT.as_secs() < MAX_GATEWAY_DELAY.as_secs(),
+    "no decision runs out before it is noticed that its client's node is gone"
+);
 /// A connection to another node that nobody asked for during this time is closed, once its streams
 /// have ended.
 const CHANNEL_IDLE: Duration = Duration::from_secs(600);

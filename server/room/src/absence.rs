@@ -24,7 +24,7 @@ pub struct Awaited {
     pub absence_counts: bool,
     /// When the decision was opened; in a silence, when that began.
     pub since: Duration,
-    /// When the server decides for it, as things stand. `None` in a silence, which would show.
+    /// When its time is up, as things stand. `None` in a silence, which would show.
     pub until: Option<Duration>,
 }
 
@@ -60,7 +60,7 @@ impl Core {
         };
         let Some(silent_since) = self.silent_since else {
             let open = self.awaited().filter(|open| !open.is_silent())?;
-            let (since, until) = (open.released, self.runs_out_at(open));
+            let (since, until) = (open.released, self.ends_at(open, Duration::ZERO));
             return Some(shown(open.id, open.decision.seat, since, Some(until)));
         };
         let first = self.first_in_silence()?;
@@ -141,18 +141,23 @@ impl Core {
 
     /// When the clock of a decision starts, as far as it is known.
     fn starts_at(&self, open: &OpenDecision) -> Duration {
-        let recalled_until = self.recalled_until(open.decision.seat);
+        let recalled_until = self.recalled_until(open);
         let latest = recalled_until.map_or(open.released, |until| open.released.max(until));
         open.start.unwrap_or(latest)
     }
 
     /// When the default is taken for a decision, as things stand.
     pub(super) fn runs_out_at(&self, open: &OpenDecision) -> Duration {
+        self.ends_at(open, self.seats[open.decision.seat.index()].grace)
+    }
+
+    /// When the clock of a decision ends, as things stand, or so much `later`.
+    fn ends_at(&self, open: &OpenDecision, later: Duration) -> Duration {
         if let Some(end) = self.phase_ends_of(open) {
             return end;
         }
         let seat = open.decision.seat;
-        let own = self.starts_at(open) + self.time_allowed(open) + self.seats[seat.index()].grace;
+        let own = self.starts_at(open) + self.time_allowed(open) + later;
         match self.absence(open) {
             Some(absence) if self.holds_others_up(seat) => own.min(absence.end),
             _ => own,

@@ -267,7 +267,7 @@ impl Core {
             return;
         };
         let connected = self.seats[seat.index()].connection.is_some();
-        let recalled_until = self.recalled_until(seat);
+        let recalled_until = (self.open.as_ref()).and_then(|open| self.recalled_until(open));
         let Some(open) = &mut self.open else { return };
         if open.start.is_some() {
             return;
@@ -283,11 +283,11 @@ impl Core {
         };
     }
 
-    /// Gives a seat that returns after a restart of the server its full time for the open decision.
+    /// Gives a seat that was away because of a server its full time for the open decision.
     pub(super) fn restart_clock(&mut self, now: Duration, seat: Seat) {
         let recalled = self.seats[seat.index()].recalled;
         if let Some(open) = &mut self.open
-            && recalled
+            && recalled.is_some()
             && open.start.is_none()
         {
             open.reopen(now);
@@ -301,11 +301,20 @@ impl Core {
         }
     }
 
-    /// Until when the clock waits for a seat that has not returned since the server restarted.
-    pub(super) fn recalled_until(&self, seat: Seat) -> Option<Duration> {
-        self.restarted
-            .filter(|_| self.seats[seat.index()].recalled)
+    /// Until when the clock of a decision waits for its seat, which is away because of a server.
+    /// Everybody knows of a restart, so that a silent decision waits too.
+    pub(super) fn recalled_until(&self, open: &OpenDecision) -> Option<Duration> {
+        let seat = open.decision.seat;
+        self.seats[seat.index()]
+            .recalled
+            .filter(|_| !open.is_silent() || self.is_away_since_restart(seat))
             .map(|at| at + RECALL_TIME)
+    }
+
+    /// Whether a seat has not been attached since the server restarted.
+    pub(super) fn is_away_since_restart(&self, seat: Seat) -> bool {
+        let recalled = self.seats[seat.index()].recalled;
+        recalled.is_some() && recalled == self.restarted
     }
 
     fn holds(&self) -> impl Iterator<Item = (Seat, Duration)> + '_ {

@@ -124,7 +124,7 @@ impl Core {
             }
             state.connection = None;
             state.lost_at = at;
-            state.recalled = true;
+            state.recalled = Some(at);
             match self.state {
                 // Its ticket must be attached again within the same time as at first.
                 State::Waiting => {

@@ -123,7 +123,7 @@ impl Core {
             self.pause_clock(arrived);
         }
         let state = &mut self.seats[seat.index()];
-        state.recalled = false;
+        state.recalled = None;
         state.connection = Some(connection);
         state.grace = Duration::ZERO;
         state.ever_attached = true;
@@ -153,8 +153,7 @@ impl Core {
         connection: ConnectionId,
         handed: Option<Duration>,
     ) {
-        // After the end of a game, the list of those present at its end does not change.
-        if self.seats[seat.index()].connection != Some(connection) || self.state.is_over() {
+        if !self.is_held_by(seat, connection) {
             return;
         }
         let state = &mut self.seats[seat.index()];
@@ -166,6 +165,36 @@ impl Core {
         if state.connection_events < MAX_CONNECTION_EVENTS {
             state.connection_events += 1;
             self.commit(now, Change::Disconnected(seat));
+        }
+    }
+
+    /// Whether a seat may lose this connection. After the end of a game, the list of those present at
+    /// its end does not change.
+    fn is_held_by(&self, seat: Seat, connection: ConnectionId) -> bool {
+        self.seats[seat.index()].connection == Some(connection) && !self.state.is_over()
+    }
+
+    /// Records the loss of a connection together with the server through which it came. As after a
+    /// restart, the clock of the seat's decision waits for it to return; not that of a silent one,
+    /// which would show.
+    pub fn lost_with_server(
+        &mut self,
+        now: Duration,
+        seat: Seat,
+        connection: ConnectionId,
+        handed: Option<Duration>,
+    ) {
+        if !self.is_held_by(seat, connection) {
+            return;
+        }
+        self.lost(now, seat, connection, handed);
+        self.seats[seat.index()].recalled = Some(now);
+        if let Some(open) = &mut self.open
+            && open.decision.seat == seat
+            && !open.is_silent()
+        {
+            open.start = None;
+            open.recheck_at = Duration::ZERO;
         }
     }
 

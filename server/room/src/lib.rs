@@ -132,8 +132,9 @@ struct SeatState {
     entropy: Vec<u8>,
     /// Whether the loss of the agent's connection has been published.
     away: bool,
-    /// Whether it has not been attached since the server restarted.
-    recalled: bool,
+    /// Since when it is away because of a server: all of them restarted, or that of its connection
+    /// was lost. `None` once it is attached again.
+    recalled: Option<Duration>,
     connection_events: u32,
     expressions: u32,
     /// The built-in agent of the seat or its substitute. Of one that searches: what it plays
@@ -277,7 +278,7 @@ impl Core {
                     grace: Duration::ZERO,
                     entropy: Vec::new(),
                     away: false,
-                    recalled: false,
+                    recalled: None,
                     connection_events: 0,
                     expressions: 0,
                     agent: match fill {
@@ -415,7 +416,7 @@ impl Core {
     pub fn has_forfeited(&self, seat: Seat) -> bool {
         let state = &self.seats[seat.index()];
         // After a restart all are away until they have attached again.
-        let is_away = state.away && !state.recalled;
+        let is_away = state.away && !self.is_away_since_restart(seat);
         let is_gone = match self.state {
             State::Aborted(AbortReason::Closed) => is_away,
             State::Aborted(AbortReason::ParticipantsLost) => {

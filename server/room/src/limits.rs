@@ -21,10 +21,11 @@ pub const JOIN_HOLD: Duration = Duration::from_secs(120);
 /// not received the request.
 pub const MAX_HANDOVER: Duration = Duration::from_secs(5);
 /// How late an answer that was measured by another server may arrive, and how much of its time the
-/// network between the servers may have cost.
-pub const MAX_GATEWAY_DELAY: Duration = Duration::from_secs(1);
-/// After a restart of the server, the clock of a decision waits this long for its seat to be
-/// attached.
+/// network between the servers may have cost. Longer than servers need to notice that they are cut
+/// off from each other.
+pub const MAX_GATEWAY_DELAY: Duration = Duration::from_secs(6);
+/// After a restart of the server, or the loss of the one that a seat is connected to, the clock of a
+/// decision waits this long for its seat to be attached.
 pub const RECALL_TIME: Duration = Duration::from_secs(60);
 /// Where built-in agents have a pace, the phase of special actions lasts this many times the pace
 /// in every Shift that has one, whether or not somebody is offered one.

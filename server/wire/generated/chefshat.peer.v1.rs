@@ -13,6 +13,14 @@ pub struct PlayRequest {
     /// late attachment supersedes a newer one.
     #[prost(bool, tag = "3")]
     pub answers_contested: bool,
+    /// In the first message: the gateway says it, with `left`, when its client has left. A stream that
+    /// ends without has lost its gateway, or the connection to it, and the clocks of its seats wait for
+    /// them. Of a gateway that does not, an older version, the client has left in any case.
+    #[prost(bool, tag = "4")]
+    pub announces_left: bool,
+    /// In the last message: the client has left.
+    #[prost(bool, tag = "5")]
+    pub left: bool,
 }
 /// An input of a client's stream.
 #[derive(Clone, PartialEq, ::prost::Message)]

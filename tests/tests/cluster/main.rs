@@ -4,6 +4,7 @@
 mod certificates;
 mod cluster;
 mod cup;
+mod cuts;
 mod faults;
 mod measure;
 mod proxy;

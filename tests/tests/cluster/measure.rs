@@ -33,7 +33,12 @@ const ROUNDS: usize = 2;
 const BEFORE: u64 = 5;
 
 /// Rooms of agents that think up to `pace`, each on one stream.
-fn rooms(count: usize, shifts: u32, decision_time_ms: u32, pace: Duration) -> Vec<RoomKind> {
+pub(crate) fn rooms(
+    count: usize,
+    shifts: u32,
+    decision_time_ms: u32,
+    pace: Duration,
+) -> Vec<RoomKind> {
     let kind = RoomKind {
         rules: v1::RuleSet {
             stop: Some(v1::rule_set::Stop::TargetShifts(shifts)),
@@ -53,7 +58,7 @@ fn rooms(count: usize, shifts: u32, decision_time_ms: u32, pace: Duration) -> Ve
     vec![kind; count]
 }
 
-async fn all_play(rooms: &BusyRooms) {
+pub(crate) async fn all_play(rooms: &BusyRooms) {
     let mut progress = rooms.progress();
     let playing = progress.wait_for(|rooms| rooms.iter().all(|count| *count >= BEFORE));
     patiently("decisions of every room", playing)
@@ -155,7 +160,7 @@ async fn games_of_a_drained_node() {
         cluster.restart(node).await;
     }
     show("all drains: longest time without a decision", "s", all);
-    show_missed(&cluster, rooms).await;
+    missed(&cluster, rooms).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -186,11 +191,11 @@ async fn an_upgrade_of_all_nodes_one_after_another() {
     let pauses = before.iter();
     let pauses = pauses.filter_map(|game| longest_pause(&rooms.ledger, game, begun));
     show("longest time without a decision", "s", pauses.collect());
-    show_missed(&cluster, rooms).await;
+    missed(&cluster, rooms).await;
 }
 
-/// Lets the games end, and says how many decisions were late.
-async fn show_missed(cluster: &Cluster, rooms: BusyRooms) {
+/// Lets the games end; says and returns how many decisions were not those of their agents.
+pub(crate) async fn missed(cluster: &Cluster, rooms: BusyRooms) -> usize {
     let ledger = std::sync::Arc::clone(&rooms.ledger);
     let games = rooms.finish().await;
     let client = cluster.nodes[0].client().await;
@@ -209,6 +214,7 @@ async fn show_missed(cluster: &Cluster, rooms: BusyRooms) {
         games.len(),
         ledger.count()
     );
+    missed
 }
 
 /// The CPU time of processes so far, seconds.

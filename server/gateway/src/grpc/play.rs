@@ -33,7 +33,7 @@ use chefshat_admission::limits::{Executing, Hint, Key};
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named};
 use chefshat_hosting::config::MAX_SEATS_PER_WATCH;
-use chefshat_hosting::room::SeatAction;
+use chefshat_hosting::room::{Loss, SeatAction};
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::tournaments::Tournaments;
 use chefshat_room::ids::{Id, Token};
@@ -204,7 +204,7 @@ impl PlayService for Play {
                     }
                 }
             }
-            reader.leave_all().await;
+            reader.leave_all(Loss::Gone).await;
         }));
         Ok(Response::new(Box::pin(updates.map_err(stream_ended))))
     }

@@ -11,7 +11,7 @@ use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
 use super::message::{
-    Acted, AttachRequest, AttachedSeat, Following, Hinted, JoinRequest, Joined, MarkOutcome,
+    Acted, AttachRequest, AttachedSeat, Following, Hinted, JoinRequest, Joined, Loss, MarkOutcome,
     MarkRequest, Message, NotAttached, Ruled, SeatAction, SpectateError, SpectateRequest, Watching,
 };
 use super::shared::SharedRoom;
@@ -142,17 +142,12 @@ impl Handle {
             .await
     }
 
-    /// Reports that a seat's connection is lost or leaves. `reason` is sent to one that leaves.
-    pub async fn lost(
-        &self,
-        seat: Seat,
-        connection: ConnectionId,
-        reason: Option<v1::DetachReason>,
-    ) {
+    /// Reports that a seat has lost its connection.
+    pub async fn lost(&self, seat: Seat, connection: ConnectionId, loss: Loss) {
         // If the room is gone, there is nothing to do.
         let _ = self
             .mailbox
-            .send(Message::Lost(seat, connection, reason))
+            .send(Message::Lost(seat, connection, loss))
             .await;
     }
 

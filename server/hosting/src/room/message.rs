@@ -208,6 +208,17 @@ pub(super) type MarkOutcome = Result<v1::Marker, MarkError>;
 /// A stream that follows markers.
 pub(super) type Following = Result<MarkerFollower, SpectateError>;
 
+/// How a seat loses its connection.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Loss {
+    /// Its client has gone.
+    Gone,
+    /// Its client detaches it, and is told so.
+    Detached,
+    /// The node is lost to which its client is connected.
+    WithNode,
+}
+
 /// A message to a room.
 pub(super) enum Message {
     Join(Box<JoinRequest>, oneshot::Sender<Result<Joined, JoinError>>),
@@ -215,7 +226,7 @@ pub(super) enum Message {
         Box<AttachRequest>,
         oneshot::Sender<Result<AttachedSeat, NotAttached>>,
     ),
-    Lost(Seat, ConnectionId, Option<v1::DetachReason>),
+    Lost(Seat, ConnectionId, Loss),
     Do(Seat, ConnectionId, SeatAction, Instant),
     /// With the secret of the seat's ticket, and who is charged for what is stored.
     Act(

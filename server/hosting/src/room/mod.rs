@@ -22,7 +22,7 @@ mod tests;
 pub use handle::{Handle, RoomGone, spawn_room};
 pub use markers::MarkerFollower;
 pub use message::{
-    Acted, AttachRequest, AttachedSeat, JoinRequest, Joined, MarkRequest, NotAttached,
+    Acted, AttachRequest, AttachedSeat, JoinRequest, Joined, Loss, MarkRequest, NotAttached,
     ReportRefusal, Ruled, SeatAction, SpectateError, SpectateRequest, Supersedes, Watching,
 };
 pub use subscriber::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};

@@ -1,7 +1,11 @@
 //! Seats whose clients are connected to another server, which measures the time of their answers.
 
+use chefshat_engine::RuleSetSpec;
+
 use super::*;
-use crate::{Answered, MAX_GATEWAY_DELAY};
+use crate::log::RoomEvent;
+use crate::testing::{dealt, second_shift};
+use crate::{Answered, MAX_GATEWAY_DELAY, RECALL_TIME};
 
 /// A game in which the seats' answers are measured elsewhere; each has 1.5 s for a decision.
 fn measured() -> Table {
@@ -41,7 +45,7 @@ fn the_measured_time_counts_instead_of_the_time_that_passed() {
         // In time at the gateway.
         (1700, 1400, Some(0), 1400),
         // The network does not delay an answer longer than this.
-        (2400, 400, Some(0), 1400),
+        (7400, 400, Some(0), 1400),
     ] {
         let mut table = measured();
         let answered = answer(&mut table, arrived, time, handed);
@@ -82,4 +86,105 @@ fn the_deadline_waits_for_answers_that_may_be_on_their_way() {
     table.pass_time(ms(1500));
     assert_eq!(table.core.decisions(), 1);
     table.assert_replays();
+}
+
+/// The connection of a seat of a table that was filled once.
+fn connection(seat: Seat) -> ConnectionId {
+    ConnectionId(seat.index() as u64 + 1)
+}
+
+/// Loses the server through which a seat is connected.
+fn lose_server(table: &mut Table, seat: Seat) {
+    (table.core).lost_with_server(table.now, seat, connection(seat), None);
+    table.commit();
+}
+
+#[test]
+fn the_clock_waits_for_a_seat_whose_server_is_lost() {
+    let mut table = measured();
+    let (seat, id) = table.open();
+    // Its time is up, and an answer may be on its way when the loss is noticed.
+    table.pass_time(ms(1500) + MAX_GATEWAY_DELAY - ms(1));
+    lose_server(&mut table, seat);
+    table.pass_time(RECALL_TIME - ms(1));
+    assert_eq!(table.open(), (seat, id));
+    table.attach(seat);
+    assert_eq!(table.happened(|it| matches!(it, RoomEvent::Returned(_))), 1);
+    assert_eq!(table.core.time_left(table.now), (ms(1000), ms(500)));
+    let action = table.legal(0);
+    assert_eq!(table.answer(seat, id, action).verdict, Verdict::Accepted);
+    // It was lost once.
+    lose_server(&mut table, seat);
+    assert!(table.core.standing(seat).connected);
+    table.assert_replays();
+}
+
+#[test]
+fn the_clock_waits_once_its_turn_comes_too() {
+    let mut table = measured();
+    let (first, _) = table.open();
+    let next = (table.core.all_seats()).filter(|seat| *seat != first);
+    for seat in next {
+        lose_server(&mut table, seat);
+    }
+    table.play_one();
+    let (second, id) = table.open();
+    table.pass_time(RECALL_TIME - ms(1));
+    assert_eq!(table.open(), (second, id));
+    table.attach(second);
+    assert_eq!(table.core.time_left(table.now), (ms(1000), ms(500)));
+}
+
+#[test]
+fn a_seat_whose_server_is_lost_and_that_stays_away_is_substituted_as_usual() {
+    let mut table = measured();
+    let (seat, id) = table.open();
+    table.pass_time(ms(700));
+    lose_server(&mut table, seat);
+    // Its absence time, for which the others wait.
+    table.pass_time(RECALL_TIME + ms(999));
+    assert_eq!(table.open(), (seat, id));
+    table.pass_time(ms(1));
+    assert!(table.core.standing(seat).substituted);
+    table.assert_replays();
+}
+
+#[test]
+fn a_silent_decision_does_not_wait() {
+    let ended = |loses_server: bool| {
+        let rules = RuleSetSpec::default();
+        let valid = rules.validate().expect("a valid rule set");
+        let hands = dealt(&valid, 3, [Seat::new(2); 2]).expect("every seat has cards to swap");
+        let policy = Policy {
+            decision_time: ms(1000),
+            ..Policy::default()
+        };
+        let mut table = Table::scripted(policy, vec![OPEN; 4], rules, second_shift(hands));
+        table.fill();
+        let (seat, _) = table.open();
+        assert!(table.core.awaited().expect("the holder").is_silent());
+        table.pass_time(ms(400));
+        match loses_server {
+            true => lose_server(&mut table, seat),
+            false => table.lost(seat, connection(seat)),
+        }
+        table.attach(seat);
+        table.pass_time(ms(599));
+        assert_eq!(table.core.decisions(), 0);
+        table.pass_time(ms(1));
+        table.core.decisions()
+    };
+    assert_eq!(ended(true), 1);
+    assert_eq!(ended(true), ended(false));
+}
+
+#[test]
+fn a_seat_that_was_lost_with_its_server_and_is_away_at_the_end_has_forfeited() {
+    let mut table = measured();
+    let (seat, _) = table.open();
+    lose_server(&mut table, seat);
+    table.core.close(table.now, []);
+    let forfeited = |seat: &Seat| table.core.has_forfeited(*seat);
+    let all: Vec<Seat> = table.core.all_seats().filter(forfeited).collect();
+    assert_eq!(all, [seat]);
 }

@@ -128,6 +128,7 @@ impl Stream {
             }],
             first_assigned_handle: 0,
             answers_contested: self.reader.by_gateway,
+            ..PlayRequest::default()
         };
         let executed = request.execute(&mut self.reader, Instant::now());
         executed.await.expect("a valid message");

@@ -22,7 +22,7 @@ use crate::grpc::refusals::count;
 use crate::grpc::status::{field, refused, room_gone, status};
 use chefshat_admission::access::Caller;
 use chefshat_hosting::config::{FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING, MAX_COMMANDS_CONTESTED};
-use chefshat_hosting::room::{Handle, SeatAction};
+use chefshat_hosting::room::{Handle, Loss, SeatAction};
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::tournaments::{Call, TournamentHandle, Tournaments};
 use chefshat_room::ids::Token;
@@ -123,6 +123,8 @@ pub(super) struct Reader {
     pub(super) by_gateway: bool,
     /// Whether that node is asked before a seat is taken from another stream.
     pub(super) asks_gateway: bool,
+    /// Whether that node is lost if the stream ends: it has not said that its client has left.
+    pub(super) needs_gateway: bool,
     /// Calls to games for the participants of this stream.
     pub(super) calls: mpsc::Sender<(u32, Call)>,
     pub(super) called: mpsc::Receiver<(u32, Call)>,
@@ -183,6 +185,7 @@ impl Reader {
             remote: None,
             by_gateway: false,
             asks_gateway: false,
+            needs_gateway: false,
             calls,
             called,
             with_decisions,
@@ -240,6 +243,7 @@ impl Reader {
             match message {
                 Ok(Some(request)) => {
                     if let Err(status) = request.execute(&mut self, arrived).await {
+                        self.needs_gateway = false;
                         break Err(status);
                     }
                 }
@@ -250,7 +254,11 @@ impl Reader {
         if closing.is_cancelled() {
             self.announce_stop();
         }
-        Box::pin(self.leave_all()).await;
+        let loss = match self.needs_gateway {
+            true => Loss::WithNode,
+            false => Loss::Gone,
+        };
+        Box::pin(self.leave_all(loss)).await;
         self.outbox.end(match end {
             Ok(()) => StreamEnd::Complete,
             Err(status) => {
@@ -374,11 +382,7 @@ impl Reader {
         if let Some(bound) = self.seats.remove(&handle) {
             bound
                 .room
-                .lost(
-                    bound.seat,
-                    bound.connection,
-                    Some(v1::DetachReason::Requested),
-                )
+                .lost(bound.seat, bound.connection, Loss::Detached)
                 .await;
         }
         if let Some(bound) = self.participants.remove(&handle) {
@@ -388,7 +392,7 @@ impl Reader {
         }
     }
 
-    pub(super) async fn leave_all(&mut self) {
+    pub(super) async fn leave_all(&mut self, loss: Loss) {
         if let Some(remote) = &mut self.remote {
             remote.leave().await;
         }
@@ -396,7 +400,7 @@ impl Reader {
             bound.leave().await;
         }
         for bound in std::mem::take(&mut self.seats).into_values() {
-            bound.room.lost(bound.seat, bound.connection, None).await;
+            bound.room.lost(bound.seat, bound.connection, loss).await;
         }
     }
 

@@ -13,8 +13,9 @@ use std::time::Duration;
 use chefshat_proto::v1::{self, seat_command::Command};
 use futures::StreamExt as _;
 use futures::future::join_all;
+use futures::stream;
 use tokio::sync::{Notify, mpsc};
-use tokio::time::Instant;
+use tokio::time::{Instant, sleep};
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::task::AbortOnDropHandle;
 use tonic::transport::Channel;
@@ -27,6 +28,7 @@ use chefshat_hosting::cluster::{Directory, Elsewhere, FoundBy, Peer};
 
 use crate::grpc::forward::Gateway;
 use crate::grpc::takeover::awaited;
+use crate::peers::{PING_INTERVAL, PING_TIMEOUT};
 use chefshat_admission::access::MAX_INPUTS_PER_MESSAGE;
 use chefshat_base::tasks::{LongTask, named};
 use chefshat_hosting::config::{MAX_PEER_MESSAGE_BYTES, MAX_SEATS_PER_STREAM};
@@ -308,7 +310,8 @@ impl RemoteSeats {
         stream.filter(|stream| !stream.shared.is_over())
     }
 
-    /// Ends the streams to other nodes, and waits until their last updates are queued.
+    /// Ends the streams to other nodes, and waits until their last updates are queued, or until the
+    /// nodes must know that a client that has gone is gone.
     pub(super) async fn leave(&mut self) {
         let outbox = Arc::clone(&self.outbox);
         let mut streams = std::mem::take(&mut self.streams);
@@ -318,7 +321,10 @@ impl RemoteSeats {
         }));
         tokio::select! {
             _ = ended => {}
-            () = outbox.abandoned() => {}
+            () = async {
+                outbox.abandoned().await;
+                sleep(PING_INTERVAL + PING_TIMEOUT).await;
+            } => {}
         }
     }
 
@@ -338,12 +344,20 @@ impl RemoteSeats {
         let batches = ReceiverStream::new(waiting).ready_chunks(MAX_INPUTS_PER_MESSAGE);
         let requests = batches.map(move |inputs| {
             let first_assigned_handle = std::mem::take(&mut first_assigned_handle);
+            let is_first = first_assigned_handle > 0;
             PlayRequest {
                 inputs,
                 first_assigned_handle,
-                answers_contested: first_assigned_handle > 0,
+                answers_contested: is_first,
+                announces_left: is_first,
+                left: false,
             }
         });
+        let left = PlayRequest {
+            left: true,
+            ..PlayRequest::default()
+        };
+        let requests = requests.chain(stream::iter([left]));
         let request = self.gateway.request(requests);
         let peer = elsewhere.peer.clone();
         let channel = self.gateway.peers().channel(&peer);

@@ -41,6 +41,7 @@ impl Requests for PlayRequest {
             reader.next_called = self.first_assigned_handle;
         }
         reader.asks_gateway |= self.answers_contested;
+        reader.needs_gateway |= self.announces_left;
         let in_place = self.inputs.len() == 1;
         for PlayInput {
             mut input,
@@ -91,6 +92,7 @@ impl Requests for PlayRequest {
                 None => {}
             }
         }
+        reader.needs_gateway &= !self.left;
         Ok(())
     }
 }

@@ -8,14 +8,14 @@ use chefshat_proto::v1;
 use chefshat_record::convert::seat_number;
 use chefshat_room::ids::Token;
 use chefshat_room::journal::SeatedParticipant;
-use chefshat_room::{ConnectionId, ExpressError, JoinError, ReportOutcome};
+use chefshat_room::{ConnectionId, Core, ExpressError, JoinError, ReportOutcome};
 use tokio::sync::oneshot;
 use tokio::time::Instant;
 
 use super::{AfterCommit, Room, answer, is_connection};
 use crate::room::message::{
-    Acted, AttachRequest, AttachedSeat, JoinRequest, Joined, MarkOutcome, MarkRequest, Message,
-    NotAttached, ReportRefusal, SeatAction,
+    Acted, AttachRequest, AttachedSeat, JoinRequest, Joined, Loss, MarkOutcome, MarkRequest,
+    Message, NotAttached, ReportRefusal, SeatAction,
 };
 use crate::room::subscriber::Subscriber;
 use chefshat_admission::limits::{Key, NotStored};
@@ -29,7 +29,7 @@ impl Room {
                 self.after_commit.push(AfterCommit::Join(reply, joined));
             }
             Message::Attach(request, reply) => self.attach(request, reply),
-            Message::Lost(seat, connection, reason) => self.lost(seat, connection, reason),
+            Message::Lost(seat, connection, loss) => self.lost(seat, connection, loss),
             Message::Do(seat, connection, action, arrived) => {
                 self.execute(seat, connection, action, arrived);
             }
@@ -192,16 +192,20 @@ impl Room {
             .push(AfterCommit::Attach(request, seat, connection, reply));
     }
 
-    fn lost(&mut self, seat: Seat, connection: ConnectionId, reason: Option<v1::DetachReason>) {
+    fn lost(&mut self, seat: Seat, connection: ConnectionId, loss: Loss) {
         if !self.is_current(seat, connection) {
             return;
         }
         let handed = self.handed();
-        self.core.lost(self.now, seat, connection, handed);
+        let lost = match loss {
+            Loss::Gone | Loss::Detached => Core::lost,
+            Loss::WithNode => Core::lost_with_server,
+        };
+        lost(&mut self.core, self.now, seat, connection, handed);
         if let Some(mut subscriber) = self.connections[seat.index()].take()
-            && let Some(reason) = reason
+            && loss == Loss::Detached
         {
-            subscriber.detach(reason);
+            subscriber.detach(v1::DetachReason::Requested);
         }
     }
 
