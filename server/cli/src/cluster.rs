@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use chefshat_server::cluster::LeaseTimes;
 use chefshat_server::peers::PeerPort;
-use chefshat_server::store::cluster::{ClusterStore, NodeInfo, NodeStatus};
+use chefshat_server::store::cluster::{ClusterStore, NodeInfo, NodeStatus, WithoutNode};
 use chefshat_server::store::{PostgresOptions, PostgresStore, Store as _};
 use chefshat_server::tls::TlsFiles;
 use clap::{Args, Subcommand};
@@ -34,7 +34,7 @@ struct DatabaseArg {
 
 impl DatabaseArg {
     async fn open(&self) -> Result<PostgresStore, CommandError> {
-        Ok(PostgresStore::open(&self.database, PostgresOptions::default()).await?)
+        Ok(PostgresStore::open_existing(&self.database, PostgresOptions::default()).await?)
     }
 }
 
@@ -47,13 +47,13 @@ pub(super) struct ClusterCommand {
 
 #[derive(Debug, Subcommand)]
 enum Subcommands {
-    /// Show the nodes: version, last beat, lease, and what they own.
+    /// Show the nodes, those that live first: version, last beat, lease, what they own; and what nobody owns.
     Status(Status),
     /// Make a node hand over all rooms, tournaments and studies to the others, and stop.
     Drain(Drain),
 }
 
-/// Show the nodes: version, last beat, lease, and what they own.
+/// Show the nodes, those that live first: version, last beat, lease, what they own; and what nobody owns.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  chefshat cluster status --database postgres://chefshat@db.example.org/chefshat"
@@ -70,7 +70,7 @@ struct Status {
 #[derive(Debug, Args)]
 #[command(
     after_help = "The node stops once it owns nothing; a supervisor that restarts it makes it a new node. SIGTERM does the same.\n\n\
-                  Example:\n  chefshat cluster drain 3"
+                  Example:\n  chefshat cluster drain one"
 )]
 struct Drain {
     /// Number or name of the node, as `chefshat cluster status` shows them.
@@ -91,12 +91,19 @@ impl ClusterCommand {
 impl Status {
     async fn run(self) -> Result<ExitCode, CommandError> {
         let store = self.database.open().await?;
-        let nodes = store.nodes().await;
+        let found = (store.nodes().await, store.without_node().await);
         store.close().await;
-        let nodes = nodes?;
+        let (nodes, without_node) = (found.0?, found.1?);
+        let WithoutNode {
+            rooms,
+            tournaments,
+            studies,
+        } = without_node;
         if self.json {
             let nodes: Vec<_> = nodes.iter().map(as_json).collect();
-            say(json!({ "nodes": nodes }))?;
+            let without_node =
+                json!({ "rooms": rooms, "tournaments": tournaments, "studies": studies });
+            say(json!({ "nodes": nodes, "without_node": without_node }))?;
             return Ok(ExitCode::SUCCESS);
         }
         let mut text = String::new();
@@ -115,6 +122,14 @@ impl Status {
         table(&mut text, &header, &[1, 2, 3, 8], nodes.iter().map(as_row));
         let mut out = anstream::stdout().lock();
         write!(out, "{text}")?;
+        if without_node != WithoutNode::default() {
+            writeln!(
+                out,
+                "\nwithout a node that lives: {}, {}, {studies} studies",
+                counted(rooms, "room"),
+                counted(tournaments, "tournament"),
+            )?;
+        }
         out.flush()?;
         Ok(ExitCode::SUCCESS)
     }

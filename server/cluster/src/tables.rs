@@ -70,8 +70,13 @@ impl<K: Ord + Copy, E> Tables<K, E> {
     pub fn join(&mut self, now_ms: u64) -> NodeId {
         self.last_node += 1;
         let node = NodeId(self.last_node);
-        self.nodes.insert(node, now_ms);
+        self.join_as(node, now_ms);
         node
+    }
+
+    /// The same with a number that was drawn elsewhere, which no node has had.
+    pub fn join_as(&mut self, node: NodeId, now_ms: u64) {
+        self.nodes.insert(node, now_ms);
     }
 
     /// Removes a node that owns nothing. Does nothing if it still owns something.

@@ -51,6 +51,17 @@ pub struct NodeStatus {
     pub studies: u64,
 }
 
+/// What is not over and belongs to no node that lives.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct WithoutNode {
+    /// Rooms, those of tournaments and studies included.
+    pub rooms: u64,
+    /// Tournaments.
+    pub tournaments: u64,
+    /// Studies.
+    pub studies: u64,
+}
+
 /// The answer to a beat.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Beat {

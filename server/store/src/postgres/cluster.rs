@@ -1,5 +1,6 @@
 //! Nodes, and who owns what. See [`ClusterStore`].
 
+use std::ops::Range;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -16,7 +17,7 @@ use super::owned::rooms;
 use super::values::{ROOM, integer, kind_of, millis, text};
 use super::{PostgresStore, lock};
 use crate::cluster::{
-    Beat, ClusterStore, Epoch, Kind, Location, NodeId, NodeInfo, NodeStatus, Unit,
+    Beat, ClusterStore, Epoch, Kind, Location, NodeId, NodeInfo, NodeStatus, Unit, WithoutNode,
 };
 use crate::form::FORM;
 use crate::units::UnitKind;
@@ -25,6 +26,9 @@ use chefshat_room::ids::Id;
 
 /// Nodes that own nothing and have not beaten for this long are forgotten.
 const FORGET_NODES_AFTER_MS: i64 = 24 * 60 * 60 * 1_000;
+/// The number of a node is drawn at random: no two processes have the same, even if the database has gone
+/// back in time and with it what it would count. Earlier versions counted from 1.
+const NODE_NUMBERS: Range<i64> = 1 << 20..1 << 31;
 /// How often a claim is tried again because the last owner has just written something.
 const CLAIM_ATTEMPTS: usize = 5;
 /// The columns of `location`.
@@ -64,6 +68,32 @@ impl PostgresStore {
             }
         }
         Ok(None)
+    }
+
+    /// What is not over and belongs to no node that lives.
+    ///
+    /// # Errors
+    /// The database does not answer.
+    pub async fn without_node(&self) -> Result<WithoutNode, StoreError> {
+        let expire_after = self.expire_after();
+        let counts = self.reader.read(move |connection| {
+            sqlx::query(
+                "SELECT count(*) FILTER (WHERE kind = 0) AS rooms, count(*) FILTER (WHERE kind = 1) AS tournaments,
+                        count(*) FILTER (WHERE kind = 2) AS studies
+                 FROM owned
+                 WHERE NOT over
+                   AND (node IS NULL OR node = ANY (ARRAY (SELECT node FROM nodes WHERE beat_ms + $1 <= clock_ms())))",
+            )
+            .bind(expire_after)
+            .fetch_one(connection)
+            .boxed()
+        });
+        let counts = counts.await?;
+        Ok(WithoutNode {
+            rooms: number(&counts, "rooms"),
+            tournaments: number(&counts, "tournaments"),
+            studies: number(&counts, "studies"),
+        })
     }
 
     /// When leases expire, milliseconds after a beat.
@@ -107,8 +137,8 @@ impl ClusterStore for PostgresStore {
                          DELETE FROM nodes WHERE beat_ms < clock_ms() - $6
                            AND NOT EXISTS (SELECT FROM owned WHERE owned.node = nodes.node AND NOT over)
                      )
-                     INSERT INTO nodes (name, peer_endpoint, client_endpoint, build, capacity, beat_ms)
-                     VALUES ($1, $2, $3, $4, $5, clock_ms()) RETURNING node",
+                     INSERT INTO nodes (node, name, peer_endpoint, client_endpoint, build, capacity, beat_ms)
+                     OVERRIDING SYSTEM VALUE VALUES ($7, $1, $2, $3, $4, $5, clock_ms()) RETURNING node",
                 )
                 .bind(text(&info.name).into_owned())
                 .bind(text(&info.peer_endpoint).into_owned())
@@ -116,6 +146,7 @@ impl ClusterStore for PostgresStore {
                 .bind(text(&info.build).into_owned())
                 .bind(integer(info.capacity))
                 .bind(FORGET_NODES_AFTER_MS)
+                .bind(rand::random_range(NODE_NUMBERS))
                 .fetch_one(connection)
                 .boxed()
             }))
@@ -381,7 +412,7 @@ impl ClusterStore for PostgresStore {
                             (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 0) AS rooms,
                             (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 1) AS tournaments,
                             (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 2) AS studies
-                     FROM nodes ORDER BY node",
+                     FROM nodes ORDER BY expired, name, node",
                 )
                 .bind(expire_after)
                 .fetch_all(connection)

@@ -58,6 +58,7 @@ use chefshat_room::policy::Durability;
 use commands::Command;
 use handover::Handed;
 use journals::{DurableJournal, Whole};
+use open::IfEmpty;
 use reader::{Reader, StoredRoom};
 use values::{FIRST_EPOCH, Owned};
 use writer::{Queue, Shared};
@@ -130,8 +131,24 @@ impl PostgresStore {
     /// # Errors
     /// The database cannot be used; nothing was changed in it.
     pub async fn open(url: &str, options: PostgresOptions) -> Result<Self, DatabaseError> {
+        Self::open_if(url, options, IfEmpty::Create).await
+    }
+
+    /// Connects to a database that has its tables.
+    ///
+    /// # Errors
+    /// The database is empty or cannot be used; nothing was changed in it.
+    pub async fn open_existing(url: &str, options: PostgresOptions) -> Result<Self, DatabaseError> {
+        Self::open_if(url, options, IfEmpty::Refuse).await
+    }
+
+    async fn open_if(
+        url: &str,
+        options: PostgresOptions,
+        if_empty: IfEmpty,
+    ) -> Result<Self, DatabaseError> {
         let address = open::address(url)?;
-        open::check(&address).await?;
+        open::check(&address, if_empty).await?;
         let sessions = open::sessions(address);
         let decoding = DecodePool::new();
         let reader = |connections| Reader {

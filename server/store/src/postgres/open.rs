@@ -47,6 +47,11 @@ pub enum DatabaseError {
         "the database contains tables of another program; nothing was changed: create a database for chefshat alone, for example with createdb"
     )]
     NotOurs,
+    /// There are no tables yet.
+    #[error(
+        "the database is empty: it has the tables of chefshat once a node was started on it; check that the address names the right one"
+    )]
+    Empty,
     /// The schema is older than this version needs.
     #[error(
         "the tables of the database are of an earlier version; nothing was changed: run `chefshat migrate` with this version, then start the server again"
@@ -178,8 +183,20 @@ async fn schema(connection: &mut PgConnection) -> sqlx::Result<Schema> {
 /// The newest schema that this version knows, which it needs.
 pub(super) const NEWEST: i64 = MIGRATIONS[MIGRATIONS.len() - 1].0;
 
-/// Checks that this version can use a database; creates the schema in an empty one.
-pub(super) async fn check(address: &PgConnectOptions) -> Result<(), DatabaseError> {
+/// What becomes of an empty database.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum IfEmpty {
+    /// It gets the schema.
+    Create,
+    /// It is refused, and stays empty.
+    Refuse,
+}
+
+/// Checks that this version can use a database.
+pub(super) async fn check(
+    address: &PgConnectOptions,
+    if_empty: IfEmpty,
+) -> Result<(), DatabaseError> {
     let mut connection = connect(address).await?;
     let mut found = schema(&mut connection).await?;
     if !found.is_complete() {
@@ -188,6 +205,7 @@ pub(super) async fn check(address: &PgConnectOptions) -> Result<(), DatabaseErro
         found = schema(&mut connection).await?;
     }
     let usable = match found {
+        Schema::Empty if if_empty == IfEmpty::Refuse => Err(DatabaseError::Empty),
         Schema::Empty => migrations(&mut connection).await,
         Schema::Ours { version, .. } if version < NEWEST => Err(DatabaseError::Older),
         Schema::Ours { oldest, .. } if oldest > NEWEST => Err(DatabaseError::Newer),

@@ -40,6 +40,11 @@ async fn node_with(database: &Database, options: PostgresOptions) -> PostgresSto
     store
 }
 
+/// The number of a node that has joined.
+fn number_of(store: &PostgresStore) -> NodeId {
+    NodeId(store.node().expect("it has joined").cast_unsigned())
+}
+
 /// Replaces the clock of a database by a number that the tests set.
 fn stop_clock(database: &Database) {
     database.run(

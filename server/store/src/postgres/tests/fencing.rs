@@ -332,8 +332,8 @@ async fn rooms_and_tournaments_are_found_by_id_and_join_code() {
     let created = pair.second.create_tournament(cup(9), vec![]);
     created.await.expect("created");
     for (code, id, kind, node) in [
-        ("ROOM1", 1, Kind::Room, NodeId(2)),
-        ("CUP9", 9, Kind::Tournament, NodeId(3)),
+        ("ROOM1", 1, Kind::Room, number_of(&pair.first)),
+        ("CUP9", 9, Kind::Tournament, number_of(&pair.second)),
     ] {
         let by_id = pair.first.locate(Id([id; 16])).await.expect("readable");
         let by_code = pair.first.locate_code(code).await.expect("readable");
@@ -373,9 +373,51 @@ async fn rooms_and_tournaments_are_found_by_id_and_join_code() {
 }
 
 #[tokio::test]
+async fn no_two_processes_are_the_same_node_even_after_a_backup_was_put_back() {
+    let database = chefshat_postgres::database();
+    let before = node(&database).await;
+    // Of before the node joined.
+    database.run("DELETE FROM nodes; ALTER TABLE nodes ALTER COLUMN node RESTART");
+    let after = node(&database).await;
+    let created = after.create(durable(1), vec![entry(1)]);
+    let mut journal = created.await.expect("created");
+    assert_eq!(before.beat().await, Ok(None), "it is no node any more");
+    assert_eq!(before.claim(Id([1; 16]), FIRST).await, Ok(None));
+    assert_eq!(before.leave().await, Ok(false));
+    let beat = after.beat().await.expect("it answers");
+    assert_eq!(beat.expect("it is known").owned, [(Id([1; 16]), FIRST)]);
+    append(&mut journal, 2).await.expect("committed");
+    drop(journal);
+    for store in [before, after] {
+        store.close().await;
+    }
+}
+
+#[tokio::test]
+async fn nodes_that_live_are_listed_first() {
+    let database = chefshat_postgres::database();
+    let lost = node(&database).await;
+    database.run("UPDATE nodes SET beat_ms = beat_ms - 3600000");
+    let living = [node(&database).await, node(&database).await];
+    let nodes = living[0].nodes().await.expect("readable");
+    let created = lost.create(durable(1), vec![entry(1)]);
+    created.await.expect("created");
+    let created = living[0].create_tournament(cup(9), vec![]);
+    created.await.expect("created");
+    let of_nobody = living[1].without_node().await.expect("readable");
+    assert_eq!((of_nobody.rooms, of_nobody.tournaments), (1, 0));
+    let expired: Vec<bool> = nodes.iter().map(|node| node.expired).collect();
+    assert_eq!(expired, [false, false, true]);
+    assert_eq!(nodes[2].id, number_of(&lost));
+    for store in living.into_iter().chain([lost]) {
+        store.close().await;
+    }
+}
+
+#[tokio::test]
 async fn a_node_is_listed_drained_and_leaves() {
     let pair = Pair::new().await;
-    let node = NodeId(2);
+    let node = number_of(&pair.first);
     let created = pair.first.create(durable(1), vec![entry(1)]);
     created.await.expect("created");
     assert_eq!(pair.first.leave().await, Ok(false), "it owns a room");
@@ -387,9 +429,10 @@ async fn a_node_is_listed_drained_and_leaves() {
     assert_eq!(beat.owned, [(Id([1; 16]), FIRST)]);
     let nodes = pair.second.nodes().await.expect("readable");
     let listed: Vec<_> = (nodes.iter())
-        .map(|node| (node.id.0, node.rooms, node.drain, node.expired))
+        .map(|node| (node.id, node.rooms, node.drain, node.expired))
         .collect();
-    assert_eq!(listed[1..], [(2, 1, true, false), (3, 0, false, false)]);
+    assert!(listed.contains(&(node, 1, true, false)), "{listed:?}");
+    assert!(listed.contains(&(number_of(&pair.second), 0, false, false)));
     let released = pair.first.release(Id([1; 16]), FIRST);
     released.await.expect("released");
     assert_eq!(pair.first.leave().await, Ok(true));

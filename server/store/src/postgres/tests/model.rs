@@ -90,9 +90,11 @@ impl Worlds {
         let mut servers = Vec::new();
         for _ in 0..NODES {
             let store = node(&database).await;
+            let id = number_of(&store);
+            tables.join_as(id, now_ms);
             servers.push(Server {
                 store,
-                id: tables.join(now_ms),
+                id,
                 journals: HashMap::new(),
                 tournaments: HashMap::new(),
             });
@@ -117,8 +119,8 @@ impl Worlds {
             Operation::Join(node) => {
                 let server = &mut self.servers[node];
                 let joined = server.store.join(NodeInfo::default()).await;
-                server.id = self.tables.join(self.now_ms);
-                assert_eq!(joined, Ok(server.id));
+                server.id = joined.expect("it answers");
+                self.tables.join_as(server.id, self.now_ms);
             }
             Operation::Leave(node) => {
                 let server = &self.servers[node];

@@ -3,7 +3,7 @@
 use chefshat_postgres::Server;
 
 use super::*;
-use crate::postgres::open::NEWEST;
+use crate::postgres::open::{IfEmpty, NEWEST};
 
 async fn refusal(database: &Database) -> DatabaseError {
     let opened = PostgresStore::open(database.url(), PostgresOptions::default()).await;
@@ -22,6 +22,10 @@ async fn only_an_empty_database_gets_tables_without_being_asked() {
     assert_eq!(database.run(tables), "1");
 
     database.run("DROP TABLE recipes");
+    let opened = PostgresStore::open_existing(database.url(), PostgresOptions::default()).await;
+    let error = opened.err().expect("it is refused");
+    assert!(matches!(error, DatabaseError::Empty), "{error}");
+    assert_eq!(database.run(tables), "0");
     node(&database).await.close().await;
     node(&database).await.close().await;
     assert_eq!(migrate(database.url()).await.ok(), Some((NEWEST, NEWEST)));
@@ -134,7 +138,8 @@ async fn who_finds_a_schema_that_another_node_is_creating_waits_for_it() {
         database.run("DROP TABLE half_a_schema");
         drop(creating);
     };
-    let (opened, ()) = futures::future::join(open::check(&address), completing).await;
+    let (opened, ()) =
+        futures::future::join(open::check(&address, IfEmpty::Create), completing).await;
     opened.expect("an empty database");
     assert_eq!(migrate(database.url()).await.ok(), Some((NEWEST, NEWEST)));
 }
@@ -143,7 +148,7 @@ async fn who_finds_a_schema_that_another_node_is_creating_waits_for_it() {
 async fn nodes_that_start_together_on_an_empty_database_all_start() {
     let database = chefshat_postgres::database();
     let address = open::address(database.url()).expect("an address");
-    let opening = (0..8).map(|_| open::check(&address));
+    let opening = (0..8).map(|_| open::check(&address, IfEmpty::Create));
     for opened in futures::future::join_all(opening).await {
         opened.expect("created by one of them");
     }
