@@ -51,7 +51,7 @@ pub struct NodeStatus {
     pub studies: u64,
 }
 
-/// What is not over and belongs to no node that lives.
+/// What is not over, survives its node and belongs to no node that lives.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct WithoutNode {
     /// Rooms, those of tournaments and studies included.

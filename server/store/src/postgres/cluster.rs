@@ -70,7 +70,7 @@ impl PostgresStore {
         Ok(None)
     }
 
-    /// What is not over and belongs to no node that lives.
+    /// What is not over, survives its node and belongs to no node that lives.
     ///
     /// # Errors
     /// The database does not answer.
@@ -81,7 +81,7 @@ impl PostgresStore {
                 "SELECT count(*) FILTER (WHERE kind = 0) AS rooms, count(*) FILTER (WHERE kind = 1) AS tournaments,
                         count(*) FILTER (WHERE kind = 2) AS studies
                  FROM owned
-                 WHERE NOT over
+                 WHERE NOT over AND durable
                    AND (node IS NULL OR node = ANY (ARRAY (SELECT node FROM nodes WHERE beat_ms + $1 <= clock_ms())))",
             )
             .bind(expire_after)

@@ -49,7 +49,7 @@ pub enum DatabaseError {
     NotOurs,
     /// There are no tables yet.
     #[error(
-        "the database is empty: it has the tables of chefshat once a node was started on it; check that the address names the right one"
+        "the database is empty: check its address; `chefshat migrate` or the first node creates the tables"
     )]
     Empty,
     /// The schema is older than this version needs.
