@@ -411,7 +411,7 @@ pub struct RoomPolicy {
     /// absence time, the decision counts as a timeout. An absence never uses the bank: if the seat
     /// returns in time, only the time in which it was connected is taken from it. A special action
     /// ends as it would with the seat connected, and substitutes nobody, since others could infer it.
-    /// After a restart of the server, see ServerRestarted. Unset in games of earlier servers: the
+    /// After a restart of the server, see ServerRestarted, and of a lost node Disconnected. Unset in games of earlier servers: the
     /// decision time and the bank run on while a seat is away, and max_timeouts alone decides when it
     /// is substituted.
     #[prost(uint32, optional, tag = "18")]
@@ -500,7 +500,7 @@ pub struct Awaited {
     /// have delayed it: since the roles were assigned.
     #[prost(uint32, tag = "3")]
     pub waited_ms: u32,
-    /// Milliseconds until the server decides for it, when the message was written, unless it answers,
+    /// Milliseconds until its time is up, when the message was written, unless it answers,
     /// leaves or returns: what is left of its decision time and bank, and while it is away of its absence
     /// time. Invalid answers and a slow store may extend it. Unset while a special action may be open
     /// or may have delayed the decision.
@@ -3209,7 +3209,10 @@ pub struct Vacated {
     pub seat: u32,
 }
 /// A seat lost its connection or detached. RoomPolicy.absence_time_ms says how long the game waits
-/// for it at each of its decisions; without one, the clock of its open decision continues.
+/// for it at each of its decisions; without one, the clock of its open decision continues. If the
+/// node of a cluster that it was connected to is lost, that clock restarts when the seat is attached
+/// again, at the latest one minute after the loss; until then the absence time does not run either.
+/// That of a special action continues, since others could infer it.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct Disconnected {
     /// The seat.

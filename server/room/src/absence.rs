@@ -6,7 +6,9 @@ use std::time::Duration;
 
 use chefshat_engine::{Decision, DecisionKind, Event, Seat};
 
-use super::limits::{MAX_SPECIAL_ACTION_TIME, MIN_PACE_OF_PHASE, SPECIAL_ACTION_PACES};
+use super::limits::{
+    MAX_GATEWAY_DELAY, MAX_SPECIAL_ACTION_TIME, MIN_PACE_OF_PHASE, SPECIAL_ACTION_PACES,
+};
 use super::{Core, OpenDecision, State};
 use crate::journal::Fill;
 use crate::table::RoomGame;
@@ -140,7 +142,7 @@ impl Core {
     }
 
     /// When the clock of a decision starts, as far as it is known.
-    fn starts_at(&self, open: &OpenDecision) -> Duration {
+    pub(super) fn starts_at(&self, open: &OpenDecision) -> Duration {
         let recalled_until = self.recalled_until(open);
         let latest = recalled_until.map_or(open.released, |until| open.released.max(until));
         open.start.unwrap_or(latest)
@@ -148,7 +150,17 @@ impl Core {
 
     /// When the default is taken for a decision, as things stand.
     pub(super) fn runs_out_at(&self, open: &OpenDecision) -> Duration {
-        self.ends_at(open, self.seats[open.decision.seat.index()].grace)
+        self.ends_at(open, self.grace(open))
+    }
+
+    /// How late an answer to a decision may arrive. To a silent one, as late whoever decides: it would
+    /// show whether the seat is connected through another server.
+    pub(super) fn grace(&self, open: &OpenDecision) -> Duration {
+        match (open.is_silent(), self.expects_delays) {
+            (false, _) => self.seats[open.decision.seat.index()].grace,
+            (true, true) => MAX_GATEWAY_DELAY,
+            (true, false) => Duration::ZERO,
+        }
     }
 
     /// When the clock of a decision ends, as things stand, or so much `later`.

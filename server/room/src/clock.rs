@@ -396,9 +396,10 @@ impl Core {
         let Some(open) = &self.open else { return };
         let (seat, silent) = (open.decision.seat, open.is_silent());
         let absent = (self.absence(open)).is_some_and(|absence| absence.end <= now);
-        let time = now.saturating_sub(open.start.unwrap_or(open.released));
+        let (started, grace) = (self.starts_at(open), self.grace(open));
+        let time = now.saturating_sub(started);
         // The timer fires later by the grace; a late answer may come at any time before.
-        let without_grace = time.saturating_sub(self.seats[seat.index()].grace);
+        let without_grace = time.saturating_sub(grace);
         let time = without_grace.max(time.min(self.time_allowed(open)));
         let source = if self.seats[seat.index()].connection.is_some() {
             Source::Timeout

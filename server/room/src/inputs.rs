@@ -143,6 +143,7 @@ impl Core {
     /// Lets answers of a seat's connection arrive late, because another server measures their time.
     pub fn expect_delays(&mut self, seat: Seat) {
         self.seats[seat.index()].grace = MAX_GATEWAY_DELAY;
+        self.expects_delays = true;
     }
 
     /// Records the loss of a connection. Does nothing if the seat has a newer one.
@@ -193,8 +194,7 @@ impl Core {
             && open.decision.seat == seat
             && !open.is_silent()
         {
-            open.start = None;
-            open.recheck_at = Duration::ZERO;
+            open.forget_start();
         }
     }
 
@@ -314,7 +314,7 @@ impl Core {
         // The clock is paused while the seat waits for the server, as for the deadline.
         let paused_since = open.paused_since.into_iter().chain(self.paused_since());
         let thought_until = paused_since.fold(arrived, Duration::min);
-        let time = thought_until.saturating_sub(open.start.unwrap_or(open.released));
+        let time = thought_until.saturating_sub(self.starts_at(open));
         let attempts = open.attempts + 1;
         if time >= self.time_allowed(open) {
             // It arrived after the deadline, but before the timer fired.

@@ -110,6 +110,8 @@ pub struct Core {
     markers: Vec<Marker>,
     /// When there is space for another marker after a burst of them.
     marker_free_at: Duration,
+    /// Whether a seat was connected through another server, since this one has the room.
+    expects_delays: bool,
     /// When the server was last restarted.
     restarted: Option<Duration>,
     /// Changes that have been folded but not yet passed to the store.
@@ -243,14 +245,19 @@ impl OpenDecision {
         self.released = self.released.max(self.held_until.unwrap_or_default());
     }
 
-    /// Opens the decision again, with its full time.
-    fn reopen(&mut self, at: Duration) {
-        self.released = at;
-        self.announced = false;
+    /// Its clock has not started, and its seat was not away from it.
+    fn forget_start(&mut self) {
         self.start = None;
         self.recheck_at = Duration::ZERO;
         self.absent = Duration::ZERO;
         self.unbanked = Duration::ZERO;
+    }
+
+    /// Opens the decision again, with its full time.
+    fn reopen(&mut self, at: Duration) {
+        self.released = at;
+        self.announced = false;
+        self.forget_start();
         self.search = Search::NotStarted;
         self.hint_runs = false;
     }
@@ -323,6 +330,7 @@ impl Core {
             decisions: 0,
             markers: Vec::new(),
             marker_free_at: Duration::ZERO,
+            expects_delays: false,
             restarted: None,
             pending: Vec::new(),
             events: Vec::new(),

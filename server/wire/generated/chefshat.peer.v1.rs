@@ -14,8 +14,8 @@ pub struct PlayRequest {
     #[prost(bool, tag = "3")]
     pub answers_contested: bool,
     /// In the first message: the gateway says it, with `left`, when its client has left. A stream that
-    /// ends without has lost its gateway, or the connection to it, and the clocks of its seats wait for
-    /// them. Of a gateway that does not, an older version, the client has left in any case.
+    /// ends without has lost its gateway, which stops, or the connection to it, and the clocks of its
+    /// seats wait for them. Of a gateway that does not, an older version, the client has left in any case.
     #[prost(bool, tag = "4")]
     pub announces_left: bool,
     /// In the last message: the client has left.
@@ -167,7 +167,7 @@ pub mod peer_service_client {
         }
         /// Plays seats of this node for one stream of a client that is connected to another node, its
         /// gateway. The metadata are those of the client's request: its token and secrets decide what it
-        /// reaches. A half-close detaches the seats and ends the stream. If the stream ends otherwise, the
+        /// reaches. After `left`, a half-close detaches the seats and ends the stream. If the stream ends otherwise, the
         /// gateway ends the client's stream with UNAVAILABLE, and the client attaches its seats again.
         pub async fn play(
             &mut self,
@@ -239,7 +239,7 @@ pub mod peer_service_server {
             + 'static;
         /// Plays seats of this node for one stream of a client that is connected to another node, its
         /// gateway. The metadata are those of the client's request: its token and secrets decide what it
-        /// reaches. A half-close detaches the seats and ends the stream. If the stream ends otherwise, the
+        /// reaches. After `left`, a half-close detaches the seats and ends the stream. If the stream ends otherwise, the
         /// gateway ends the client's stream with UNAVAILABLE, and the client attaches its seats again.
         async fn play(
             &self,

@@ -193,6 +193,7 @@ impl PlayService for Play {
                     () = outbox.abandoned() => break,
                     () = closing.cancelled() => {
                         reader.announce_stop();
+                        reader.loss = Loss::WithNode;
                         outbox.end(StreamEnd::Complete);
                         break;
                     }
@@ -204,7 +205,7 @@ impl PlayService for Play {
                     }
                 }
             }
-            reader.leave_all(Loss::Gone).await;
+            reader.leave_all().await;
         }));
         Ok(Response::new(Box::pin(updates.map_err(stream_ended))))
     }

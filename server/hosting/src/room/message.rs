@@ -213,9 +213,9 @@ pub(super) type Following = Result<MarkerFollower, SpectateError>;
 pub enum Loss {
     /// Its client has gone.
     Gone,
-    /// Its client detaches it, and is told so.
+    /// Its client detaches it and is notified.
     Detached,
-    /// The node is lost to which its client is connected.
+    /// The node that its client is connected to is lost, or stops.
     WithNode,
 }
 

@@ -150,8 +150,8 @@ fn a_seat_whose_server_is_lost_and_that_stays_away_is_substituted_as_usual() {
 }
 
 #[test]
-fn a_silent_decision_does_not_wait() {
-    let ended = |loses_server: bool| {
+fn a_silent_decision_ends_at_the_same_time_whoever_decides_and_is_lost() {
+    let ended = |measured: Seat, loses_server: bool| {
         let rules = RuleSetSpec::default();
         let valid = rules.validate().expect("a valid rule set");
         let hands = dealt(&valid, 3, [Seat::new(2); 2]).expect("every seat has cards to swap");
@@ -163,19 +163,24 @@ fn a_silent_decision_does_not_wait() {
         table.fill();
         let (seat, _) = table.open();
         assert!(table.core.awaited().expect("the holder").is_silent());
+        // Of the seats, one or another is connected through a server.
+        table.core.expect_delays(measured);
         table.pass_time(ms(400));
         match loses_server {
             true => lose_server(&mut table, seat),
             false => table.lost(seat, connection(seat)),
         }
         table.attach(seat);
-        table.pass_time(ms(599));
+        table.pass_time(ms(599) + MAX_GATEWAY_DELAY);
         assert_eq!(table.core.decisions(), 0);
         table.pass_time(ms(1));
         table.core.decisions()
     };
-    assert_eq!(ended(true), 1);
-    assert_eq!(ended(true), ended(false));
+    for measured in [2, 3] {
+        for loses_server in [false, true] {
+            assert_eq!(ended(Seat::new(measured), loses_server), 1);
+        }
+    }
 }
 
 #[test]
@@ -187,4 +192,37 @@ fn a_seat_that_was_lost_with_its_server_and_is_away_at_the_end_has_forfeited() {
     let forfeited = |seat: &Seat| table.core.has_forfeited(*seat);
     let all: Vec<Seat> = table.core.all_seats().filter(forfeited).collect();
     assert_eq!(all, [seat]);
+}
+
+#[test]
+fn earlier_absences_do_not_shorten_the_time_after_a_server_is_lost() {
+    let mut table = measured();
+    let (seat, _) = table.open();
+    table.lost(seat, connection(seat));
+    table.pass_time(ms(800));
+    let again = table.attach(seat);
+    table.core.lost_with_server(table.now, seat, again, None);
+    table.commit();
+    table.pass_time(RECALL_TIME + ms(1000));
+    let decided = table.last_decision();
+    assert_eq!(decided.source, Source::Disconnected);
+    assert_eq!(decided.time_us, 1_000_000, "its whole absence time");
+}
+
+#[test]
+fn an_answer_without_a_stream_is_in_time_while_the_clock_waits() {
+    let mut table = measured();
+    let (seat, id) = table.open();
+    table.pass_time(ms(1400));
+    lose_server(&mut table, seat);
+    table.pass_time(ms(5000));
+    let action = table.legal(0);
+    let (answer, now) = (Answer::new(id, action), table.now);
+    let answered = table.core.answer(now, seat, answer, now, None);
+    table.commit();
+    assert_eq!(
+        (answered.verdict, answered.time),
+        (Verdict::Accepted, ms(0))
+    );
+    assert_eq!(table.last_decision().bank_left_ms, 500);
 }

@@ -11,7 +11,7 @@ use super::reader::{Reader, Requests as _};
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::Key;
 use chefshat_hosting::config::ServerConfig;
-use chefshat_hosting::room::{JoinRequest, Joined};
+use chefshat_hosting::room::{JoinRequest, Joined, Loss};
 use chefshat_hosting::rooms::{NewRoom, Rooms};
 use chefshat_hosting::tournaments::{Call, Entry, Tournaments};
 use chefshat_room::ids::Token;
@@ -263,4 +263,27 @@ async fn a_participant_whose_tournament_stops_while_the_gateway_is_asked_enters_
     next.read(Input::StillOpen(3)).await;
     let end = next.updates.next().now_or_never().flatten();
     assert_eq!(end.expect("an end").err(), Some(StreamEnd::RoomGone));
+}
+
+#[tokio::test]
+async fn only_a_gateway_that_announces_it_and_has_not_said_it_is_lost_with_its_stream() {
+    let server = Server::start();
+    for (announces_left, left, loss) in [
+        // An older version.
+        (false, false, Loss::Gone),
+        (true, false, Loss::WithNode),
+        (true, true, Loss::Gone),
+    ] {
+        let mut stream = server.stream_by_gateway();
+        for (announces_left, left) in [(announces_left, false), (false, left)] {
+            let request = PlayRequest {
+                announces_left,
+                left,
+                ..PlayRequest::default()
+            };
+            let executed = request.execute(&mut stream.reader, Instant::now());
+            executed.await.expect("a valid message");
+        }
+        assert_eq!(stream.reader.loss, loss, "{announces_left} {left}");
+    }
 }

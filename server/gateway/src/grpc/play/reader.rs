@@ -123,8 +123,8 @@ pub(super) struct Reader {
     pub(super) by_gateway: bool,
     /// Whether that node is asked before a seat is taken from another stream.
     pub(super) asks_gateway: bool,
-    /// Whether that node is lost if the stream ends: it has not said that its client has left.
-    pub(super) needs_gateway: bool,
+    /// What an end of the stream means.
+    pub(super) loss: Loss,
     /// Calls to games for the participants of this stream.
     pub(super) calls: mpsc::Sender<(u32, Call)>,
     pub(super) called: mpsc::Receiver<(u32, Call)>,
@@ -185,7 +185,7 @@ impl Reader {
             remote: None,
             by_gateway: false,
             asks_gateway: false,
-            needs_gateway: false,
+            loss: Loss::Gone,
             calls,
             called,
             with_decisions,
@@ -243,7 +243,7 @@ impl Reader {
             match message {
                 Ok(Some(request)) => {
                     if let Err(status) = request.execute(&mut self, arrived).await {
-                        self.needs_gateway = false;
+                        self.loss = Loss::Gone;
                         break Err(status);
                     }
                 }
@@ -253,12 +253,9 @@ impl Reader {
         };
         if closing.is_cancelled() {
             self.announce_stop();
+            self.loss = Loss::WithNode;
         }
-        let loss = match self.needs_gateway {
-            true => Loss::WithNode,
-            false => Loss::Gone,
-        };
-        Box::pin(self.leave_all(loss)).await;
+        Box::pin(self.leave_all()).await;
         self.outbox.end(match end {
             Ok(()) => StreamEnd::Complete,
             Err(status) => {
@@ -392,15 +389,17 @@ impl Reader {
         }
     }
 
-    pub(super) async fn leave_all(&mut self, loss: Loss) {
-        if let Some(remote) = &mut self.remote {
-            remote.leave().await;
-        }
+    pub(super) async fn leave_all(&mut self) {
+        let loss = self.loss;
         for bound in std::mem::take(&mut self.participants).into_values() {
             bound.leave().await;
         }
         for bound in std::mem::take(&mut self.seats).into_values() {
             bound.room.lost(bound.seat, bound.connection, loss).await;
+        }
+        // Last, because it may wait for other nodes.
+        if let Some(remote) = &mut self.remote {
+            remote.leave(loss).await;
         }
     }
 

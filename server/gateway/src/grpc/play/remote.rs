@@ -32,6 +32,7 @@ use crate::peers::{PING_INTERVAL, PING_TIMEOUT};
 use chefshat_admission::access::MAX_INPUTS_PER_MESSAGE;
 use chefshat_base::tasks::{LongTask, named};
 use chefshat_hosting::config::{MAX_PEER_MESSAGE_BYTES, MAX_SEATS_PER_STREAM};
+use chefshat_hosting::room::Loss;
 use chefshat_room::ids::Id;
 use chefshat_wire::encoded::peer::peer_service_client::PeerServiceClient;
 use chefshat_wire::encoded::peer::{HandedOver, PlayInput, PlayRequest, play_input::Input};
@@ -53,6 +54,8 @@ pub(super) struct RemoteSeats {
     outbox: Arc<Outbox>,
     clock: Arc<ProcessClock>,
     streams: Vec<PeerStream>,
+    /// Whether the client has left, once its stream has ended: otherwise this node stops.
+    client_left: Arc<AtomicBool>,
     /// Attachments that reached no node.
     give_back: mpsc::Sender<(u32, Box<Parked>)>,
     given_back: mpsc::Receiver<(u32, Box<Parked>)>,
@@ -173,6 +176,7 @@ impl RemoteSeats {
             outbox: Arc::clone(outbox),
             clock: Arc::clone(clock),
             streams: Vec::new(),
+            client_left: Arc::default(),
             give_back,
             given_back,
         }
@@ -311,8 +315,9 @@ impl RemoteSeats {
     }
 
     /// Ends the streams to other nodes, and waits until their last updates are queued, or until the
-    /// nodes must know that a client that has gone is gone.
-    pub(super) async fn leave(&mut self) {
+    /// nodes must know that a client that has gone is gone. `loss`: how the client's stream ends.
+    pub(super) async fn leave(&mut self, loss: Loss) {
+        (self.client_left).store(loss == Loss::Gone, Ordering::Relaxed);
         let outbox = Arc::clone(&self.outbox);
         let mut streams = std::mem::take(&mut self.streams);
         let ended = join_all(streams.iter_mut().map(|stream| {
@@ -353,11 +358,14 @@ impl RemoteSeats {
                 left: false,
             }
         });
-        let left = PlayRequest {
-            left: true,
-            ..PlayRequest::default()
-        };
-        let requests = requests.chain(stream::iter([left]));
+        let client_left = Arc::clone(&self.client_left);
+        let last = stream::once(async move {
+            PlayRequest {
+                left: client_left.load(Ordering::Relaxed),
+                ..PlayRequest::default()
+            }
+        });
+        let requests = requests.chain(last);
         let request = self.gateway.request(requests);
         let peer = elsewhere.peer.clone();
         let channel = self.gateway.peers().channel(&peer);

@@ -10,7 +10,7 @@ use tonic::{Code, Status};
 use super::reader::{Reader, Requests};
 use crate::grpc::status::status;
 use chefshat_hosting::config::{MAX_COMMANDS_CONTESTED, MAX_COMMANDS_PER_MESSAGE};
-use chefshat_hosting::room::SeatAction;
+use chefshat_hosting::room::{Loss, SeatAction};
 use chefshat_room::Answer;
 use chefshat_wire::convert;
 use chefshat_wire::encoded::peer::{HandedOver, PlayInput, PlayRequest, play_input::Input};
@@ -41,7 +41,9 @@ impl Requests for PlayRequest {
             reader.next_called = self.first_assigned_handle;
         }
         reader.asks_gateway |= self.answers_contested;
-        reader.needs_gateway |= self.announces_left;
+        if self.announces_left {
+            reader.loss = Loss::WithNode;
+        }
         let in_place = self.inputs.len() == 1;
         for PlayInput {
             mut input,
@@ -92,7 +94,9 @@ impl Requests for PlayRequest {
                 None => {}
             }
         }
-        reader.needs_gateway &= !self.left;
+        if self.left {
+            reader.loss = Loss::Gone;
+        }
         Ok(())
     }
 }
