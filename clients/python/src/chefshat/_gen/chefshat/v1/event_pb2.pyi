@@ -319,7 +319,10 @@ Global___Vacated: _TypeAlias = Vacated  # noqa: Y015
 @_typing.final
 class Disconnected(_message.Message):
     """A seat lost its connection or detached. RoomPolicy.absence_time_ms says how long the game waits
-    for it at each of its decisions; without one, the clock of its open decision continues.
+    for it at each of its decisions; without one, the clock of its open decision continues. If the
+    node of a cluster that it was connected to is lost, that clock restarts when the seat is attached
+    again, at the latest one minute after the loss; until then the absence time does not run either.
+    That of a special action continues, since others could infer it.
     """
 
     DESCRIPTOR: _descriptor.Descriptor

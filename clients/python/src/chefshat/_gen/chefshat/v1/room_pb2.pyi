@@ -534,7 +534,7 @@ class RoomPolicy(_message.Message):
     absence time, the decision counts as a timeout. An absence never uses the bank: if the seat
     returns in time, only the time in which it was connected is taken from it. A special action
     ends as it would with the seat connected, and substitutes nobody, since others could infer it.
-    After a restart of the server, see ServerRestarted. Unset in games of earlier servers: the
+    After a restart of the server, see ServerRestarted, and of a lost node Disconnected. Unset in games of earlier servers: the
     decision time and the bank run on while a seat is away, and max_timeouts alone decides when it
     is substituted.
     """
@@ -766,7 +766,7 @@ class Awaited(_message.Message):
     have delayed it: since the roles were assigned.
     """
     left_ms: _builtins.int
-    """Milliseconds until the server decides for it, when the message was written, unless it answers,
+    """Milliseconds until its time is up, when the message was written, unless it answers,
     leaves or returns: what is left of its decision time and bank, and while it is away of its absence
     time. Invalid answers and a slow store may extend it. Unset while a special action may be open
     or may have delayed the decision.
