@@ -3218,6 +3218,10 @@ pub struct Disconnected {
     /// The seat.
     #[prost(uint32, tag = "1")]
     pub seat: u32,
+    /// The node that it was connected to was lost, or the connection to it: its participant has not
+    /// left by itself. Unset in games of earlier servers.
+    #[prost(bool, tag = "2")]
+    pub with_node: bool,
 }
 /// A seat is connected again, or resumed after a substitute played for it.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]

@@ -8735,9 +8735,15 @@ impl serde::Serialize for Disconnected {
         if self.seat != 0 {
             len += 1;
         }
+        if self.with_node {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.Disconnected", len)?;
         if self.seat != 0 {
             struct_ser.serialize_field("seat", &self.seat)?;
+        }
+        if self.with_node {
+            struct_ser.serialize_field("withNode", &self.with_node)?;
         }
         struct_ser.end()
     }
@@ -8750,11 +8756,14 @@ impl<'de> serde::Deserialize<'de> for Disconnected {
     {
         const FIELDS: &[&str] = &[
             "seat",
+            "with_node",
+            "withNode",
         ];
 
         #[allow(clippy::enum_variant_names)]
         enum GeneratedField {
             Seat,
+            WithNode,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -8777,6 +8786,7 @@ impl<'de> serde::Deserialize<'de> for Disconnected {
                     {
                         match value {
                             "seat" => Ok(GeneratedField::Seat),
+                            "withNode" | "with_node" => Ok(GeneratedField::WithNode),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -8797,6 +8807,7 @@ impl<'de> serde::Deserialize<'de> for Disconnected {
                     V: serde::de::MapAccess<'de>,
             {
                 let mut seat__ = None;
+                let mut with_node__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Seat => {
@@ -8807,10 +8818,17 @@ impl<'de> serde::Deserialize<'de> for Disconnected {
                                 Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
                             ;
                         }
+                        GeneratedField::WithNode => {
+                            if with_node__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("withNode"));
+                            }
+                            with_node__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(Disconnected {
                     seat: seat__.unwrap_or_default(),
+                    with_node: with_node__.unwrap_or_default(),
                 })
             }
         }

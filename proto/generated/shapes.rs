@@ -125,7 +125,7 @@ pub static DISCONNECT_CLIENT_REQUEST: Shape = Shape { name: "chefshat.v1.Disconn
 /// `chefshat.v1.DisconnectClientResponse`.
 pub static DISCONNECT_CLIENT_RESPONSE: Shape = Shape { name: "chefshat.v1.DisconnectClientResponse", size: size_of::<crate::v1::DisconnectClientResponse>(), fields: &[] };
 /// `chefshat.v1.Disconnected`.
-pub static DISCONNECTED: Shape = Shape { name: "chefshat.v1.Disconnected", size: size_of::<crate::v1::Disconnected>(), fields: &[Field { number: 1, list: false, kind: Kind::Number { size: 4, width: 0 } }, ] };
+pub static DISCONNECTED: Shape = Shape { name: "chefshat.v1.Disconnected", size: size_of::<crate::v1::Disconnected>(), fields: &[Field { number: 1, list: false, kind: Kind::Number { size: 4, width: 0 } }, Field { number: 2, list: false, kind: Kind::Number { size: 1, width: 0 } }, ] };
 /// `chefshat.v1.EndConfirmed`.
 pub static END_CONFIRMED: Shape = Shape { name: "chefshat.v1.EndConfirmed", size: size_of::<crate::v1::EndConfirmed>(), fields: &[] };
 /// `chefshat.v1.Entered`.

@@ -104,7 +104,8 @@ impl Core {
         if self.state == State::Playing {
             for seat in seats {
                 if !self.seats[seat.index()].away {
-                    self.commit(now, Change::Disconnected(seat));
+                    let with_node = false;
+                    self.commit(now, Change::Disconnected { seat, with_node });
                 }
             }
         }

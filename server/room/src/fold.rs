@@ -35,9 +35,13 @@ impl Core {
                 self.log_presence(at, *seat, RoomEvent::Vacated(*seat));
             }
             Change::Started { entropy } => self.begin(at, entropy),
-            Change::Disconnected(seat) => {
+            Change::Disconnected { seat, with_node } => {
                 self.seats[seat.index()].away = true;
-                self.log_presence(at, *seat, RoomEvent::Disconnected(*seat));
+                let event = RoomEvent::Disconnected {
+                    seat: *seat,
+                    with_node: *with_node,
+                };
+                self.log_presence(at, *seat, event);
             }
             Change::Returned(seat) => {
                 let state = &mut self.seats[seat.index()];

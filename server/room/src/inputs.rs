@@ -154,9 +154,12 @@ impl Core {
         connection: ConnectionId,
         handed: Option<Duration>,
     ) {
-        if !self.is_held_by(seat, connection) {
-            return;
+        if self.is_held_by(seat, connection) {
+            self.disconnect(now, seat, false, handed);
         }
+    }
+
+    fn disconnect(&mut self, now: Duration, seat: Seat, with_node: bool, handed: Option<Duration>) {
         let state = &mut self.seats[seat.index()];
         (state.connection, state.lost_at, state.grace) = (None, now, Duration::ZERO);
         if self.awaited_from(seat).is_some() {
@@ -165,7 +168,7 @@ impl Core {
         let state = &mut self.seats[seat.index()];
         if state.connection_events < MAX_CONNECTION_EVENTS {
             state.connection_events += 1;
-            self.commit(now, Change::Disconnected(seat));
+            self.commit(now, Change::Disconnected { seat, with_node });
         }
     }
 
@@ -175,10 +178,9 @@ impl Core {
         self.seats[seat.index()].connection == Some(connection) && !self.state.is_over()
     }
 
-    /// Records the loss of a connection together with the server through which it came. As after a
-    /// restart, the clock of the seat's decision waits for it to return; not that of a silent one,
-    /// which would show.
-    pub fn lost_with_server(
+    /// Records the loss of a connection together with the node that it was to. As after a restart, the
+    /// clock of the seat's decision waits for it to return; not that of a silent one, which would show.
+    pub fn lost_with_node(
         &mut self,
         now: Duration,
         seat: Seat,
@@ -188,7 +190,7 @@ impl Core {
         if !self.is_held_by(seat, connection) {
             return;
         }
-        self.lost(now, seat, connection, handed);
+        self.disconnect(now, seat, true, handed);
         self.seats[seat.index()].recalled = Some(now);
         if let Some(open) = &mut self.open
             && open.decision.seat == seat

@@ -29,7 +29,12 @@ pub enum RoomEvent {
     /// A seat became free again.
     Vacated(Seat),
     /// A seat's agent lost its connection.
-    Disconnected(Seat),
+    Disconnected {
+        /// The seat.
+        seat: Seat,
+        /// Whether it was lost together with the node that it was connected to.
+        with_node: bool,
+    },
     /// A seat's agent plays again.
     Returned(Seat),
     /// A built-in agent plays for a seat.

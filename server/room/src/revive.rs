@@ -71,7 +71,7 @@ impl Core {
                 self.check_open_seat(*seat)?;
                 check(!begun, "the game has already started")
             }
-            Change::Disconnected(seat)
+            Change::Disconnected { seat, .. }
             | Change::Returned(seat)
             | Change::Substituted(seat)
             | Change::Retired(seat) => self.check_open_seat(*seat),

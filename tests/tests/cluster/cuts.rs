@@ -33,6 +33,20 @@ async fn a_cut_between_two_nodes_costs_nobody_a_decision() {
     assert_eq!(missed(&cluster, rooms).await, 0);
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn a_node_that_restarts_costs_the_clients_connected_to_it_no_decision() {
+    let mut cluster = Cluster::start(2, Leases::Steady).await;
+    let (owner, gateway) = (cluster.nodes[0].url(), cluster.nodes[1].url());
+    let kinds = rooms(ROOMS, 1, 10_000, Duration::from_millis(50));
+    let rooms = BusyRooms::start_apart(&owner, &gateway, kinds);
+    all_play(&rooms).await;
+    cluster.stop(1).await;
+    tokio::time::sleep(CUT).await;
+    cluster.restart(1).await;
+    rooms.all_go_on().await;
+    assert_eq!(missed(&cluster, rooms).await, 0);
+}
+
 /// Tells of each of its decisions.
 struct Telling(RandomAgent, mpsc::UnboundedSender<()>);
 

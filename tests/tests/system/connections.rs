@@ -42,7 +42,7 @@ async fn a_reconnected_seat_receives_missed_events_and_its_open_decision() {
     while let Some(event) = watching.next().await.expect("a watched room") {
         if matches!(
             event.kind,
-            Some(Kind::Disconnected(v1::Disconnected { seat: 2 }))
+            Some(Kind::Disconnected(v1::Disconnected { seat: 2, .. }))
         ) {
             break;
         }

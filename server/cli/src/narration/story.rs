@@ -86,7 +86,13 @@ fn lines_of(view: &GameView, kind: &Kind) -> Vec<Line> {
             seat_number(seated.seat)
         )),
         Kind::Vacated(seat) => plain(format!("{} leaves the table", view.name(seat.seat))),
-        Kind::Disconnected(seat) => about(seat.seat, "is disconnected".into()),
+        Kind::Disconnected(lost) => about(
+            lost.seat,
+            match lost.with_node {
+                false => "is disconnected".into(),
+                true => "is disconnected, since its node is lost".into(),
+            },
+        ),
         Kind::Returned(seat) => about(seat.seat, "is back".into()),
         Kind::Substituted(seat) => {
             let agent = clean(&seat.built_in_agent, MAX_NAME);

@@ -195,7 +195,10 @@ fn roles_special_actions_and_incidents() {
         gives(1, 1, 2),
         gives(2, 1, 1),
         play(3, (2, 11, 0), 15),
-        Kind::Disconnected(v1::Disconnected { seat: 0 }),
+        Kind::Disconnected(v1::Disconnected {
+            seat: 0,
+            ..v1::Disconnected::default()
+        }),
         Kind::Substituted(v1::Substituted {
             seat: 0,
             built_in_agent: "random".into(),

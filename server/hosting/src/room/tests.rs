@@ -904,7 +904,7 @@ async fn an_owner_who_closes_its_room_leaves_the_seats_that_are_its_own() {
         };
         let left: Vec<usize> = (entries.iter())
             .filter_map(|entry| match &entry.change {
-                Change::Disconnected(seat) => Some(seat.index()),
+                Change::Disconnected { seat, .. } => Some(seat.index()),
                 _ => None,
             })
             .collect();

@@ -448,7 +448,10 @@ mod tests {
         assert_eq!(seats.clocks[2].connected, Some(false));
         for elapsed_ms in 0..u64::from(MAX_CONNECTION_EVENTS) {
             let kind = match elapsed_ms % 2 {
-                0 => Kind::Disconnected(v1::Disconnected { seat: SEAT }),
+                0 => Kind::Disconnected(v1::Disconnected {
+                    seat: SEAT,
+                    ..v1::Disconnected::default()
+                }),
                 _ => Kind::Returned(v1::Returned { seat: SEAT }),
             };
             assert_eq!(seats.take(&kind, elapsed_ms, &header), Ok(true));

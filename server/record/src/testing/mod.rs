@@ -122,7 +122,10 @@ impl TestGame<'_> {
             match source {
                 v1::DecisionSource::Disconnected if connected[open.seat] => {
                     connected[open.seat] = false;
-                    lines.event(Kind::Disconnected(v1::Disconnected { seat }));
+                    lines.event(Kind::Disconnected(v1::Disconnected {
+                        seat,
+                        ..v1::Disconnected::default()
+                    }));
                 }
                 v1::DecisionSource::Timeout if !connected[open.seat] => {
                     connected[open.seat] = true;

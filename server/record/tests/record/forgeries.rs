@@ -70,7 +70,7 @@ const FORGERIES: [Forgery; 47] = [
     ("a dropped substitution", Replay, |lines| without_event(lines, 51)),
     ("a substitution added", Replay, |lines| with_event(lines, 380, Kind::Substituted(v1::Substituted { seat: 3, built_in_agent: "random".into(), for_good: false }))),
     ("a participant left for good, where none can", Replay, |lines| with_event(lines, 380, Kind::Substituted(v1::Substituted { seat: 3, built_in_agent: "random".into(), for_good: true }))),
-    ("a lost connection added", Signature, |lines| with_event(lines, 380, Kind::Disconnected(v1::Disconnected { seat: 3 }))),
+    ("a lost connection added", Signature, |lines| with_event(lines, 380, Kind::Disconnected(v1::Disconnected { seat: 3, ..v1::Disconnected::default() }))),
     ("a decision ended by an absence shorter than the absence time", Replay, short_absence),
     ("another name everywhere", Signature, rename),
     ("another name at one place", Replay, |lines| header(lines).seats[3].name = "Rosa".into()),
@@ -180,7 +180,10 @@ fn short_absence(lines: &mut Lines) {
     shift_clock(lines, 56, 10);
     time(lines, 56, 8_000);
     source(lines, 56, v1::DecisionSource::Disconnected);
-    let lost = Kind::Disconnected(v1::Disconnected { seat: 3 });
+    let lost = Kind::Disconnected(v1::Disconnected {
+        seat: 3,
+        ..v1::Disconnected::default()
+    });
     let given = Kind::Substituted(v1::Substituted {
         seat: 3,
         built_in_agent: "random".into(),

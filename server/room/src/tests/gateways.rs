@@ -95,7 +95,7 @@ fn connection(seat: Seat) -> ConnectionId {
 
 /// Loses the server through which a seat is connected.
 fn lose_server(table: &mut Table, seat: Seat) {
-    (table.core).lost_with_server(table.now, seat, connection(seat), None);
+    (table.core).lost_with_node(table.now, seat, connection(seat), None);
     table.commit();
 }
 
@@ -109,6 +109,8 @@ fn the_clock_waits_for_a_seat_whose_server_is_lost() {
     table.pass_time(RECALL_TIME - ms(1));
     assert_eq!(table.open(), (seat, id));
     table.attach(seat);
+    let lost = |it: &RoomEvent| matches!(it, RoomEvent::Disconnected { seat: lost, with_node: true } if *lost == seat);
+    assert_eq!(table.happened(lost), 1);
     assert_eq!(table.happened(|it| matches!(it, RoomEvent::Returned(_))), 1);
     assert_eq!(table.core.time_left(table.now), (ms(1000), ms(500)));
     let action = table.legal(0);
@@ -201,7 +203,7 @@ fn earlier_absences_do_not_shorten_the_time_after_a_server_is_lost() {
     table.lost(seat, connection(seat));
     table.pass_time(ms(800));
     let again = table.attach(seat);
-    table.core.lost_with_server(table.now, seat, again, None);
+    table.core.lost_with_node(table.now, seat, again, None);
     table.commit();
     table.pass_time(RECALL_TIME + ms(1000));
     let decided = table.last_decision();

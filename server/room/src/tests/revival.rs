@@ -352,7 +352,10 @@ fn an_inconsistent_journal_is_refused() {
             };
         }),
         ("does not exist", |change| {
-            *change = Change::Disconnected(Seat::new(5))
+            *change = Change::Disconnected {
+                seat: Seat::new(5),
+                with_node: false,
+            }
         }),
     ];
     for (words, damage) in damages {

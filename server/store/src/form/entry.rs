@@ -24,7 +24,7 @@ struct EntryForm {
     at_us: u64,
     #[prost(
         oneof = "ChangeForm",
-        tags = "2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17"
+        tags = "2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18"
     )]
     change: Option<ChangeForm>,
 }
@@ -63,6 +63,8 @@ enum ChangeForm {
     Marked(MarkedForm),
     #[prost(bool, tag = "17")]
     EndConfirmed(bool),
+    #[prost(uint32, tag = "18")]
+    DisconnectedWithNode(u32),
 }
 
 /// Whether these bytes are an entry of a kind that this version knows.
@@ -210,7 +212,10 @@ pub(crate) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
         Change::Started { entropy } => ChangeForm::Started(StartedForm {
             entropy: entropy.clone(),
         }),
-        Change::Disconnected(seat) => ChangeForm::Disconnected(seat_number(*seat)),
+        Change::Disconnected { seat, with_node } => match with_node {
+            false => ChangeForm::Disconnected(seat_number(*seat)),
+            true => ChangeForm::DisconnectedWithNode(seat_number(*seat)),
+        },
         Change::Returned(seat) => ChangeForm::Returned(seat_number(*seat)),
         Change::Substituted(seat) => ChangeForm::Substituted(seat_number(*seat)),
         Change::Retired(seat) => ChangeForm::Retired(seat_number(*seat)),
@@ -289,7 +294,14 @@ fn change_from(form: ChangeForm) -> Result<Change, Unreadable> {
         ChangeForm::Started(form) => Change::Started {
             entropy: form.entropy,
         },
-        ChangeForm::Disconnected(number) => Change::Disconnected(seat(number)?),
+        ChangeForm::Disconnected(number) => Change::Disconnected {
+            seat: seat(number)?,
+            with_node: false,
+        },
+        ChangeForm::DisconnectedWithNode(number) => Change::Disconnected {
+            seat: seat(number)?,
+            with_node: true,
+        },
         ChangeForm::Returned(number) => Change::Returned(seat(number)?),
         ChangeForm::Substituted(number) => Change::Substituted(seat(number)?),
         ChangeForm::Retired(number) => Change::Retired(seat(number)?),

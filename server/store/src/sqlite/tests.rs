@@ -110,7 +110,10 @@ fn entries() -> Vec<Entry> {
         Change::Started {
             entropy: vec![vec![], vec![1, 2, 3], vec![0; 32], vec![7]],
         },
-        Change::Disconnected(seat),
+        Change::Disconnected {
+            seat,
+            with_node: false,
+        },
         Change::Returned(seat),
         Change::Substituted(Seat::new(0)),
         Change::Attempted {
@@ -140,6 +143,10 @@ fn entries() -> Vec<Entry> {
         })),
         seated("0123456789abcdef"),
         Change::EndConfirmed,
+        Change::Disconnected {
+            seat,
+            with_node: true,
+        },
     ];
     (1..)
         .zip(changes)

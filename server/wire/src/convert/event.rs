@@ -40,8 +40,9 @@ fn kind(core: &Core, event: &RoomEvent, viewer: Viewer) -> Kind {
         RoomEvent::Vacated(seat) => Kind::Vacated(v1::Vacated {
             seat: seat_number(*seat),
         }),
-        RoomEvent::Disconnected(seat) => Kind::Disconnected(v1::Disconnected {
+        RoomEvent::Disconnected { seat, with_node } => Kind::Disconnected(v1::Disconnected {
             seat: seat_number(*seat),
+            with_node: *with_node,
         }),
         RoomEvent::Returned(seat) => Kind::Returned(v1::Returned {
             seat: seat_number(*seat),

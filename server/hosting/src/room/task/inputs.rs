@@ -199,7 +199,7 @@ impl Room {
         let handed = self.handed();
         let lost = match loss {
             Loss::Gone | Loss::Detached => Core::lost,
-            Loss::WithNode => Core::lost_with_server,
+            Loss::WithNode => Core::lost_with_node,
         };
         lost(&mut self.core, self.now, seat, connection, handed);
         if let Some(mut subscriber) = self.connections[seat.index()].take()

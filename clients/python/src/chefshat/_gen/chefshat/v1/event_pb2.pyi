@@ -328,16 +328,22 @@ class Disconnected(_message.Message):
     DESCRIPTOR: _descriptor.Descriptor
 
     SEAT_FIELD_NUMBER: _builtins.int
+    WITH_NODE_FIELD_NUMBER: _builtins.int
     seat: _builtins.int
     """The seat."""
+    with_node: _builtins.bool
+    """The node that it was connected to was lost, or the connection to it: its participant has not
+    left by itself. Unset in games of earlier servers.
+    """
     def __init__(
         self,
         *,
         seat: _builtins.int = ...,
+        with_node: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["seat", b"seat"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["seat", b"seat", "with_node", b"with_node"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
