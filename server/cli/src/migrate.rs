@@ -16,7 +16,7 @@ use super::{CommandError, progress, say};
 #[command(
     after_help = "Upgrade the tables with the new version first, while the nodes of the old one run; then replace the nodes one by one.\n\n\
                   With --from, stop the server of the folder first. Finished and unfinished games and tournaments move in one transaction: \
-                  all or nothing. The folder is not changed, but start no server on it again: its unfinished games resume on the cluster. \
+                  all or nothing. The folder keeps everything, but no server starts on it again: its unfinished games resume on the cluster. \
                   The nodes need its signing-key and its files of tokens and certificates.\n\n\
                   Examples:\n  \
                   chefshat migrate --database postgres://chefshat@db.example.org/chefshat\n  \

@@ -94,6 +94,13 @@ fn without_password(url: &str) -> String {
     }
 }
 
+/// An address as people may read it: without its user and password.
+pub(super) fn shown(address: &PgConnectOptions) -> String {
+    let (host, port) = (address.get_host(), address.get_port());
+    let database = address.get_database().unwrap_or_default();
+    format!("postgres://{host}:{port}/{database}")
+}
+
 /// Sessions of nodes.
 pub(super) fn sessions(address: PgConnectOptions) -> PgConnectOptions {
     address.options(SESSION)

@@ -8,14 +8,15 @@ use sqlx::postgres::PgConnection;
 use sqlx::{AssertSqlSafe, ConnectOptions as _, Connection as _};
 use tracing::error;
 
-use super::errors::failure;
+use super::errors::{failure, is_temporary};
 use super::open::{self, DatabaseError};
 use super::values::{FIRST_EPOCH, integer, text};
 use crate::form;
 use crate::sqlite::{
-    Contents, GameRow, JournalRow, ParticipantRow, StudyRow, TournamentRow, TracesRow,
+    self, Contents, GameRow, JournalRow, ParticipantRow, StudyRow, TournamentRow, TracesRow,
 };
 use crate::{DATABASE_FILE, OpenError, StoreError};
+use chefshat_record::atomic_file::WriteError;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::GameHeader;
 
@@ -59,6 +60,14 @@ pub enum TransferError {
     /// Reading or writing failed.
     #[error("{0}; nothing was moved")]
     Store(#[from] StoreError),
+    /// The folder cannot be marked as moved.
+    #[error("{0}; nothing was moved")]
+    Mark(#[from] WriteError),
+    /// The database did not answer when everything had been sent.
+    #[error(
+        "{0}; whether everything has moved is not known, and no server starts on the folder: run chefshat migrate again, which says so if the database has the games"
+    )]
+    Unknown(StoreError),
 }
 
 impl From<sqlx::Error> for TransferError {
@@ -68,11 +77,11 @@ impl From<sqlx::Error> for TransferError {
 }
 
 /// Moves the games and tournaments of a data directory into a database without any. Creates or
-/// upgrades its tables. The folder keeps everything; no server may run on it afterwards, because its
+/// upgrades its tables. The folder keeps everything; no server starts on it afterwards, because its
 /// unfinished games would resume twice. `progress` receives the number of moved games and of all.
 ///
 /// # Errors
-/// Nothing was moved.
+/// Nothing was moved, or it is not known.
 pub async fn transfer(
     data_dir: &Path,
     url: &str,
@@ -137,8 +146,16 @@ pub async fn transfer(
     ] {
         sqlx::query(statement).execute(&mut *transaction).await?;
     }
-    transaction.commit().await?;
-    Ok(moved)
+    // Before the end: if this process dies meanwhile, the games do not go on in both places.
+    sqlite::note_move(data_dir, &open::shown(&address))?;
+    match transaction.commit().await {
+        Ok(()) => Ok(moved),
+        Err(error) if is_temporary(&error) => Err(TransferError::Unknown(failure(&error))),
+        Err(error) => {
+            sqlite::forget_move(data_dir);
+            Err(error.into())
+        }
+    }
 }
 
 async fn move_tournaments(

@@ -36,6 +36,7 @@ pub(crate) use contents::{
 };
 pub use errors::FILE as DATABASE_FILE;
 pub use former::LOCK_FILE;
+pub(crate) use former::{forget_move, note_move};
 pub use open::OpenError;
 use open::{FolderLock, IfGone};
 
@@ -95,6 +96,7 @@ impl SqliteStore {
     }
 
     async fn opened(data_dir: &Path, if_gone: IfGone) -> Result<Self, OpenError> {
+        open::check_not_moved(data_dir)?;
         let opened = open::open(data_dir, if_gone).await?;
         let (last, last_row, last_listed): (i64, i64, i64) = sqlx::query_as(
             "SELECT (SELECT coalesce(max(number), 0) FROM games),

@@ -75,6 +75,11 @@ pub enum OpenError {
         "{0} is empty or missing, but a server used this folder before: {1}; nothing was changed: restore a backup or put the database back, or begin with an empty database: chefshat serve --new (records stay)"
     )]
     Gone(PathBuf, String),
+    /// The games have moved to a PostgreSQL database.
+    #[error(
+        "the games of this folder have moved to {1}: connect to that with --database, or choose another folder with --data-dir; only if nothing has arrived there, delete {0} and start again"
+    )]
+    Moved(PathBuf, String),
     /// The database was written by a newer version.
     #[error(
         "{0} was written by a newer version of chefshat; nothing was changed: use that version, or choose another folder with --data-dir"
@@ -152,6 +157,16 @@ pub(super) async fn open(data_dir: &Path, if_gone: IfGone) -> Result<Opened, Ope
         readers,
         lock,
     })
+}
+
+/// Checks that the games of a data directory have not moved: unfinished ones would go on twice.
+pub(super) fn check_not_moved(data_dir: &Path) -> Result<(), OpenError> {
+    let path = data_dir.join(former::MOVED_FILE);
+    match former::moved_to(data_dir) {
+        Ok(None) => Ok(()),
+        Ok(Some(address)) => Err(OpenError::Moved(path, address)),
+        Err(source) => Err(OpenError::Io { path, source }),
+    }
 }
 
 /// Opens the database of a data directory that this process has locked. `trace` shows that it had

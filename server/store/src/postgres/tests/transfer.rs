@@ -7,7 +7,7 @@ use chefshat_record::replay;
 use super::*;
 use crate::testing::folded;
 use crate::tournaments::StoredTournament;
-use crate::{DATABASE_FILE, SqliteStore};
+use crate::{DATABASE_FILE, OpenError, SqliteStore};
 use chefshat_room::Core;
 
 /// A folder with the database that an earlier version wrote.
@@ -128,7 +128,55 @@ async fn a_database_of_an_earlier_version_moves_with_everything_in_it() {
     let again = transfer(folder.path(), database.url(), |_, _| {}).await;
     let error = again.expect_err("it has games");
     assert!(matches!(error, TransferError::NotEmpty), "{error}");
+    assert!(is_moved(folder.path()).await);
     store.close().await;
+}
+
+/// Whether no server starts on a folder, because its games have moved.
+async fn is_moved(folder: &Path) -> bool {
+    for opened in [
+        SqliteStore::open(folder).await,
+        SqliteStore::open_or_new(folder).await,
+    ] {
+        match opened {
+            Ok(store) => {
+                store.close().await;
+                return false;
+            }
+            Err(OpenError::Moved(_, address)) => assert!(
+                address.starts_with("postgres://127.0.0.1:") && !address.contains('@'),
+                "{address}"
+            ),
+            Err(error) => panic!("{error}"),
+        }
+    }
+    true
+}
+
+#[tokio::test]
+async fn a_folder_whose_move_has_no_answer_is_used_by_no_server() {
+    for (at_the_end, unknown) in [
+        ("RAISE EXCEPTION ''refused''", false),
+        ("PERFORM pg_terminate_backend(pg_backend_pid())", true),
+    ] {
+        let folder = earlier_version();
+        let database = chefshat_postgres::database();
+        migrate(database.url()).await.expect("an empty database");
+        database.run(&format!(
+            "CREATE FUNCTION at_the_end() RETURNS trigger LANGUAGE plpgsql AS 'BEGIN {at_the_end}; RETURN NULL; END';
+             CREATE CONSTRAINT TRIGGER at_the_end AFTER INSERT ON games DEFERRABLE INITIALLY DEFERRED
+                 FOR EACH ROW EXECUTE FUNCTION at_the_end()"
+        ));
+        let error = transfer(folder.path(), database.url(), |_, _| {}).await;
+        let error = error.expect_err("it does not end");
+        let is_unknown = matches!(error, TransferError::Unknown(_));
+        assert_eq!(is_unknown, unknown, "{error}");
+        assert_eq!(is_moved(folder.path()).await, unknown);
+        database.run("DROP TRIGGER at_the_end ON games");
+        let moved = transfer(folder.path(), database.url(), |_, _| {}).await;
+        assert!(moved.is_ok_and(|moved| moved.finished > 0));
+        assert!(is_moved(folder.path()).await);
+    }
 }
 
 #[tokio::test]
@@ -144,6 +192,7 @@ async fn a_move_that_fails_moves_nothing() {
         let rows = database.run(&format!("SELECT count(*) FROM {table}"));
         assert_eq!(rows, "0", "{table}");
     }
+    assert!(!is_moved(folder.path()).await);
     database.run("ALTER TABLE participants DROP CONSTRAINT participants_seat_check");
     let moved = transfer(folder.path(), database.url(), |_, _| {}).await;
     assert!(moved.is_ok_and(|moved| moved.finished > 0));
