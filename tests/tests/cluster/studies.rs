@@ -197,8 +197,11 @@ async fn a_study_whose_owner_is_killed_goes_on_at_another_node() {
         settings: Some(settings()),
         request_id: vec![7; 32],
     };
-    let created = service.create_study(request.clone()).await.expect("valid");
-    let created = created.into_inner();
+    let created = settled(|| {
+        let (mut service, request) = (service.clone(), request.clone());
+        async move { service.create_study(request).await }
+    });
+    let created = created.await.into_inner();
     let study_id = created.study.expect("a study").study_id;
     let owner_token = created.owner_token;
     // Each node answers the same request with the same study, and lists it.

@@ -39,7 +39,7 @@ pub(super) async fn follow(
             return Ok(());
         }
         sleep_until(sent + FOLLOW_INTERVAL).await;
-        changed(&mut changes, sender).await?;
+        changed(&mut changes, handle.stopped(), sender).await?;
     }
 }
 
@@ -51,16 +51,20 @@ pub(super) async fn end<M>(sender: &mpsc::Sender<Result<M, Status>>, followed: R
     }
 }
 
-/// Waits for a change, as long as there is a follower to send it to.
+/// Waits for a change of what a task does, as long as there is a follower to send it to.
 ///
 /// # Errors
-/// Nothing will change any more, or the follower has gone: then the status is for nobody.
+/// The task has stopped: whoever follows again finds the node that goes on with it. Or the follower
+/// has gone: then the status is for nobody.
 pub(super) async fn changed<C, M>(
     changes: &mut watch::Receiver<C>,
+    stopped: impl Future<Output = ()>,
     sender: &mpsc::Sender<M>,
 ) -> Result<(), Status> {
     tokio::select! {
+        biased;
         changed = changes.changed() => changed.map_err(|_| status::shutting_down()),
+        () = stopped => Err(status::shutting_down()),
         () = sender.closed() => Err(Status::cancelled("the follower has gone")),
     }
 }
@@ -101,6 +105,10 @@ pub(super) async fn send<M>(
 
 #[cfg(test)]
 mod tests {
+    use std::future::pending;
+    use std::pin::pin;
+
+    use futures::FutureExt as _;
     use tonic_types::StatusExt as _;
 
     use crate::grpc::follow::*;
@@ -118,18 +126,33 @@ mod tests {
         assert_eq!(first.expect("no error"), 1);
     }
 
-    #[tokio::test]
-    async fn a_follower_that_has_gone_is_forgotten_while_nothing_changes() {
+    #[tokio::test(start_paused = true)]
+    async fn a_follower_of_a_tournament_without_a_task_follows_again() {
         let handle = TournamentHandle::for_tests(4);
         let (sender, mut receiver) = mpsc::channel(1);
-        let following = tokio::spawn(async move {
-            let permits = Arc::new(Semaphore::new(1));
-            follow(&handle, &permits, &sender).await
-        });
+        let permits = Arc::new(Semaphore::new(1));
+        let followed = follow(&handle, &permits, &sender).await;
+        assert_eq!(followed.expect_err("it stops").code(), Code::Unavailable);
         let first = receiver.recv().await.expect("a message");
         let tournament = first.expect("no error").tournament.expect("a tournament");
         assert_eq!(tournament.participants.len(), 4);
+    }
+
+    #[tokio::test]
+    async fn a_follower_waits_for_a_change_the_end_of_the_task_or_its_own_end() {
+        let (count, mut changes) = watch::channel(0);
+        let (sender, receiver) = mpsc::channel::<()>(1);
+        count.send_replace(1);
+        let last = changed(&mut changes, async {}, &sender).await;
+        last.expect("what changed last is sent before");
+        let stopped = changed(&mut changes, async {}, &sender).await;
+        assert_eq!(stopped.expect_err("the end").code(), Code::Unavailable);
+        let mut waiting = pin!(changed(&mut changes, pending(), &sender));
+        assert!(waiting.as_mut().now_or_never().is_none());
         drop(receiver);
-        following.await.unwrap().expect_err("nobody follows");
+        assert_eq!(
+            waiting.await.expect_err("it has gone").code(),
+            Code::Cancelled
+        );
     }
 }

@@ -433,7 +433,7 @@ async fn follow(
             return Ok(());
         }
         sleep_until(began + FOLLOW_INTERVAL).await;
-        follow::changed(&mut changes, sender).await?;
+        follow::changed(&mut changes, handle.stopped(), sender).await?;
     }
 }
 

@@ -204,6 +204,11 @@ impl<U: Journaled> Handle<U> {
         self.mailbox.is_closed()
     }
 
+    /// Waits until its task has ended.
+    pub async fn stopped(&self) {
+        self.mailbox.closed().await;
+    }
+
     /// Counts changes.
     pub fn changes(&self) -> watch::Receiver<u64> {
         self.changes.subscribe()

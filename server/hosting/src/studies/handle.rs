@@ -326,7 +326,7 @@ impl StudyHandle {
         while delete_data && self.lock_deleting().contains(&number) {
             tokio::select! {
                 changed = changes.changed() => changed.map_err(|_| Stopped)?,
-                () = self.mailbox.closed() => return Err(Stopped),
+                () = self.stopped() => return Err(Stopped),
             }
         }
         Ok(Ok(()))

@@ -276,7 +276,7 @@ async fn follow(
         if ended {
             return Ok(());
         }
-        changed(&mut changes, sender).await?;
+        changed(&mut changes, handle.stopped(), sender).await?;
     }
 }
 
