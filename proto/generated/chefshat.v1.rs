@@ -464,8 +464,9 @@ pub struct Participant {
     #[prost(bool, tag = "6")]
     pub connected: bool,
     /// Whether a substitute plays for the seat now. In lists of records: whether the participant did
-    /// not play to the end by itself, because a substitute took a decision for it, it was given a hint,
-    /// or it was gone when the game was broken off; ratings count it.
+    /// not play to the end by itself, because a substitute took a decision for it, its own fallback took
+    /// more than a tenth of those with a choice (Annotations.extra), it was given a hint, or it was gone
+    /// when the game was broken off; ratings count it.
     #[prost(bool, tag = "7")]
     pub substituted: bool,
     /// The recorded player that the built-in agent "replay" imitates; unset for all others.
@@ -1053,7 +1054,8 @@ pub struct TournamentGameSeat {
     /// after those who were present.
     #[prost(bool, tag = "2")]
     pub forfeited: bool,
-    /// Whether a substitute took decisions for it.
+    /// Whether a substitute took decisions for it, or its own fallback more than a tenth of those with a
+    /// choice (Annotations.extra).
     #[prost(bool, tag = "3")]
     pub substituted: bool,
     /// Its place in the game, from 1.
@@ -1172,7 +1174,7 @@ pub struct TournamentStanding {
     /// Number of games it forfeited.
     #[prost(uint32, tag = "9")]
     pub forfeited: u32,
-    /// Number of games in which a substitute took decisions for it.
+    /// Number of games in which a substitute, or too often its own fallback, took decisions for it.
     #[prost(uint32, tag = "10")]
     pub substituted: u32,
     /// Number of its invalid answers.
@@ -2732,7 +2734,9 @@ pub struct Annotations {
     /// The agent's score per action, in its own unit, index = action.
     #[prost(float, repeated, tag = "2")]
     pub action_scores: ::prost::alloc::vec::Vec<f32>,
-    /// Free keys and values.
+    /// Free keys and values. The key "fallback" says that another agent than the participant decided,
+    /// and which and why: if that took more than a tenth of the seat's decisions with a choice, the
+    /// participant did not play by itself (Participant.substituted in lists of records).
     #[prost(btree_map = "string, string", tag = "3")]
     pub extra: ::prost::alloc::collections::BTreeMap<
         ::prost::alloc::string::String,

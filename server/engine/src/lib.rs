@@ -57,7 +57,8 @@ pub use game::{ActionError, Game, GameState, Refusal, Script, ScriptError, Stage
 pub use ids::{ActionId, Face, Seat};
 pub use mask::Mask;
 pub use metrics::{
-    MetricsRecorder, RecorderState, SeatCounts, SeatMetrics, SeatStatistics, ShiftMetrics,
+    MetricsRecorder, OwnChoices, RecorderState, SeatCounts, SeatMetrics, SeatStatistics,
+    ShiftMetrics,
 };
 pub use observation::Observation;
 pub use order::{SeatOrder, Standings};

@@ -36,6 +36,30 @@ impl SeatMetrics {
     }
 }
 
+/// Counts whose decisions those of a participant are that had a choice: its own, or those of another
+/// agent, its fallback, which decided when it could not.
+#[derive(Copy, Clone, PartialEq, Eq, Debug, Default)]
+pub struct OwnChoices {
+    choices: u32,
+    fallbacks: u32,
+}
+
+impl OwnChoices {
+    /// Most decisions of the fallback in so many of both.
+    pub const ONE_IN: u32 = 10;
+
+    /// Counts a decision with a choice.
+    pub fn add(&mut self, by_fallback: bool) {
+        self.choices = self.choices.saturating_add(1);
+        self.fallbacks = self.fallbacks.saturating_add(u32::from(by_fallback));
+    }
+
+    /// Whether the participant played by itself: the fallback decided at most a tenth.
+    pub fn are_own(&self) -> bool {
+        self.fallbacks <= self.choices / Self::ONE_IN
+    }
+}
+
 /// The result of one seat in a game, and statistics of how it played.
 #[derive(Copy, Clone, PartialEq, Debug, Default)]
 pub struct SeatStatistics {

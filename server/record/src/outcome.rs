@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use chefshat_engine::SeatStatistics;
+use chefshat_engine::{OwnChoices, SeatStatistics};
 use chefshat_proto::v1::{
     self, DecisionSource, GameOrigin, ParticipantKind, RoomState, game_event::Kind,
     record_line::Line,
@@ -106,6 +106,26 @@ impl SeatOutcome {
     }
 }
 
+/// The key of annotations that says that another agent decided, the participant's fallback, and which.
+pub const FALLBACK: &str = "fallback";
+
+/// Whether annotations say that the participant's fallback decided.
+pub fn is_by_fallback(annotations: &v1::Annotations) -> bool {
+    annotations.extra.contains_key(FALLBACK)
+}
+
+/// Counts a decision of a record if its participant had a choice.
+pub(crate) fn add_choice(choices: &mut OwnChoices, decision: &v1::DecisionRecord) {
+    let legal: u32 = decision
+        .action_mask
+        .iter()
+        .map(|byte| byte.count_ones())
+        .sum();
+    if decision.source() == DecisionSource::Agent && legal > 1 {
+        choices.add(decision.annotations.as_ref().is_some_and(is_by_fallback));
+    }
+}
+
 /// Why a finished game is unrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, thiserror::Error)]
 pub enum Unrated {
@@ -115,7 +135,7 @@ pub enum Unrated {
     )]
     NotDealt,
     /// A substitute played for a participant.
-    #[error("a substitute played")]
+    #[error("a substitute played, or a participant's own fallback too often")]
     Substituted,
     /// The server suggested actions to a participant.
     #[error("a participant was given hints")]
@@ -176,6 +196,7 @@ pub fn outcome(lines: &[v1::RecordLine]) -> Result<Outcome, OutcomeError> {
     };
     let mut gathered = Gathered {
         seats: header.seats.iter().map(SeatOutcome::of).collect(),
+        choices: vec![OwnChoices::default(); header.seats.len()],
         shifts: 0,
         elapsed_ms: 0,
         standings: None,
@@ -193,7 +214,10 @@ pub fn outcome(lines: &[v1::RecordLine]) -> Result<Outcome, OutcomeError> {
     };
     let mut seats = gathered.seats;
     place(&mut seats, standings).ok_or(OutcomeError::Standings)?;
-    for seat in &mut seats {
+    // What is known of the decisions at a physical table may change later.
+    let is_physical = header.origin() == GameOrigin::Physical;
+    for (seat, choices) in seats.iter_mut().zip(&gathered.choices) {
+        seat.statistics.substituted |= !is_physical && !choices.are_own();
         // The sum until now.
         seat.statistics.performance_score /= f64::from(gathered.shifts.max(1));
     }
@@ -232,6 +256,8 @@ impl SeatOutcome {
 /// The totals of the lines so far.
 struct Gathered<'a> {
     seats: Vec<SeatOutcome>,
+    /// By seat.
+    choices: Vec<OwnChoices>,
     shifts: u32,
     elapsed_ms: u64,
     standings: Option<&'a [v1::Standing]>,
@@ -259,6 +285,8 @@ impl<'a> Gathered<'a> {
     }
 
     fn decision(&mut self, decision: &v1::DecisionRecord) -> Option<()> {
+        let index = usize::try_from(decision.seat).ok()?;
+        add_choice(self.choices.get_mut(index)?, decision);
         let seat = &mut self.seat(decision.seat)?.statistics;
         seat.hinted |= decision.hints > 0;
         let source = decision.source();

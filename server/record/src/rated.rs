@@ -2,8 +2,8 @@
 //! server and for ratings recomputed from records.
 //!
 //! Whether a game is rated is decided by what is fixed before it starts. What a participant does
-//! later never takes a game out of its ratings, only its place: one whose substitute played, who was
-//! given a hint, who was away when the game was broken off, or who broke it off, has lost to all.
+//! later never takes a game out of its ratings, only its place: one whose substitute played, or too often
+//! its own fallback, who was given a hint, who was away when the game was broken off, or who broke it off, has lost to all.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,9 +1,13 @@
 //! The summary of a record, as listings show it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
-use chefshat_proto::v1::{self, AbortReason, DecisionSource, game_event::Kind, record_line::Line};
+use chefshat_engine::OwnChoices;
+use chefshat_proto::v1::{
+    self, AbortReason, DecisionSource, GameOrigin, game_event::Kind, record_line::Line,
+};
 
+use crate::outcome::add_choice;
 use crate::replay::Replayed;
 
 /// The summary of a verified record; `None` if nothing was dealt.
@@ -16,6 +20,7 @@ pub fn summary(lines: &[v1::RecordLine], replayed: &Replayed) -> Option<v1::Reco
     };
     // The seats whose participants did not play to the end by themselves.
     let (mut forfeited, mut away, mut late) = (BTreeSet::new(), BTreeSet::new(), None);
+    let mut choices: BTreeMap<u32, OwnChoices> = BTreeMap::new();
     for line in lines.iter().filter_map(|line| line.line.as_ref()) {
         match line {
             Line::Header(header) => {
@@ -58,6 +63,7 @@ pub fn summary(lines: &[v1::RecordLine], replayed: &Replayed) -> Option<v1::Reco
                     DecisionSource::Timeout | DecisionSource::Disconnected
                 );
                 late = is_late.then_some(decision.seat);
+                add_choice(choices.entry(decision.seat).or_default(), decision);
                 if decision.hints > 0 {
                     summary.hinted = true;
                     forfeited.insert(decision.seat);
@@ -66,6 +72,12 @@ pub fn summary(lines: &[v1::RecordLine], replayed: &Replayed) -> Option<v1::Reco
             _ => {}
         }
     }
+    // What is known of the decisions at a physical table may change later.
+    if summary.origin() == GameOrigin::Physical {
+        choices.clear();
+    }
+    let by_fallback = choices.iter().filter(|(_, choices)| !choices.are_own());
+    forfeited.extend(by_fallback.map(|(seat, _)| *seat));
     for seat in &mut summary.seats {
         seat.substituted = forfeited.contains(&seat.seat);
     }

@@ -159,6 +159,8 @@ pub struct Answer {
     pub action: u32,
     /// Annotations, encoded.
     pub annotations: Option<Box<[u8]>>,
+    /// The annotations say that another agent decided, the participant's fallback.
+    pub by_fallback: bool,
     /// Annotations were sent that cannot be recorded.
     pub annotations_refused: bool,
     /// Time from handing over the decision request until the answer was read, if both happened at
@@ -173,6 +175,7 @@ impl Answer {
             decision_id,
             action,
             annotations: None,
+            by_fallback: false,
             annotations_refused: false,
             measured: None,
         }

@@ -185,6 +185,7 @@ impl Core {
         // What is not published must not show later either: not in when the seat is substituted,
         // nor in how far delayed spectators see.
         let offered = self.open.as_ref().is_some_and(OpenDecision::is_silent);
+        let has_choice = !self.header.is_physical() && self.legal_actions().len() > 1;
         let declined = offered && Some(decided.action) == self.default_action();
         // Neither does a gift of a built-in agent show before all gifts are given.
         let shows = !declined && !self.seems_automatic(decided.seat);
@@ -207,6 +208,9 @@ impl Core {
         seat.annotation_bytes += decided.annotations.as_ref().map_or(0, |bytes| bytes.len());
         match decided.source {
             Source::Agent => {
+                if has_choice {
+                    seat.choices.add(decided.by_fallback);
+                }
                 if !declined {
                     seat.timeouts = 0;
                 }
@@ -362,6 +366,7 @@ impl Core {
             time_us: micros(time),
             bank_left_ms: u32::try_from(bank_left.as_millis()).unwrap_or(u32::MAX),
             annotations: None,
+            by_fallback: false,
         }
     }
 

@@ -359,6 +359,7 @@ impl Core {
             time,
             bank_left,
         );
+        decided.by_fallback = input.by_fallback && annotations.is_some();
         decided.annotations = annotations;
         self.commit(now, Change::Decided(decided));
         let last = self.seats[seat.index()]

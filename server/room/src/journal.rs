@@ -388,4 +388,6 @@ pub struct Decided {
     pub bank_left_ms: u32,
     /// The message `chefshat.v1.Annotations`, encoded.
     pub annotations: Option<Box<[u8]>>,
+    /// The annotations say that another agent decided, the participant's fallback.
+    pub by_fallback: bool,
 }

@@ -31,7 +31,8 @@ use std::time::Duration;
 
 use chefshat_agents::{BuiltInAgent, NamedAgent};
 use chefshat_engine::{
-    ActionId, Decision, DecisionKind, Event, Game, Mask, Observation, Requirement, Seat, Viewer,
+    ActionId, Decision, DecisionKind, Event, Game, Mask, Observation, OwnChoices, Requirement,
+    Seat, Viewer,
 };
 
 pub use absence::Awaited;
@@ -149,6 +150,8 @@ struct SeatState {
     /// Whether its participant has left for good.
     retired: bool,
     ever_hinted: bool,
+    /// Whose decisions those of its participant were.
+    choices: OwnChoices,
     decisions: u64,
     /// Timeouts since the agent's last valid answer in time. Silent decisions do not count.
     timeouts: u32,
@@ -306,6 +309,7 @@ impl Core {
                     retiring: false,
                     retired: false,
                     ever_hinted: false,
+                    choices: OwnChoices::default(),
                     decisions: 0,
                     timeouts: 0,
                     bank_left: header.policy.bank,
@@ -419,8 +423,8 @@ impl Core {
         self.seats.iter().any(|seat| seat.ever_substituted)
     }
 
-    /// Whether the participant of a seat did not play to the end by itself: a substitute played for
-    /// it, it was given a hint, or it was gone when the game was broken off.
+    /// Whether the participant of a seat did not play to the end by itself: a substitute or too often its
+    /// own fallback played for it, it was given a hint, or it was gone when the game was broken off.
     pub fn has_forfeited(&self, seat: Seat) -> bool {
         let state = &self.seats[seat.index()];
         // After a restart all are away until they have attached again.
@@ -432,7 +436,10 @@ impl Core {
             }
             _ => false,
         };
-        state.ever_substituted || state.ever_hinted || (is_gone && state.participant.is_some())
+        state.ever_substituted
+            || state.ever_hinted
+            || !state.choices.are_own()
+            || (is_gone && state.participant.is_some())
     }
 
     /// Whether any seat was given a hint.

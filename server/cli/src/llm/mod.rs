@@ -12,6 +12,7 @@ use std::time::Duration;
 use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_client::v1::{self, seat_update::Update};
 use chefshat_client::{ActionId, Agent, Outcome, is_legal, legal_count};
+use chefshat_record::outcome::FALLBACK;
 use clap::Args;
 use serde_json::{Map, Value};
 use tokio::runtime::Handle;
@@ -42,7 +43,6 @@ const MAX_SILENT: u32 = 3;
 
 /// Keys of annotations.
 const MODEL: &str = "model";
-const FALLBACK: &str = "fallback";
 const TOKENS: &str = "tokens";
 
 /// What follows an answer without an action.

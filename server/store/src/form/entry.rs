@@ -115,6 +115,8 @@ struct DecidedForm {
     bank_left_ms: u32,
     #[prost(bytes = "vec", optional, tag = "6")]
     annotations: Option<Vec<u8>>,
+    #[prost(bool, tag = "7")]
+    by_fallback: bool,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -231,6 +233,7 @@ pub(crate) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
             time_us: decided.time_us,
             bank_left_ms: decided.bank_left_ms,
             annotations: decided.annotations.as_deref().map(<[u8]>::to_vec),
+            by_fallback: decided.by_fallback,
         }),
         Change::Expressed {
             seat,
@@ -317,6 +320,7 @@ fn change_from(form: ChangeForm) -> Result<Change, Unreadable> {
             time_us: form.time_us,
             bank_left_ms: form.bank_left_ms,
             annotations: form.annotations.map(Vec::into_boxed_slice),
+            by_fallback: form.by_fallback,
         }),
         ChangeForm::Expressed(form) => Change::Expressed {
             seat: seat(form.seat)?,

@@ -127,6 +127,7 @@ fn entries() -> Vec<Entry> {
             time_us: u64::MAX,
             bank_left_ms: 17,
             annotations: Some(Box::from([1, 2, 3])),
+            by_fallback: false,
         }),
         Change::Expressed {
             seat,

@@ -63,6 +63,7 @@ fn decided(seat: usize) -> Entry {
         time_us: 5,
         bank_left_ms: 0,
         annotations: Some(Box::from([])),
+        by_fallback: false,
     }))
 }
 

@@ -3,6 +3,7 @@
 use chefshat_engine::{MAX_SEATS, Mask, RuleSet};
 use chefshat_proto::v1::{self, expression::About};
 use chefshat_record::convert::{FieldProblem, check_expression};
+use chefshat_record::outcome::is_by_fallback;
 use prost::Message as _;
 
 use chefshat_room::journal::Source;
@@ -81,8 +82,10 @@ fn annotations_from_proto(
 
 /// Converts an answer and encodes its annotations for storage.
 pub fn answer_from_proto(answer: v1::Answer) -> Answer {
+    let by_fallback = answer.annotations.as_ref().is_some_and(is_by_fallback);
     let annotations = annotations_from_proto(answer.annotations);
     Answer {
+        by_fallback,
         decision_id: answer.decision_id,
         action: answer.action,
         annotations_refused: annotations.is_err(),

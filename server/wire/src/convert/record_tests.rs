@@ -3,8 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use chefshat_engine::{RuleSetSpec, Seat, Stop};
+use chefshat_engine::{OwnChoices, RuleSetSpec, Seat, Stop};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_record::outcome::{FALLBACK, outcome};
 use chefshat_record::replay::replay;
 use chefshat_record::summary::summary;
 use chefshat_room::ConnectionId;
@@ -12,7 +13,7 @@ use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{AbortPolicy, KindClock, Policy};
 use chefshat_room::testing::{OPEN, Table, ms};
 
-use super::record_lines;
+use super::{answer_from_proto, record_lines};
 
 /// A small generator of random numbers (SplitMix64).
 struct Chance(u64);
@@ -99,7 +100,12 @@ fn played_with(chance: &mut Chance, policy: Policy, closes: u64) -> Table {
                 Some(open) if connections[open.index()].is_some() => {
                     let (seat, id) = table.open();
                     let action = table.legal(chance.index(9));
-                    table.answer(seat, id, action);
+                    answer(
+                        &mut table,
+                        seat,
+                        (id, action),
+                        (id + seat.index() as u64).is_multiple_of(8),
+                    );
                 }
                 _ => table.pass_time(ms(chance.below(300))),
             },
@@ -108,6 +114,50 @@ fn played_with(chance: &mut Chance, policy: Policy, closes: u64) -> Table {
         table.pass_time(ms(0));
     }
     table
+}
+
+/// Answers a decision, or lets the participant's fallback answer it.
+fn answer(table: &mut Table, seat: Seat, (decision_id, action): (u64, u32), by_fallback: bool) {
+    let why = (FALLBACK.to_owned(), "greedy: no answer in time".to_owned());
+    let annotations = by_fallback.then(|| v1::Annotations {
+        extra: [why].into(),
+        ..v1::Annotations::default()
+    });
+    let answer = answer_from_proto(v1::Answer {
+        decision_id,
+        action,
+        annotations,
+    });
+    table.core.answer(table.now, seat, answer, table.now, None);
+    table.commit();
+}
+
+#[test]
+fn who_lets_its_fallback_play_has_lost_to_all() {
+    for (one_in, is_own) in [(OwnChoices::ONE_IN, true), (5, false)] {
+        let mut table = Table::with_rules(Policy::default(), vec![OPEN; 4], RuleSetSpec::default());
+        table.fill();
+        let mut choices = 0;
+        while !table.core.state().is_over() {
+            let (seat, id) = table.open();
+            let has_choice = seat.index() == 0 && table.core.legal_actions().len() > 1;
+            choices += u32::from(has_choice);
+            let by_fallback = has_choice && choices % one_in == 0;
+            let action = table.legal(0);
+            answer(&mut table, seat, (id, action), by_fallback);
+        }
+        table.assert_replays();
+        let own = super::summary(&table.core);
+        let lost = own.seats.iter().filter(|seat| seat.substituted).count();
+        assert_eq!(lost, usize::from(!is_own));
+        assert_ne!(own.seats[0].substituted, is_own);
+        let lines = record_of(&table);
+        let replayed = replay(&lines).expect("it verifies");
+        let read = summary(&lines, &replayed).expect("something was dealt");
+        assert_ne!(read.seats[0].substituted, is_own);
+        let outcome = outcome(&lines).expect("it has a result");
+        assert_ne!(outcome.seats[0].statistics.substituted, is_own);
+    }
 }
 
 fn record_of(table: &Table) -> Vec<v1::RecordLine> {

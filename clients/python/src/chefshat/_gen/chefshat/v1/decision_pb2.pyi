@@ -503,7 +503,10 @@ class Annotations(_message.Message):
 
     @_builtins.property
     def extra(self) -> _containers.ScalarMap[_builtins.str, _builtins.str]:
-        """Free keys and values."""
+        """Free keys and values. The key "fallback" says that another agent than the participant decided,
+        and which and why: if that took more than a tenth of the seat's decisions with a choice, the
+        participant did not play by itself (Participant.substituted in lists of records).
+        """
 
     def __init__(
         self,
