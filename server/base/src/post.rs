@@ -74,6 +74,14 @@ impl std::fmt::Debug for Target {
 }
 
 impl Target {
+    /// The host and the port, without what may be secret.
+    pub fn authority(&self) -> String {
+        match self.host.contains(':') {
+            true => format!("[{}]:{}", self.host, self.port),
+            false => format!("{}:{}", self.host, self.port),
+        }
+    }
+
     /// Parses an address, http or https; `ca`: the file of the authorities to trust instead of the
     /// system's.
     ///

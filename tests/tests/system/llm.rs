@@ -13,6 +13,7 @@ use http::{HeaderMap, Response, StatusCode};
 use http_body_util::{BodyExt as _, Full};
 use hyper_util::rt::TokioIo;
 use serde_json::{Value, json};
+use sha2::{Digest as _, Sha256};
 use tokio::net::TcpListener;
 use tokio::process::Command;
 
@@ -81,7 +82,11 @@ async fn endpoint(script: Script) -> (String, Arc<Mutex<Vec<Asked>>>) {
                         Said::Text(text, tokens) => Response::new(Bytes::from(
                             json!({
                                 "choices": [{"message": {"role": "assistant", "content": text}}],
-                                "usage": {"total_tokens": tokens},
+                                "usage": {
+                                    "prompt_tokens": tokens.saturating_sub(8), "completion_tokens": 8, "total_tokens": tokens,
+                                    "prompt_tokens_details": {"cached_tokens": 5},
+                                    "completion_tokens_details": null,
+                                },
                             })
                             .to_string(),
                         )),
@@ -252,9 +257,28 @@ async fn a_model_plays_and_its_reasons_are_recorded() {
             ("the first of them", "500")
         );
         assert_eq!(said.get("fallback"), None);
+        assert_eq!(
+            said["usage"],
+            r#"{"prompt":492,"cached":5,"completion":8,"reasoning":0}"#
+        );
     }
     let asked = played.asked.lock().expect("no panic");
     assert!(asked[0].is_first());
+    // How the model was asked is said once.
+    let first = &choices[0].1;
+    let sampling: Value = serde_json::from_str(first["sampling"]).expect("JSON");
+    let expected = json!({ "max_tokens": 1_000, "temperature": 0.5, "seed": 7 });
+    assert_eq!(sampling, expected);
+    let host = asked[1].headers["host"].to_str().expect("text");
+    assert_eq!(first["endpoint"], host);
+    let prompt = asked[1].body["messages"][0]["content"].as_str();
+    let digest = hex::encode(&Sha256::digest(prompt.expect("text"))[..8]);
+    let version = env!("CARGO_PKG_VERSION");
+    assert_eq!(first["prompt"], format!("{version} {digest}"));
+    let again = choices[1..]
+        .iter()
+        .any(|(_, said)| said.contains_key("prompt"));
+    assert!(!again);
     for asked in asked.iter().skip(1) {
         assert_eq!(asked.headers["authorization"], format!("Bearer {KEY}"));
         assert_eq!(asked.body["model"], "ada/test-1");

@@ -2,12 +2,14 @@
 //! messages, and a text with the tokens it took.
 
 use std::fmt;
+use std::ops::AddAssign;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use chefshat_server::post::{Answer, PostError, Target};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
+use sha2::{Digest as _, Sha256};
 
 /// Maximum bytes of an answer.
 const MAX_ANSWER_BYTES: usize = 1 << 20;
@@ -26,6 +28,8 @@ const FIRST_ATTEMPTS: u32 = 3;
 /// The first question, which no game depends on, in the form of those that follow.
 const FIRST_QUESTION: &str = "\
 Before the game: a question to see whether you can be asked. Answer with one JSON object: {\"action\": 199}\noptions\n199=pass";
+/// Longest text in which a record says how a model is asked.
+const MAX_SAMPLING_BYTES: usize = 1_024;
 /// What follows the address that is given.
 const PATH: &str = "/chat/completions";
 
@@ -62,8 +66,36 @@ pub(super) struct Completion {
     pub(super) text: String,
     /// Tokens of the question and the answer.
     pub(super) tokens: u64,
+    /// The same in parts, as the server reports them.
+    pub(super) used: Used,
     /// Whether it ends because it may not be longer.
     pub(super) cut: bool,
+}
+
+/// Tokens by what they are for, as a server reports them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub(super) struct Used {
+    /// Of questions.
+    prompt: u64,
+    /// Of those, which the server had kept from earlier ones.
+    cached: u64,
+    /// Of answers.
+    completion: u64,
+    /// Of those, which the model thought with.
+    reasoning: u64,
+}
+
+impl AddAssign for Used {
+    fn add_assign(&mut self, more: Self) {
+        for (sum, more) in [
+            (&mut self.prompt, more.prompt),
+            (&mut self.cached, more.cached),
+            (&mut self.completion, more.completion),
+            (&mut self.reasoning, more.reasoning),
+        ] {
+            *sum = sum.saturating_add(more);
+        }
+    }
 }
 
 /// Why there is no completion.
@@ -163,6 +195,40 @@ impl Said {
 struct Usage {
     #[serde(default)]
     total_tokens: Option<u64>,
+    #[serde(default)]
+    prompt_tokens: Option<u64>,
+    #[serde(default)]
+    completion_tokens: Option<u64>,
+    #[serde(default)]
+    prompt_tokens_details: Option<PromptDetails>,
+    #[serde(default)]
+    completion_tokens_details: Option<CompletionDetails>,
+}
+
+#[derive(Deserialize)]
+struct PromptDetails {
+    #[serde(default)]
+    cached_tokens: Option<u64>,
+}
+
+#[derive(Deserialize)]
+struct CompletionDetails {
+    #[serde(default)]
+    reasoning_tokens: Option<u64>,
+}
+
+impl Usage {
+    fn parts(&self) -> Used {
+        let (prompt, completion) = (&self.prompt_tokens_details, &self.completion_tokens_details);
+        let cached = prompt.as_ref().and_then(|it| it.cached_tokens);
+        let reasoning = completion.as_ref().and_then(|it| it.reasoning_tokens);
+        Used {
+            prompt: self.prompt_tokens.unwrap_or(0),
+            cached: cached.unwrap_or(0),
+            completion: self.completion_tokens.unwrap_or(0),
+            reasoning: reasoning.unwrap_or(0),
+        }
+    }
 }
 
 /// Leaves out the key.
@@ -249,9 +315,41 @@ impl Endpoint {
         let choice = choice.ok_or_else(|| lasting("the answer has no choice"))?;
         let cut = choice.finish_reason.as_deref() == Some("length");
         let text = choice.message.text();
+        let used = (answered.usage.as_ref()).map_or_else(Used::default, Usage::parts);
         let reported = answered.usage.and_then(|usage| usage.total_tokens);
         let tokens = reported.unwrap_or(0).max(at_least(asked + text.len()));
-        Ok(Completion { text, tokens, cut })
+        Ok(Completion {
+            text,
+            tokens,
+            used,
+            cut,
+        })
+    }
+
+    /// What is asked with every question, in its form: `limit` is the member that limits the answer.
+    fn sampling(&self, limit: &str) -> Value {
+        let mut sampling = json!({ limit: self.answer_tokens });
+        if let Some(temperature) = self.temperature {
+            sampling["temperature"] = json!(temperature);
+        }
+        if let Some(seed) = self.seed {
+            sampling["seed"] = json!(seed);
+        }
+        for (name, value) in &self.extra {
+            sampling[name] = value.clone();
+        }
+        sampling
+    }
+
+    /// How the model is asked, as a record says it: host and port, and a JSON object of what is asked
+    /// with every question, or its digest if that is long.
+    pub(super) fn described(&self) -> (String, String) {
+        let sampling = self.sampling(ANSWER_LIMIT).to_string();
+        let sampling = match sampling.len() {
+            ..=MAX_SAMPLING_BYTES => sampling,
+            _ => format!("sha256:{}", hex::encode(Sha256::digest(sampling))),
+        };
+        (self.target.authority(), sampling)
     }
 
     async fn post(&self, messages: &[Message], time: Duration) -> Result<Answer, PostError> {
@@ -259,21 +357,10 @@ impl Endpoint {
             true => LATER_ANSWER_LIMIT,
             false => ANSWER_LIMIT,
         };
-        let mut question = json!({
-            "model": self.model,
-            "messages": messages,
-            limit: self.answer_tokens,
-            "stream": false,
-        });
-        if let Some(temperature) = self.temperature {
-            question["temperature"] = json!(temperature);
-        }
-        if let Some(seed) = self.seed {
-            question["seed"] = json!(seed);
-        }
-        for (name, value) in &self.extra {
-            question[name] = value.clone();
-        }
+        let mut question = self.sampling(limit);
+        question["model"] = json!(self.model);
+        question["messages"] = json!(messages);
+        question["stream"] = json!(false);
         let key = self.key.iter();
         let headers = key.map(|key| ("authorization", format!("Bearer {key}")));
         (self.target)

@@ -15,6 +15,7 @@ use chefshat_client::{ActionId, Agent, Outcome, is_legal, legal_count};
 use chefshat_record::outcome::FALLBACK;
 use clap::Args;
 use serde_json::{Map, Value};
+use sha2::{Digest as _, Sha256};
 use tokio::runtime::Handle;
 use tokio::time::Instant;
 use tracing::warn;
@@ -25,7 +26,7 @@ use crate::language::{self, RULES, cards, text};
 use crate::narration::view::GameView;
 use crate::remote::{RemoteAgent, named_agent};
 pub(crate) use endpoint::Endpoint;
-use endpoint::{EndpointError, Message};
+use endpoint::{EndpointError, Message, Used};
 use reply::Reply;
 
 /// The name of the agent on the command line.
@@ -44,6 +45,12 @@ const MAX_SILENT: u32 = 3;
 /// Keys of annotations.
 const MODEL: &str = "model";
 const TOKENS: &str = "tokens";
+/// A JSON object of the tokens in parts.
+const USAGE: &str = "usage";
+/// Of the first decision of a game: where the model is asked, with what first message and what else.
+const ENDPOINT: &str = "endpoint";
+const PROMPT: &str = "prompt";
+const SAMPLING: &str = "sampling";
 
 /// What follows an answer without an action.
 const UNREADABLE: &str =
@@ -161,6 +168,7 @@ impl LlmArgs {
             live: Live::new(GameView::default(), None),
             spent: Spent::default(),
             before: 0,
+            used: Used::default(),
             answered: None,
             silent: 0,
             said: v1::Annotations::default(),
@@ -193,6 +201,8 @@ pub(crate) struct LanguageModel {
     spent: Spent,
     /// Tokens spent before this decision.
     before: u64,
+    /// Tokens of this decision in parts.
+    used: Used,
     /// The decision that was answered last, while the server may refuse the answer: with that answer,
     /// and those before it that could not be used with what was said about them.
     answered: Option<(u64, Vec<Message>)>,
@@ -235,16 +245,36 @@ impl LanguageModel {
         asked
     }
 
+    /// The first message to the model.
+    fn prompt(&self) -> String {
+        format!(
+            "You play the card game Chef's Hat. {RULES} {}\n\n{FORM}",
+            language::this_game(self.live.view.rules.as_ref())
+        )
+    }
+
+    /// Says in the record how the model is asked. The digest tells whether two games had the same
+    /// first message.
+    fn say_how(&mut self) {
+        let (endpoint, sampling) = self.endpoint.described();
+        let digest = Sha256::digest(self.prompt());
+        let prompt = format!(
+            "{} {}",
+            env!("CARGO_PKG_VERSION"),
+            hex::encode(&digest[..8])
+        );
+        for (key, words) in [(ENDPOINT, endpoint), (PROMPT, prompt), (SAMPLING, sampling)] {
+            self.say(key, words);
+        }
+    }
+
     async fn ask_until(
         &mut self,
         request: &v1::DecisionRequest,
         until: Instant,
     ) -> Result<Reply, String> {
         let mut messages = vec![
-            Message::system(format!(
-                "You play the card game Chef's Hat. {RULES} {}\n\n{FORM}",
-                language::this_game(self.live.view.rules.as_ref())
-            )),
+            Message::system(self.prompt()),
             Message::user(text::decision(&self.live, self.now_ms())),
         ];
         let before = messages.len();
@@ -276,6 +306,7 @@ impl LanguageModel {
                 }
             };
             self.spent.tokens = self.spent.tokens.saturating_add(completion.tokens);
+            self.used += completion.used;
             let by_cards = |cards: &str| cards::option_of(self.live.space(), request, cards);
             let Some(reply) = reply::parse(&completion.text, by_cards) else {
                 problem = match completion.cut {
@@ -357,10 +388,18 @@ impl Agent for LanguageModel {
         if !again {
             self.spent.decisions += 1;
             self.before = self.spent.tokens;
+            self.used = Used::default();
+        }
+        if self.spent.decisions == 1 {
+            self.say_how();
         }
         self.say(MODEL, self.endpoint.model().to_owned());
         let asked = tokio::task::block_in_place(|| Handle::current().block_on(self.ask(request)));
         self.say(TOKENS, (self.spent.tokens - self.before).to_string());
+        if self.used != Used::default() {
+            let used = serde_json::to_string(&self.used).unwrap_or_default();
+            self.say(USAGE, used);
+        }
         match asked {
             Ok(Reply { action, reason }) => {
                 if let Some(reason) = language::reason(&reason) {
