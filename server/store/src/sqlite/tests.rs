@@ -599,16 +599,21 @@ fn the_encoding_of_stored_data_does_not_change() {
         hex::encode(form::header_to_bytes(&header)),
         hex::encode(&journal)
     );
-    assert_eq!(written, include_str!("fixtures/form2.hex"));
-    let former = include_str!("fixtures/form1.hex");
-    let (first, second) = former.split_once('\n').expect("two lines");
-    let bytes = hex::decode(first).expect("hexadecimal digits");
-    let read = form::header_from_bytes(&bytes).expect("readable");
-    assert_eq!(read.server_version, "0.1.0", "the first version named none");
-    let bytes = hex::decode(second.trim()).expect("hexadecimal digits");
-    let mut read = Vec::new();
-    form::read_entries(&bytes, &mut read).expect("readable");
-    assert_eq!(shown(&read), shown(&entries()[..read.len()]));
+    assert_eq!(written, include_str!("fixtures/form3.hex"));
+    for (former, version) in [
+        // That of before versions were named.
+        (include_str!("fixtures/form1.hex"), "0.1.0"),
+        (include_str!("fixtures/form2.hex"), "0.0.1"),
+    ] {
+        let (first, second) = former.split_once('\n').expect("two lines");
+        let bytes = hex::decode(first).expect("hexadecimal digits");
+        let read = form::header_from_bytes(&bytes).expect("readable");
+        assert_eq!(read.server_version, version);
+        let bytes = hex::decode(second.trim()).expect("hexadecimal digits");
+        let mut read = Vec::new();
+        form::read_entries(&bytes, &mut read).expect("readable");
+        assert_eq!(shown(&read), shown(&entries()[..read.len()]));
+    }
     let (first, second) = written.split_once('\n').expect("two lines");
     let bytes = hex::decode(first).expect("hexadecimal digits");
     let read = form::header_from_bytes(&bytes).expect("readable");
