@@ -93,7 +93,7 @@ impl Who {
         work: impl AsyncFnOnce(&ParticipantData) -> Result<T, CommandError>,
     ) -> Result<T, CommandError> {
         let data_dir = self.data_dir()?;
-        let store = Arc::new(SqliteStore::open(&data_dir).await?);
+        let store = Arc::new(SqliteStore::open_for_deletion(&data_dir).await?);
         let key = key_of(&data_dir)?.map(Arc::new);
         let data = ParticipantData::new(Arc::clone(&store) as _, Some(data_dir)).signing_with(key);
         let done = work(&data).await;

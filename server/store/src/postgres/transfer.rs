@@ -93,7 +93,13 @@ pub async fn transfer(
     }
     // Its statements may take long.
     let address = open::address(url)?.disable_statement_logging();
+    let target = open::shown(&address);
     let contents = Contents::open(data_dir).await?;
+    // If that move had no answer, it may be tried again.
+    let moved_before = sqlite::moved_to(data_dir)?;
+    if let Some(other) = moved_before.filter(|before| *before != target) {
+        return Err(sqlite::moved(data_dir, other).into());
+    }
     open::migrate(url).await?;
     let mut connection = open::connect(&address).await?;
     let mut transaction = connection.begin().await?;
@@ -147,7 +153,10 @@ pub async fn transfer(
         sqlx::query(statement).execute(&mut *transaction).await?;
     }
     // Before the end: if this process dies meanwhile, the games do not go on in both places.
-    sqlite::note_move(data_dir, &open::shown(&address))?;
+    if let Err(error) = sqlite::note_move(data_dir, &target) {
+        sqlite::forget_move(data_dir);
+        return Err(error.into());
+    }
     match transaction.commit().await {
         Ok(()) => Ok(moved),
         Err(error) if is_temporary(&error) => Err(TransferError::Unknown(failure(&error))),

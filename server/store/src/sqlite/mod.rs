@@ -39,6 +39,7 @@ pub use former::LOCK_FILE;
 pub(crate) use former::{forget_move, note_move};
 pub use open::OpenError;
 use open::{FolderLock, IfGone};
+pub(crate) use open::{moved, moved_to};
 
 use super::decode_pool::DecodePool;
 use super::ephemeral::{EphemeralJournal, Reservations};
@@ -84,6 +85,15 @@ impl SqliteStore {
     /// # Errors
     /// The directory cannot be used; nothing was changed in it.
     pub async fn open(data_dir: &Path) -> Result<Self, OpenError> {
+        Self::for_games(data_dir, IfGone::CreateFirst).await
+    }
+
+    /// Opens the database of a data directory in which nothing is played from here on: its games may
+    /// have moved.
+    ///
+    /// # Errors
+    /// The directory cannot be used; nothing was changed in it.
+    pub async fn open_for_deletion(data_dir: &Path) -> Result<Self, OpenError> {
         Self::opened(data_dir, IfGone::CreateFirst).await
     }
 
@@ -92,11 +102,23 @@ impl SqliteStore {
     /// # Errors
     /// The directory cannot be used; nothing was changed in it.
     pub async fn open_or_new(data_dir: &Path) -> Result<Self, OpenError> {
-        Self::opened(data_dir, IfGone::Create).await
+        Self::for_games(data_dir, IfGone::Create).await
+    }
+
+    /// Opens the database unless its games have moved: unfinished ones would go on twice.
+    async fn for_games(data_dir: &Path, if_gone: IfGone) -> Result<Self, OpenError> {
+        let store = Self::opened(data_dir, if_gone).await?;
+        // A move holds the lock that the store holds now.
+        match moved_to(data_dir)? {
+            None => Ok(store),
+            Some(address) => {
+                store.close().await;
+                Err(moved(data_dir, address))
+            }
+        }
     }
 
     async fn opened(data_dir: &Path, if_gone: IfGone) -> Result<Self, OpenError> {
-        open::check_not_moved(data_dir)?;
         let opened = open::open(data_dir, if_gone).await?;
         let (last, last_row, last_listed): (i64, i64, i64) = sqlx::query_as(
             "SELECT (SELECT coalesce(max(number), 0) FROM games),

@@ -159,14 +159,20 @@ pub(super) async fn open(data_dir: &Path, if_gone: IfGone) -> Result<Opened, Ope
     })
 }
 
-/// Checks that the games of a data directory have not moved: unfinished ones would go on twice.
-pub(super) fn check_not_moved(data_dir: &Path) -> Result<(), OpenError> {
-    let path = data_dir.join(former::MOVED_FILE);
-    match former::moved_to(data_dir) {
-        Ok(None) => Ok(()),
-        Ok(Some(address)) => Err(OpenError::Moved(path, address)),
-        Err(source) => Err(OpenError::Io { path, source }),
-    }
+/// Where the games of a data directory have moved, if they have.
+///
+/// # Errors
+/// The note that says so cannot be read.
+pub(crate) fn moved_to(data_dir: &Path) -> Result<Option<String>, OpenError> {
+    former::moved_to(data_dir).map_err(|source| OpenError::Io {
+        path: data_dir.join(former::MOVED_FILE),
+        source,
+    })
+}
+
+/// Why a data directory whose games have moved to an address is not used.
+pub(crate) fn moved(data_dir: &Path, address: String) -> OpenError {
+    OpenError::Moved(data_dir.join(former::MOVED_FILE), address)
 }
 
 /// Opens the database of a data directory that this process has locked. `trace` shows that it had

@@ -128,7 +128,14 @@ async fn a_database_of_an_earlier_version_moves_with_everything_in_it() {
     let again = transfer(folder.path(), database.url(), |_, _| {}).await;
     let error = again.expect_err("it has games");
     assert!(matches!(error, TransferError::NotEmpty), "{error}");
+    let elsewhere = chefshat_postgres::database();
+    let twice = transfer(folder.path(), elsewhere.url(), |_, _| {}).await;
+    let error = twice.expect_err("its games would go on twice");
+    let is_moved_already = matches!(error, TransferError::Folder(OpenError::Moved(..)));
+    assert!(is_moved_already, "{error}");
     assert!(is_moved(folder.path()).await);
+    let kept = SqliteStore::open_for_deletion(folder.path()).await;
+    kept.expect("its data can be deleted").close().await;
     store.close().await;
 }
 
