@@ -45,7 +45,7 @@ pub struct OwnChoices {
 }
 
 impl OwnChoices {
-    /// Most decisions of the fallback in so many of both.
+    /// The fallback may take one decision in this number.
     pub const ONE_IN: u32 = 10;
 
     /// Counts a decision with a choice.

@@ -114,6 +114,15 @@ pub fn is_by_fallback(annotations: &v1::Annotations) -> bool {
     annotations.extra.contains_key(FALLBACK)
 }
 
+/// What is left of annotations when the comments of a participant are deleted: whose decision it was,
+/// which is no comment.
+pub fn without_comments(annotations: &v1::Annotations) -> Option<v1::Annotations> {
+    is_by_fallback(annotations).then(|| v1::Annotations {
+        extra: [(FALLBACK.to_owned(), String::new())].into(),
+        ..v1::Annotations::default()
+    })
+}
+
 /// Counts a decision of a record if its participant had a choice.
 pub(crate) fn add_choice(choices: &mut OwnChoices, decision: &v1::DecisionRecord) {
     let legal: u32 = decision
@@ -135,7 +144,7 @@ pub enum Unrated {
     )]
     NotDealt,
     /// A substitute played for a participant.
-    #[error("a substitute played, or a participant's own fallback too often")]
+    #[error("a substitute played")]
     Substituted,
     /// The server suggested actions to a participant.
     #[error("a participant was given hints")]
@@ -196,7 +205,6 @@ pub fn outcome(lines: &[v1::RecordLine]) -> Result<Outcome, OutcomeError> {
     };
     let mut gathered = Gathered {
         seats: header.seats.iter().map(SeatOutcome::of).collect(),
-        choices: vec![OwnChoices::default(); header.seats.len()],
         shifts: 0,
         elapsed_ms: 0,
         standings: None,
@@ -214,10 +222,7 @@ pub fn outcome(lines: &[v1::RecordLine]) -> Result<Outcome, OutcomeError> {
     };
     let mut seats = gathered.seats;
     place(&mut seats, standings).ok_or(OutcomeError::Standings)?;
-    // What is known of the decisions at a physical table may change later.
-    let is_physical = header.origin() == GameOrigin::Physical;
-    for (seat, choices) in seats.iter_mut().zip(&gathered.choices) {
-        seat.statistics.substituted |= !is_physical && !choices.are_own();
+    for seat in &mut seats {
         // The sum until now.
         seat.statistics.performance_score /= f64::from(gathered.shifts.max(1));
     }
@@ -256,8 +261,6 @@ impl SeatOutcome {
 /// The totals of the lines so far.
 struct Gathered<'a> {
     seats: Vec<SeatOutcome>,
-    /// By seat.
-    choices: Vec<OwnChoices>,
     shifts: u32,
     elapsed_ms: u64,
     standings: Option<&'a [v1::Standing]>,
@@ -285,8 +288,6 @@ impl<'a> Gathered<'a> {
     }
 
     fn decision(&mut self, decision: &v1::DecisionRecord) -> Option<()> {
-        let index = usize::try_from(decision.seat).ok()?;
-        add_choice(self.choices.get_mut(index)?, decision);
         let seat = &mut self.seat(decision.seat)?.statistics;
         seat.hinted |= decision.hints > 0;
         let source = decision.source();

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 
 use crate::convert::MAX_LABEL;
+use crate::outcome::without_comments;
 use crate::signature::SigningKey;
 
 /// The longest name of a room, characters.
@@ -185,8 +186,10 @@ impl Pseudonym {
                 true
             }
             Some(Line::Decision(decision)) => {
-                if own.has(decision.seat) && decision.annotations.take().is_some() {
-                    out.annotations += 1;
+                if own.has(decision.seat) {
+                    let left = decision.annotations.as_ref().and_then(without_comments);
+                    out.annotations += u64::from(left != decision.annotations);
+                    decision.annotations = left;
                 }
                 true
             }

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use chefshat_proto::v1;
 use chefshat_record::convert::seat_number;
+use chefshat_record::outcome::without_comments;
 use chefshat_record::pseudonym::{Named, ParticipantSeats, Pseudonym, Redactions};
 use chefshat_record::signature::SigningKey;
 use chefshat_tournament::Change as TournamentChange;
@@ -372,8 +373,14 @@ fn forget_entries(
             true
         }
         Change::Decided(decided) => {
-            if own.has(seat_number(decided.seat)) && decided.annotations.take().is_some() {
-                out.annotations += 1;
+            if own.has(seat_number(decided.seat))
+                && let Some(bytes) = &decided.annotations
+            {
+                let annotations = v1::Annotations::decode(bytes.as_ref()).ok();
+                let left = annotations.as_ref().and_then(without_comments);
+                let left = left.map(|it| it.encode_to_vec().into_boxed_slice());
+                out.annotations += u64::from(left != decided.annotations);
+                decided.annotations = left;
             }
             true
         }

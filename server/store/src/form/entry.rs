@@ -5,6 +5,7 @@ use std::time::Duration;
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use chefshat_record::convert::seat_number;
+use chefshat_record::outcome::is_by_fallback;
 use prost::Message;
 
 use super::{Unreadable, action, array};
@@ -115,8 +116,6 @@ struct DecidedForm {
     bank_left_ms: u32,
     #[prost(bytes = "vec", optional, tag = "6")]
     annotations: Option<Vec<u8>>,
-    #[prost(bool, tag = "7")]
-    by_fallback: bool,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -233,7 +232,6 @@ pub(crate) fn put_entry(entry: &Entry, out: &mut Vec<u8>) {
             time_us: decided.time_us,
             bank_left_ms: decided.bank_left_ms,
             annotations: decided.annotations.as_deref().map(<[u8]>::to_vec),
-            by_fallback: decided.by_fallback,
         }),
         Change::Expressed {
             seat,
@@ -282,6 +280,11 @@ pub(crate) fn read_entries(mut bytes: &[u8], entries: &mut Vec<Entry>) -> Result
     Ok(())
 }
 
+/// Whether stored annotations say that the participant's fallback decided.
+fn are_by_fallback(annotations: &[u8]) -> bool {
+    v1::Annotations::decode(annotations).is_ok_and(|it| is_by_fallback(&it))
+}
+
 fn change_from(form: ChangeForm) -> Result<Change, Unreadable> {
     Ok(match form {
         ChangeForm::Seated(form) => Change::Seated {
@@ -319,8 +322,8 @@ fn change_from(form: ChangeForm) -> Result<Change, Unreadable> {
             source: value_of(&SOURCES, form.source, "source of a decision")?,
             time_us: form.time_us,
             bank_left_ms: form.bank_left_ms,
+            by_fallback: form.annotations.as_deref().is_some_and(are_by_fallback),
             annotations: form.annotations.map(Vec::into_boxed_slice),
-            by_fallback: form.by_fallback,
         }),
         ChangeForm::Expressed(form) => Change::Expressed {
             seat: seat(form.seat)?,
