@@ -254,6 +254,8 @@ impl Reader {
         if closing.is_cancelled() {
             self.announce_stop();
             self.loss = Loss::WithNode;
+        } else if self.remote.as_ref().is_some_and(|it| it.has_lost_a_node()) {
+            self.loss = Loss::WithNode;
         }
         Box::pin(self.leave_all()).await;
         self.outbox.end(match end {

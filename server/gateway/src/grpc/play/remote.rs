@@ -19,7 +19,7 @@ use tokio::time::{Instant, sleep};
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::task::AbortOnDropHandle;
 use tonic::transport::Channel;
-use tonic::{Request, Status};
+use tonic::{Code, Request, Status};
 use tracing::debug;
 
 use super::parked::Parked;
@@ -79,6 +79,8 @@ struct Shared {
     /// Whether the stream has ended and its attachments were given back. Changes while `seats` are
     /// locked.
     is_over: AtomicBool,
+    /// Whether the other node, or the connection to it, was lost with seats of the client.
+    is_lost: AtomicBool,
 }
 
 impl Shared {
@@ -312,6 +314,12 @@ impl RemoteSeats {
             }
         };
         stream.filter(|stream| !stream.shared.is_over())
+    }
+
+    /// Whether the client's stream ends because another node was lost.
+    pub(super) fn has_lost_a_node(&self) -> bool {
+        let is_lost = |stream: &PeerStream| stream.shared.is_lost.load(Ordering::Relaxed);
+        self.streams.iter().any(is_lost)
     }
 
     /// Ends the streams to other nodes, and waits until their last updates are queued, or until the
@@ -556,6 +564,10 @@ impl Receiver {
         for id in &self.shared.ids() {
             directory.forget(&FoundBy::Id(*id));
         }
+        // What the other node refuses is the client's own fault.
+        let is_lost = |status: Status| status.code() != Code::ResourceExhausted;
+        let is_lost = ended.err().is_some_and(is_lost);
+        self.shared.is_lost.store(is_lost, Ordering::Relaxed);
         self.outbox.end(StreamEnd::RoomGone);
     }
 }
