@@ -3,15 +3,16 @@
 //! when it is asked for is not counted here but read by `scrape`. Labels have a fixed set of values:
 //! never names or ids.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use prometheus_client::collector::Collector;
-use prometheus_client::encoding::{EncodeMetric, MetricEncoder, text};
+use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric, MetricEncoder, text};
 use prometheus_client::metrics::counter::Counter;
 use prometheus_client::metrics::family::Family;
-use prometheus_client::metrics::gauge::Gauge;
+use prometheus_client::metrics::gauge::{ConstGauge, Gauge};
 use prometheus_client::metrics::{MetricType, TypedMetric};
 use prometheus_client::registry::{Registry, Unit};
 
@@ -180,6 +181,9 @@ pub struct Metrics {
     webhooks: [Counter; 4],
     vector_decisions: Counter,
     vector_games: Gauge,
+    node_lease: Gauge,
+    takeovers: Counter,
+    not_resumed: Counter,
     outboxes: Mutex<Vec<Weak<dyn Queue>>>,
 }
 
@@ -189,6 +193,9 @@ impl Default for Metrics {
         let all = registry.sub_registry_with_prefix(PREFIX);
         let rooms = ["waiting", "playing", "finished", "aborted"];
         let kinds = ["agent", "human", "robot", "model"];
+        let help = "1 while the server may publish, 0 while a node of a cluster has no lease";
+        let node_lease: Gauge = plain(all, "node_lease", help);
+        node_lease.set(1);
         Self {
             rooms: labelled(all, "rooms", "Listed rooms", "state", rooms),
             seats: labelled(
@@ -251,6 +258,17 @@ impl Default for Metrics {
             ),
             vector_decisions: plain(all, "vector_decisions", "Decisions of vector games"),
             vector_games: plain(all, "vector_games", "Games of open vector streams"),
+            node_lease,
+            takeovers: plain(
+                all,
+                "takeovers",
+                "Rooms, tournaments and studies that the node took over from others or had to read again",
+            ),
+            not_resumed: plain(
+                all,
+                "not_resumed",
+                "Rooms, tournaments and studies that could not be resumed and stand still",
+            ),
             outboxes: Mutex::default(),
             registry: Mutex::new(registry),
         }
@@ -279,6 +297,9 @@ impl Metrics {
             registry.register_with_unit("commit", help, Unit::Seconds, store.commit.clone());
             let help = "Commands of one transaction";
             registry.register("commit_commands", help, store.commands.clone());
+            let help = "Transactions that were sent again because they had no answer";
+            registry.register("commit_retries", help, store.retries.clone());
+            registry.register_collector(Box::new(store.clone()));
         });
     }
 
@@ -393,6 +414,21 @@ impl Metrics {
         Counted::several(&self.vector_games, games.into())
     }
 
+    /// Says whether the node of a cluster has a lease.
+    pub fn leased(&self, has_lease: bool) {
+        self.node_lease.set(has_lease.into());
+    }
+
+    /// Counts a unit that the node is about to resume.
+    pub fn taken_over(&self) {
+        self.takeovers.inc();
+    }
+
+    /// Counts a unit that could not be resumed.
+    pub fn not_resumed(&self) {
+        self.not_resumed.inc();
+    }
+
     /// Includes an outbox in the depths of queues.
     pub fn add_outbox<Q: Queue>(&self, outbox: &Arc<Q>) {
         let mut outboxes = self.outboxes();
@@ -425,6 +461,11 @@ pub trait Queue: std::fmt::Debug + Send + Sync + 'static {
 pub struct StoreMetrics {
     commit: Histogram,
     commands: Histogram,
+    retries: Counter,
+    /// Since when transactions wait for their commit.
+    waiting: Arc<Mutex<BTreeMap<u64, Instant>>>,
+    /// Counts them.
+    waited: Arc<AtomicU64>,
 }
 
 impl Default for StoreMetrics {
@@ -432,6 +473,9 @@ impl Default for StoreMetrics {
         Self {
             commit: Histogram::new(SERVER_TIMES, MICROS),
             commands: Histogram::new(BATCH_SIZES, 1.0),
+            retries: Counter::default(),
+            waiting: Arc::default(),
+            waited: Arc::default(),
         }
     }
 }
@@ -441,6 +485,47 @@ impl StoreMetrics {
     pub fn committed(&self, commands: usize, time: Duration) {
         self.commit.observe_duration(time);
         (self.commands).observe(u64::try_from(commands).unwrap_or(u64::MAX));
+    }
+
+    /// Counts a transaction that is sent again.
+    pub fn retried(&self) {
+        self.retries.inc();
+    }
+
+    /// A transaction waits for its commit while the guard lives.
+    pub fn waits(&self) -> Waits {
+        let number = self.waited.fetch_add(1, Ordering::Relaxed);
+        self.lock_waiting().insert(number, Instant::now());
+        Waits(self.clone(), number)
+    }
+
+    /// How long the oldest transaction has waited.
+    fn longest_wait(&self) -> Duration {
+        let oldest = self.lock_waiting().values().next().copied();
+        oldest.map_or(Duration::ZERO, |since| since.elapsed())
+    }
+
+    fn lock_waiting(&self) -> std::sync::MutexGuard<'_, BTreeMap<u64, Instant>> {
+        (self.waiting.lock()).expect("no code that holds this lock can panic")
+    }
+}
+
+impl Collector for StoreMetrics {
+    fn encode(&self, mut encoder: DescriptorEncoder<'_>) -> std::fmt::Result {
+        let waits = ConstGauge::new(self.longest_wait().as_secs_f64());
+        let help = "How long the oldest transaction has waited for its commit";
+        let (unit, kind) = (Some(&Unit::Seconds), waits.metric_type());
+        waits.encode(encoder.encode_descriptor("commit_waiting", help, unit, kind)?)
+    }
+}
+
+/// Says that a transaction waits, until it is dropped.
+#[derive(Debug)]
+pub struct Waits(StoreMetrics, u64);
+
+impl Drop for Waits {
+    fn drop(&mut self) {
+        self.0.lock_waiting().remove(&self.1);
     }
 }
 
@@ -609,6 +694,22 @@ mod tests {
         let text = metrics.text();
         assert!(text.contains("chefshat_rooms{state=\"playing\"} 0\n"));
         assert!(text.contains("chefshat_vector_games 0\n"));
+    }
+
+    #[test]
+    fn the_oldest_transaction_is_known_while_it_waits() {
+        let store = StoreMetrics::default();
+        assert_eq!(store.longest_wait(), Duration::ZERO);
+        let first = store.waits();
+        let since = |number| store.lock_waiting()[&number];
+        let second = store.waits();
+        let (oldest, next) = (since(0), since(1));
+        assert!(store.longest_wait() <= oldest.elapsed() && oldest <= next);
+        drop(first);
+        let left: Vec<Instant> = store.lock_waiting().values().copied().collect();
+        assert_eq!(left, [next]);
+        drop(second);
+        assert_eq!(store.longest_wait(), Duration::ZERO);
     }
 
     #[derive(Debug)]

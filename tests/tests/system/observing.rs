@@ -395,6 +395,19 @@ impl Prometheus {
 }
 
 #[tokio::test]
+async fn the_alerts_of_a_cluster_fire_while_their_fault_lasts() {
+    let checked = Command::new("promtool")
+        .args(["test", "rules"])
+        .arg(source("tests/fixtures/alerts_test.yml"))
+        .output()
+        .await;
+    let Ok(checked) = checked else {
+        return skip("the_alerts_of_a_cluster…", "Prometheus is not installed");
+    };
+    assert!(checked.status.success(), "{checked:?}");
+}
+
+#[tokio::test]
 async fn the_shipped_dashboard_and_alerts_have_data_in_a_real_prometheus() {
     let server = Observed::start().await;
     server.play().await;

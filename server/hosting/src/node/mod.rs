@@ -252,6 +252,7 @@ impl Task {
         let until_ms = self.node.publishes_until_ms();
         self.lease.set(self.began + Duration::from_millis(until_ms));
         let publishes = self.node.may_publish(now_ms);
+        self.units.metrics().leased(publishes);
         self.publishes.send_if_modified(|known| {
             let is_new = *known != publishes;
             *known = publishes;
@@ -383,6 +384,7 @@ impl Task {
 
     fn given_up(&mut self, unit: Id) {
         let minutes = LEFT_ALONE.as_secs() / 60;
+        self.units.metrics().not_resumed();
         error!(%unit, minutes, "nothing of it can be resumed here; for some time it is left to other nodes");
         self.not_resumable.insert(unit, Instant::now());
         self.running.remove(&unit);

@@ -81,6 +81,11 @@ impl TestNode {
         }
     }
 
+    /// Whether its metrics have this line.
+    fn shows(&self, line: &str) -> bool {
+        self.rooms.metrics().text().lines().any(|it| it == line)
+    }
+
     /// Creates a durable room for four.
     async fn create_room(&self) -> Handle {
         self.create(Durability::Durable).await
@@ -175,6 +180,7 @@ async fn the_room_of_a_dead_node_continues_at_another() {
     assert_eq!(names(&room).await, ["Ada"]);
     soon(join(&room, "Bo")).await.expect("it runs");
     assert_eq!(database.seated(id), ["Ada", "Bo"]);
+    assert!(second.shows("chefshat_takeovers_total 1"));
 }
 
 #[tokio::test(start_paused = true)]
@@ -255,6 +261,7 @@ async fn without_a_lease_nothing_is_published_until_it_is_back() {
     let mut publishes = first.node.may_publish();
     first.store.beats_lost.send_replace(true);
     soon(publishes.wait_for(|it| !it)).await.expect("it runs");
+    assert!(first.shows("chefshat_node_lease 0"));
 
     let joining = join(&room, "Ada");
     tokio::pin!(joining);
@@ -271,6 +278,8 @@ async fn without_a_lease_nothing_is_published_until_it_is_back() {
     first.store.beats_lost.send_replace(false);
     soon(joining).await.expect("the room continues");
     assert_eq!(names(&room).await, ["Ada"]);
+    assert!(first.shows("chefshat_node_lease 1"));
+    assert!(first.shows("chefshat_takeovers_total 0"));
 }
 
 #[tokio::test(start_paused = true)]
@@ -511,6 +520,7 @@ async fn a_room_that_a_node_cannot_resume_is_left_to_others() {
     sleep(SOON).await;
     assert_eq!(database.owner(room), None);
     assert_eq!(*loads.borrow(), 1, "it does not try again");
+    assert!(second.shows("chefshat_not_resumed_total 1"));
     let other = second.create_room().await;
     soon(join(&other, "Ada")).await.expect("it runs");
     // What prevented it has passed.

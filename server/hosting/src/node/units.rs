@@ -8,6 +8,7 @@ use tracing::{info, warn};
 use crate::rooms::Rooms;
 use crate::studies::Studies;
 use crate::tournaments::Tournaments;
+use chefshat_base::metrics::Metrics;
 use chefshat_room::ids::Id;
 use chefshat_store::StoreError;
 use chefshat_store::cluster::{ClusterStore, Epoch};
@@ -72,6 +73,11 @@ impl Units {
         }
     }
 
+    /// Counts what the node does.
+    pub(super) fn metrics(&self) -> &Metrics {
+        self.rooms.metrics()
+    }
+
     /// From here on, a unit is to run here at this epoch.
     pub(super) fn want(&self, unit: Id, epoch: Epoch) {
         self.wanted().insert(unit, epoch);
@@ -114,6 +120,7 @@ impl Units {
         if is_new && self.runs(unit) {
             return Resumed::Runs;
         }
+        self.metrics().taken_over();
         self.stop(unit).await;
         while self.wanted().get(&unit) == Some(&epoch) {
             match self.load(unit, epoch).await {

@@ -160,7 +160,9 @@ impl Writer {
             }
             let began = Instant::now();
             let pieces = batch.len();
+            let waits = self.shared.metrics.waits();
             self.commit(std::mem::take(&mut batch)).await;
+            drop(waits);
             self.shared.metrics.committed(pieces, began.elapsed());
         }
     }
@@ -193,6 +195,7 @@ impl Writer {
                 }
                 continue;
             }
+            self.shared.metrics.retried();
             if !batch.again {
                 warn!(error = %failed, "a commit has no answer; it is tried again");
             }

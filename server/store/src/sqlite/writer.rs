@@ -154,6 +154,7 @@ pub(super) async fn run(
     {
         let failure = failed.borrow().clone();
         let began = Instant::now();
+        let waits = metrics.waits();
         let committed = match failure {
             Some(failure) => Err(failure),
             None => {
@@ -168,6 +169,7 @@ pub(super) async fn run(
                     })
             }
         };
+        drop(waits);
         metrics.committed(pending.len(), began.elapsed());
         open = !pending
             .iter()

@@ -1,6 +1,7 @@
 //! Takeovers: an owner that has lost a room or tournament writes nothing any more, and nothing that
 //! was acknowledged is lost.
 
+use chefshat_base::metrics::Metrics;
 use chefshat_postgres::Server;
 use tokio::sync::watch;
 
@@ -569,10 +570,14 @@ async fn a_database_that_restarts_is_waited_for() {
 #[tokio::test]
 async fn a_row_without_an_answer_is_settled_before_the_next_one() {
     let (mut server, store, mut journal) = stopped(Duration::ZERO).await;
+    let metrics = Metrics::default();
+    metrics.add_store(store.metrics().expect("it has writers"));
+    assert!(metrics.text().contains("chefshat_commit_retries_total 0\n"));
     let failed = append(&mut journal, 3).await;
     assert!(matches!(failed, Err(StoreError::Failed(_))), "{failed:?}");
     let failed = append(&mut journal, 4).await;
     assert!(matches!(failed, Err(StoreError::Failed(_))), "{failed:?}");
+    assert!(!metrics.text().contains("chefshat_commit_retries_total 0\n"));
     server.resume();
     append(&mut journal, 5).await.expect("the database is back");
     let entries = journal.entries().await.expect("readable");
