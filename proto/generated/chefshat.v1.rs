@@ -411,9 +411,9 @@ pub struct RoomPolicy {
     /// absence time, the decision counts as a timeout. An absence never uses the bank: if the seat
     /// returns in time, only the time in which it was connected is taken from it. A special action
     /// ends as it would with the seat connected, and substitutes nobody, since others could infer it.
-    /// After a restart of the server, see ServerRestarted, and of a lost node Disconnected. Unset in games of earlier servers: the
-    /// decision time and the bank run on while a seat is away, and max_timeouts alone decides when it
-    /// is substituted.
+    /// After a restart of the server, see ServerRestarted, and after the loss of a node Disconnected.
+    /// Unset in games of earlier servers: the decision time and the bank run on while a seat is away,
+    /// and max_timeouts alone decides when it is substituted.
     #[prost(uint32, optional, tag = "18")]
     pub absence_time_ms: ::core::option::Option<u32>,
     /// Whether people may write to everybody at the table: an Expression with the label "say" and the
@@ -1054,8 +1054,7 @@ pub struct TournamentGameSeat {
     /// after those who were present.
     #[prost(bool, tag = "2")]
     pub forfeited: bool,
-    /// Whether a substitute took decisions for it, or its own fallback more than a tenth of those with a
-    /// choice (Annotations.extra).
+    /// Whether a substitute took decisions for it.
     #[prost(bool, tag = "3")]
     pub substituted: bool,
     /// Its place in the game, from 1.
@@ -1174,7 +1173,7 @@ pub struct TournamentStanding {
     /// Number of games it forfeited.
     #[prost(uint32, tag = "9")]
     pub forfeited: u32,
-    /// Number of games in which a substitute, or too often its own fallback, took decisions for it.
+    /// Number of games in which a substitute took decisions for it.
     #[prost(uint32, tag = "10")]
     pub substituted: u32,
     /// Number of its invalid answers.

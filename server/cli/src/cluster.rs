@@ -47,13 +47,13 @@ pub(super) struct ClusterCommand {
 
 #[derive(Debug, Subcommand)]
 enum Subcommands {
-    /// Show the nodes, those that live first: version, last beat, lease, what they own; and what nobody owns.
+    /// Show the nodes, living ones first: version, last heartbeat, lease, what they own; and what nobody owns.
     Status(Status),
     /// Make a node hand over all rooms, tournaments and studies to the others, and stop.
     Drain(Drain),
 }
 
-/// Show the nodes, those that live first: version, last beat, lease, what they own; and what nobody owns.
+/// Show the nodes, living ones first: version, last heartbeat, lease, what they own; and what nobody owns.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  chefshat cluster status --database postgres://chefshat@db.example.org/chefshat"
@@ -113,7 +113,7 @@ impl Status {
             "name",
             "version",
             "state",
-            "last beat",
+            "last heartbeat",
             "rooms",
             "tournaments",
             "studies",

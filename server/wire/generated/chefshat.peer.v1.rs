@@ -167,8 +167,9 @@ pub mod peer_service_client {
         }
         /// Plays seats of this node for one stream of a client that is connected to another node, its
         /// gateway. The metadata are those of the client's request: its token and secrets decide what it
-        /// reaches. After `left`, a half-close detaches the seats and ends the stream. If the stream ends otherwise, the
-        /// gateway ends the client's stream with UNAVAILABLE, and the client attaches its seats again.
+        /// reaches. After `left`, a half-close detaches the seats and ends the stream. If the stream ends
+        /// otherwise, the gateway ends the client's stream with UNAVAILABLE, and the client attaches its
+        /// seats again.
         pub async fn play(
             &mut self,
             request: impl tonic::IntoStreamingRequest<Message = super::PlayRequest>,
@@ -239,8 +240,9 @@ pub mod peer_service_server {
             + 'static;
         /// Plays seats of this node for one stream of a client that is connected to another node, its
         /// gateway. The metadata are those of the client's request: its token and secrets decide what it
-        /// reaches. After `left`, a half-close detaches the seats and ends the stream. If the stream ends otherwise, the
-        /// gateway ends the client's stream with UNAVAILABLE, and the client attaches its seats again.
+        /// reaches. After `left`, a half-close detaches the seats and ends the stream. If the stream ends
+        /// otherwise, the gateway ends the client's stream with UNAVAILABLE, and the client attaches its
+        /// seats again.
         async fn play(
             &self,
             request: tonic::Request<tonic::Streaming<super::PlayRequest>>,

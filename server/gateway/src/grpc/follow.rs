@@ -54,8 +54,8 @@ pub(super) async fn end<M>(sender: &mpsc::Sender<Result<M, Status>>, followed: R
 /// Waits for a change of what a task does, as long as there is a follower to send it to.
 ///
 /// # Errors
-/// The task has stopped: whoever follows again finds the node that goes on with it. Or the follower
-/// has gone: then the status is for nobody.
+/// The task has stopped: the follower can follow again, where the unit runs then. Or the follower has
+/// gone: then the status is for nobody.
 pub(super) async fn changed<C, M>(
     changes: &mut watch::Receiver<C>,
     stopped: impl Future<Output = ()>,

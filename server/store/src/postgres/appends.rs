@@ -23,7 +23,7 @@ pub(super) struct Row {
     pub(super) owned: Owned,
     /// The number of the game.
     pub(super) game: i64,
-    /// From 0. Only one row of a journal may be on its way at a time.
+    /// From 0. A journal sends one row at a time.
     pub(super) position: i64,
     pub(super) entries: Vec<u8>,
 }

@@ -534,9 +534,9 @@ class RoomPolicy(_message.Message):
     absence time, the decision counts as a timeout. An absence never uses the bank: if the seat
     returns in time, only the time in which it was connected is taken from it. A special action
     ends as it would with the seat connected, and substitutes nobody, since others could infer it.
-    After a restart of the server, see ServerRestarted, and of a lost node Disconnected. Unset in games of earlier servers: the
-    decision time and the bank run on while a seat is away, and max_timeouts alone decides when it
-    is substituted.
+    After a restart of the server, see ServerRestarted, and after the loss of a node Disconnected.
+    Unset in games of earlier servers: the decision time and the bank run on while a seat is away,
+    and max_timeouts alone decides when it is substituted.
     """
     chat: _builtins.bool
     """Whether people may write to everybody at the table: an Expression with the label "say" and the

@@ -435,9 +435,7 @@ class TournamentGameSeat(_message.Message):
     after those who were present.
     """
     substituted: _builtins.bool
-    """Whether a substitute took decisions for it, or its own fallback more than a tenth of those with a
-    choice (Annotations.extra).
-    """
+    """Whether a substitute took decisions for it."""
     place: _builtins.int
     """Its place in the game, from 1."""
     score: _builtins.int
@@ -611,7 +609,7 @@ class TournamentStanding(_message.Message):
     forfeited: _builtins.int
     """Number of games it forfeited."""
     substituted: _builtins.int
-    """Number of games in which a substitute, or too often its own fallback, took decisions for it."""
+    """Number of games in which a substitute took decisions for it."""
     wrong_actions: _builtins.int
     """Number of its invalid answers."""
     timeouts: _builtins.int
