@@ -564,8 +564,13 @@ impl Receiver {
         for id in &self.shared.ids() {
             directory.forget(&FoundBy::Id(*id));
         }
-        // What the other node refuses is the client's own fault.
-        let is_lost = |status: Status| status.code() != Code::ResourceExhausted;
+        // What the other node refuses has another code, and is the client's own fault.
+        let is_lost = |status: Status| {
+            matches!(
+                status.code(),
+                Code::Unavailable | Code::Unknown | Code::Internal
+            )
+        };
         let is_lost = ended.err().is_some_and(is_lost);
         self.shared.is_lost.store(is_lost, Ordering::Relaxed);
         self.outbox.end(StreamEnd::RoomGone);
