@@ -40,6 +40,9 @@ fn tables_are_created_and_a_data_directory_moves_into_them() {
     migrate(&from).assert_failed("already has games");
     let other = chefshat_postgres::database();
     let again = ["migrate", "--from", from[1], "--database", other.url()];
+    chefshat(&again).assert_failed("the games of this folder have moved to postgres://");
+    // As if they had not arrived there.
+    fs::remove_file(folder.path().join("games.moved")).unwrap();
     chefshat(&again)
         .clean()
         .assert_says(&["moved: ", "2 tournaments"]);
