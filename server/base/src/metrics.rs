@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use prometheus_client::collector::Collector;
@@ -496,7 +496,7 @@ impl StoreMetrics {
     pub fn waits(&self) -> Waits {
         let number = self.waited.fetch_add(1, Ordering::Relaxed);
         self.lock_waiting().insert(number, Instant::now());
-        Waits(self.clone(), number)
+        Waits(Arc::clone(&self.waiting), number)
     }
 
     /// How long the oldest transaction has waited.
@@ -505,9 +505,15 @@ impl StoreMetrics {
         oldest.map_or(Duration::ZERO, |since| since.elapsed())
     }
 
-    fn lock_waiting(&self) -> std::sync::MutexGuard<'_, BTreeMap<u64, Instant>> {
-        (self.waiting.lock()).expect("no code that holds this lock can panic")
+    fn lock_waiting(&self) -> MutexGuard<'_, BTreeMap<u64, Instant>> {
+        locked(&self.waiting)
     }
+}
+
+fn locked(waiting: &Mutex<BTreeMap<u64, Instant>>) -> MutexGuard<'_, BTreeMap<u64, Instant>> {
+    waiting
+        .lock()
+        .expect("no code that holds this lock can panic")
 }
 
 impl Collector for StoreMetrics {
@@ -521,11 +527,11 @@ impl Collector for StoreMetrics {
 
 /// Says that a transaction waits, until it is dropped.
 #[derive(Debug)]
-pub struct Waits(StoreMetrics, u64);
+pub struct Waits(Arc<Mutex<BTreeMap<u64, Instant>>>, u64);
 
 impl Drop for Waits {
     fn drop(&mut self) {
-        self.0.lock_waiting().remove(&self.1);
+        locked(&self.0).remove(&self.1);
     }
 }
 

@@ -114,8 +114,7 @@ pub fn is_by_fallback(annotations: &v1::Annotations) -> bool {
     annotations.extra.contains_key(FALLBACK)
 }
 
-/// What is left of annotations when the comments of a participant are deleted: whose decision it was,
-/// which is no comment.
+/// What is left of annotations when the comments of a participant are deleted: that the fallback decided.
 pub fn without_comments(annotations: &v1::Annotations) -> Option<v1::Annotations> {
     is_by_fallback(annotations).then(|| v1::Annotations {
         extra: [(FALLBACK.to_owned(), String::new())].into(),

@@ -153,7 +153,7 @@ impl Core {
         self.ends_at(open, self.grace(open))
     }
 
-    /// How late an answer to a decision may arrive. To a silent one, as late whoever decides: it would
+    /// How late an answer to a decision may arrive. To a silent one it is the same for all seats: it would
     /// show whether the seat is connected through another server.
     pub(super) fn grace(&self, open: &OpenDecision) -> Duration {
         match (open.is_silent(), self.expects_delays) {

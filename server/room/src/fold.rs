@@ -185,7 +185,9 @@ impl Core {
         // What is not published must not show later either: not in when the seat is substituted,
         // nor in how far delayed spectators see.
         let offered = self.open.as_ref().is_some_and(OpenDecision::is_silent);
-        let has_choice = !self.header.is_physical() && self.legal_actions().len() > 1;
+        let has_choice = decided.source == Source::Agent
+            && !self.header.is_physical()
+            && self.legal_actions().len() > 1;
         let declined = offered && Some(decided.action) == self.default_action();
         // Neither does a gift of a built-in agent show before all gifts are given.
         let shows = !declined && !self.seems_automatic(decided.seat);
@@ -206,11 +208,11 @@ impl Core {
         let seat = &mut self.seats[decided.seat.index()];
         seat.bank_left = Duration::from_millis(decided.bank_left_ms.into());
         seat.annotation_bytes += decided.annotations.as_ref().map_or(0, |bytes| bytes.len());
+        if has_choice {
+            seat.choices.add(decided.by_fallback);
+        }
         match decided.source {
             Source::Agent => {
-                if has_choice {
-                    seat.choices.add(decided.by_fallback);
-                }
                 if !declined {
                     seat.timeouts = 0;
                 }
