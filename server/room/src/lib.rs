@@ -262,7 +262,6 @@ impl OpenDecision {
         self.announced = false;
         self.forget_start();
         self.search = Search::NotStarted;
-        self.hint_runs = false;
     }
 }
 

@@ -272,6 +272,29 @@ fn a_hint_is_recorded_and_bounded() {
 }
 
 #[test]
+fn a_hint_that_runs_counts_while_its_seat_returns_from_a_lost_server() {
+    let policy = Policy {
+        hints: true,
+        ..Policy::default()
+    };
+    let mut table = Table::playing(policy);
+    let (seat, decision) = table.open();
+    let ask = |table: &mut Table| {
+        let started = table.core.start_hint(seat, decision, MonteCarlo::default());
+        started.map(drop)
+    };
+    assert_eq!(ask(&mut table), Ok(()));
+    let connection = ConnectionId(seat.index() as u64 + 1);
+    (table.core).lost_with_node(table.now, seat, connection, None);
+    table.commit();
+    table.attach(seat);
+    assert_eq!(table.open(), (seat, decision));
+    assert_eq!(ask(&mut table), Err(HintError::TooMany));
+    assert_eq!(table.core.hinted(table.now, seat, decision), Ok(()));
+    assert_eq!(ask(&mut table), Ok(()));
+}
+
+#[test]
 fn a_room_gives_no_hints_unless_its_policy_says_so() {
     let mut table = Table::playing(Policy::default());
     let (seat, decision) = table.open();
