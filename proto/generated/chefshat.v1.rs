@@ -10231,9 +10231,10 @@ pub mod study_service_client {
                 .insert(GrpcMethod::new("chefshat.v1.StudyService", "CloseStudy"));
             self.inner.unary(req, path, codec).await
         }
-        /// Streams the data of a study as files: `study.json`, `participants.csv`, `games.csv`,
-        /// `answers.csv`, `traces.csv`, and the records of its games under `records/`. NOT_FOUND
-        /// (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+        /// Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
+        /// `items.csv`, `answers.csv` and `traces.csv`, the records of its games under `records/`, and last
+        /// what the columns of the tables mean, `codebook.csv` for people and `datapackage.json` for
+        /// programs. NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         pub async fn export_study(
             &mut self,
             request: impl tonic::IntoRequest<super::ExportStudyRequest>,
@@ -10422,9 +10423,10 @@ pub mod study_service_server {
             >
             + std::marker::Send
             + 'static;
-        /// Streams the data of a study as files: `study.json`, `participants.csv`, `games.csv`,
-        /// `answers.csv`, `traces.csv`, and the records of its games under `records/`. NOT_FOUND
-        /// (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+        /// Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
+        /// `items.csv`, `answers.csv` and `traces.csv`, the records of its games under `records/`, and last
+        /// what the columns of the tables mean, `codebook.csv` for people and `datapackage.json` for
+        /// programs. NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         async fn export_study(
             &self,
             request: tonic::Request<super::ExportStudyRequest>,

@@ -486,6 +486,51 @@ fn contains(bytes: &[u8], word: &str) -> bool {
         .any(|window| window == word.as_bytes())
 }
 
+/// Asserts that every cell of the exported tables is what their descriptor says.
+fn assert_as_described(files: &BTreeMap<String, Vec<u8>>) {
+    let descriptor: serde_json::Value =
+        serde_json::from_slice(&files["datapackage.json"]).expect("JSON");
+    let list = |value: &serde_json::Value| value.as_array().expect("a list").clone();
+    let mut described = BTreeSet::new();
+    for resource in list(&descriptor["resources"]) {
+        let path = resource["path"].as_str().expect("a name").to_owned();
+        let fields = list(&resource["schema"]["fields"]);
+        let mut keys = BTreeSet::new();
+        let rows = csv::Reader::from_reader(files[&path].as_slice()).into_deserialize();
+        for row in rows {
+            let row: BTreeMap<String, String> = row.expect("as many cells as columns");
+            assert_eq!(row.len(), fields.len(), "{path}");
+            for field in &fields {
+                let cell = &row[field["name"].as_str().expect("a name")];
+                let constraints = &field["constraints"];
+                let fits = match (cell.as_str(), field["type"].as_str()) {
+                    ("", _) => constraints["required"] == false,
+                    (_, Some("integer")) => cell.parse::<i64>().is_ok(),
+                    (_, Some("boolean")) => ["true", "false"].contains(&cell.as_str()),
+                    (_, Some("string")) => match constraints["enum"].as_array() {
+                        Some(codes) => codes.iter().any(|code| code == cell.as_str()),
+                        None => true,
+                    },
+                    _ => false,
+                };
+                assert!(fits, "{path}: {cell:?} is not {field}");
+            }
+            if let Some(key) = resource["schema"]["primaryKey"].as_array() {
+                let key = key
+                    .iter()
+                    .map(|name| row[name.as_str().expect("a name")].clone());
+                assert!(
+                    keys.insert(key.collect::<Vec<_>>()),
+                    "{path}: {row:?} is there twice"
+                );
+            }
+        }
+        described.insert(path);
+    }
+    let tables = files.keys().filter(|name| name.ends_with(".csv"));
+    assert_eq!(described, tables.cloned().collect());
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_study_from_its_links_to_its_data() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -638,6 +683,7 @@ async fn a_study_from_its_links_to_its_data() {
 
     // The export has everything but practice and what was deleted.
     let files = lab.export().await;
+    assert_as_described(&files);
     let table = |name: &str| rows(&files[name]);
     assert_eq!(table("participants.csv").len(), PARTICIPANTS as usize + 2);
     let games = table("games.csv");

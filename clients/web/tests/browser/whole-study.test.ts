@@ -28,12 +28,12 @@ const FEW = 2;
 
 const COLUMNS = {
   "participants.csv":
-    "number,participant,state,slot,conditions,step,sessions,began_at_ms,ended_at_ms,consent_at_ms,consent_version,consent_text_sha256,consent_language,data_deleted",
+    "number,participant,state,slot,conditions,factor_warmth,step,sessions,began_at_ms,ended_at_ms,consent_at_ms,consent_version,consent_text_sha256,consent_language,data_deleted",
   "games.csv":
-    "study,number,participant,condition,factor_warmth,step,practice,attempt,seed_index,seed,seat,game_id,outcome,ended_at_ms,place,points,shifts,decisions,invalid_answers,timeouts,decision_time_us",
+    "study,number,participant,condition,factor_warmth,step,practice,attempt,seed_index,seed,seat,game_id,outcome,started_at_ms,ended_at_ms,place,points,shifts,decisions,invalid_answers,timeouts,hints,decision_time_us",
   "answers.csv":
-    "number,participant,step,condition,questionnaire,item,scale,position,answer,answered_after_ms,questionnaire_shown_at_ms,questionnaire_answered_at_ms",
-  "traces.csv": "number,participant,condition,game_id,decision_id,at_ms,kind,target,duration_ms",
+    "number,participant,step,condition,factor_warmth,questionnaire,item,scale,position,status,answer,label,answered_after_ms,questionnaire_shown_at_ms,questionnaire_answered_at_ms",
+  "traces.csv": "number,participant,condition,factor_warmth,game_id,decision_id,at_ms,kind,target,duration_ms",
 };
 const LEVELS: Partial<Record<string, string>> = { "cond-warm": "lvl-high", "cond-cold": "lvl-low" };
 
@@ -195,6 +195,7 @@ function expectComplete(
   const answers = rows("answers.csv");
   for (const { participant } of games) {
     const own = answers.filter((row) => row.participant === participant);
+    expect(own.every(({ status }) => status === "answered")).toBe(true);
     expect(own.map(({ item, answer }) => [item, answer])).toEqual([
       ["liked", "4"],
       ["real", "6"],
@@ -205,7 +206,7 @@ function expectComplete(
     for (const kind of ["decision_shown", "answer_sent"]) expect(kinds, participant).toContain(kind);
   }
   expect(answers).toHaveLength(4 * COUNT);
-  expect([...new Set(answers.flatMap(emptyCells))]).toEqual(["scale"]);
+  expect([...new Set(answers.flatMap(emptyCells))]).toEqual(["scale", "label"]);
 }
 
 /** The rows of a table whose cells are not quoted. */

@@ -1,9 +1,11 @@
 //! Studies of a server whose clock is stopped: dropping out, and deleting a study.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use chefshat_study::{At, ParticipantLink, Status};
+use chefshat_study::{Answer, At, ItemAnswer, ParticipantLink, Status};
+use tokio::sync::mpsc;
 use tokio::time::advance;
 
 use super::*;
@@ -79,11 +81,18 @@ impl Lab {
     }
 
     async fn of(config: &ServerConfig) -> Self {
+        Self::with(config, settings(), 2).await
+    }
+
+    /// A new study with these settings and this number of participants.
+    async fn with(config: &ServerConfig, settings: v1::StudySettings, participants: usize) -> Self {
         let store: Arc<dyn Store> = Arc::new(MemoryStore::default());
         let studies = server_of(config, &store);
-        let created = studies.create(settings(), None, Key::Local).await;
+        let created = studies.create(settings, None, Key::Local).await;
         let (study, _) = created.expect("valid settings");
-        let added = study.add(Key::Local, vec![String::new(); 2]).await;
+        let added = study
+            .add(Key::Local, vec![String::new(); participants])
+            .await;
         assert_eq!(added.expect("it runs"), Ok(1));
         Self {
             store,
@@ -373,6 +382,210 @@ async fn a_record_from_elsewhere_is_no_data_of_a_study() {
     assert_eq!(imported, Ok(true));
     let record = super::export::record_of(lab.studies.rooms(), lab.study.id(), game).await;
     assert_eq!(record, Ok(None));
+}
+
+/// The rows of exported tables, without those of records, each by the names of its columns.
+type Tables = BTreeMap<String, Vec<BTreeMap<String, String>>>;
+
+/// The files that a study exports, by name.
+async fn exported(lab: &Lab) -> BTreeMap<String, Vec<u8>> {
+    let (sender, mut receiver) = mpsc::channel::<ExportedFile>(1);
+    let mut files: BTreeMap<String, Vec<u8>> = BTreeMap::new();
+    let receiving = async {
+        while let Some(part) = receiver.recv().await {
+            files.entry(part.file).or_default().extend(part.data);
+        }
+    };
+    let exporting = async {
+        let rooms = lab.studies.rooms();
+        lab.study.export(rooms, &sender).await.expect("an export");
+        drop(sender);
+    };
+    tokio::join!(receiving, exporting);
+    files
+}
+
+fn tables(files: &BTreeMap<String, Vec<u8>>) -> Tables {
+    let tables = files.iter().filter(|(name, _)| name.ends_with(".csv"));
+    let tables = tables.map(|(name, file)| {
+        let rows = csv::Reader::from_reader(file.as_slice()).into_deserialize();
+        let rows = rows.map(|row| row.expect("as many cells as columns"));
+        (name.clone(), rows.collect())
+    });
+    tables.collect()
+}
+
+#[tokio::test]
+async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
+    use v1::study_item::Kind;
+    use v1::study_stage::Stage;
+    let item = |id: &str, optional, kind| v1::StudyItem {
+        id: id.into(),
+        text: format!("About {id}, \"as it was\""),
+        optional,
+        kind: Some(kind),
+        ..v1::StudyItem::default()
+    };
+    let questionnaire = v1::StudyQuestionnaire {
+        id: "after".into(),
+        title: "After all".into(),
+        items: vec![
+            item(
+                "liked",
+                false,
+                Kind::Likert(v1::StudyLikert {
+                    points: 5,
+                    labels: vec!["not at all".into(), "very".into()],
+                }),
+            ),
+            item(
+                "seen",
+                true,
+                Kind::Choice(v1::StudyChoice {
+                    options: vec!["=cards".into(), "faces".into(), "nothing".into()],
+                    multiple: true,
+                }),
+            ),
+            item(
+                "said",
+                true,
+                Kind::FreeText(v1::StudyFreeText { max_characters: 50 }),
+            ),
+        ],
+        ..v1::StudyQuestionnaire::default()
+    };
+    let mut settings = settings();
+    settings.participants = 3;
+    settings.factors = vec![v1::StudyFactor {
+        name: "mood".into(),
+        levels: vec!["-low".into(), "high".into()],
+    }];
+    settings.conditions[0].levels = [("mood".to_owned(), "-low".to_owned())].into();
+    settings.stages.insert(
+        1,
+        v1::StudyStage {
+            stage: Some(Stage::Questionnaire(questionnaire)),
+        },
+    );
+    let lab = Lab::with(&ServerConfig::default(), settings, 4).await;
+    let at = |number, step| At {
+        number,
+        session: 1,
+        step,
+    };
+    for number in 1..=3 {
+        assert_eq!(lab.study.open(number).await.expect("it runs"), Ok(1));
+        let consented = lab.study.consent(at(number, 0)).await;
+        assert_eq!(consented.expect("it runs"), Ok(0));
+    }
+    let answer = |item, value| ItemAnswer {
+        item,
+        value,
+        answered_after_ms: Some(700),
+    };
+    let all = vec![
+        answer(0, Answer::Number(5)),
+        answer(1, Answer::Options(vec![0, 2])),
+        answer(2, Answer::Text("=1+2, or \"three\"".into())),
+    ];
+    let few = vec![answer(0, Answer::Number(3))];
+    for (number, answers) in [(1, all), (2, few)] {
+        let answered = lab.study.answer(Key::Local, at(number, 1), answers).await;
+        answered.expect("it runs").expect("they are valid");
+    }
+
+    let files = exported(&lab).await;
+    let tables = tables(&files);
+    let cells = |row: &BTreeMap<String, String>, columns: &[&str]| {
+        let cells = columns.iter().map(|column| row[*column].clone());
+        cells.collect::<Vec<_>>().join("|")
+    };
+    let columns = [
+        "number",
+        "factor_mood",
+        "item",
+        "position",
+        "status",
+        "answer",
+        "label",
+    ];
+    let answers = tables["answers.csv"].iter();
+    let answers: Vec<String> = answers.map(|row| cells(row, &columns)).collect();
+    assert_eq!(
+        answers,
+        [
+            "1|'-low|liked|1|answered|5|very",
+            "1|'-low|seen|2|answered|0 2|'=cards; nothing",
+            "1|'-low|said|3|answered|'=1+2, or \"three\"|",
+            // Points between the ends have no label.
+            "2|'-low|liked|1|answered|3|",
+            "2|'-low|seen|2|left_out||",
+            "2|'-low|said|3|left_out||",
+            "3|'-low|liked|1|not_sent||",
+            "3|'-low|seen|2|not_sent||",
+            "3|'-low|said|3|not_sent||",
+        ]
+    );
+    let items = tables["items.csv"].iter();
+    let columns = ["item", "kind", "required", "lowest", "highest", "labels"];
+    let items: Vec<String> = items.map(|row| cells(row, &columns)).collect();
+    assert_eq!(
+        items,
+        [
+            "liked|likert|true|1|5|1 = not at all; 5 = very",
+            "seen|choices|false|0|2|0 = =cards; 1 = faces; 2 = nothing",
+            "said|free_text|false|||",
+        ]
+    );
+    let people = tables["participants.csv"].iter();
+    let people: Vec<String> = people
+        .map(|row| cells(row, &["number", "state", "conditions", "factor_mood"]))
+        .collect();
+    assert_eq!(
+        people,
+        [
+            "1|active|only|'-low",
+            "2|active|only|'-low",
+            "3|active|only|'-low",
+            "4|invited||"
+        ]
+    );
+
+    // The codebook and the descriptor name the columns of all files, in order.
+    let descriptor: serde_json::Value =
+        serde_json::from_slice(&files["datapackage.json"]).expect("JSON");
+    let resources = descriptor["resources"].as_array().expect("a list");
+    let described = resources
+        .iter()
+        .map(|it| it["path"].as_str().expect("a name"));
+    let described: BTreeSet<&str> = described.collect();
+    assert_eq!(described, tables.keys().map(String::as_str).collect());
+    for resource in resources {
+        let file = resource["path"].as_str().expect("a name");
+        let mut reader = csv::Reader::from_reader(files[file].as_slice());
+        let header = reader.headers().cloned();
+        let fields = resource["schema"]["fields"].as_array().expect("a list");
+        let names: Vec<&str> = fields
+            .iter()
+            .map(|it| it["name"].as_str().expect("a name"))
+            .collect();
+        assert_eq!(
+            header.expect("a header").iter().collect::<Vec<_>>(),
+            names,
+            "{file}"
+        );
+        if file != "codebook.csv" {
+            let codebook = tables["codebook.csv"]
+                .iter()
+                .filter(|row| row["file"] == file);
+            let codebook: Vec<&str> = codebook.map(|row| row["column"].as_str()).collect();
+            assert_eq!(codebook, names);
+        }
+    }
+    let mood = tables["codebook.csv"]
+        .iter()
+        .find(|row| row["column"] == "factor_mood");
+    assert_eq!(mood.expect("a row")["codes"], "'-low; high");
 }
 
 #[tokio::test(start_paused = true)]

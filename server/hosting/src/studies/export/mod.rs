@@ -1,13 +1,17 @@
-//! The data of a study as files: tables of participants, games, answers and interface traces, the
-//! settings, and the records and samples of games. A file is sent in parts, so that no table is in
-//! memory as a whole.
+//! The data of a study as files: the settings, tables of participants, games, items, answers and
+//! interface traces (`columns`), the records and samples of games, and what the columns mean (`table`).
+//! A file is sent in parts, so that no table is in memory as a whole.
+
+mod columns;
+mod table;
 
 use std::collections::BTreeMap;
 use std::io;
 
 use chefshat_proto::v1;
-use chefshat_record::{outcome, sheet};
-use chefshat_study::{Answer, Outcome, Participant, PlayedGame, Study, Task};
+use chefshat_record::sheet;
+use chefshat_study::{Participant, PlayedGame, Stage, Study, Task};
+use serde::Serialize;
 use tokio::io::AsyncReadExt as _;
 use tokio::sync::mpsc;
 use tracing::error;
@@ -17,7 +21,8 @@ use crate::config::STUDY_EXPORT_CHUNK;
 use crate::rooms::Rooms;
 use chefshat_room::ids::Id;
 use chefshat_store::{StoreError, StoredGame};
-use chefshat_wire::convert;
+use columns::{AnswerRow, CodebookRow, GameResult, GameRow, ItemRow, ParticipantRow, TraceRow};
+use table::{Sheet, Table};
 
 /// A part of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -71,9 +76,21 @@ impl<'s> File<'s> {
         Ok(())
     }
 
-    async fn row(&mut self, cells: &[String]) -> Result<(), ExportError> {
-        let cells: Vec<String> = cells.iter().map(|cell| quoted(cell)).collect();
-        self.line(&cells.join(",")).await
+    /// Writes a line of a table.
+    async fn row(
+        &mut self,
+        cells: impl Iterator<Item = impl AsRef<str>>,
+    ) -> Result<(), ExportError> {
+        let mut line = csv::WriterBuilder::new().from_writer(&mut self.buffer);
+        let mut written = Ok(());
+        for cell in cells {
+            let cell = sheet::cell(cell.as_ref());
+            written = written.and_then(|()| line.write_field(cell.as_bytes()));
+        }
+        let written = written.and_then(|()| line.write_record(None::<&[u8]>));
+        drop(line);
+        written.map_err(|error| StoreError::Failed(error.to_string()))?;
+        self.send_full().await
     }
 
     async fn end(mut self) -> Result<(), ExportError> {
@@ -88,21 +105,31 @@ impl<'s> File<'s> {
     }
 }
 
-/// A cell of a table (RFC 4180).
-fn quoted(text: &str) -> String {
-    let text = sheet::cell(text);
-    match text.contains(['"', ',', '\n', '\r']) {
-        true => format!("\"{}\"", text.replace('"', "\"\"")),
-        false => text.into_owned(),
+/// A table that is being sent.
+struct TableFile<'s, R> {
+    table: Table<R>,
+    file: File<'s>,
+}
+
+impl<'s, R> TableFile<'s, R> {
+    async fn new(
+        table: Table<R>,
+        sender: &'s mpsc::Sender<ExportedFile>,
+    ) -> Result<Self, ExportError> {
+        let mut file = File::new(table.sheet().file, sender);
+        file.row(table.header()).await?;
+        Ok(Self { table, file })
     }
-}
 
-fn text(value: impl ToString) -> String {
-    value.to_string()
-}
+    async fn row(&mut self, row: &R) -> Result<(), ExportError> {
+        self.file.row(self.table.cells(row)).await
+    }
 
-fn optional(value: Option<impl ToString>) -> String {
-    value.map_or_else(String::new, text)
+    /// Returns what the table is.
+    async fn end(self) -> Result<Sheet, ExportError> {
+        self.file.end().await?;
+        Ok(self.table.into_sheet())
+    }
 }
 
 impl StudyHandle {
@@ -116,76 +143,47 @@ impl StudyHandle {
         sender: &mpsc::Sender<ExportedFile>,
     ) -> Result<(), ExportError> {
         let study = self.committed().clone();
-        let mut settings = File::new("study.json", sender);
-        let message = self.describe();
-        let json = serde_json::to_string_pretty(&message)
-            .map_err(|error| StoreError::Failed(error.to_string()))?;
-        settings.line(&json).await?;
-        settings.end().await?;
-        participants(&study, sender).await?;
-        games(self, &study, rooms, sender).await?;
-        answers(&study, sender).await?;
-        traces(self, &study, rooms, sender).await
+        json_file("study.json", &self.describe(), sender).await?;
+        let mut sheets = vec![participants(&study, sender).await?];
+        sheets.extend(games(self, &study, rooms, sender).await?);
+        sheets.push(items(&study, sender).await?);
+        sheets.push(answers(&study, sender).await?);
+        sheets.push(traces(self, &study, rooms, sender).await?);
+        sheets.push(codebook(&sheets, sender).await?);
+        let name = format!("study-{}", self.id());
+        let descriptor = table::descriptor(&name, &self.plan.name, &sheets);
+        json_file("datapackage.json", &descriptor, sender).await
     }
+}
+
+/// Sends a value as a file.
+async fn json_file(
+    name: &str,
+    value: &impl Serialize,
+    sender: &mpsc::Sender<ExportedFile>,
+) -> Result<(), ExportError> {
+    let json = serde_json::to_string_pretty(value);
+    let json = json.map_err(|error| StoreError::Failed(error.to_string()))?;
+    let mut file = File::new(name, sender);
+    file.line(&json).await?;
+    file.end().await
 }
 
 async fn participants(
     study: &Study,
     sender: &mpsc::Sender<ExportedFile>,
-) -> Result<(), ExportError> {
-    let mut file = File::new("participants.csv", sender);
-    let header = [
-        "number",
-        "participant",
-        "state",
-        "slot",
-        "conditions",
-        "step",
-        "sessions",
-        "began_at_ms",
-        "ended_at_ms",
-        "consent_at_ms",
-        "consent_version",
-        "consent_text_sha256",
-        "consent_language",
-        "data_deleted",
-    ];
-    file.row(&header.map(str::to_owned)).await?;
+) -> Result<Sheet, ExportError> {
+    let mut file = TableFile::new(columns::participants(study.settings()), sender).await?;
     for (number, participant) in study.participants() {
-        let consent = participant.consent.as_ref();
-        let state = convert::participant_state(participant.status);
-        let prefix = "STUDY_PARTICIPANT_STATE_";
-        let row = [
-            text(number),
-            participant.pseudonym.clone(),
-            state
-                .as_str_name()
-                .trim_start_matches(prefix)
-                .to_lowercase(),
-            optional(participant.slot),
-            conditions_of(study, participant),
-            text(participant.step()),
-            text(participant.session),
-            optional(participant.reached_at_ms.first()),
-            optional(participant.ended_at_ms),
-            optional(consent.map(|it| it.at_ms)),
-            optional(consent.map(|it| &it.version)),
-            optional(consent.map(|it| hex::encode(it.text_sha256))),
-            optional(consent.map(|it| &it.language)),
-            text(participant.data_deleted),
-        ];
+        let number = *number;
+        let row = ParticipantRow {
+            study,
+            number,
+            participant,
+        };
         file.row(&row).await?;
     }
     file.end().await
-}
-
-fn conditions_of(study: &Study, participant: &Participant) -> String {
-    let sequence = study.sequence_of(participant).unwrap_or_default();
-    let conditions = &study.settings().conditions;
-    let ids: Vec<&str> = (sequence.iter())
-        .map(|index| conditions[*index].id.as_str())
-        .collect();
-    ids.join(" ")
 }
 
 /// Whether exported data include a game.
@@ -201,109 +199,51 @@ fn is_in_data(study: &Study, participant: &Participant, game: &PlayedGame) -> bo
     )
 }
 
+/// Sends the games, what cannot be read of them, and their records.
 async fn games(
     handle: &StudyHandle,
     study: &Study,
     rooms: &Rooms,
     sender: &mpsc::Sender<ExportedFile>,
-) -> Result<(), ExportError> {
+) -> Result<Vec<Sheet>, ExportError> {
     let settings = study.settings();
-    let factors: Vec<&str> = settings.factors.iter().map(|it| it.name.as_str()).collect();
-    let mut file = File::new("games.csv", sender);
-    let mut header: Vec<String> = ["study", "number", "participant", "condition"]
-        .map(str::to_owned)
-        .into();
-    header.extend(factors.iter().map(|name| format!("factor_{name}")));
-    header.extend(
-        [
-            "step",
-            "practice",
-            "attempt",
-            "seed_index",
-            "seed",
-            "seat",
-            "game_id",
-            "outcome",
-            "ended_at_ms",
-            "place",
-            "points",
-            "shifts",
-            "decisions",
-            "invalid_answers",
-            "timeouts",
-            "decision_time_us",
-        ]
-        .map(str::to_owned),
-    );
-    file.row(&header).await?;
+    let mut file = TableFile::new(columns::games(settings), sender).await?;
     let (mut records, mut unreadable) = (Vec::new(), Vec::new());
     for (number, participant) in study.participants() {
         for game in &participant.games {
             if !is_in_data(study, participant, game) {
                 continue;
             }
-            let placed = &game.placed;
-            let condition = &settings.conditions[placed.condition];
-            let lines = match record_of(rooms, handle.id(), Id(placed.game)).await {
+            let id = Id(game.placed.game);
+            let lines = match record_of(rooms, handle.id(), id).await {
                 // One game that cannot be read ends no export of the others.
                 Err(StoreError::Unreadable(problem)) => {
                     error!(study = %handle.id(), %problem, "a game is left out of an export");
-                    unreadable.push((Id(placed.game), problem));
+                    unreadable.push((id, problem));
                     None
                 }
                 lines => lines?,
             };
-            let result = lines
-                .as_ref()
-                .and_then(|lines| outcome::outcome(lines).ok());
-            let seat = result.as_ref().and_then(|it| it.seats.get(placed.seat));
-            let seat = seat.map(|seat| &seat.statistics);
-            let seeds = match condition.seeds.is_empty() {
-                true => &settings.seeds,
-                false => &condition.seeds,
+            let result = lines.as_ref();
+            let row = GameRow {
+                settings,
+                study: &handle.plan.name,
+                number: *number,
+                participant,
+                game,
+                result: result.and_then(|lines| GameResult::of(lines, game.placed.seat)),
             };
-            let mut row = vec![
-                handle.plan.name.clone(),
-                text(number),
-                participant.pseudonym.clone(),
-                condition.id.clone(),
-            ];
-            let level = |name: &&str| condition.levels.get(*name).cloned().unwrap_or_default();
-            row.extend(factors.iter().map(level));
-            row.extend([
-                text(placed.step),
-                text(placed.practice),
-                text(placed.attempt),
-                optional(placed.seed_index),
-                optional(placed.seed_index.map(|index| hex::encode(seeds[index]))),
-                text(placed.seat),
-                text(Id(placed.game)),
-                match game.ended {
-                    None => "playing".to_owned(),
-                    Some((Outcome::Finished, _)) => "finished".to_owned(),
-                    Some((Outcome::Aborted, _)) => "aborted".to_owned(),
-                },
-                optional(game.ended.map(|(_, at_ms)| at_ms)),
-                optional(seat.map(|it| it.place)),
-                optional(seat.map(|it| it.points)),
-                optional(result.as_ref().map(|it| it.shifts)),
-                optional(seat.map(|it| it.decisions)),
-                optional(seat.map(|it| it.wrong_actions)),
-                optional(seat.map(|it| it.timeouts)),
-                optional(seat.map(|it| it.decision_time_us)),
-            ]);
             file.row(&row).await?;
-            records.extend(lines.map(|_| Id(placed.game)));
+            records.extend(lines.map(|_| id));
         }
     }
-    file.end().await?;
+    let mut sheets = vec![file.end().await?];
     if !unreadable.is_empty() {
-        let mut file = File::new("unreadable.csv", sender);
-        file.row(&["game_id", "problem"].map(str::to_owned)).await?;
-        for (game, problem) in unreadable {
-            file.row(&[text(game), problem]).await?;
+        let mut file = TableFile::new(columns::unreadable(), sender).await?;
+        for row in &unreadable {
+            file.row(row).await?;
         }
-        file.end().await?;
+        sheets.push(file.end().await?);
     }
     for game in records {
         let lines = match record_of(rooms, handle.id(), game).await {
@@ -323,7 +263,7 @@ async fn games(
         file.end().await?;
         samples(rooms, game, sender).await?;
     }
-    Ok(())
+    Ok(sheets)
 }
 
 /// The samples of a game's seats, in files that `chefshat export` finds beside the records.
@@ -371,63 +311,62 @@ pub(super) async fn record_of(
         .ok_or_else(|| StoreError::Unreadable(format!("the record of game {game} cannot be made")))
 }
 
-async fn answers(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<(), ExportError> {
-    let mut file = File::new("answers.csv", sender);
-    let header = [
-        "number",
-        "participant",
-        "step",
-        "condition",
-        "questionnaire",
-        "item",
-        "scale",
-        "position",
-        "answer",
-        "answered_after_ms",
-        "questionnaire_shown_at_ms",
-        "questionnaire_answered_at_ms",
-    ];
-    file.row(&header.map(str::to_owned)).await?;
+/// Sends the items of all questionnaires.
+async fn items(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<Sheet, ExportError> {
+    let stages = study.settings().stages.iter();
+    let tasks = stages.flat_map(|stage| match stage {
+        Stage::Once(task) => std::slice::from_ref(task),
+        Stage::PerCondition(tasks) => tasks,
+    });
+    let mut file = TableFile::new(columns::items(), sender).await?;
+    for task in tasks {
+        let Task::Questionnaire(questionnaire) = task else {
+            continue;
+        };
+        for (index, item) in questionnaire.items.iter().enumerate() {
+            let row = ItemRow {
+                questionnaire,
+                index,
+                item,
+            };
+            file.row(&row).await?;
+        }
+    }
+    file.end().await
+}
+
+/// Sends the items that participants were shown, with their answers.
+async fn answers(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<Sheet, ExportError> {
+    let settings = study.settings();
+    let mut file = TableFile::new(columns::answers(settings), sender).await?;
     for (number, participant) in study.participants() {
+        if participant.data_deleted {
+            continue;
+        }
         let sequence = study.sequence_of(participant).unwrap_or_default();
-        let steps = study.settings().steps(sequence);
-        for (step, answers) in &participant.answers {
-            let Some((at, Task::Questionnaire(questionnaire))) =
-                steps.get(*step).map(|at| (at, at.task))
-            else {
+        let steps = settings.steps(sequence).into_iter().enumerate();
+        for (step, at) in steps.take(participant.reached_at_ms.len()) {
+            let Task::Questionnaire(questionnaire) = at.task else {
                 continue;
             };
             let condition = at
                 .block
                 .or_else(|| (sequence.len() == 1).then(|| sequence[0]));
-            let condition = condition.map(|index| &study.settings().conditions[index].id);
-            let order = study.item_order(*number, *step).unwrap_or_default();
-            for answer in answers.iter() {
-                let Some(item) = questionnaire.items.get(answer.item) else {
-                    continue;
+            let answers = participant.answers.get(&step);
+            let answers = answers.map_or(&[][..], |answers| answers);
+            let order = study.item_order(*number, step).unwrap_or_default();
+            for (index, item) in questionnaire.items.iter().enumerate() {
+                let position = order.iter().position(|it| *it == index);
+                let row = AnswerRow {
+                    number: *number,
+                    participant,
+                    step,
+                    condition: condition.map(|index| &settings.conditions[index]),
+                    questionnaire,
+                    item,
+                    position: position.unwrap_or(index) + 1,
+                    answer: answers.iter().find(|answer| answer.item == index),
                 };
-                let position = order.iter().position(|index| *index == answer.item);
-                let row = [
-                    text(number),
-                    participant.pseudonym.clone(),
-                    text(step),
-                    optional(condition),
-                    questionnaire.id.clone(),
-                    item.id.clone(),
-                    item.scale.clone(),
-                    optional(position.map(|position| position + 1)),
-                    match &answer.value {
-                        Answer::Number(number) => text(number),
-                        Answer::Options(options) => {
-                            let options: Vec<String> = options.iter().map(text).collect();
-                            options.join(" ")
-                        }
-                        Answer::Text(words) => words.clone(),
-                    },
-                    optional(answer.answered_after_ms),
-                    optional(participant.reached_at_ms.get(*step)),
-                    optional(participant.reached_at_ms.get(step + 1)),
-                ];
                 file.row(&row).await?;
             }
         }
@@ -440,20 +379,8 @@ async fn traces(
     study: &Study,
     rooms: &Rooms,
     sender: &mpsc::Sender<ExportedFile>,
-) -> Result<(), ExportError> {
-    let mut file = File::new("traces.csv", sender);
-    let header = [
-        "number",
-        "participant",
-        "condition",
-        "game_id",
-        "decision_id",
-        "at_ms",
-        "kind",
-        "target",
-        "duration_ms",
-    ];
-    file.row(&header.map(str::to_owned)).await?;
+) -> Result<Sheet, ExportError> {
+    let settings = study.settings();
     let mut conditions = BTreeMap::new();
     for (number, participant) in study.participants() {
         for game in &participant.games {
@@ -462,50 +389,37 @@ async fn traces(
             }
         }
     }
-    for stored in rooms.store().traces(handle.id()).await? {
+    let traces = rooms.store().traces(handle.id()).await?;
+    let mut file = TableFile::new(columns::traces(settings), sender).await?;
+    for stored in &traces {
         let Some(condition) = conditions.get(&(stored.number, stored.game)) else {
             continue;
         };
         let participant = study.participant(stored.number);
         for trace in &stored.traces {
-            let kind = trace.kind().as_str_name();
-            let row = [
-                text(stored.number),
-                participant.map_or_else(String::new, |it| it.pseudonym.clone()),
-                study.settings().conditions[*condition].id.clone(),
-                text(stored.game),
-                text(trace.decision_id),
-                text(trace.at_ms),
-                kind.trim_start_matches("STUDY_TRACE_KIND_").to_lowercase(),
-                trace.target.clone(),
-                text(trace.duration_ms),
-            ];
+            let row = TraceRow {
+                number: stored.number,
+                pseudonym: participant.map_or("", |it| &it.pseudonym),
+                condition: &settings.conditions[*condition],
+                game: stored.game,
+                trace,
+            };
             file.row(&row).await?;
         }
     }
     file.end().await
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn cells_are_quoted_and_never_formulas() {
-        for (cell, expected) in [
-            ("plain", "plain"),
-            ("", ""),
-            ("a,b", "\"a,b\""),
-            ("say \"hi\"", "\"say \"\"hi\"\"\""),
-            ("two\nlines", "\"two\nlines\""),
-            ("-3", "-3"),
-            ("=1+2", "'=1+2"),
-            ("-cmd", "'-cmd"),
-            ("@a,b", "\"'@a,b\""),
-            ("\t=1+2", "'\t=1+2"),
-            ("\r=1+2", "\"'\r=1+2\""),
-        ] {
-            assert_eq!(quoted(cell), expected);
+/// Sends what the columns of these tables mean.
+async fn codebook(
+    sheets: &[Sheet],
+    sender: &mpsc::Sender<ExportedFile>,
+) -> Result<Sheet, ExportError> {
+    let mut file = TableFile::new(columns::codebook(), sender).await?;
+    for sheet in sheets {
+        for index in 0..sheet.columns.len() {
+            file.row(&CodebookRow { sheet, index }).await?;
         }
     }
+    file.end().await
 }

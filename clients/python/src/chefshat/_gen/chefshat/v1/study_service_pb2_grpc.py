@@ -168,9 +168,10 @@ class StudyServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def ExportStudy(self, request, context):
-        """Streams the data of a study as files: `study.json`, `participants.csv`, `games.csv`,
-        `answers.csv`, `traces.csv`, and the records of its games under `records/`. NOT_FOUND
-        (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+        """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
+        `items.csv`, `answers.csv` and `traces.csv`, the records of its games under `records/`, and last
+        what the columns of the tables mean, `codebook.csv` for people and `datapackage.json` for
+        programs. NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

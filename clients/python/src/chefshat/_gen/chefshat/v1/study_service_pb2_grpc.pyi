@@ -71,9 +71,10 @@ class StudyServiceStub:
     (STUDY_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     ExportStudy: _grpc.UnaryStreamMultiCallable[_study_service_pb2.ExportStudyRequest, _study_service_pb2.ExportStudyResponse]
-    """Streams the data of a study as files: `study.json`, `participants.csv`, `games.csv`,
-    `answers.csv`, `traces.csv`, and the records of its games under `records/`. NOT_FOUND
-    (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+    """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
+    `items.csv`, `answers.csv` and `traces.csv`, the records of its games under `records/`, and last
+    what the columns of the tables mean, `codebook.csv` for people and `datapackage.json` for
+    programs. NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteStudyParticipant: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]
     """Deletes the data of a participant: its pseudonym, answers, interface traces, and its games with
@@ -132,9 +133,10 @@ class StudyServiceAsyncStub(StudyServiceStub):
     (STUDY_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     ExportStudy: _aio.UnaryStreamMultiCallable[_study_service_pb2.ExportStudyRequest, _study_service_pb2.ExportStudyResponse]  # type: ignore[assignment]
-    """Streams the data of a study as files: `study.json`, `participants.csv`, `games.csv`,
-    `answers.csv`, `traces.csv`, and the records of its games under `records/`. NOT_FOUND
-    (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+    """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
+    `items.csv`, `answers.csv` and `traces.csv`, the records of its games under `records/`, and last
+    what the columns of the tables mean, `codebook.csv` for people and `datapackage.json` for
+    programs. NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteStudyParticipant: _aio.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]  # type: ignore[assignment]
     """Deletes the data of a participant: its pseudonym, answers, interface traces, and its games with
@@ -244,9 +246,10 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _study_service_pb2.ExportStudyRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_study_service_pb2.ExportStudyResponse], _abc.AsyncIterator[_study_service_pb2.ExportStudyResponse]]:
-        """Streams the data of a study as files: `study.json`, `participants.csv`, `games.csv`,
-        `answers.csv`, `traces.csv`, and the records of its games under `records/`. NOT_FOUND
-        (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+        """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
+        `items.csv`, `answers.csv` and `traces.csv`, the records of its games under `records/`, and last
+        what the columns of the tables mean, `codebook.csv` for people and `datapackage.json` for
+        programs. NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         """
 
     @_abc_1.abstractmethod

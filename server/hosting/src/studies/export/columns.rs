@@ -1,0 +1,780 @@
+//! The tables of a study's data, with their columns in order.
+
+use chefshat_engine::SeatStatistics;
+use chefshat_proto::v1::{self, StudyTraceKind, game_event::Kind as EventKind, record_line::Line};
+use chefshat_study::{
+    Answer, Condition, Item, ItemAnswer, ItemKind, Outcome, Participant, PlayedGame, Questionnaire,
+    Settings, Status, Study,
+};
+
+use super::table::{Code, Column, Kind, Sheet, Table};
+use chefshat_room::ids::Id;
+use chefshat_wire::convert;
+
+/// A time of day.
+const SINCE_EPOCH: Kind = Kind::Integer("milliseconds since 1970-01-01 00:00 UTC");
+const MILLISECONDS: Kind = Kind::Integer("milliseconds");
+/// A number of something, or the number or index of one.
+const COUNT: Kind = Kind::Integer("");
+
+const NUMBER: &str = "number of the participant in the study, from 1";
+const PSEUDONYM: &str = "pseudonym of the participant, its name in games";
+const CONDITION: &str = "condition";
+const STEP: &str = "step of the study, from 0";
+const DELETED: &str = "its data were deleted";
+const NO_RESULT: &str = "the game has no record that can be read, or ended before a Shift";
+
+fn text(value: impl ToString) -> String {
+    value.to_string()
+}
+
+fn optional(value: Option<impl ToString>) -> String {
+    value.map_or_else(String::new, text)
+}
+
+/// The codes of the study's conditions.
+fn conditions(settings: &Settings) -> Vec<Code> {
+    let ids = settings.conditions.iter().map(|it| Code::new(&it.id, ""));
+    ids.collect()
+}
+
+/// The columns of the factors. `levels` has a row's level of a factor, or several separated by spaces.
+fn with_factors<R>(
+    table: Table<R>,
+    settings: &Settings,
+    several: bool,
+    missing: Option<&'static str>,
+    levels: impl Fn(&R, &str) -> String + Copy + Send + Sync + 'static,
+) -> Table<R> {
+    settings.factors.iter().fold(table, |table, factor| {
+        let codes = factor.levels.iter().map(|level| Code::new(level, ""));
+        let codes = codes.collect();
+        let name = factor.name.clone();
+        let table = table.with(
+            format!("factor_{name}"),
+            Kind::Codes { codes, several },
+            "level of this factor in the condition",
+            move |row| levels(row, &name),
+        );
+        match missing {
+            Some(when) => table.empty(when),
+            None => table,
+        }
+    })
+}
+
+fn level(condition: &Condition, factor: &str) -> String {
+    condition.levels.get(factor).cloned().unwrap_or_default()
+}
+
+/// A participant, with its number.
+pub(super) struct ParticipantRow<'s> {
+    pub(super) study: &'s Study,
+    pub(super) number: u32,
+    pub(super) participant: &'s Participant,
+}
+
+impl ParticipantRow<'_> {
+    /// Something of each of its conditions, in order.
+    fn of_each(&self, what: impl Fn(&Condition) -> String) -> String {
+        let sequence = self.study.sequence_of(self.participant).unwrap_or_default();
+        let conditions = &self.study.settings().conditions;
+        let words: Vec<String> = sequence.iter().map(|it| what(&conditions[*it])).collect();
+        words.join(" ")
+    }
+}
+
+pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>> {
+    type Row<'s> = ParticipantRow<'s>;
+    const NO_SLOT: &str = "it has no slot yet";
+    const NO_CONSENT: &str = "it has not consented";
+    let states = STATES.map(|(status, label)| Code::new(state_name(status), label));
+    let conditions = Kind::Codes {
+        codes: conditions(settings),
+        several: true,
+    };
+    let table = Table::new("participants.csv", "a participant", &["number"])
+        .with("number", COUNT, NUMBER, |row: &Row<'s>| text(row.number))
+        .with("participant", Kind::Text, PSEUDONYM, |row| {
+            row.participant.pseudonym.clone()
+        })
+        .empty(DELETED)
+        .with("state", Kind::one_of(states), "how far it is", |row| {
+            state_name(row.participant.status)
+        })
+        .with(
+            "slot",
+            COUNT,
+            "its slot in the assignment of conditions, from 0",
+            |row| optional(row.participant.slot),
+        )
+        .empty(NO_SLOT)
+        .with("conditions", conditions, "its conditions in order", |row| {
+            row.of_each(|condition| condition.id.clone())
+        })
+        .empty(NO_SLOT);
+    with_factors(table, settings, true, Some(NO_SLOT), |row, factor| {
+        row.of_each(|condition| level(condition, factor))
+    })
+    .with(
+        "step",
+        COUNT,
+        "step it is at, from 0; the number of steps once it has completed the study",
+        |row| text(row.participant.step()),
+    )
+    .with(
+        "sessions",
+        COUNT,
+        "number of times that it opened the study",
+        |row| text(row.participant.session),
+    )
+    .with("began_at_ms", SINCE_EPOCH, "when it began", |row| {
+        optional(row.participant.reached_at_ms.first())
+    })
+    .empty("it has not begun")
+    .with(
+        "ended_at_ms",
+        SINCE_EPOCH,
+        "when it completed the study or left it",
+        |row| optional(row.participant.ended_at_ms),
+    )
+    .empty("it has done neither")
+    .with("consent_at_ms", SINCE_EPOCH, "when it consented", |row| {
+        optional(row.participant.consent.as_ref().map(|it| it.at_ms))
+    })
+    .empty(NO_CONSENT)
+    .with(
+        "consent_version",
+        Kind::Text,
+        "version of the text that it consented to",
+        |row| optional(row.participant.consent.as_ref().map(|it| &it.version)),
+    )
+    .empty(NO_CONSENT)
+    .with(
+        "consent_text_sha256",
+        Kind::Text,
+        "SHA-256 of that text in UTF-8, in hexadecimal digits",
+        |row| {
+            optional(
+                row.participant
+                    .consent
+                    .as_ref()
+                    .map(|it| hex::encode(it.text_sha256)),
+            )
+        },
+    )
+    .empty(NO_CONSENT)
+    .with(
+        "consent_language",
+        Kind::Text,
+        "language of the page on which it consented",
+        |row| optional(row.participant.consent.as_ref().map(|it| &it.language)),
+    )
+    .empty(NO_CONSENT)
+    .with(
+        "data_deleted",
+        Kind::Boolean,
+        "whether its data were deleted",
+        |row| text(row.participant.data_deleted),
+    )
+}
+
+fn state_name(status: Status) -> String {
+    let name = convert::participant_state(status).as_str_name();
+    let prefix = "STUDY_PARTICIPANT_STATE_";
+    name.trim_start_matches(prefix).to_lowercase()
+}
+
+/// What participants can be, as in `StudyParticipantState`.
+const STATES: [(Status, &str); 6] = [
+    (Status::Invited, "has not opened its link"),
+    (Status::Active, "has begun"),
+    (Status::Completed, "has completed all steps"),
+    (Status::Withdrawn, "has withdrawn"),
+    (Status::DroppedOut, "had no page open for too long"),
+    (Status::Removed, "was removed by the study's owner"),
+];
+
+/// A game of a participant.
+pub(super) struct GameRow<'s> {
+    pub(super) settings: &'s Settings,
+    /// Name of the study.
+    pub(super) study: &'s str,
+    pub(super) number: u32,
+    pub(super) participant: &'s Participant,
+    pub(super) game: &'s PlayedGame,
+    pub(super) result: Option<GameResult>,
+}
+
+/// What the record of a game says of the participant.
+pub(super) struct GameResult {
+    started_at_ms: Option<u64>,
+    shifts: u32,
+    /// Hints that it was given.
+    hints: u32,
+    statistics: SeatStatistics,
+}
+
+impl GameResult {
+    /// `None` if the record has no outcome, or not this seat.
+    pub(super) fn of(lines: &[v1::RecordLine], seat: usize) -> Option<Self> {
+        let outcome = chefshat_record::outcome::outcome(lines).ok()?;
+        let statistics = outcome.seats.into_iter().nth(seat)?.statistics;
+        let (mut created_at_ms, mut started_at_ms, mut hints) = (0, None, 0);
+        for line in lines.iter().filter_map(|line| line.line.as_ref()) {
+            match line {
+                Line::Header(header) => created_at_ms = header.created_at_ms,
+                Line::Event(event) if matches!(event.kind, Some(EventKind::GameStarted(_))) => {
+                    started_at_ms = Some(created_at_ms + event.elapsed_ms);
+                }
+                Line::Decision(decision) if decision.seat as usize == seat => {
+                    hints += decision.hints;
+                }
+                _ => {}
+            }
+        }
+        Some(Self {
+            started_at_ms,
+            shifts: outcome.shifts,
+            hints,
+            statistics,
+        })
+    }
+}
+
+impl GameRow<'_> {
+    fn condition(&self) -> &Condition {
+        &self.settings.conditions[self.game.placed.condition]
+    }
+
+    fn seed(&self) -> Option<String> {
+        let own = &self.condition().seeds;
+        let seeds = match own.is_empty() {
+            true => &self.settings.seeds,
+            false => own,
+        };
+        self.game
+            .placed
+            .seed_index
+            .map(|index| hex::encode(seeds[index]))
+    }
+
+    /// Something of its result, or an empty cell.
+    fn result<T: ToString>(&self, what: impl Fn(&GameResult) -> T) -> String {
+        optional(self.result.as_ref().map(what))
+    }
+
+    fn statistics<T: ToString>(&self, what: impl Fn(&SeatStatistics) -> T) -> String {
+        self.result(|it| what(&it.statistics))
+    }
+}
+
+pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
+    type Row<'s> = GameRow<'s>;
+    const PRACTICE: &str = "practice has no seed of the list";
+    let outcomes = [
+        Code::new("playing", "has not ended"),
+        Code::new("finished", "was played to its end"),
+        Code::new("aborted", "ended early"),
+    ];
+    let condition = Kind::one_of(conditions(settings));
+    let table = Table::new("games.csv", "a game of a participant", &["game_id"])
+        .with("study", Kind::Text, "name of the study", |row: &Row<'s>| {
+            row.study.to_owned()
+        })
+        .with("number", COUNT, NUMBER, |row| text(row.number))
+        .with("participant", Kind::Text, PSEUDONYM, |row| {
+            row.participant.pseudonym.clone()
+        })
+        .with("condition", condition, CONDITION, |row| {
+            row.condition().id.clone()
+        });
+    with_factors(table, settings, false, None, |row, factor| {
+        level(row.condition(), factor)
+    })
+    .with("step", COUNT, STEP, |row| text(row.game.placed.step))
+    .with("practice", Kind::Boolean, "whether it is practice", |row| {
+        text(row.game.placed.practice)
+    })
+    .with(
+        "attempt",
+        COUNT,
+        "attempt at this game, from 1; one that could not go on is begun again",
+        |row| text(row.game.placed.attempt),
+    )
+    .with(
+        "seed_index",
+        COUNT,
+        "index of its seed in the list of the condition, or else of the study, from 0",
+        |row| optional(row.game.placed.seed_index),
+    )
+    .empty(PRACTICE)
+    .with(
+        "seed",
+        Kind::Text,
+        "its seed, in hexadecimal digits",
+        |row| optional(row.seed()),
+    )
+    .empty(PRACTICE)
+    .with("seat", COUNT, "seat of the participant, from 0", |row| {
+        text(row.game.placed.seat)
+    })
+    .with(
+        "game_id",
+        Kind::Text,
+        "identifies the game; its record is records/<game_id>.jsonl",
+        |row| text(Id(row.game.placed.game)),
+    )
+    .with("outcome", Kind::one_of(outcomes), "how it ended", |row| {
+        let outcome = match row.game.ended {
+            None => "playing",
+            Some((Outcome::Finished, _)) => "finished",
+            Some((Outcome::Aborted, _)) => "aborted",
+        };
+        outcome.to_owned()
+    })
+    .with(
+        "started_at_ms",
+        SINCE_EPOCH,
+        "when all seats were there and it started",
+        |row| optional(row.result.as_ref().and_then(|it| it.started_at_ms)),
+    )
+    .empty(NO_RESULT)
+    .with("ended_at_ms", SINCE_EPOCH, "when it ended", |row| {
+        optional(row.game.ended.map(|(_, at_ms)| at_ms))
+    })
+    .empty("it has not ended")
+    .with("place", COUNT, "place of the participant, from 1", |row| {
+        row.statistics(|it| it.place)
+    })
+    .empty(NO_RESULT)
+    .with("points", COUNT, "points of the participant", |row| {
+        row.statistics(|it| it.points)
+    })
+    .empty(NO_RESULT)
+    .with("shifts", COUNT, "Shifts played", |row| {
+        row.result(|it| it.shifts)
+    })
+    .empty(NO_RESULT)
+    .with(
+        "decisions",
+        COUNT,
+        "decisions of the participant, including those that timed out; not those of a substitute",
+        |row| row.statistics(|it| it.decisions),
+    )
+    .empty(NO_RESULT)
+    .with(
+        "invalid_answers",
+        COUNT,
+        "invalid attempts at them",
+        |row| row.statistics(|it| it.wrong_actions),
+    )
+    .empty(NO_RESULT)
+    .with("timeouts", COUNT, "those of them that timed out", |row| {
+        row.statistics(|it| it.timeouts)
+    })
+    .empty(NO_RESULT)
+    .with(
+        "hints",
+        COUNT,
+        "hints that the participant was given",
+        |row| row.result(|it| it.hints),
+    )
+    .empty(NO_RESULT)
+    .with(
+        "decision_time_us",
+        Kind::Integer("microseconds"),
+        "sum of the times of its decisions, measured by the server",
+        |row| row.statistics(|it| it.decision_time_us),
+    )
+    .empty(NO_RESULT)
+}
+
+/// A game whose record cannot be read, and why.
+pub(super) fn unreadable() -> Table<(Id, String)> {
+    Table::new(
+        "unreadable.csv",
+        "a game whose record cannot be read",
+        &["game_id"],
+    )
+    .with(
+        "game_id",
+        Kind::Text,
+        "identifies the game",
+        |(game, _): &(Id, String)| text(game),
+    )
+    .with(
+        "problem",
+        Kind::Text,
+        "why its record cannot be read",
+        |(_, problem)| problem.clone(),
+    )
+}
+
+/// An item of a questionnaire.
+pub(super) struct ItemRow<'s> {
+    pub(super) questionnaire: &'s Questionnaire,
+    /// Its index.
+    pub(super) index: usize,
+    pub(super) item: &'s Item,
+}
+
+pub(super) fn items<'s>() -> Table<ItemRow<'s>> {
+    type Row<'s> = ItemRow<'s>;
+    const IN_WORDS: &str = "it is answered in words";
+    let kinds = [
+        Code::new("likert", "by a point, by how much one agrees"),
+        Code::new("semantic_differential", "by a point between two words"),
+        Code::new("slider", "by a value on a slider"),
+        Code::new("choice", "by an option of a list"),
+        Code::new("choices", "by any number of options of a list"),
+        Code::new("free_text", "in words"),
+    ];
+    Table::new(
+        "items.csv",
+        "an item of a questionnaire",
+        &["questionnaire", "item"],
+    )
+    .with(
+        "questionnaire",
+        Kind::Text,
+        QUESTIONNAIRE,
+        |row: &Row<'s>| row.questionnaire.id.clone(),
+    )
+    .with("item", Kind::Text, ITEM, |row| row.item.id.clone())
+    .with(
+        "index",
+        COUNT,
+        "place of the item in the settings, from 1",
+        |row| text(row.index + 1),
+    )
+    .with("scale", Kind::Text, SCALE, |row| row.item.scale.clone())
+    .empty(NO_SCALE)
+    .with("text", Kind::Text, "the question or statement", |row| {
+        row.item.text.clone()
+    })
+    .empty("the two words say it")
+    .with("kind", Kind::one_of(kinds), "how it is answered", |row| {
+        let kind = match row.item.kind {
+            ItemKind::Likert { .. } => "likert",
+            ItemKind::SemanticDifferential { .. } => "semantic_differential",
+            ItemKind::Slider { .. } => "slider",
+            ItemKind::Choice {
+                multiple: false, ..
+            } => "choice",
+            ItemKind::Choice { multiple: true, .. } => "choices",
+            ItemKind::FreeText { .. } => "free_text",
+        };
+        kind.to_owned()
+    })
+    .with(
+        "required",
+        Kind::Boolean,
+        "whether it must be answered",
+        |row| text(row.item.required),
+    )
+    .with("lowest", COUNT, "lowest number that answers it", |row| {
+        optional(numbers_of(&row.item.kind).map(|(lowest, ..)| lowest))
+    })
+    .empty(IN_WORDS)
+    .with("highest", COUNT, "highest number that answers it", |row| {
+        optional(numbers_of(&row.item.kind).map(|(_, highest, _)| highest))
+    })
+    .empty(IN_WORDS)
+    .with(
+        "distance",
+        COUNT,
+        "distance of two numbers that answer it",
+        |row| optional(numbers_of(&row.item.kind).map(|(.., distance)| distance)),
+    )
+    .empty(IN_WORDS)
+    .with(
+        "labels",
+        Kind::Text,
+        "numbers that have a label, each with it",
+        |row| {
+            let labels = labels_of(&row.item.kind).into_iter();
+            let labels = labels.map(|(number, label)| format!("{number} = {label}"));
+            labels.collect::<Vec<_>>().join("; ")
+        },
+    )
+    .empty("it has no labels")
+}
+
+/// The lowest and highest number that answers an item, and the distance of two; `None` if it is
+/// answered in words.
+fn numbers_of(kind: &ItemKind) -> Option<(i64, i64, u32)> {
+    match kind {
+        ItemKind::Likert { points, .. } | ItemKind::SemanticDifferential { points, .. } => {
+            Some((1, i64::from(*points), 1))
+        }
+        ItemKind::Slider { min, max, step, .. } => Some((i64::from(*min), i64::from(*max), *step)),
+        ItemKind::Choice { options, .. } => {
+            let last = i64::try_from(options.len()).unwrap_or(i64::MAX) - 1;
+            Some((0, last, 1))
+        }
+        ItemKind::FreeText { .. } => None,
+    }
+}
+
+/// The numbers that answer an item and have a label, each with it.
+fn labels_of(kind: &ItemKind) -> Vec<(i64, &str)> {
+    let Some((lowest, highest, _)) = numbers_of(kind) else {
+        return Vec::new();
+    };
+    let ends = |left, right| vec![(lowest, left), (highest, right)];
+    let mut labels: Vec<(i64, &str)> = match kind {
+        ItemKind::Likert { labels, .. } => match labels.as_slice() {
+            [left, right] => ends(left.as_str(), right.as_str()),
+            all => (lowest..).zip(all.iter().map(String::as_str)).collect(),
+        },
+        ItemKind::SemanticDifferential { left, right, .. }
+        | ItemKind::Slider { left, right, .. } => ends(left, right),
+        ItemKind::Choice { options, .. } => {
+            (lowest..).zip(options.iter().map(String::as_str)).collect()
+        }
+        ItemKind::FreeText { .. } => Vec::new(),
+    };
+    labels.retain(|(_, label)| !label.is_empty());
+    labels
+}
+
+const QUESTIONNAIRE: &str = "id of the questionnaire";
+const ITEM: &str = "id of the item in the questionnaire";
+const SCALE: &str = "scale that the item belongs to";
+const NO_SCALE: &str = "it belongs to none";
+
+/// An item that a participant was shown.
+pub(super) struct AnswerRow<'s> {
+    pub(super) number: u32,
+    pub(super) participant: &'s Participant,
+    pub(super) step: usize,
+    pub(super) condition: Option<&'s Condition>,
+    pub(super) questionnaire: &'s Questionnaire,
+    pub(super) item: &'s Item,
+    /// Place of the item in the order in which the participant met them, from 1.
+    pub(super) position: usize,
+    pub(super) answer: Option<&'s ItemAnswer>,
+}
+
+impl AnswerRow<'_> {
+    /// The numbers that answer the item.
+    fn chosen(&self) -> Vec<i64> {
+        match self.answer.map(|it| &it.value) {
+            Some(Answer::Number(number)) => vec![i64::from(*number)],
+            Some(Answer::Options(options)) => {
+                let options = options
+                    .iter()
+                    .map(|it| i64::try_from(*it).unwrap_or(i64::MAX));
+                options.collect()
+            }
+            Some(Answer::Text(_)) | None => Vec::new(),
+        }
+    }
+}
+
+pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
+    type Row<'s> = AnswerRow<'s>;
+    const NO_CONDITION: &str = "the step belongs to no condition, or to several";
+    let statuses = [
+        Code::new("answered", "the item was answered"),
+        Code::new("left_out", "the questionnaire was sent without it"),
+        Code::new("not_sent", "the questionnaire was shown and not sent"),
+    ];
+    let condition = Kind::one_of(conditions(settings));
+    let table = Table::new(
+        "answers.csv",
+        "an item that a participant was shown",
+        &["number", "step", "item"],
+    )
+    .with("number", COUNT, NUMBER, |row: &Row<'s>| text(row.number))
+    .with("participant", Kind::Text, PSEUDONYM, |row| {
+        row.participant.pseudonym.clone()
+    })
+    .with("step", COUNT, STEP, |row| text(row.step))
+    .with("condition", condition, CONDITION, |row| {
+        optional(row.condition.map(|it| &it.id))
+    })
+    .empty(NO_CONDITION);
+    with_factors(table, settings, false, Some(NO_CONDITION), |row, factor| {
+        row.condition.map_or_else(String::new, |it| level(it, factor))
+    })
+    .with("questionnaire", Kind::Text, QUESTIONNAIRE, |row| row.questionnaire.id.clone())
+    .with("item", Kind::Text, ITEM, |row| row.item.id.clone())
+    .with("scale", Kind::Text, SCALE, |row| row.item.scale.clone())
+    .empty(NO_SCALE)
+    .with("position", COUNT, "place of the item in the order in which the participant met them, from 1", |row| {
+        text(row.position)
+    })
+    .with("status", Kind::one_of(statuses), "whether it was answered", |row| {
+        let was_sent = row.participant.answers.contains_key(&row.step);
+        let status = match (row.answer, was_sent) {
+            (Some(_), _) => "answered",
+            (None, true) => "left_out",
+            (None, false) => "not_sent",
+        };
+        status.to_owned()
+    })
+    .with("answer", Kind::Text, "a number of items.csv, several separated by spaces, or words", |row| {
+        match row.answer.map(|it| &it.value) {
+            Some(Answer::Text(words)) => words.clone(),
+            _ => row.chosen().iter().map(text).collect::<Vec<_>>().join(" "),
+        }
+    })
+    .empty("it was not answered, or by none of several options")
+    .with("label", Kind::Text, "label of that number; several separated by semicolons", |row| {
+        let (labels, chosen) = (labels_of(&row.item.kind), row.chosen());
+        let labels = labels.into_iter().filter(|(number, _)| chosen.contains(number));
+        labels.map(|(_, label)| label).collect::<Vec<_>>().join("; ")
+    })
+    .empty("it has none")
+    .with("answered_after_ms", MILLISECONDS, "time from showing the questionnaire to the last change of the answer, measured by the participant's device", |row| {
+        optional(row.answer.and_then(|it| it.answered_after_ms))
+    })
+    .empty("the device did not measure it")
+    .with("questionnaire_shown_at_ms", SINCE_EPOCH, "when the participant reached the step", |row| {
+        optional(row.participant.reached_at_ms.get(row.step))
+    })
+    .with("questionnaire_answered_at_ms", SINCE_EPOCH, "when the questionnaire was sent", |row| {
+        optional(row.participant.reached_at_ms.get(row.step + 1))
+    })
+    .empty("it was not sent")
+}
+
+/// An event of the interface.
+pub(super) struct TraceRow<'s> {
+    pub(super) number: u32,
+    pub(super) pseudonym: &'s str,
+    pub(super) condition: &'s Condition,
+    pub(super) game: Id,
+    pub(super) trace: &'s v1::StudyTrace,
+}
+
+pub(super) fn traces<'s>(settings: &Settings) -> Table<TraceRow<'s>> {
+    type Row<'s> = TraceRow<'s>;
+    let kinds = TRACES.map(|(kind, label)| Code::new(trace_name(kind), label));
+    let condition = Kind::one_of(conditions(settings));
+    let table = Table::new("traces.csv", "an event of a participant's interface", &[])
+        .with("number", COUNT, NUMBER, |row: &Row<'s>| text(row.number))
+        .with("participant", Kind::Text, PSEUDONYM, |row| {
+            row.pseudonym.to_owned()
+        })
+        .with("condition", condition, CONDITION, |row| {
+            row.condition.id.clone()
+        });
+    with_factors(table, settings, false, None, |row, factor| {
+        level(row.condition, factor)
+    })
+    .with("game_id", Kind::Text, "identifies the game", |row| {
+        text(row.game)
+    })
+    .with(
+        "decision_id",
+        COUNT,
+        "decision of the participant that was open, from 1; 0 if none was",
+        |row| text(row.trace.decision_id),
+    )
+    .with(
+        "at_ms",
+        MILLISECONDS,
+        "time since the page began the game, by a clock of the device that never goes back",
+        |row| text(row.trace.at_ms),
+    )
+    .with("kind", Kind::one_of(kinds), "what happened", |row| {
+        trace_name(row.trace.kind())
+    })
+    .with("target", Kind::Text, "what it happened to", |row| {
+        row.trace.target.clone()
+    })
+    .empty("it happened to nothing")
+    .with(
+        "duration_ms",
+        MILLISECONDS,
+        "how long it lasted; 0 of what has no duration",
+        |row| text(row.trace.duration_ms),
+    )
+}
+
+fn trace_name(kind: StudyTraceKind) -> String {
+    let prefix = "STUDY_TRACE_KIND_";
+    kind.as_str_name().trim_start_matches(prefix).to_lowercase()
+}
+
+/// The kinds of events that are stored.
+const TRACES: [(StudyTraceKind, &str); 8] = [
+    (StudyTraceKind::DecisionShown, "the decision was shown"),
+    (StudyTraceKind::CardPicked, "a card of the hand was picked"),
+    (StudyTraceKind::CardPutBack, "a picked card was put back"),
+    (StudyTraceKind::Hover, "the pointer was over something"),
+    (StudyTraceKind::Focus, "something had the keyboard's focus"),
+    (StudyTraceKind::AnswerSent, "the answer was sent"),
+    (
+        StudyTraceKind::PageLeft,
+        "the page was hidden or lost the window's focus",
+    ),
+    (
+        StudyTraceKind::PageReturned,
+        "the page was shown or had the window's focus again",
+    ),
+];
+
+/// A column of a table.
+pub(super) struct CodebookRow<'s> {
+    pub(super) sheet: &'s Sheet,
+    /// Its index.
+    pub(super) index: usize,
+}
+
+impl CodebookRow<'_> {
+    fn column(&self) -> &Column {
+        &self.sheet.columns[self.index]
+    }
+}
+
+pub(super) fn codebook<'s>() -> Table<CodebookRow<'s>> {
+    type Row<'s> = CodebookRow<'s>;
+    let types = [
+        Code::new("string", "any text"),
+        Code::new("integer", "an integer"),
+        Code::new("boolean", "true or false"),
+        Code::new("code", "one of the codes"),
+        Code::new("codes", "codes separated by spaces"),
+    ];
+    Table::new("codebook.csv", "a column of a table", &["file", "column"])
+        .with(
+            "file",
+            Kind::Text,
+            "name of the table's file",
+            |row: &Row<'s>| row.sheet.file.to_owned(),
+        )
+        .with(
+            "position",
+            COUNT,
+            "place of the column in the table, from 1",
+            |row| text(row.index + 1),
+        )
+        .with("column", Kind::Text, "name of the column", |row| {
+            row.column().name.clone()
+        })
+        .with("type", Kind::one_of(types), "what its cells hold", |row| {
+            row.column().kind().to_owned()
+        })
+        .with("unit", Kind::Text, "unit of its numbers", |row| {
+            row.column().unit().to_owned()
+        })
+        .empty("it has none")
+        .with("meaning", Kind::Text, "what it means", |row| {
+            row.column().meaning.to_owned()
+        })
+        .with(
+            "codes",
+            Kind::Text,
+            "its codes, with what they mean",
+            |row| row.column().codes(),
+        )
+        .empty("it has no codes")
+        .with("empty", Kind::Text, "when a cell is empty", |row| {
+            optional(row.column().missing)
+        })
+        .empty("it never is")
+}
