@@ -82,7 +82,8 @@ impl Core {
         open.released + self.wait_of(open).max(search.unwrap_or_default())
     }
 
-    /// Starts a hint for the open decision of a seat. [`Core::hinted`] takes its end.
+    /// Starts a hint for the open decision of a seat. [`Core::hinted`] or [`Core::hint_ended`] takes
+    /// its end.
     ///
     /// # Errors
     /// There is no hint for it now.
@@ -112,6 +113,7 @@ impl Core {
     /// # Errors
     /// Its decision is closed.
     pub fn hinted(&mut self, now: Duration, seat: Seat, decision: u64) -> Result<(), HintError> {
+        self.hint_ended(seat, decision);
         let awaited = self
             .awaited_from(seat)
             .is_some_and(|open| open.id == decision);
@@ -119,10 +121,16 @@ impl Core {
             return Err(HintError::Closed);
         }
         self.commit(now, Change::Hinted(seat));
-        if let Some(open) = &mut self.open {
+        Ok(())
+    }
+
+    /// Takes the end of a hint that could not be computed.
+    pub fn hint_ended(&mut self, seat: Seat, decision: u64) {
+        if let Some(open) = &mut self.open
+            && (open.decision.seat, open.id) == (seat, decision)
+        {
             open.hint_runs = false;
         }
-        Ok(())
     }
 
     /// Takes the end of a search. The decision is then due like that of any built-in agent. Does

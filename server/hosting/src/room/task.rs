@@ -471,7 +471,10 @@ impl Room {
     fn give_hint(&mut self, (request, hint): HintEnded) {
         let given = match hint {
             Some(_) => (self.core).hinted(self.now, request.seat, request.decision),
-            None => Ok(()),
+            None => {
+                self.core.hint_ended(request.seat, request.decision);
+                Ok(())
+            }
         };
         let waiting = self.latest_hint.ended(request, hint, given);
         let release = waiting.map(|(reply, hint)| AfterCommit::Hint(reply, hint));
