@@ -1,12 +1,13 @@
 //! `cargo xtask lint`: all checks that do not run the project.
 
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::command::{self, cargo, python_command};
 use crate::failure::Failure;
 use crate::places::{NO_PYTHON_PACKAGE, NO_WEB_PACKAGE, Places};
-use crate::setup;
+use crate::setup::{self, at};
 use crate::steps::Steps;
 use crate::web;
 use crate::{arrows, book, circles};
@@ -93,7 +94,48 @@ pub(crate) fn sources(places: &Places, steps: &mut Steps) -> Result<(), Failure>
     let fmt = ["fmt", "--all", "--check"];
     steps.program("cargo fmt", in_root(places, cargo()).args(fmt))?;
     steps.run("arrows between crates", || arrows::check(places))?;
-    steps.run("circles between files", || circles::check(places))
+    steps.run("circles between files", || circles::check(places))?;
+    steps.run("tests that are not built", || not_built(places))
+}
+
+/// Refuses tests in the sources of libraries whose own tests Cargo does not build (`test = false`).
+fn not_built(places: &Places) -> Result<(), Failure> {
+    let metadata = arrows::metadata(places)?;
+    let packages = metadata["packages"].as_array();
+    let targets = packages.into_iter().flatten();
+    let targets = targets.filter_map(|package| package["targets"].as_array());
+    let untested = targets.flatten().filter(|target| target["test"] == false);
+    for library in untested.filter(|target| target["kind"][0] == "lib") {
+        let root = library["src_path"].as_str().map(Path::new);
+        let Some(folder) = root.and_then(Path::parent) else {
+            continue;
+        };
+        if let Some(file) = with_tests(folder)? {
+            let file = file.display();
+            let problem = format!("{file} has tests, but its library has `test = false`");
+            return Err(Failure::new(problem));
+        }
+    }
+    Ok(())
+}
+
+/// A file in a folder, or in one of its folders, that has tests.
+fn with_tests(folder: &Path) -> Result<Option<PathBuf>, Failure> {
+    let listed = fs::read_dir(folder).map_err(|error| at(folder, &error))?;
+    for entry in listed {
+        let path = entry.map_err(|error| at(folder, &error))?.path();
+        let found = match path.is_dir() {
+            true => with_tests(&path)?,
+            false => {
+                let text = fs::read_to_string(&path).map_err(|error| at(&path, &error))?;
+                text.contains("#[cfg(test)]").then_some(path)
+            }
+        };
+        if found.is_some() {
+            return Ok(found);
+        }
+    }
+    Ok(None)
 }
 
 /// The checks of everything but programs: protocol, book, files of docker/. And the format of the agent
@@ -168,4 +210,19 @@ fn tool(places: &Places, name: &str) -> Command {
 fn in_root(places: &Places, mut command: Command) -> Command {
     command.current_dir(&places.root);
     command
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tests_are_found_in_every_folder() {
+        let root = Places::find().unwrap().root;
+        let xtask = root.join("tests/xtask");
+        assert!(with_tests(&xtask.join("src")).unwrap().is_some());
+        assert!(with_tests(&xtask.join("src/circles")).unwrap().is_some());
+        assert_eq!(with_tests(&root.join("proto/src")).unwrap(), None);
+        assert!(with_tests(&xtask.join("none")).is_err());
+    }
 }
