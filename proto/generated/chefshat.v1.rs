@@ -10232,9 +10232,10 @@ pub mod study_service_client {
             self.inner.unary(req, path, codec).await
         }
         /// Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
-        /// `items.csv`, `answers.csv` and `traces.csv`, the records of its games under `records/`, and last
-        /// what the columns of the tables mean, `codebook.csv` for people and `datapackage.json` for
-        /// programs. NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+        /// `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
+        /// read, the records of its games under `records/` and samples under `samples/`, and last what the
+        /// columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
+        /// NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         pub async fn export_study(
             &mut self,
             request: impl tonic::IntoRequest<super::ExportStudyRequest>,
@@ -10424,9 +10425,10 @@ pub mod study_service_server {
             + std::marker::Send
             + 'static;
         /// Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
-        /// `items.csv`, `answers.csv` and `traces.csv`, the records of its games under `records/`, and last
-        /// what the columns of the tables mean, `codebook.csv` for people and `datapackage.json` for
-        /// programs. NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+        /// `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
+        /// read, the records of its games under `records/` and samples under `samples/`, and last what the
+        /// columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
+        /// NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         async fn export_study(
             &self,
             request: tonic::Request<super::ExportStudyRequest>,

@@ -61,7 +61,7 @@ mod tests {
         for path in files {
             let text = std::fs::read_to_string(&path).expect("a source");
             let program = text.split("#[cfg(test)]").next().unwrap_or_default();
-            let writes = ["csv::Writer", "WriterBuilder", ".csv\", sender"]
+            let writes = ["csv::Writer", "WriterBuilder"]
                 .into_iter()
                 .any(|word| program.contains(word));
             if writes && !path.components().any(|part| part.as_os_str() == "tests") {

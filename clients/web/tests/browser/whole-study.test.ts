@@ -30,7 +30,7 @@ const COLUMNS = {
   "participants.csv":
     "number,participant,state,slot,conditions,factor_warmth,step,sessions,began_at_ms,ended_at_ms,consent_at_ms,consent_version,consent_text_sha256,consent_language,data_deleted",
   "games.csv":
-    "study,number,participant,condition,factor_warmth,step,practice,attempt,seed_index,seed,seat,game_id,outcome,started_at_ms,ended_at_ms,place,points,shifts,decisions,invalid_answers,timeouts,hints,decision_time_us",
+    "study,number,participant,condition,factor_warmth,step,practice,attempt,seed_index,seed,seat,game_id,outcome,started_at_ms,ended_at_ms,place,points,shifts,decisions,invalid_answers,timeouts,hints,timed_decisions,decision_time_us",
   "answers.csv":
     "number,participant,step,condition,factor_warmth,questionnaire,item,scale,position,status,answer,label,answered_after_ms,questionnaire_shown_at_ms,questionnaire_answered_at_ms",
   "traces.csv": "number,participant,condition,factor_warmth,game_id,decision_id,at_ms,kind,target,duration_ms",

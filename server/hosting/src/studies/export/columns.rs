@@ -2,6 +2,7 @@
 
 use chefshat_engine::SeatStatistics;
 use chefshat_proto::v1::{self, StudyTraceKind, game_event::Kind as EventKind, record_line::Line};
+use chefshat_record::outcome;
 use chefshat_study::{
     Answer, Condition, Item, ItemAnswer, ItemKind, Outcome, Participant, PlayedGame, Questionnaire,
     Settings, Status, Study,
@@ -22,7 +23,8 @@ const PSEUDONYM: &str = "pseudonym of the participant, its name in games";
 const CONDITION: &str = "condition";
 const STEP: &str = "step of the study, from 0";
 const DELETED: &str = "its data were deleted";
-const NO_RESULT: &str = "the game has no record that can be read, or ended before a Shift";
+const NO_RECORD: &str = "the game has not ended, or its record cannot be read";
+const NO_RESULT: &str = "the game was not finished, or its record cannot be read";
 
 fn text(value: impl ToString) -> String {
     value.to_string()
@@ -38,7 +40,8 @@ fn conditions(settings: &Settings) -> Vec<Code> {
     ids.collect()
 }
 
-/// The columns of the factors. `levels` has a row's level of a factor, or several separated by spaces.
+/// Adds the columns of the factors. `levels`: the level of a factor in a row, or several separated
+/// by spaces.
 fn with_factors<R>(
     table: Table<R>,
     settings: &Settings,
@@ -75,7 +78,7 @@ pub(super) struct ParticipantRow<'s> {
 }
 
 impl ParticipantRow<'_> {
-    /// Something of each of its conditions, in order.
+    /// `what` of each of its conditions, in order, separated by spaces.
     fn of_each(&self, what: impl Fn(&Condition) -> String) -> String {
         let sequence = self.study.sequence_of(self.participant).unwrap_or_default();
         let conditions = &self.study.settings().conditions;
@@ -86,7 +89,11 @@ impl ParticipantRow<'_> {
 
 pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>> {
     type Row<'s> = ParticipantRow<'s>;
-    const NO_SLOT: &str = "it has no slot yet";
+    const NO_SLOT: &str = "it was assigned no slot";
+    const SLOT: &str = "its slot in the assignment of conditions, from 0; of one that has \
+        left the slot it had, which another may have now";
+    const AT_STEP: &str =
+        "step it is at, from 0; the number of steps once it has completed the study";
     const NO_CONSENT: &str = "it has not consented";
     let states = STATES.map(|(status, label)| Code::new(state_name(status), label));
     let conditions = Kind::Codes {
@@ -99,15 +106,13 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
             row.participant.pseudonym.clone()
         })
         .empty(DELETED)
-        .with("state", Kind::one_of(states), "how far it is", |row| {
-            state_name(row.participant.status)
-        })
         .with(
-            "slot",
-            COUNT,
-            "its slot in the assignment of conditions, from 0",
-            |row| optional(row.participant.slot),
+            "state",
+            Kind::one_of(states),
+            "state of the participant",
+            |row| state_name(row.participant.status),
         )
+        .with("slot", COUNT, SLOT, |row| optional(row.participant.slot))
         .empty(NO_SLOT)
         .with("conditions", conditions, "its conditions in order", |row| {
             row.of_each(|condition| condition.id.clone())
@@ -116,12 +121,7 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
     with_factors(table, settings, true, Some(NO_SLOT), |row, factor| {
         row.of_each(|condition| level(condition, factor))
     })
-    .with(
-        "step",
-        COUNT,
-        "step it is at, from 0; the number of steps once it has completed the study",
-        |row| text(row.participant.step()),
-    )
+    .with("step", COUNT, AT_STEP, |row| text(row.participant.step()))
     .with(
         "sessions",
         COUNT,
@@ -206,39 +206,39 @@ pub(super) struct GameRow<'s> {
     pub(super) result: Option<GameResult>,
 }
 
-/// What the record of a game says of the participant.
+/// What the record of a game says.
+#[derive(Default)]
 pub(super) struct GameResult {
+    /// `None` if it has not started.
     started_at_ms: Option<u64>,
-    shifts: u32,
-    /// Hints that it was given.
+    /// Hints that the participant was given.
     hints: u32,
-    statistics: SeatStatistics,
+    /// Shifts played and the participant's statistics; `None` if it was not finished.
+    outcome: Option<(u32, SeatStatistics)>,
 }
 
 impl GameResult {
-    /// `None` if the record has no outcome, or not this seat.
-    pub(super) fn of(lines: &[v1::RecordLine], seat: usize) -> Option<Self> {
-        let outcome = chefshat_record::outcome::outcome(lines).ok()?;
-        let statistics = outcome.seats.into_iter().nth(seat)?.statistics;
-        let (mut created_at_ms, mut started_at_ms, mut hints) = (0, None, 0);
+    /// `seat`: the participant's.
+    pub(super) fn of(lines: &[v1::RecordLine], seat: usize) -> Self {
+        let mut result = Self::default();
+        let mut created_at_ms = 0_u64;
         for line in lines.iter().filter_map(|line| line.line.as_ref()) {
             match line {
                 Line::Header(header) => created_at_ms = header.created_at_ms,
                 Line::Event(event) if matches!(event.kind, Some(EventKind::GameStarted(_))) => {
-                    started_at_ms = Some(created_at_ms + event.elapsed_ms);
+                    result.started_at_ms = Some(created_at_ms.saturating_add(event.elapsed_ms));
                 }
                 Line::Decision(decision) if decision.seat as usize == seat => {
-                    hints += decision.hints;
+                    result.hints = result.hints.saturating_add(decision.hints);
                 }
                 _ => {}
             }
         }
-        Some(Self {
-            started_at_ms,
-            shifts: outcome.shifts,
-            hints,
-            statistics,
-        })
+        result.outcome = outcome::outcome(lines).ok().and_then(|outcome| {
+            let seat = outcome.seats.into_iter().nth(seat)?;
+            Some((outcome.shifts, seat.statistics))
+        });
+        result
     }
 }
 
@@ -259,23 +259,34 @@ impl GameRow<'_> {
             .map(|index| hex::encode(seeds[index]))
     }
 
-    /// Something of its result, or an empty cell.
-    fn result<T: ToString>(&self, what: impl Fn(&GameResult) -> T) -> String {
-        optional(self.result.as_ref().map(what))
+    /// `what` of the outcome, or an empty cell.
+    fn outcome<T: ToString>(&self, what: impl Fn(u32, &SeatStatistics) -> T) -> String {
+        let result = self.result.as_ref();
+        let outcome = result.and_then(|result| result.outcome.as_ref());
+        optional(outcome.map(|(shifts, statistics)| what(*shifts, statistics)))
     }
 
+    /// `what` of the participant's statistics, or an empty cell.
     fn statistics<T: ToString>(&self, what: impl Fn(&SeatStatistics) -> T) -> String {
-        self.result(|it| what(&it.statistics))
+        self.outcome(|_, statistics| what(statistics))
     }
 }
 
 pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
     type Row<'s> = GameRow<'s>;
     const PRACTICE: &str = "practice has no seed of the list";
+    const ATTEMPT: &str =
+        "attempt at this game, from 1: a game that ends without a result is played again";
+    const SEED_INDEX: &str =
+        "index of its seed in the list of the condition, or else of the study, from 0";
+    const GAME: &str = "identifies the game; records/<game_id>.jsonl is its record, if it has one";
+    const DECISIONS: &str =
+        "decisions of the participant, with those that timed out, without those of a substitute";
+    const TIME: &str = "sum of the times of timed_decisions, measured by the server";
     let outcomes = [
         Code::new("playing", "has not ended"),
         Code::new("finished", "was played to its end"),
-        Code::new("aborted", "ended early"),
+        Code::new("aborted", "ended without a result"),
     ];
     let condition = Kind::one_of(conditions(settings));
     let table = Table::new("games.csv", "a game of a participant", &["game_id"])
@@ -296,18 +307,12 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
     .with("practice", Kind::Boolean, "whether it is practice", |row| {
         text(row.game.placed.practice)
     })
-    .with(
-        "attempt",
-        COUNT,
-        "attempt at this game, from 1; one that could not go on is begun again",
-        |row| text(row.game.placed.attempt),
-    )
-    .with(
-        "seed_index",
-        COUNT,
-        "index of its seed in the list of the condition, or else of the study, from 0",
-        |row| optional(row.game.placed.seed_index),
-    )
+    .with("attempt", COUNT, ATTEMPT, |row| {
+        text(row.game.placed.attempt)
+    })
+    .with("seed_index", COUNT, SEED_INDEX, |row| {
+        optional(row.game.placed.seed_index)
+    })
     .empty(PRACTICE)
     .with(
         "seed",
@@ -319,12 +324,9 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
     .with("seat", COUNT, "seat of the participant, from 0", |row| {
         text(row.game.placed.seat)
     })
-    .with(
-        "game_id",
-        Kind::Text,
-        "identifies the game; its record is records/<game_id>.jsonl",
-        |row| text(Id(row.game.placed.game)),
-    )
+    .with("game_id", Kind::Text, GAME, |row| {
+        text(Id(row.game.placed.game))
+    })
     .with("outcome", Kind::one_of(outcomes), "how it ended", |row| {
         let outcome = match row.game.ended {
             None => "playing",
@@ -333,13 +335,10 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
         };
         outcome.to_owned()
     })
-    .with(
-        "started_at_ms",
-        SINCE_EPOCH,
-        "when all seats were there and it started",
-        |row| optional(row.result.as_ref().and_then(|it| it.started_at_ms)),
-    )
-    .empty(NO_RESULT)
+    .with("started_at_ms", SINCE_EPOCH, "when it started", |row| {
+        optional(row.result.as_ref().and_then(|it| it.started_at_ms))
+    })
+    .empty("it has not started, or has no record yet")
     .with("ended_at_ms", SINCE_EPOCH, "when it ended", |row| {
         optional(row.game.ended.map(|(_, at_ms)| at_ms))
     })
@@ -353,15 +352,12 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
     })
     .empty(NO_RESULT)
     .with("shifts", COUNT, "Shifts played", |row| {
-        row.result(|it| it.shifts)
+        row.outcome(|shifts, _| shifts)
     })
     .empty(NO_RESULT)
-    .with(
-        "decisions",
-        COUNT,
-        "decisions of the participant, including those that timed out; not those of a substitute",
-        |row| row.statistics(|it| it.decisions),
-    )
+    .with("decisions", COUNT, DECISIONS, |row| {
+        row.statistics(|it| it.decisions)
+    })
     .empty(NO_RESULT)
     .with(
         "invalid_answers",
@@ -378,13 +374,20 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
         "hints",
         COUNT,
         "hints that the participant was given",
-        |row| row.result(|it| it.hints),
+        |row| optional(row.result.as_ref().map(|it| it.hints)),
+    )
+    .empty(NO_RECORD)
+    .with(
+        "timed_decisions",
+        COUNT,
+        "those of them that the participant took in time",
+        |row| row.statistics(|it| it.timed_decisions),
     )
     .empty(NO_RESULT)
     .with(
         "decision_time_us",
         Kind::Integer("microseconds"),
-        "sum of the times of its decisions, measured by the server",
+        TIME,
         |row| row.statistics(|it| it.decision_time_us),
     )
     .empty(NO_RESULT)
@@ -443,7 +446,7 @@ pub(super) fn items<'s>() -> Table<ItemRow<'s>> {
     )
     .with("item", Kind::Text, ITEM, |row| row.item.id.clone())
     .with(
-        "index",
+        "position",
         COUNT,
         "place of the item in the settings, from 1",
         |row| text(row.index + 1),
@@ -482,9 +485,9 @@ pub(super) fn items<'s>() -> Table<ItemRow<'s>> {
     })
     .empty(IN_WORDS)
     .with(
-        "distance",
+        "step",
         COUNT,
-        "distance of two numbers that answer it",
+        "step between neighbouring numbers that answer it",
         |row| optional(numbers_of(&row.item.kind).map(|(.., distance)| distance)),
     )
     .empty(IN_WORDS)
@@ -501,8 +504,8 @@ pub(super) fn items<'s>() -> Table<ItemRow<'s>> {
     .empty("it has no labels")
 }
 
-/// The lowest and highest number that answers an item, and the distance of two; `None` if it is
-/// answered in words.
+/// The lowest and highest number that answers an item, and the step between neighbouring ones;
+/// `None` if it is answered in words.
 fn numbers_of(kind: &ItemKind) -> Option<(i64, i64, u32)> {
     match kind {
         ItemKind::Likert { points, .. } | ItemKind::SemanticDifferential { points, .. } => {
@@ -576,6 +579,15 @@ impl AnswerRow<'_> {
 pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
     type Row<'s> = AnswerRow<'s>;
     const NO_CONDITION: &str = "the step belongs to no condition, or to several";
+    const POSITION: &str =
+        "place of the item in the order in which the participant met them, from 1";
+    const ANSWER: &str = "a number of items.csv, several separated by spaces, or words";
+    const NO_ANSWER: &str = "it was not answered, or by none of several options";
+    const LABEL: &str = "label of that number; several separated by semicolons";
+    const NO_LABEL: &str = "it was not answered, or in words, or the number has no label";
+    const AFTER: &str = "time from showing the questionnaire to the last change of the answer, \
+        measured by the participant's device";
+    const NOT_MEASURED: &str = "it was not answered, or the device did not measure it";
     let statuses = [
         Code::new("answered", "the item was answered"),
         Code::new("left_out", "the questionnaire was sent without it"),
@@ -597,47 +609,64 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
     })
     .empty(NO_CONDITION);
     with_factors(table, settings, false, Some(NO_CONDITION), |row, factor| {
-        row.condition.map_or_else(String::new, |it| level(it, factor))
+        row.condition
+            .map_or_else(String::new, |it| level(it, factor))
     })
-    .with("questionnaire", Kind::Text, QUESTIONNAIRE, |row| row.questionnaire.id.clone())
+    .with("questionnaire", Kind::Text, QUESTIONNAIRE, |row| {
+        row.questionnaire.id.clone()
+    })
     .with("item", Kind::Text, ITEM, |row| row.item.id.clone())
     .with("scale", Kind::Text, SCALE, |row| row.item.scale.clone())
     .empty(NO_SCALE)
-    .with("position", COUNT, "place of the item in the order in which the participant met them, from 1", |row| {
-        text(row.position)
-    })
-    .with("status", Kind::one_of(statuses), "whether it was answered", |row| {
-        let was_sent = row.participant.answers.contains_key(&row.step);
-        let status = match (row.answer, was_sent) {
-            (Some(_), _) => "answered",
-            (None, true) => "left_out",
-            (None, false) => "not_sent",
-        };
-        status.to_owned()
-    })
-    .with("answer", Kind::Text, "a number of items.csv, several separated by spaces, or words", |row| {
+    .with("position", COUNT, POSITION, |row| text(row.position))
+    .with(
+        "status",
+        Kind::one_of(statuses),
+        "whether it was answered",
+        |row| {
+            let was_sent = row.participant.answers.contains_key(&row.step);
+            let status = match (row.answer, was_sent) {
+                (Some(_), _) => "answered",
+                (None, true) => "left_out",
+                (None, false) => "not_sent",
+            };
+            status.to_owned()
+        },
+    )
+    .with("answer", Kind::Text, ANSWER, |row| {
         match row.answer.map(|it| &it.value) {
             Some(Answer::Text(words)) => words.clone(),
             _ => row.chosen().iter().map(text).collect::<Vec<_>>().join(" "),
         }
     })
-    .empty("it was not answered, or by none of several options")
-    .with("label", Kind::Text, "label of that number; several separated by semicolons", |row| {
+    .empty(NO_ANSWER)
+    .with("label", Kind::Text, LABEL, |row| {
         let (labels, chosen) = (labels_of(&row.item.kind), row.chosen());
-        let labels = labels.into_iter().filter(|(number, _)| chosen.contains(number));
-        labels.map(|(_, label)| label).collect::<Vec<_>>().join("; ")
+        let labels = labels
+            .into_iter()
+            .filter(|(number, _)| chosen.contains(number));
+        labels
+            .map(|(_, label)| label)
+            .collect::<Vec<_>>()
+            .join("; ")
     })
-    .empty("it has none")
-    .with("answered_after_ms", MILLISECONDS, "time from showing the questionnaire to the last change of the answer, measured by the participant's device", |row| {
+    .empty(NO_LABEL)
+    .with("answered_after_ms", MILLISECONDS, AFTER, |row| {
         optional(row.answer.and_then(|it| it.answered_after_ms))
     })
-    .empty("the device did not measure it")
-    .with("questionnaire_shown_at_ms", SINCE_EPOCH, "when the participant reached the step", |row| {
-        optional(row.participant.reached_at_ms.get(row.step))
-    })
-    .with("questionnaire_answered_at_ms", SINCE_EPOCH, "when the questionnaire was sent", |row| {
-        optional(row.participant.reached_at_ms.get(row.step + 1))
-    })
+    .empty(NOT_MEASURED)
+    .with(
+        "questionnaire_shown_at_ms",
+        SINCE_EPOCH,
+        "when the participant reached the step",
+        |row| optional(row.participant.reached_at_ms.get(row.step)),
+    )
+    .with(
+        "questionnaire_answered_at_ms",
+        SINCE_EPOCH,
+        "when the questionnaire was sent",
+        |row| optional(row.participant.reached_at_ms.get(row.step + 1)),
+    )
     .empty("it was not sent")
 }
 
@@ -777,4 +806,44 @@ pub(super) fn codebook<'s>() -> Table<CodebookRow<'s>> {
             optional(row.column().missing)
         })
         .empty("it never is")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_game_without_an_outcome_the_start_and_the_hints_are_known() {
+        let event = |elapsed_ms, kind| {
+            Line::Event(v1::GameEvent {
+                elapsed_ms,
+                kind: Some(kind),
+                ..v1::GameEvent::default()
+            })
+        };
+        let decision = |seat, hints| {
+            Line::Decision(v1::DecisionRecord {
+                seat,
+                hints,
+                ..v1::DecisionRecord::default()
+            })
+        };
+        let lines = [
+            Line::Header(v1::RecordHeader {
+                created_at_ms: 5_000,
+                ..v1::RecordHeader::default()
+            }),
+            event(400, EventKind::GameStarted(Box::default())),
+            decision(1, 2),
+            decision(0, 1),
+            decision(1, 1),
+            event(900, EventKind::GameAborted(Box::default())),
+        ];
+        let lines = lines.map(|line| v1::RecordLine { line: Some(line) });
+        let result = GameResult::of(&lines, 1);
+        assert_eq!(result.started_at_ms, Some(5_400));
+        assert_eq!(result.hints, 3);
+        assert_eq!(result.outcome, None);
+        assert_eq!(GameResult::of(&[], 1).started_at_ms, None);
+    }
 }

@@ -1,6 +1,6 @@
 //! The data of a study as files: the settings, tables of participants, games, items, answers and
-//! interface traces (`columns`), the records and samples of games, and what the columns mean (`table`).
-//! A file is sent in parts, so that no table is in memory as a whole.
+//! interface traces (`columns`), the records and samples of games, and what the columns mean
+//! (`table`). A file is sent in parts, so that none is in memory as a whole.
 
 mod columns;
 mod table;
@@ -23,6 +23,9 @@ use chefshat_room::ids::Id;
 use chefshat_store::{StoreError, StoredGame};
 use columns::{AnswerRow, CodebookRow, GameResult, GameRow, ItemRow, ParticipantRow, TraceRow};
 use table::{Sheet, Table};
+
+/// Bytes that most lines of a table do not exceed.
+const LINE: usize = 512;
 
 /// A part of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -81,7 +84,8 @@ impl<'s> File<'s> {
         &mut self,
         cells: impl Iterator<Item = impl AsRef<str>>,
     ) -> Result<(), ExportError> {
-        let mut line = csv::WriterBuilder::new().from_writer(&mut self.buffer);
+        let mut writer = csv::WriterBuilder::new();
+        let mut line = writer.buffer_capacity(LINE).from_writer(&mut self.buffer);
         let mut written = Ok(());
         for cell in cells {
             let cell = sheet::cell(cell.as_ref());
@@ -231,7 +235,7 @@ async fn games(
                 number: *number,
                 participant,
                 game,
-                result: result.and_then(|lines| GameResult::of(lines, game.placed.seat)),
+                result: result.map(|lines| GameResult::of(lines, game.placed.seat)),
             };
             file.row(&row).await?;
             records.extend(lines.map(|_| id));

@@ -100,18 +100,17 @@ impl Column {
         self.kind.name()
     }
 
-    /// Its codes as they stand in cells, each with what it means.
+    /// Its codes, each with what it means.
     pub(super) fn codes(&self) -> String {
         let Kind::Codes { codes, .. } = &self.kind else {
             return String::new();
         };
-        let codes = codes.iter().map(|Code { code, label }| {
-            let code = sheet::cell(code);
-            match label.is_empty() {
-                true => code.into_owned(),
+        let codes = codes
+            .iter()
+            .map(|Code { code, label }| match label.is_empty() {
+                true => code.clone(),
                 false => format!("{code} = {label}"),
-            }
-        });
+            });
         codes.collect::<Vec<_>>().join("; ")
     }
 
@@ -183,8 +182,8 @@ impl Sheet {
     }
 }
 
-/// The descriptor of a Data Package (<https://datapackage.org/standard/data-package/>, version 2) of
-/// these tables.
+/// The descriptor of these tables as a Data Package, version 2
+/// (<https://datapackage.org/standard/data-package/>).
 pub(super) fn descriptor(name: &str, title: &str, sheets: &[Sheet]) -> Value {
     json!({
         "$schema": "https://datapackage.org/profiles/2.0/datapackage.json",
@@ -265,7 +264,10 @@ impl<R> Table<R> {
         columns.map(|(column, cell)| {
             let cell = cell(row);
             let (name, file) = (&column.name, self.sheet.file);
-            debug_assert!(column.has(&cell), "{cell:?} is no {name} of {file}");
+            debug_assert!(
+                column.has(&cell),
+                "{cell:?} is not a valid {name} of {file}"
+            );
             cell
         })
     }
@@ -308,10 +310,10 @@ mod tests {
     }
 
     #[test]
-    fn codes_are_described_as_they_stand_in_cells() {
+    fn a_descriptor_has_codes_as_they_stand_in_cells() {
         let codes = [Code::new("a", "the first"), Code::new("-b", "")];
         let column = column(Kind::one_of(codes), Some("sometimes"));
-        assert_eq!(column.codes(), "a = the first; '-b");
+        assert_eq!(column.codes(), "a = the first; -b");
         let field = column.field();
         assert_eq!(field["constraints"]["enum"], json!(["a", "'-b"]));
         assert_eq!(field["constraints"]["required"], json!(false));

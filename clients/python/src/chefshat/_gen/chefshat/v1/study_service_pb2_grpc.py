@@ -169,9 +169,10 @@ class StudyServiceServicer(object):
 
     def ExportStudy(self, request, context):
         """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
-        `items.csv`, `answers.csv` and `traces.csv`, the records of its games under `records/`, and last
-        what the columns of the tables mean, `codebook.csv` for people and `datapackage.json` for
-        programs. NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+        `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
+        read, the records of its games under `records/` and samples under `samples/`, and last what the
+        columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
+        NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

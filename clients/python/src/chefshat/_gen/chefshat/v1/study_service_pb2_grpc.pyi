@@ -72,9 +72,10 @@ class StudyServiceStub:
     """
     ExportStudy: _grpc.UnaryStreamMultiCallable[_study_service_pb2.ExportStudyRequest, _study_service_pb2.ExportStudyResponse]
     """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
-    `items.csv`, `answers.csv` and `traces.csv`, the records of its games under `records/`, and last
-    what the columns of the tables mean, `codebook.csv` for people and `datapackage.json` for
-    programs. NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+    `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
+    read, the records of its games under `records/` and samples under `samples/`, and last what the
+    columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
+    NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteStudyParticipant: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]
     """Deletes the data of a participant: its pseudonym, answers, interface traces, and its games with
@@ -134,9 +135,10 @@ class StudyServiceAsyncStub(StudyServiceStub):
     """
     ExportStudy: _aio.UnaryStreamMultiCallable[_study_service_pb2.ExportStudyRequest, _study_service_pb2.ExportStudyResponse]  # type: ignore[assignment]
     """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
-    `items.csv`, `answers.csv` and `traces.csv`, the records of its games under `records/`, and last
-    what the columns of the tables mean, `codebook.csv` for people and `datapackage.json` for
-    programs. NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+    `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
+    read, the records of its games under `records/` and samples under `samples/`, and last what the
+    columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
+    NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteStudyParticipant: _aio.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]  # type: ignore[assignment]
     """Deletes the data of a participant: its pseudonym, answers, interface traces, and its games with
@@ -247,9 +249,10 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_study_service_pb2.ExportStudyResponse], _abc.AsyncIterator[_study_service_pb2.ExportStudyResponse]]:
         """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
-        `items.csv`, `answers.csv` and `traces.csv`, the records of its games under `records/`, and last
-        what the columns of the tables mean, `codebook.csv` for people and `datapackage.json` for
-        programs. NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
+        `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
+        read, the records of its games under `records/` and samples under `samples/`, and last what the
+        columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
+        NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         """
 
     @_abc_1.abstractmethod
