@@ -588,6 +588,48 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
     assert_eq!(mood.expect("a row")["codes"], "'-low; high");
 }
 
+#[tokio::test]
+async fn traces_that_were_sent_again_are_exported_once() {
+    let mut settings = settings();
+    settings.traces = true;
+    let lab = Lab::with(&ServerConfig::default(), settings, 1).await;
+    assert_eq!(lab.study.open(1).await.expect("it runs"), Ok(1));
+    let _present = lab.study.present(1, 1).await;
+    let at = At {
+        number: 1,
+        session: 1,
+        step: 0,
+    };
+    assert_eq!(lab.study.consent(at).await.expect("it runs"), Ok(0));
+    lab.settled().await;
+    let game = |study: &Study| Id(study.participants()[&1].games[0].placed.game);
+    let game = lab.study.read(game);
+    let trace = |at_ms| v1::StudyTrace {
+        kind: v1::StudyTraceKind::CardPicked.into(),
+        at_ms,
+        target: "card:7".into(),
+        ..v1::StudyTrace::default()
+    };
+    for times in [
+        [1, 2].as_slice(),
+        &[1, 2, 3],
+        &[1, 2, 3, 4, 5],
+        &[6],
+        &[6, 7],
+    ] {
+        let traces = times.iter().copied().map(trace).collect();
+        let rooms = lab.studies.rooms();
+        let recorded = lab.study.record_traces((1, 1), game, traces, rooms).await;
+        assert!(matches!(recorded, Ok(Ok(()))), "{recorded:?}");
+    }
+    let tables = tables(&exported(&lab).await);
+    let times = tables["traces.csv"].iter().map(|row| row["at_ms"].as_str());
+    assert_eq!(
+        times.collect::<Vec<_>>(),
+        ["1", "2", "3", "4", "5", "6", "7"]
+    );
+}
+
 #[tokio::test(start_paused = true)]
 async fn the_settings_of_all_studies_of_a_caller_take_its_share_of_memory() {
     use v1::study_stage::Stage;

@@ -395,12 +395,16 @@ async fn traces(
     }
     let traces = rooms.store().traces(handle.id()).await?;
     let mut file = TableFile::new(columns::traces(settings), sender).await?;
+    let mut earlier: BTreeMap<Id, &[v1::StudyTrace]> = BTreeMap::new();
     for stored in &traces {
         let Some(condition) = conditions.get(&(stored.number, stored.game)) else {
             continue;
         };
         let participant = study.participant(stored.number);
-        for trace in &stored.traces {
+        // Traces whose receipt did not reach the device came again, before those that followed.
+        let before = earlier.insert(stored.game, &stored.traces);
+        let new = before.and_then(|before| stored.traces.strip_prefix(before));
+        for trace in new.unwrap_or(&stored.traces) {
             let row = TraceRow {
                 number: stored.number,
                 pseudonym: participant.map_or("", |it| &it.pseudonym),
