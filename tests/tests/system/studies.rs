@@ -23,10 +23,11 @@ use chefshat_server::config::ServerConfig;
 use chefshat_server::host::Host;
 use chefshat_server::store::studies::StoredStudy;
 use chefshat_server::store::{SqliteStore, Store as _};
-use chefshat_tests::{one_shift, patiently};
+use chefshat_tests::{one_shift, patiently, set_up};
 use futures::future::join_all;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream};
+use tokio::process::Command;
 use tonic::transport::Channel;
 use tonic::{Code, Request, Status};
 use tonic_types::StatusExt as _;
@@ -531,6 +532,45 @@ fn assert_as_described(files: &BTreeMap<String, Vec<u8>>) {
     assert_eq!(described, tables.cloned().collect());
 }
 
+/// Asserts that the sample in Python reads the exported tables and summarises them by condition.
+async fn assert_analysed(files: &BTreeMap<String, Vec<u8>>) {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, bytes) in files.iter().filter(|(name, _)| !name.contains('/')) {
+        std::fs::write(folder.path().join(name), bytes).expect("a file");
+    }
+    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../clients/python");
+    let analysing = Command::new(set_up("CHEFSHAT_PYTHON"))
+        .arg(python.join("samples/study/analysis.py"))
+        .arg(folder.path())
+        .kill_on_drop(true)
+        .output();
+    let analysed = patiently("the analysis", analysing).await.expect("Python");
+    let problem = String::from_utf8_lossy(&analysed.stderr);
+    assert!(analysed.status.success(), "{problem}");
+    let printed = String::from_utf8(analysed.stdout).expect("UTF-8");
+    let first = printed.lines().next().unwrap_or_default();
+    assert!(
+        first.contains(&format!("{PARTICIPANTS} completed")),
+        "{printed}"
+    );
+    // Half of the participants met each condition, and all answered by the ends of the sliders.
+    let half = (PARTICIPANTS / 2).to_string();
+    for (measure, expected) in [("timeouts_per_decision", "0.000"), ("effort", "100.000")] {
+        for condition in ["condition-warm", "condition-cold"] {
+            let line = printed.lines().find(|line| {
+                let mut words = line.split_whitespace();
+                words.any(|word| word == measure) && words.any(|word| word == condition)
+            });
+            let line = line.unwrap_or_else(|| panic!("no {measure}, {condition}: {printed}"));
+            let words: Vec<&str> = line.split_whitespace().rev().collect();
+            assert_eq!(words[1], expected, "{line}");
+            if measure == "timeouts_per_decision" {
+                assert_eq!(words[2], half, "{line}");
+            }
+        }
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn a_study_from_its_links_to_its_data() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -684,6 +724,7 @@ async fn a_study_from_its_links_to_its_data() {
     // The export has everything but practice and what was deleted.
     let files = lab.export().await;
     assert_as_described(&files);
+    assert_analysed(&files).await;
     let table = |name: &str| rows(&files[name]);
     assert_eq!(table("participants.csv").len(), PARTICIPANTS as usize + 2);
     let games = table("games.csv");

@@ -1,0 +1,90 @@
+"""Reads the data of a study and summarises them by condition.
+
+`chefshat study export STUDY-ID --out data` writes the data; then `python analysis.py data`. Needs pandas.
+
+The tables are read as `datapackage.json` describes them: codes become categories, empty cells missing values. A participant
+counts once in each condition: its games and items are averaged first.
+"""
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+# The types of columns that are not categories.
+TYPES = {"integer": "Int64", "boolean": "boolean", "string": "string"}
+
+
+def read(folder: Path) -> dict[str, pd.DataFrame]:
+    """Reads the tables of an export.
+
+    Returns:
+        The tables by the names of their files without the ending, such as `games`.
+    """
+    descriptor = json.loads((folder / "datapackage.json").read_text(encoding="utf-8"))
+    tables = {}
+    for resource in descriptor["resources"]:
+        fields = resource["schema"]["fields"]
+        types: dict[str, Any] = {field["name"]: type_of(field) for field in fields}
+        path = folder / resource["path"]
+        tables[resource["name"]] = pd.read_csv(path, dtype=types, keep_default_na=False, na_values=[""])
+    return tables
+
+
+def type_of(field: dict[str, Any]) -> pd.CategoricalDtype | str:
+    """The pandas type of a column of the descriptor."""
+    codes = field["constraints"].get("enum")
+    return TYPES[field["type"]] if codes is None else pd.CategoricalDtype(codes)
+
+
+def of_games(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    """The measures of games, as rows of participant, condition, measure and value."""
+    games = tables["games"]
+    games = games[(games["outcome"] == "finished") & ~games["practice"]]
+    values = games[["number", "condition", "place", "points", "hints"]].assign(
+        seconds_per_decision=games["decision_time_us"] / games["timed_decisions"] / 1e6,
+        timeouts_per_decision=games["timeouts"] / games["decisions"],
+    )
+    return values.melt(["number", "condition"], var_name="measure")
+
+
+def of_answers(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    """The scales of questionnaires, or the items that belong to none, as rows of participant, condition, measure and value."""
+    answers = tables["answers"]
+    items = tables["items"]
+    numbers = items.loc[items["kind"].isin(["likert", "semantic_differential", "slider"]), ["questionnaire", "item"]]
+    answers = answers[answers["status"] == "answered"].merge(numbers, on=["questionnaire", "item"])
+    return pd.DataFrame(
+        {
+            "number": answers["number"],
+            "condition": answers["condition"],
+            "measure": answers["questionnaire"] + " " + answers["scale"].fillna(answers["item"]),
+            "value": pd.to_numeric(answers["answer"]),
+        }
+    )
+
+
+def summary(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
+    """Summarises each measure by condition: number of participants, mean and standard deviation over them."""
+    values = pd.concat([of_games(tables), of_answers(tables)]).dropna(subset=["condition", "value"])
+    values["value"] = values["value"].astype(float)
+    participants = values.groupby(["measure", "condition", "number"], observed=True)["value"].mean()
+    by_condition = participants.groupby(level=["measure", "condition"], observed=True)
+    figures = pd.DataFrame({"participants": by_condition.count(), "mean": by_condition.mean(), "sd": by_condition.std()})
+    return figures.reset_index()
+
+
+def main() -> None:
+    """Prints who took part and the summary."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, help="what `chefshat study export` has written")
+    tables = read(parser.parse_args().folder)
+    states = tables["participants"]["state"].value_counts()
+    print("participants:", ", ".join(f"{count} {state}" for state, count in states.items() if count))
+    print(summary(tables).to_string(index=False, float_format=lambda value: f"{value:.3f}"))
+
+
+if __name__ == "__main__":
+    main()
