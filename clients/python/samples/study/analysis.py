@@ -83,7 +83,11 @@ def main() -> None:
     tables = read(parser.parse_args().folder)
     states = tables["participants"]["state"].value_counts()
     print("participants:", ", ".join(f"{count} {state}" for state, count in states.items() if count))
-    print(summary(tables).to_string(index=False, float_format=lambda value: f"{value:.3f}"))
+    figures = summary(tables)
+    if figures.empty:
+        print("no finished games and no answers yet")
+    else:
+        print(figures.to_string(index=False, float_format=lambda value: f"{value:.3f}"))
 
 
 if __name__ == "__main__":
