@@ -57,6 +57,15 @@ fn settings() -> v1::StudySettings {
     }
 }
 
+/// A step of a participant, in its first session.
+fn at(number: u32, step: usize) -> At {
+    At {
+        number,
+        session: 1,
+        step,
+    }
+}
+
 struct Lab {
     store: Arc<dyn Store>,
     studies: Arc<Studies>,
@@ -195,12 +204,7 @@ async fn a_study_sleeps_when_the_one_who_waited_for_a_room_has_left() {
     .await;
     assert_eq!(lab.study.open(1).await.expect("it runs"), Ok(1));
     let _present = lab.study.present(1, 1).await;
-    let at = At {
-        number: 1,
-        session: 1,
-        step: 0,
-    };
-    assert_eq!(lab.study.consent(at).await.expect("it runs"), Ok(0));
+    assert_eq!(lab.study.consent(at(1, 0)).await.expect("it runs"), Ok(0));
     lab.settled().await;
     let games = |study: &Study| study.participants()[&1].games.len();
     assert_eq!(lab.study.read(games), 1, "it waits for a room");
@@ -252,12 +256,7 @@ async fn a_study_is_deleted_once_nobody_is_in_the_middle_of_it() {
     assert_eq!(study.open(1).await.expect("it runs"), Ok(1));
     let refused = studies.delete(Arc::clone(study), false).await;
     assert_eq!(refused.expect("it runs"), Err(1));
-    let at = At {
-        number: 1,
-        session: 1,
-        step: 0,
-    };
-    let consented = study.consent(at).await.expect("it runs");
+    let consented = study.consent(at(1, 0)).await.expect("it runs");
     assert_eq!(consented, Ok(0), "it continues");
     // Its game begins when it is there.
     let _present = study.present(1, 1).await;
@@ -468,11 +467,6 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         },
     );
     let lab = Lab::with(&ServerConfig::default(), settings, 4).await;
-    let at = |number, step| At {
-        number,
-        session: 1,
-        step,
-    };
     for number in 1..=3 {
         assert_eq!(lab.study.open(number).await.expect("it runs"), Ok(1));
         let consented = lab.study.consent(at(number, 0)).await;
@@ -595,12 +589,7 @@ async fn traces_that_were_sent_again_are_exported_once() {
     let lab = Lab::with(&ServerConfig::default(), settings, 1).await;
     assert_eq!(lab.study.open(1).await.expect("it runs"), Ok(1));
     let _present = lab.study.present(1, 1).await;
-    let at = At {
-        number: 1,
-        session: 1,
-        step: 0,
-    };
-    assert_eq!(lab.study.consent(at).await.expect("it runs"), Ok(0));
+    assert_eq!(lab.study.consent(at(1, 0)).await.expect("it runs"), Ok(0));
     lab.settled().await;
     let game = |study: &Study| Id(study.participants()[&1].games[0].placed.game);
     let game = lab.study.read(game);
@@ -718,23 +707,13 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
     let answers: Vec<_> = (0..100).map(answer).collect();
     let mut step = 0;
     let mut answer = async |key, study: &StudyHandle| {
-        let at = At {
-            number: 1,
-            session: 1,
-            step,
-        };
-        let answered = study.answer(key, at, answers.clone()).await;
+        let answered = study.answer(key, at(1, step), answers.clone()).await;
         let answered = answered.expect("it runs");
         step += usize::from(answered.is_ok());
         answered
     };
     // An answer at another step is charged for nothing.
-    let wrong = At {
-        number: 1,
-        session: 1,
-        step: 7,
-    };
-    let refused = study.answer(address(1), wrong, answers.clone()).await;
+    let refused = study.answer(address(1), at(1, 7), answers.clone()).await;
     assert!(
         matches!(refused, Ok(Err(NotAdded::Study(_)))),
         "{refused:?}"
@@ -743,12 +722,9 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
 
     // What is saved replaces what was saved before, and goes when it is answered.
     let save = async |count: usize| {
-        let at = At {
-            number: 1,
-            session: 1,
-            step: 0,
-        };
-        let saved = study.save(address(1), at, answers[..count].to_vec()).await;
+        let saved = study
+            .save(address(1), at(1, 0), answers[..count].to_vec())
+            .await;
         assert_eq!(saved.expect("it runs"), Ok(0));
         studies.common.data.taken() - before
     };

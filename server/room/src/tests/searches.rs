@@ -292,7 +292,7 @@ fn a_hint_that_runs_counts_while_its_seat_returns_from_a_lost_server() {
     assert_eq!(ask(&mut table), Err(HintError::TooMany));
     assert_eq!(table.core.hinted(table.now, seat, decision), Ok(()));
     assert_eq!(ask(&mut table), Ok(()));
-    // One that fails is no hint.
+    // A hint that could not be computed does not count.
     table.core.hint_ended(seat, decision);
     assert_eq!(ask(&mut table), Ok(()));
 }

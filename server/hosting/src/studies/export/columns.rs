@@ -34,6 +34,11 @@ fn optional(value: Option<impl ToString>) -> String {
     value.map_or_else(String::new, text)
 }
 
+/// The code of a value of the protocol, whose name begins with `prefix`.
+fn code_of(name: &str, prefix: &str) -> String {
+    name.trim_start_matches(prefix).to_lowercase()
+}
+
 /// The codes of the study's conditions.
 fn conditions(settings: &Settings) -> Vec<Code> {
     let ids = settings.conditions.iter().map(|it| Code::new(&it.id, ""));
@@ -181,8 +186,7 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
 
 fn state_name(status: Status) -> String {
     let name = convert::participant_state(status).as_str_name();
-    let prefix = "STUDY_PARTICIPANT_STATE_";
-    name.trim_start_matches(prefix).to_lowercase()
+    code_of(name, "STUDY_PARTICIPANT_STATE_")
 }
 
 /// What participants can be, as in `StudyParticipantState`.
@@ -488,7 +492,7 @@ pub(super) fn items<'s>() -> Table<ItemRow<'s>> {
         "step",
         COUNT,
         "step between neighbouring numbers that answer it",
-        |row| optional(numbers_of(&row.item.kind).map(|(.., distance)| distance)),
+        |row| optional(numbers_of(&row.item.kind).map(|(.., step)| step)),
     )
     .empty(IN_WORDS)
     .with(
@@ -725,8 +729,7 @@ pub(super) fn traces<'s>(settings: &Settings) -> Table<TraceRow<'s>> {
 }
 
 fn trace_name(kind: StudyTraceKind) -> String {
-    let prefix = "STUDY_TRACE_KIND_";
-    kind.as_str_name().trim_start_matches(prefix).to_lowercase()
+    code_of(kind.as_str_name(), "STUDY_TRACE_KIND_")
 }
 
 /// The kinds of events that are stored.
