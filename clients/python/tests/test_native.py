@@ -25,6 +25,8 @@ chefshat_native = pytest.importorskip("chefshat_native")
 SOURCE = Path(chefshat.__file__).parents[1]
 # Time limit in seconds.
 WAIT_S = 60
+# Pause in seconds in which the other of two threads may call.
+BETWEEN_CALLS_S = 0.001
 
 AGENTS = ["random", "greedy", "random_unmasked", "trained"]
 
@@ -266,9 +268,10 @@ def test_two_threads_on_one_env_do_not_end_it() -> None:
                 refusals.append(error.reason)
                 if error.reason != "GAMES_IN_USE":
                     raise
+                time.sleep(BETWEEN_CALLS_S)
 
     def look() -> None:
-        while not done.is_set():
+        while not done.wait(BETWEEN_CALLS_S):
             again(env.save)
 
     steps = 0
