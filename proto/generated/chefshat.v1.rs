@@ -8872,6 +8872,30 @@ pub mod study_stage {
         PerCondition(super::StudyBlock),
     }
 }
+/// How people take part who were not given a link of their own, for example from a panel such as
+/// Prolific, SONA or MTurk.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct StudyRecruiting {
+    /// Whether the study has an open link (`open_link` of Study): whoever opens it takes part.
+    #[prost(bool, tag = "1")]
+    pub open_link: bool,
+    /// Name of the query parameter of the open link in which the panel gives a person's id there, for
+    /// example "PROLIFIC_PID": 1..=64 letters, digits, `_`, `-` or `.`. Nobody takes part without such
+    /// an id, or twice with the same. Empty: no id is asked for.
+    #[prost(string, tag = "2")]
+    pub id_parameter: ::prost::alloc::string::String,
+    /// Where those who complete the study go on: empty, or an address that begins with <https://,> at
+    /// most 2000 characters. "{id}" stands for the id at the panel; those without one have no address.
+    #[prost(string, tag = "3")]
+    pub completed_url: ::prost::alloc::string::String,
+    /// As `completed_url`, for those who do not agree or withdraw. The id at the panel is deleted with
+    /// the data of those who have them deleted.
+    #[prost(string, tag = "4")]
+    pub withdrawn_url: ::prost::alloc::string::String,
+    /// As `completed_url`, for those who cannot begin because the study is closed or full.
+    #[prost(string, tag = "5")]
+    pub full_url: ::prost::alloc::string::String,
+}
 /// The settings of a study. In a request an unset field means its default; in a response every field
 /// is set.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -8923,6 +8947,9 @@ pub struct StudySettings {
     /// Milliseconds since the Unix epoch when the study closes; 0: when its owner closes it.
     #[prost(uint64, tag = "14")]
     pub closes_at_ms: u64,
+    /// How people without a link of their own take part; by default nobody does.
+    #[prost(message, optional, tag = "15")]
+    pub recruiting: ::core::option::Option<StudyRecruiting>,
 }
 /// A consent that was given. Only for researchers.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -9025,6 +9052,9 @@ pub struct StudyParticipant {
     /// Whether its data were deleted.
     #[prost(bool, tag = "13")]
     pub data_deleted: bool,
+    /// Its id at the panel (StudyRecruiting); empty if there is none, and after its data were deleted.
+    #[prost(string, tag = "14")]
+    pub panel_id: ::prost::alloc::string::String,
 }
 /// The link of a participant.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -9082,6 +9112,10 @@ pub struct Study {
     /// Number of participants who have withdrawn, dropped out or were removed.
     #[prost(uint32, tag = "13")]
     pub left: u32,
+    /// The open link, if the settings have one: 30 characters that need no escaping. The page's address
+    /// for it is the path "/study/" and this text.
+    #[prost(string, tag = "14")]
+    pub open_link: ::prost::alloc::string::String,
 }
 /// What a participant is shown now. This and all that follows reaches participants.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -9217,11 +9251,14 @@ pub struct StudyShownGame {
     pub labelled: bool,
 }
 /// The end of a participation.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StudyEnd {
     /// The reason.
     #[prost(enumeration = "StudyEndReason", tag = "1")]
     pub reason: i32,
+    /// Where the participant goes on (StudyRecruiting); empty if nowhere.
+    #[prost(string, tag = "2")]
+    pub url: ::prost::alloc::string::String,
 }
 /// An answer to an item. Sent by participants.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -9778,6 +9815,28 @@ pub struct DeleteStudyResponse {
     /// Number of games that were deleted with their records.
     #[prost(uint32, tag = "2")]
     pub games: u32,
+}
+/// Requests to take part by an open link.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct JoinStudyRequest {
+    /// `open_link` of Study.
+    #[prost(string, tag = "1")]
+    pub open_link: ::prost::alloc::string::String,
+    /// The person's id at the panel, 1..=128 characters, the value of the query parameter
+    /// `id_parameter` of StudyRecruiting; empty if that is empty.
+    #[prost(string, tag = "2")]
+    pub panel_id: ::prost::alloc::string::String,
+    /// 32 random bytes, which must be kept secret. A repeated call with the same ones, after a lost
+    /// response, adds nobody and returns the same link.
+    #[prost(bytes = "vec", tag = "3")]
+    pub request_id: ::prost::alloc::vec::Vec<u8>,
+}
+/// The participant takes part.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct JoinStudyResponse {
+    /// The secret of its link, as `link` of StudyLink.
+    #[prost(string, tag = "1")]
+    pub link: ::prost::alloc::string::String,
 }
 /// Requests to open the study.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -11180,10 +11239,43 @@ pub mod participation_service_client {
             self.inner = self.inner.max_encoding_message_size(limit);
             self
         }
+        /// Takes part by an open link (`open_link` of Study), and returns a link of one's own, which
+        /// OpenStudy opens. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+        /// INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
+        /// RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN). STUDY_CLOSED and
+        /// STUDY_FULL, also of OpenStudy and GiveConsent, have the metadata `url` if the study has a
+        /// `full_url`.
+        pub async fn join_study(
+            &mut self,
+            request: impl tonic::IntoRequest<super::JoinStudyRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::JoinStudyResponse>,
+            tonic::Status,
+        > {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = crate::codec::CallCodec::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/chefshat.v1.ParticipationService/JoinStudy",
+            );
+            let mut req = request.into_request();
+            req.extensions_mut()
+                .insert(
+                    GrpcMethod::new("chefshat.v1.ParticipationService", "JoinStudy"),
+                );
+            self.inner.unary(req, path, codec).await
+        }
         /// Opens the study on this device: the participant's earlier session ends. For a participant whose
         /// participation is over there is only the end to show, and no session. UNAUTHENTICATED
-        /// (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL); RESOURCE_EXHAUSTED
-        /// (TOO_MANY_SESSIONS); UNAVAILABLE (SHUTTING_DOWN).
+        /// (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; LINK_OPEN for an open link, with the
+        /// metadata `id_parameter`: take part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS);
+        /// UNAVAILABLE (SHUTTING_DOWN).
         pub async fn open_study(
             &mut self,
             request: impl tonic::IntoRequest<super::OpenStudyRequest>,
@@ -11439,10 +11531,24 @@ pub mod participation_service_server {
     /// Generated trait containing gRPC methods that should be implemented for use with ParticipationServiceServer.
     #[async_trait]
     pub trait ParticipationService: std::marker::Send + std::marker::Sync + 'static {
+        /// Takes part by an open link (`open_link` of Study), and returns a link of one's own, which
+        /// OpenStudy opens. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+        /// INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
+        /// RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN). STUDY_CLOSED and
+        /// STUDY_FULL, also of OpenStudy and GiveConsent, have the metadata `url` if the study has a
+        /// `full_url`.
+        async fn join_study(
+            &self,
+            request: tonic::Request<super::JoinStudyRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::JoinStudyResponse>,
+            tonic::Status,
+        >;
         /// Opens the study on this device: the participant's earlier session ends. For a participant whose
         /// participation is over there is only the end to show, and no session. UNAUTHENTICATED
-        /// (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL); RESOURCE_EXHAUSTED
-        /// (TOO_MANY_SESSIONS); UNAVAILABLE (SHUTTING_DOWN).
+        /// (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; LINK_OPEN for an open link, with the
+        /// metadata `id_parameter`: take part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS);
+        /// UNAVAILABLE (SHUTTING_DOWN).
         async fn open_study(
             &self,
             request: tonic::Request<super::OpenStudyRequest>,
@@ -11612,6 +11718,52 @@ pub mod participation_service_server {
         }
         fn call(&mut self, req: http::Request<B>) -> Self::Future {
             match req.uri().path() {
+                "/chefshat.v1.ParticipationService/JoinStudy" => {
+                    #[allow(non_camel_case_types)]
+                    struct JoinStudySvc<T: ParticipationService>(pub Arc<T>);
+                    impl<
+                        T: ParticipationService,
+                    > tonic::server::UnaryService<super::JoinStudyRequest>
+                    for JoinStudySvc<T> {
+                        type Response = super::JoinStudyResponse;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::Response>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<super::JoinStudyRequest>,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as ParticipationService>::join_study(&inner, request)
+                                    .await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = JoinStudySvc(inner);
+                        let codec = crate::codec::CallCodec::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.unary(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
                 "/chefshat.v1.ParticipationService/OpenStudy" => {
                     #[allow(non_camel_case_types)]
                     struct OpenStudySvc<T: ParticipationService>(pub Arc<T>);

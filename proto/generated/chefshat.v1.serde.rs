@@ -17537,6 +17537,229 @@ impl<'de> serde::Deserialize<'de> for JoinRoomResponse {
         deserializer.deserialize_struct("chefshat.v1.JoinRoomResponse", FIELDS, GeneratedVisitor)
     }
 }
+impl serde::Serialize for JoinStudyRequest {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if !self.open_link.is_empty() {
+            len += 1;
+        }
+        if !self.panel_id.is_empty() {
+            len += 1;
+        }
+        if !self.request_id.is_empty() {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.JoinStudyRequest", len)?;
+        if !self.open_link.is_empty() {
+            struct_ser.serialize_field("openLink", &self.open_link)?;
+        }
+        if !self.panel_id.is_empty() {
+            struct_ser.serialize_field("panelId", &self.panel_id)?;
+        }
+        if !self.request_id.is_empty() {
+            #[allow(clippy::needless_borrow)]
+            #[allow(clippy::needless_borrows_for_generic_args)]
+            struct_ser.serialize_field("requestId", pbjson::private::base64::encode(&self.request_id).as_str())?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for JoinStudyRequest {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "open_link",
+            "openLink",
+            "panel_id",
+            "panelId",
+            "request_id",
+            "requestId",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            OpenLink,
+            PanelId,
+            RequestId,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "openLink" | "open_link" => Ok(GeneratedField::OpenLink),
+                            "panelId" | "panel_id" => Ok(GeneratedField::PanelId),
+                            "requestId" | "request_id" => Ok(GeneratedField::RequestId),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = JoinStudyRequest;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.JoinStudyRequest")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<JoinStudyRequest, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut open_link__ = None;
+                let mut panel_id__ = None;
+                let mut request_id__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::OpenLink => {
+                            if open_link__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("openLink"));
+                            }
+                            open_link__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::PanelId => {
+                            if panel_id__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("panelId"));
+                            }
+                            panel_id__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::RequestId => {
+                            if request_id__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("requestId"));
+                            }
+                            request_id__ = 
+                                Some(map_.next_value::<::pbjson::private::BytesDeserialize<_>>()?.0)
+                            ;
+                        }
+                    }
+                }
+                Ok(JoinStudyRequest {
+                    open_link: open_link__.unwrap_or_default(),
+                    panel_id: panel_id__.unwrap_or_default(),
+                    request_id: request_id__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.JoinStudyRequest", FIELDS, GeneratedVisitor)
+    }
+}
+impl serde::Serialize for JoinStudyResponse {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if !self.link.is_empty() {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.JoinStudyResponse", len)?;
+        if !self.link.is_empty() {
+            struct_ser.serialize_field("link", &self.link)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for JoinStudyResponse {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "link",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Link,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "link" => Ok(GeneratedField::Link),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = JoinStudyResponse;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.JoinStudyResponse")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<JoinStudyResponse, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut link__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Link => {
+                            if link__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("link"));
+                            }
+                            link__ = Some(map_.next_value()?);
+                        }
+                    }
+                }
+                Ok(JoinStudyResponse {
+                    link: link__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.JoinStudyResponse", FIELDS, GeneratedVisitor)
+    }
+}
 impl serde::Serialize for JoinTournamentRequest {
     #[allow(deprecated)]
     fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
@@ -35315,6 +35538,9 @@ impl serde::Serialize for Study {
         if self.left != 0 {
             len += 1;
         }
+        if !self.open_link.is_empty() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.Study", len)?;
         if !self.study_id.is_empty() {
             struct_ser.serialize_field("studyId", &self.study_id)?;
@@ -35359,6 +35585,9 @@ impl serde::Serialize for Study {
         if self.left != 0 {
             struct_ser.serialize_field("left", &self.left)?;
         }
+        if !self.open_link.is_empty() {
+            struct_ser.serialize_field("openLink", &self.open_link)?;
+        }
         struct_ser.end()
     }
 }
@@ -35386,6 +35615,8 @@ impl<'de> serde::Deserialize<'de> for Study {
             "active",
             "completed",
             "left",
+            "open_link",
+            "openLink",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -35403,6 +35634,7 @@ impl<'de> serde::Deserialize<'de> for Study {
             Active,
             Completed,
             Left,
+            OpenLink,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -35437,6 +35669,7 @@ impl<'de> serde::Deserialize<'de> for Study {
                             "active" => Ok(GeneratedField::Active),
                             "completed" => Ok(GeneratedField::Completed),
                             "left" => Ok(GeneratedField::Left),
+                            "openLink" | "open_link" => Ok(GeneratedField::OpenLink),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -35469,6 +35702,7 @@ impl<'de> serde::Deserialize<'de> for Study {
                 let mut active__ = None;
                 let mut completed__ = None;
                 let mut left__ = None;
+                let mut open_link__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::StudyId => {
@@ -35569,6 +35803,12 @@ impl<'de> serde::Deserialize<'de> for Study {
                                 Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
                             ;
                         }
+                        GeneratedField::OpenLink => {
+                            if open_link__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("openLink"));
+                            }
+                            open_link__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(Study {
@@ -35585,6 +35825,7 @@ impl<'de> serde::Deserialize<'de> for Study {
                     active: active__.unwrap_or_default(),
                     completed: completed__.unwrap_or_default(),
                     left: left__.unwrap_or_default(),
+                    open_link: open_link__.unwrap_or_default(),
                 })
             }
         }
@@ -36414,11 +36655,17 @@ impl serde::Serialize for StudyEnd {
         if self.reason != 0 {
             len += 1;
         }
+        if !self.url.is_empty() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyEnd", len)?;
         if self.reason != 0 {
             let v = StudyEndReason::try_from(self.reason)
                 .map_err(|_| serde::ser::Error::custom(format!("Invalid variant {}", self.reason)))?;
             struct_ser.serialize_field("reason", &v)?;
+        }
+        if !self.url.is_empty() {
+            struct_ser.serialize_field("url", &self.url)?;
         }
         struct_ser.end()
     }
@@ -36431,11 +36678,13 @@ impl<'de> serde::Deserialize<'de> for StudyEnd {
     {
         const FIELDS: &[&str] = &[
             "reason",
+            "url",
         ];
 
         #[allow(clippy::enum_variant_names)]
         enum GeneratedField {
             Reason,
+            Url,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -36458,6 +36707,7 @@ impl<'de> serde::Deserialize<'de> for StudyEnd {
                     {
                         match value {
                             "reason" => Ok(GeneratedField::Reason),
+                            "url" => Ok(GeneratedField::Url),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -36478,6 +36728,7 @@ impl<'de> serde::Deserialize<'de> for StudyEnd {
                     V: serde::de::MapAccess<'de>,
             {
                 let mut reason__ = None;
+                let mut url__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Reason => {
@@ -36486,10 +36737,17 @@ impl<'de> serde::Deserialize<'de> for StudyEnd {
                             }
                             reason__ = Some(map_.next_value::<StudyEndReason>()? as i32);
                         }
+                        GeneratedField::Url => {
+                            if url__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("url"));
+                            }
+                            url__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(StudyEnd {
                     reason: reason__.unwrap_or_default(),
+                    url: url__.unwrap_or_default(),
                 })
             }
         }
@@ -38283,6 +38541,9 @@ impl serde::Serialize for StudyParticipant {
         if self.data_deleted {
             len += 1;
         }
+        if !self.panel_id.is_empty() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyParticipant", len)?;
         if self.number != 0 {
             struct_ser.serialize_field("number", &self.number)?;
@@ -38329,6 +38590,9 @@ impl serde::Serialize for StudyParticipant {
         if self.data_deleted {
             struct_ser.serialize_field("dataDeleted", &self.data_deleted)?;
         }
+        if !self.panel_id.is_empty() {
+            struct_ser.serialize_field("panelId", &self.panel_id)?;
+        }
         struct_ser.end()
     }
 }
@@ -38355,6 +38619,8 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
             "games",
             "data_deleted",
             "dataDeleted",
+            "panel_id",
+            "panelId",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -38372,6 +38638,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
             Consent,
             Games,
             DataDeleted,
+            PanelId,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -38406,6 +38673,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                             "consent" => Ok(GeneratedField::Consent),
                             "games" => Ok(GeneratedField::Games),
                             "dataDeleted" | "data_deleted" => Ok(GeneratedField::DataDeleted),
+                            "panelId" | "panel_id" => Ok(GeneratedField::PanelId),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -38438,6 +38706,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                 let mut consent__ = None;
                 let mut games__ = None;
                 let mut data_deleted__ = None;
+                let mut panel_id__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Number => {
@@ -38530,6 +38799,12 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                             }
                             data_deleted__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::PanelId => {
+                            if panel_id__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("panelId"));
+                            }
+                            panel_id__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(StudyParticipant {
@@ -38546,6 +38821,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                     consent: consent__,
                     games: games__.unwrap_or_default(),
                     data_deleted: data_deleted__.unwrap_or_default(),
+                    panel_id: panel_id__.unwrap_or_default(),
                 })
             }
         }
@@ -39198,6 +39474,170 @@ impl<'de> serde::Deserialize<'de> for StudyRecord {
         deserializer.deserialize_struct("chefshat.v1.StudyRecord", FIELDS, GeneratedVisitor)
     }
 }
+impl serde::Serialize for StudyRecruiting {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if self.open_link {
+            len += 1;
+        }
+        if !self.id_parameter.is_empty() {
+            len += 1;
+        }
+        if !self.completed_url.is_empty() {
+            len += 1;
+        }
+        if !self.withdrawn_url.is_empty() {
+            len += 1;
+        }
+        if !self.full_url.is_empty() {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyRecruiting", len)?;
+        if self.open_link {
+            struct_ser.serialize_field("openLink", &self.open_link)?;
+        }
+        if !self.id_parameter.is_empty() {
+            struct_ser.serialize_field("idParameter", &self.id_parameter)?;
+        }
+        if !self.completed_url.is_empty() {
+            struct_ser.serialize_field("completedUrl", &self.completed_url)?;
+        }
+        if !self.withdrawn_url.is_empty() {
+            struct_ser.serialize_field("withdrawnUrl", &self.withdrawn_url)?;
+        }
+        if !self.full_url.is_empty() {
+            struct_ser.serialize_field("fullUrl", &self.full_url)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyRecruiting {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "open_link",
+            "openLink",
+            "id_parameter",
+            "idParameter",
+            "completed_url",
+            "completedUrl",
+            "withdrawn_url",
+            "withdrawnUrl",
+            "full_url",
+            "fullUrl",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            OpenLink,
+            IdParameter,
+            CompletedUrl,
+            WithdrawnUrl,
+            FullUrl,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "openLink" | "open_link" => Ok(GeneratedField::OpenLink),
+                            "idParameter" | "id_parameter" => Ok(GeneratedField::IdParameter),
+                            "completedUrl" | "completed_url" => Ok(GeneratedField::CompletedUrl),
+                            "withdrawnUrl" | "withdrawn_url" => Ok(GeneratedField::WithdrawnUrl),
+                            "fullUrl" | "full_url" => Ok(GeneratedField::FullUrl),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = StudyRecruiting;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.StudyRecruiting")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<StudyRecruiting, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut open_link__ = None;
+                let mut id_parameter__ = None;
+                let mut completed_url__ = None;
+                let mut withdrawn_url__ = None;
+                let mut full_url__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::OpenLink => {
+                            if open_link__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("openLink"));
+                            }
+                            open_link__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::IdParameter => {
+                            if id_parameter__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("idParameter"));
+                            }
+                            id_parameter__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::CompletedUrl => {
+                            if completed_url__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("completedUrl"));
+                            }
+                            completed_url__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::WithdrawnUrl => {
+                            if withdrawn_url__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("withdrawnUrl"));
+                            }
+                            withdrawn_url__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::FullUrl => {
+                            if full_url__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("fullUrl"));
+                            }
+                            full_url__ = Some(map_.next_value()?);
+                        }
+                    }
+                }
+                Ok(StudyRecruiting {
+                    open_link: open_link__.unwrap_or_default(),
+                    id_parameter: id_parameter__.unwrap_or_default(),
+                    completed_url: completed_url__.unwrap_or_default(),
+                    withdrawn_url: withdrawn_url__.unwrap_or_default(),
+                    full_url: full_url__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.StudyRecruiting", FIELDS, GeneratedVisitor)
+    }
+}
 impl serde::Serialize for StudySemanticDifferential {
     #[allow(deprecated)]
     fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
@@ -39375,6 +39815,9 @@ impl serde::Serialize for StudySettings {
         if self.closes_at_ms != 0 {
             len += 1;
         }
+        if self.recruiting.is_some() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudySettings", len)?;
         if !self.name.is_empty() {
             struct_ser.serialize_field("name", &self.name)?;
@@ -39426,6 +39869,9 @@ impl serde::Serialize for StudySettings {
             #[allow(clippy::needless_borrows_for_generic_args)]
             struct_ser.serialize_field("closesAtMs", ToString::to_string(&self.closes_at_ms).as_str())?;
         }
+        if let Some(v) = self.recruiting.as_ref() {
+            struct_ser.serialize_field("recruiting", v)?;
+        }
         struct_ser.end()
     }
 }
@@ -39454,6 +39900,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
             "dropOutAfterMs",
             "closes_at_ms",
             "closesAtMs",
+            "recruiting",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -39472,6 +39919,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
             Traces,
             DropOutAfterMs,
             ClosesAtMs,
+            Recruiting,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -39507,6 +39955,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                             "traces" => Ok(GeneratedField::Traces),
                             "dropOutAfterMs" | "drop_out_after_ms" => Ok(GeneratedField::DropOutAfterMs),
                             "closesAtMs" | "closes_at_ms" => Ok(GeneratedField::ClosesAtMs),
+                            "recruiting" => Ok(GeneratedField::Recruiting),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -39540,6 +39989,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                 let mut traces__ = None;
                 let mut drop_out_after_ms__ = None;
                 let mut closes_at_ms__ = None;
+                let mut recruiting__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Name => {
@@ -39639,6 +40089,12 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                                 Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
                             ;
                         }
+                        GeneratedField::Recruiting => {
+                            if recruiting__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("recruiting"));
+                            }
+                            recruiting__ = map_.next_value()?;
+                        }
                     }
                 }
                 Ok(StudySettings {
@@ -39656,6 +40112,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                     traces: traces__.unwrap_or_default(),
                     drop_out_after_ms: drop_out_after_ms__.unwrap_or_default(),
                     closes_at_ms: closes_at_ms__.unwrap_or_default(),
+                    recruiting: recruiting__,
                 })
             }
         }

@@ -138,6 +138,12 @@ export function readdress(search: string, fragment = ""): void {
   history.replaceState(history.state, "", shown + fragment);
 }
 
+/** Gives the page that is shown the address of a route, and shows nothing else. */
+export function replaceAddress(to: Route): void {
+  shown = pathOf(to);
+  history.replaceState(history.state, "", shown);
+}
+
 /** Goes to a page; `replace` adds no entry to the browser's history. */
 export function navigate(to: Route, options: { replace?: boolean; search?: string } = {}): void {
   const address = pathOf(to) + (options.search ?? "");

@@ -87,6 +87,14 @@ test("the form makes the settings of a study, and says what is missing", async (
     "questionnaire",
     "text",
   ]);
+  expect(settings.recruiting).toBe(undefined);
+  const panel = { openLink: true, idParameter: "PROLIFIC_PID", fullUrl: "https://panel.example/full" };
+  const recruited = await settingsOf({ ...filled, ...panel });
+  expect(recruited.recruiting).toEqual({ ...panel, completedUrl: "", withdrawnUrl: "" });
+  expect(Object.keys(faultsOf({ ...filled, ...panel, fullUrl: "http://x", idParameter: "a b" }))).toEqual([
+    "fullUrl",
+    "idParameter",
+  ]);
   const within = await settingsOf({ ...filled, within: true });
   expect(within.stages?.map(({ stage }) => stage?.case)).toEqual(["consent", "practice", "perCondition", "text"]);
 });

@@ -94,6 +94,7 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "TOO_MANY_CONNECTIONS",
     "TOO_MANY_HANDSHAKES",
   ],
+  "it asks the page to join first": ["LINK_OPEN"],
   "only nodes of a cluster send it to each other": ["NOT_OWNER"],
   "environment variables": ["CARGO_MANIFEST_DIR", "CARGO_PKG_VERSION", "CHEFSHAT_PAIRS"],
 };

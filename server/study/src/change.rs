@@ -14,6 +14,8 @@ pub enum Change {
         number: u32,
         /// Its pseudonym.
         pseudonym: String,
+        /// How it joined, if not by being added by a researcher.
+        joined: Option<Joined>,
     },
     /// A participant opened a session, which supersedes its earlier ones.
     Opened {
@@ -120,13 +122,19 @@ impl Change {
         }
     }
 
-    /// Deletes the data of a participant who withdrew and had them deleted: its pseudonym and its
-    /// answers. The changes fold to the same study as before. Returns whether this one is different
+    /// Deletes the data of a participant who withdrew and had them deleted: its pseudonym, its
+    /// answers and its id at the panel. The changes fold to the same study as before. Returns whether this one is different
     /// now and must be stored again.
     pub fn forget(&mut self, forgotten: u32) -> bool {
         match self {
-            Self::Added { number, pseudonym } if *number == forgotten => {
-                !std::mem::take(pseudonym).is_empty()
+            Self::Added {
+                number,
+                pseudonym,
+                joined,
+            } if *number == forgotten => {
+                let panel_id = joined.as_mut().map(|it| std::mem::take(&mut it.panel_id));
+                let had_panel_id = panel_id.is_some_and(|it| !it.is_empty());
+                !std::mem::take(pseudonym).is_empty() || had_panel_id
             }
             Self::Answered {
                 number, answers, ..
@@ -139,6 +147,15 @@ impl Change {
             _ => false,
         }
     }
+}
+
+/// How a participant joined by the open link.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Joined {
+    /// SHA-256 of the request id. The same request again adds nobody.
+    pub request_sha256: [u8; 32],
+    /// Its id at the panel; empty if none is asked for.
+    pub panel_id: String,
 }
 
 /// A consent that was given.

@@ -7,7 +7,7 @@ use sha2::{Digest as _, Sha256};
 use thiserror::Error;
 
 use crate::Study;
-use crate::change::{Change, ConsentGiven};
+use crate::change::{Change, ConsentGiven, Joined};
 use crate::games::Phase;
 use crate::questionnaire::{AnswerProblem, ItemAnswer};
 use crate::settings::MAX_PARTICIPANTS;
@@ -55,6 +55,12 @@ pub enum Refusal {
     /// The answers are invalid.
     #[error(transparent)]
     Answers(#[from] AnswerProblem),
+    /// Not an id at the panel, or one that is not asked for.
+    #[error("{0}")]
+    PanelId(String),
+    /// A participant has this id at the panel.
+    #[error("somebody with this id already takes part; go on in the browser in which you began")]
+    PanelIdTaken,
     /// Another participant has this pseudonym.
     #[error("another participant is called {0:?}")]
     NameTaken(String),
@@ -84,7 +90,7 @@ impl Study {
         if self.is_closed() {
             return Err(Refusal::Closed);
         }
-        let first = self.participants().len() as u32 + 1;
+        let first = self.next_number();
         if self.participants().len() + pseudonyms.len() > MAX_PARTICIPANTS as usize {
             return Err(Refusal::TooManyParticipants);
         }
@@ -106,9 +112,60 @@ impl Study {
                     .find(|name| taken.insert(name.to_lowercase()))
                     .expect("there are more numbers than participants");
             }
-            changes.push(Change::Added { number, pseudonym });
+            changes.push(Change::Added {
+                number,
+                pseudonym,
+                joined: None,
+            });
         }
         Ok(changes)
+    }
+
+    /// The number of the participant that is added next.
+    pub fn next_number(&self) -> u32 {
+        self.participants().len() as u32 + 1
+    }
+
+    /// The participant who joined by the open link with a request, and the change that adds it unless
+    /// the request is repeated.
+    ///
+    /// # Errors
+    /// The study has no open link, is closed, full, or has too many participants; or the id at the
+    /// panel is refused or taken.
+    pub fn join(&self, joined: Joined) -> Result<(u32, Option<Change>), Refusal> {
+        let recruiting = &self.settings().recruiting;
+        if !recruiting.open_link {
+            return Err(Refusal::Unknown);
+        }
+        let mut by_link = (self.participants().iter())
+            .filter_map(|(number, it)| Some((*number, it.joined.as_ref()?)));
+        let is_repeated =
+            |(_, other): &(u32, &Joined)| other.request_sha256 == joined.request_sha256;
+        if let Some((number, _)) = by_link.clone().find(is_repeated) {
+            return Ok((number, None));
+        }
+        recruiting
+            .check_panel_id(&joined.panel_id)
+            .map_err(Refusal::PanelId)?;
+        let has_id = !joined.panel_id.is_empty();
+        if has_id && by_link.any(|(_, other)| other.panel_id == joined.panel_id) {
+            return Err(Refusal::PanelIdTaken);
+        }
+        let mut changes = self.add(&[String::new()])?;
+        self.free_slot().ok_or(Refusal::Full)?;
+        let Some(Change::Added {
+            number, pseudonym, ..
+        }) = changes.pop()
+        else {
+            return Err(Refusal::TooManyParticipants);
+        };
+        let joined = Some(joined);
+        let change = Change::Added {
+            number,
+            pseudonym,
+            joined,
+        };
+        Ok((number, Some(change)))
     }
 
     /// The change that opens a session of a participant, which is the newest then; `None` if its

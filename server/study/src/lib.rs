@@ -29,6 +29,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod address;
 mod assignment;
 mod chance;
 mod change;
@@ -38,6 +39,7 @@ mod games;
 mod link;
 mod presence;
 mod questionnaire;
+mod recruiting;
 mod settings;
 mod stage;
 mod state;
@@ -50,7 +52,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 pub use assignment::Order;
-pub use change::{Change, ConsentGiven, Outcome, PlacedGame};
+pub use change::{Change, ConsentGiven, Joined, Outcome, PlacedGame};
 pub use checks::SettingsProblem;
 pub use commands::{At, MAX_SAVES, MAX_SESSIONS, Refusal};
 pub use games::{DueGame, MAX_ATTEMPTS};
@@ -58,6 +60,7 @@ pub use link::{ParticipantLink, SessionSecret};
 pub use questionnaire::{
     Answer, AnswerProblem, Item, ItemAnswer, ItemKind, MAX_ITEMS, MAX_OPTIONS, Questionnaire,
 };
+pub use recruiting::Recruiting;
 pub use settings::{
     Condition, Factor, Hide, Labels, MAX_FACTORS, MAX_GAMES, MAX_LEVELS, MAX_PARTICIPANTS,
     MAX_SEEDS, MAX_STEPS, Settings,

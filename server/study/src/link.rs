@@ -1,5 +1,5 @@
 //! Links of participants: the study, the participant's number, and a code that only the server can
-//! compute. Sessions have the number of the session as well. Nothing is stored for them.
+//! compute. Number 0 is the open link of a study. Sessions have the number of the session as well. Nothing is stored for them.
 
 use std::fmt;
 
@@ -12,6 +12,8 @@ const STUDY_BYTES: usize = 12;
 const NUMBER_BYTES: usize = 2;
 const CODE_BYTES: usize = 8;
 const LINK_BYTES: usize = STUDY_BYTES + NUMBER_BYTES + CODE_BYTES;
+/// The number in an open link: participants have numbers from 1.
+const OPEN: u32 = 0;
 /// Separates these codes from others of the same key.
 const PURPOSE: &[u8] = b"chefshat.v1 study link";
 
@@ -36,6 +38,16 @@ impl ParticipantLink {
             number,
             code: std::array::from_fn(|index| code[index]),
         }
+    }
+
+    /// The open link of a study, by which people join.
+    pub fn open(key: &[u8; 32], study: [u8; STUDY_BYTES]) -> Self {
+        Self::new(key, study, OPEN)
+    }
+
+    /// Whether it is the open link of its study, if the study made it.
+    pub fn is_open(&self) -> bool {
+        u32::from(self.number) == OPEN
     }
 
     /// Reads a link, which may be forged; `None` if the text is not one.

@@ -7,6 +7,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::assignment::Order;
 use crate::checks::{Checked, characters, identifier, refuse, unique, within};
+use crate::recruiting::Recruiting;
 use crate::stage::{MAX_BLOCK, MAX_STAGES, Stage, Step, Task, steps};
 use crate::templates::Language;
 
@@ -56,6 +57,8 @@ pub struct Settings {
     pub drop_out_after_ms: u64,
     /// When the study closes, in milliseconds since the Unix epoch.
     pub closes_at_ms: Option<u64>,
+    /// How people without a link of their own take part.
+    pub recruiting: Recruiting,
 }
 
 /// A factor of the design.
@@ -168,6 +171,7 @@ impl Settings {
         within("participants", self.participants, 1..=MAX_PARTICIPANTS)?;
         self.check_design()?;
         self.check_stages()?;
+        self.recruiting.check("recruiting")?;
         let away = self.drop_out_after_ms;
         within("drop_out_after_ms", away, 60_000..=604_800_000)
     }

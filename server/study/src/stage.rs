@@ -1,7 +1,8 @@
 //! The stages of a study, and the steps of a participant: stages with those of a block repeated for
 //! each of its conditions.
 
-use crate::checks::{Checked, characters, refuse, within};
+use crate::address;
+use crate::checks::{Checked, characters, within};
 use crate::questionnaire::Questionnaire;
 
 /// Maximum number of stages.
@@ -12,8 +13,8 @@ pub const MAX_BLOCK: usize = 20;
 pub const MAX_STAGE_GAMES: u32 = 100;
 /// Maximum length of a text to read or agree to, in characters.
 const MAX_TEXT: usize = 20_000;
-/// Maximum length of an address and of the text above it, in characters.
-const MAX_ADDRESS: usize = 2000;
+/// Maximum length of the text above an address, in characters.
+const MAX_TEXT_ABOVE: usize = 2000;
 /// What an address may contain, to be replaced by the participant's pseudonym.
 const PLACEHOLDER: &str = "{participant}";
 
@@ -129,8 +130,8 @@ impl Task {
             Self::Questionnaire(it) => it.check(&format!("{field}.questionnaire")),
             Self::External(external) => {
                 let field = format!("{field}.external_questionnaire");
-                characters(&format!("{field}.text"), &external.text, 0..=MAX_ADDRESS)?;
-                external.check_url(&format!("{field}.url"))
+                characters(&format!("{field}.text"), &external.text, 0..=MAX_TEXT_ABOVE)?;
+                address::check(&format!("{field}.url"), &external.url, PLACEHOLDER)
             }
             Self::Practice { .. } => Ok(()),
             Self::Games { count } => {
@@ -146,38 +147,11 @@ impl Task {
 }
 
 impl ExternalQuestionnaire {
-    fn check_url(&self, field: &str) -> Checked {
-        characters(field, &self.url, 1..=MAX_ADDRESS)?;
-        let host = self.url.strip_prefix("https://").unwrap_or_default();
-        if host.is_empty() || host.starts_with(['/', '?', '#', '{']) {
-            return refuse(field, "an address must begin with https:// and a host");
-        }
-        let is_allowed = |letter: char| letter.is_ascii_graphic() && !"\"<>\\^`|".contains(letter);
-        if !self.url.chars().all(is_allowed) {
-            return refuse(
-                field,
-                "an address has no spaces, quotes or letters beyond ASCII",
-            );
-        }
-        if self.url.replace(PLACEHOLDER, "").contains(['{', '}']) {
-            return refuse(field, "only {participant} can be filled in");
-        }
-        Ok(())
-    }
-
     /// The questionnaire with its address complete.
     pub(crate) fn filled_in(&self, pseudonym: &str) -> Self {
-        let url = self.url.replace(PLACEHOLDER, &percent_encoded(pseudonym));
-        let text = self.text.clone();
-        Self { text, url }
+        Self {
+            text: self.text.clone(),
+            url: address::filled_in(&self.url, PLACEHOLDER, pseudonym),
+        }
     }
-}
-
-/// Everything but letters and digits, so that a pseudonym cannot add to the address.
-fn percent_encoded(text: &str) -> String {
-    let encoded = text.bytes().map(|byte| match byte {
-        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' => char::from(byte).to_string(),
-        _ => format!("%{byte:02X}"),
-    });
-    encoded.collect()
 }

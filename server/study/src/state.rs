@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::change::{Change, ConsentGiven, Outcome, PlacedGame};
+use crate::change::{Change, ConsentGiven, Joined, Outcome, PlacedGame};
 use crate::questionnaire::ItemAnswer;
 
 /// The state of a participant.
@@ -30,6 +30,9 @@ pub enum Status {
 pub struct Participant {
     /// Its name in games and exported data; empty after its data were deleted.
     pub pseudonym: String,
+    /// How it joined by the open link, if it did. Its id at the panel is empty after its data were
+    /// deleted.
+    pub joined: Option<Joined>,
     /// Its state.
     pub status: Status,
     /// Its slot, or after it has left the one it had; `None` until it begins, or until its consent.
@@ -70,6 +73,11 @@ impl Participant {
     /// The step it is at, from 0; the number of steps once it has completed the study.
     pub fn step(&self) -> usize {
         self.reached_at_ms.len().saturating_sub(1)
+    }
+
+    /// Its id at the panel; empty if there is none.
+    pub fn panel_id(&self) -> &str {
+        self.joined.as_ref().map_or("", |it| &it.panel_id)
     }
 
     /// Whether it keeps its slot. Without its data somebody else is needed there.
@@ -134,9 +142,14 @@ impl StudyState {
     pub(crate) fn apply(&mut self, change: &Change) {
         let steps = self.steps;
         match change {
-            Change::Added { number, pseudonym } => {
+            Change::Added {
+                number,
+                pseudonym,
+                joined,
+            } => {
                 let added = || Participant {
                     pseudonym: pseudonym.clone(),
+                    joined: joined.clone(),
                     status: Status::Invited,
                     slot: None,
                     session: 0,
@@ -264,6 +277,9 @@ impl StudyState {
         if delete_data {
             participant.data_deleted = true;
             participant.pseudonym.clear();
+            if let Some(joined) = &mut participant.joined {
+                joined.panel_id.clear();
+            }
             participant.answers.clear();
             participant.saved_answers = Arc::default();
         }

@@ -4,7 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::{
-    Condition, Consent, Factor, Labels, Language, Order, Settings, Stage, Task, Template, Text,
+    Condition, Consent, Factor, Labels, Language, Order, Recruiting, Settings, Stage, Task,
+    Template, Text,
 };
 
 /// A study between participants in two conditions: consent, a game, a text.
@@ -33,6 +34,7 @@ pub fn settings() -> Settings {
         traces: false,
         drop_out_after_ms: 60_000,
         closes_at_ms: None,
+        recruiting: Recruiting::default(),
     }
 }
 

@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 use crate::Study;
 use crate::games::Phase;
 use crate::questionnaire::{ItemKind, Questionnaire};
+use crate::recruiting::Recruiting;
 use crate::settings::{Hide, Labels};
 use crate::stage::{Consent, ExternalQuestionnaire, Task, Text};
 use crate::state::{Participant, Status};
@@ -45,7 +46,12 @@ pub enum Content {
     /// A game, or practice.
     Game(ShownGame),
     /// Nothing more.
-    End(End),
+    End {
+        /// Why.
+        reason: End,
+        /// Where the participant goes on, if anywhere.
+        url: Option<String>,
+    },
 }
 
 /// A questionnaire, as participants see it.
@@ -113,11 +119,11 @@ impl Study {
         let content = match participant.status {
             Status::Invited => return None,
             Status::Active => self.content(number, participant)?,
-            _ if participant.data_deleted => Content::End(End::DataDeleted),
-            Status::Completed => Content::End(End::Completed),
-            Status::Withdrawn => Content::End(End::Withdrawn),
-            Status::DroppedOut => Content::End(End::DroppedOut),
-            Status::Removed => Content::End(End::Removed),
+            _ if participant.data_deleted => self.end(participant, End::DataDeleted),
+            Status::Completed => self.end(participant, End::Completed),
+            Status::Withdrawn => self.end(participant, End::Withdrawn),
+            Status::DroppedOut => self.end(participant, End::DroppedOut),
+            Status::Removed => self.end(participant, End::Removed),
         };
         let settings = self.settings();
         Some(View {
@@ -129,6 +135,17 @@ impl Study {
             traces: settings.traces,
             content,
         })
+    }
+
+    fn end(&self, participant: &Participant, reason: End) -> Content {
+        let recruiting = &self.settings().recruiting;
+        let url = match participant.status {
+            Status::Completed => &recruiting.completed_url,
+            Status::Withdrawn => &recruiting.withdrawn_url,
+            _ => "",
+        };
+        let url = Recruiting::filled_in(url, participant.panel_id());
+        Content::End { reason, url }
     }
 
     fn content(&self, number: u32, participant: &Participant) -> Option<Content> {

@@ -968,7 +968,7 @@ const ASKED_ELSEWHERE: [(&str, &str); 4] = [
 ];
 
 /// The calls about a study, whose ids and secrets nobody else may know.
-const OF_STUDIES: [&str; 18] = [
+const OF_STUDIES: [&str; 19] = [
     "AddStudyParticipants",
     "AnswerQuestionnaire",
     "CloseStudy",
@@ -980,6 +980,7 @@ const OF_STUDIES: [&str; 18] = [
     "FollowStudy",
     "GetStudy",
     "GiveConsent",
+    "JoinStudy",
     "ListStudies",
     "ListStudyLinks",
     "OpenStudy",
@@ -1159,6 +1160,10 @@ async fn asked_of_study(
         DeleteStudyParticipantRequest
     );
     ask_owner!("DeleteStudy", delete_study, DeleteStudyRequest);
+    ask!(
+        "JoinStudy",
+        participant.join_study(JoinStudyRequest { open_link: link })
+    );
     ask!(
         "OpenStudy",
         participant.open_study(OpenStudyRequest { link: link })

@@ -12,7 +12,15 @@ import { navigate } from "../router";
 import css from "./Own.module.css";
 import { createStudy } from "./owning";
 import { settingsFrom } from "./settings-file";
-import { type ConditionForm, emptyForm, faultsOf, hasTemplates, type StudyForm, settingsOf } from "./study-form";
+import {
+  type ConditionForm,
+  emptyForm,
+  faultsOf,
+  hasTemplates,
+  PANEL_URLS,
+  type StudyForm,
+  settingsOf,
+} from "./study-form";
 
 /** The page. */
 export function NewStudyPage() {
@@ -77,6 +85,7 @@ function FromFile() {
   );
 }
 
+type PanelUrl = (typeof PANEL_URLS)[number];
 const LABELS: readonly ConditionForm["labels"][] = ["players", "kinds", "asTheyAre"];
 
 function FromForm() {
@@ -97,7 +106,11 @@ function FromForm() {
     if (Object.keys(faultsOf(form)).length > 0) return;
     run(async () => navigate({ page: "ownStudy", studyId: await createStudy(await settingsOf(form), requestId) }));
   };
-  const text = (name: "name" | "title" | "version" | "external", label: string, hint?: string) => (
+  const text = (
+    name: "name" | "title" | "version" | "external" | "idParameter" | PanelUrl,
+    label: string,
+    hint?: string,
+  ) => (
     <TextField
       label={label}
       hint={hint}
@@ -117,7 +130,7 @@ function FromForm() {
       fault={faults[name]}
     />
   );
-  const check = (name: "within" | "practice" | "traces", label: string) => (
+  const check = (name: "within" | "practice" | "traces" | "openLink", label: string) => (
     <CheckField label={label} checked={form[name]} onCheck={(checked) => change({ [name]: checked })} />
   );
   const inLanguage = hasTemplates(form.language);
@@ -211,6 +224,13 @@ function FromForm() {
       {text("external", words.external, words.externalHint)}
       {long("debriefing", words.debriefing)}
       {check("traces", words.traces)}
+      {check("openLink", words.openLink)}
+      {form.openLink && (
+        <div class={css.fields} data-part="panel">
+          {text("idParameter", words.idParameter, words.idParameterHint)}
+          {PANEL_URLS.map((name) => text(name, words[name], words.panelUrlHint))}
+        </div>
+      )}
       {fault && <Notice kind="fault">{fault}</Notice>}
       <div>
         <Button type="submit" look="main" busy={busy}>

@@ -129,6 +129,7 @@ export function OwnStudy({ study, participants }: FollowedStudy) {
       </header>
       {closed && <Notice kind="hint">{words.isClosed}</Notice>}
       <Counts study={study} participants={participants} />
+      {!closed && study.openLink && <OpenLink link={study.openLink} />}
       {!closed && <Add studyId={studyId} />}
       <Links key={participants.length} studyId={studyId} />
       <Participants study={study} participants={participants} />
@@ -207,6 +208,20 @@ function Counts({ study, participants }: FollowedStudy) {
           </tbody>
         </table>
       </section>
+    </section>
+  );
+}
+
+/** The link for everyone. */
+function OpenLink({ link }: { link: string }) {
+  const words = t().studies.own.openLink;
+  const address = addressOf({ link });
+  return (
+    <section class={`sheet ${css.part}`} data-part="open-link">
+      <h2>{words.title}</h2>
+      <p class="soft">{words.text}</p>
+      <CopyLine label={words.label} text={address} />
+      <QrCode text={address} label={words.label} />
     </section>
   );
 }
@@ -339,7 +354,7 @@ const LEFT = [
 
 function Row({ study, participant }: { study: Study; participant: StudyParticipant }) {
   const words = t().studies.own;
-  const { number, pseudonym, state, step, sessions, connected, conditions, dataDeleted } = participant;
+  const { number, pseudonym, panelId, state, step, sessions, connected, conditions, dataDeleted } = participant;
   const name = pseudonym || `${words.board.number} ${number}`;
   const over = LEFT.includes(state);
   const running = participant.games.find(({ joinCode }) => joinCode !== "");
@@ -347,7 +362,10 @@ function Row({ study, participant }: { study: Study; participant: StudyParticipa
   return (
     <tr>
       <td class="number">{number}</td>
-      <th scope="row">{dataDeleted ? <span class="soft">{words.board.deleted}</span> : pseudonym}</th>
+      <th scope="row">
+        {dataDeleted ? <span class="soft">{words.board.deleted}</span> : pseudonym}
+        {panelId && <span class="soft small"> {panelId}</span>}
+      </th>
       <td>{conditions.join(", ")}</td>
       <td>{words.state[stateName(state)]}</td>
       <td class="number">

@@ -6,6 +6,7 @@ import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
 import {
   type StudyConsent,
+  type StudyEnd,
   StudyEndReason,
   type StudyExternalQuestionnaire,
   type StudyText,
@@ -18,6 +19,7 @@ import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import buttonCss from "../parts/Button.module.css";
 import { ConfirmButton } from "../parts/ConfirmButton";
+import { download } from "../parts/download";
 import { CheckField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import type { PageProps } from "../router";
@@ -66,6 +68,7 @@ export function Taking({ part }: { part: Participating }) {
       <section class={`sheet ${css.stage}`}>
         <h1>{words.title}</h1>
         <Notice kind="fault">{wordsOf(part.fault.value)}</Notice>
+        <GoOn url={part.fault.value.metadata.url ?? ""} />
       </section>
     );
   }
@@ -123,7 +126,7 @@ function Stage({ view, part }: StageProps) {
   const { content, step, title, traces, pseudonym } = view;
   switch (content.case) {
     case "consent":
-      return <Consent consent={content.value} part={part} />;
+      return <Consent consent={content.value} {...{ title, part }} />;
     case "questionnaire":
       return (
         <section class={`sheet ${css.stage}`}>
@@ -137,13 +140,13 @@ function Stage({ view, part }: StageProps) {
     case "game":
       return <StudyGame game={content.value} {...{ title, traces, part }} />;
     case "end":
-      return <End reason={content.value.reason} pseudonym={pseudonym} />;
+      return <End end={content.value} pseudonym={pseudonym} />;
     default:
       return <p class="soft">{t().common.loading}</p>;
   }
 }
 
-function Consent({ consent, part }: { consent: StudyConsent; part: Participating }) {
+function Consent({ consent, title, part }: { consent: StudyConsent; title: string; part: Participating }) {
   const words = t().studies.consent;
   const [agreed, setAgreed] = useState(false);
   const [tried, setTried] = useState(false);
@@ -160,6 +163,14 @@ function Consent({ consent, part }: { consent: StudyConsent; part: Participating
         <Paragraphs text={consent.text} />
       </section>
       <p class="soft small">{words.version(consent.version)}</p>
+      <div>
+        <Button
+          look="quiet"
+          onClick={() => download(copyOf(title, consent), "consent.txt", "text/plain;charset=utf-8")}
+        >
+          {words.copy}
+        </Button>
+      </div>
       <CheckField
         label={words.agree}
         checked={agreed}
@@ -172,8 +183,16 @@ function Consent({ consent, part }: { consent: StudyConsent; part: Participating
           {words.submit}
         </Button>
       </div>
+      <ConfirmButton label={words.decline} confirm={words.declineDo} act={() => part.withdraw(true).then(() => false)}>
+        {words.declineText}
+      </ConfirmButton>
     </form>
   );
+}
+
+/** The text of a consent as a file for the participant. */
+function copyOf(title: string, { text, version }: StudyConsent): string {
+  return `${title}\n\n${text}\n\n${t().studies.consent.version(version)}\n`;
 }
 
 function Text({ text, part }: { text: StudyText; part: Participating }) {
@@ -244,7 +263,20 @@ const ENDS: Partial<Record<StudyEndReason, keyof ReturnType<typeof t>["studies"]
   [StudyEndReason.REMOVED]: "removed",
 };
 
-function End({ reason, pseudonym }: { reason: StudyEndReason; pseudonym: string }) {
+/** A link to the site from which the participant came. */
+function GoOn({ url }: { url: string }) {
+  const address = safeAddress(url);
+  if (!address) return null;
+  return (
+    <p>
+      <a class={buttonCss.button} data-look="main" data-part="go-on" href={address} rel="noreferrer external">
+        {t().studies.end.goOn(new URL(address).host)}
+      </a>
+    </p>
+  );
+}
+
+function End({ end: { reason, url }, pseudonym }: { end: StudyEnd; pseudonym: string }) {
   const words = t().studies.end;
   const which = ENDS[reason] ?? "completed";
   return (
@@ -252,7 +284,7 @@ function End({ reason, pseudonym }: { reason: StudyEndReason; pseudonym: string 
       <StageTitle>{reason === StudyEndReason.COMPLETED ? words.thanks : words.title}</StageTitle>
       <p>{words.texts[which]}</p>
       {pseudonym && <p class="soft">{words.pseudonym(pseudonym)}</p>}
-      <p>{words.close}</p>
+      {url ? <GoOn url={url} /> : <p>{words.close}</p>}
     </section>
   );
 }

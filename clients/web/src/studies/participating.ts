@@ -1,6 +1,5 @@
 // Taking part in a study: opens it with the link's secret, follows what to show, and sends what the
-// participant does. Nothing is stored on this device: the link is enough to come back, also on
-// another one.
+// participant does. The link is enough to come back, also on another device.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { effect, type Signal, signal } from "@preact/signals";
@@ -8,7 +7,9 @@ import { CALL_LIMIT_MS } from "../api/client";
 import { type Fault, faultOf, isPassing } from "../api/faults";
 import { type Following, follow, type Link } from "../api/follow";
 import type { StudyItemAnswer, StudyItemAnswerSchema, StudyTraceSchema, StudyView } from "../gen/chefshat/v1/study_pb";
+import { replaceAddress } from "../router";
 import { participationApi } from "./client";
+import { join } from "./joining";
 
 /**
  * How this page takes part: opening the study, open, taken over by another page or device, or
@@ -59,12 +60,14 @@ const LONGEST_WAIT_MS = 8_000;
 /** The page is behind: the newest view says what to do. */
 const OUTDATED = ["STEP_OVER", "STEP_MISMATCH", "PARTICIPATION_OVER"];
 
-/** Takes part with the secret of a link. */
-export function startParticipating(secret: string): Participating {
+/** Takes part with the secret of a link: one's own, or the open link of the study. */
+export function startParticipating(given: string): Participating {
+  let secret = given;
   const presence = signal<Presence>("opening");
   const view = signal<StudyView | undefined>(undefined);
   const fault = signal<Fault | undefined>(undefined);
   const link = signal<Link>("connecting");
+  const call = { timeoutMs: CALL_LIMIT_MS };
   let session = "";
   let progress: Progress = { step: -1, reachedAtMs: 0, saved: [] };
   let following: Following | undefined;
@@ -90,6 +93,18 @@ export function startParticipating(secret: string): Participating {
     view.value = next;
   };
 
+  /** An open link leads to one's own, which the page's address has from then on. */
+  const joinFirst = async (thrown: unknown) => {
+    const { reason, metadata } = faultOf(thrown);
+    if (reason !== "LINK_OPEN") throw thrown;
+    const own = await join(secret, metadata.id_parameter ?? "");
+    if (!stopped) {
+      secret = own;
+      replaceAddress({ page: "study", link: own });
+    }
+    return participationApi.openStudy({ link: own }, call);
+  };
+
   const open = async () => {
     leave();
     opened += 1;
@@ -101,7 +116,7 @@ export function startParticipating(secret: string): Participating {
       waitMs = Math.min(LONGEST_WAIT_MS, 2 * waitMs)
     ) {
       try {
-        const answer = await participationApi.openStudy({ link: secret }, { timeoutMs: CALL_LIMIT_MS });
+        const answer = await participationApi.openStudy({ link: secret }, call).catch(joinFirst);
         if (stopped || attempt !== opened) return;
         session = answer.session;
         progress = {
@@ -161,7 +176,6 @@ export function startParticipating(secret: string): Participating {
       throw thrown;
     }
   };
-  const call = { timeoutMs: CALL_LIMIT_MS };
 
   void open();
   return {

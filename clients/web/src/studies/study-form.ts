@@ -31,7 +31,15 @@ export interface StudyForm {
   readonly external: string;
   readonly debriefing: string;
   readonly traces: boolean;
+  readonly openLink: boolean;
+  readonly idParameter: string;
+  readonly completedUrl: string;
+  readonly withdrawnUrl: string;
+  readonly fullUrl: string;
 }
+
+/** The addresses of a panel, by their names in the form and in the protocol. */
+export const PANEL_URLS = ["completedUrl", "withdrawnUrl", "fullUrl"] as const;
 
 /** Whether the questionnaires Godspeed and NASA-TLX have texts in this language. */
 export function hasTemplates(language: Language): boolean {
@@ -60,6 +68,11 @@ export function emptyForm(language: Language): StudyForm {
     external: "",
     debriefing: "",
     traces: false,
+    openLink: false,
+    idParameter: "",
+    completedUrl: "",
+    withdrawnUrl: "",
+    fullUrl: "",
   };
 }
 
@@ -93,7 +106,10 @@ export function faultsOf(form: StudyForm): StudyFaults {
     if (!ID.test(id)) faults[`condition.${index}`] = words.id;
     else if (form.conditions.findIndex((other) => other.id === id) < index) faults[`condition.${index}`] = words.twice;
   });
-  if (form.external !== "" && !form.external.startsWith("https://")) faults.external = words.address;
+  const addresses = ["external", ...(form.openLink ? PANEL_URLS : [])] as const;
+  for (const field of addresses)
+    if (form[field] !== "" && !form[field].startsWith("https://")) faults[field] = words.address;
+  if (form.openLink && form.idParameter !== "" && !ID.test(form.idParameter)) faults.idParameter = words.id;
   return faults;
 }
 
@@ -134,5 +150,10 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
     })),
     stages,
     traces: form.traces,
+    ...(form.openLink && { recruiting: recruitingOf(form) }),
   };
+}
+
+function recruitingOf({ idParameter, completedUrl, withdrawnUrl, fullUrl }: StudyForm) {
+  return { openLink: true, idParameter, completedUrl, withdrawnUrl, fullUrl };
 }

@@ -155,3 +155,77 @@ test("a researcher deletes a study with a participant in the middle of it, and i
   await participant.page.getByRole("alert").waitFor();
   expect(faults).toEqual([]);
 });
+
+test("people of a panel take part by the open link, once each, and go on where the panel says", async () => {
+  const stages = [
+    { stage: { case: "consent" as const, value: { text: "We record your games.", version: "1" } } },
+    { stage: { case: "text" as const, value: { title: "About this study", text: "Thank you." } } },
+  ];
+  const recruiting = {
+    openLink: true,
+    idParameter: "PROLIFIC_PID",
+    completedUrl: "https://panel.example/done?id={id}",
+    withdrawnUrl: "https://panel.example/left",
+    fullUrl: "https://panel.example/full",
+  };
+  const condition = {
+    id: "one",
+    rules: { preset: "paper", faces: 8 },
+    seats: Array.from({ length: 3 }, () => ({ filledBy: { case: "builtInAgent" as const, value: "random" } })),
+  };
+  const plan = { participants: 1, factors: [], conditions: [condition], stages, recruiting };
+  const { studyId, ownerToken } = await newStudy(server, plan);
+  const researcher = await person(browser);
+  await researcher.page.goto(`${server.url}/studies/${studyId}`);
+  await researcher.page.getByLabel("Owner token").fill(ownerToken);
+  await researcher.page.getByRole("button", { name: "Use this key" }).click();
+  const shown = researcher.page.locator('[data-part~="open-link"] [data-part~="invite-link"]');
+  const openLink = ((await shown.textContent()) ?? "").trim();
+  expect(await inaccessible(researcher.page)).toEqual([]);
+
+  const ada = await person(browser, { viewport: PHONE });
+  await ada.page.goto(openLink);
+  await ada.page.getByText("The link has no valid id.").waitFor();
+  await ada.page.goto(`${openLink}?PROLIFIC_PID=ada`);
+  await ada.page.getByRole("heading", { name: "Before you begin" }).waitFor();
+  const own = ada.page.url();
+  expect(own).not.toContain("PROLIFIC_PID");
+  expect(own).not.toContain(openLink);
+  expect(await inaccessible(ada.page)).toEqual([]);
+  expect(await tooWide(ada.page)).toEqual([]);
+  const [copy] = await Promise.all([
+    ada.page.waitForEvent("download"),
+    ada.page.getByRole("button", { name: "Save a copy of this text" }).click(),
+  ]);
+  expect(readFileSync(await copy.path(), "utf8")).toContain("We record your games.");
+  // The panel's link leads the same browser to the same participation.
+  await ada.page.goto(`${openLink}?PROLIFIC_PID=ada`);
+  await until(() => ada.page.url() === own);
+  const elsewhere = await person(browser);
+  await elsewhere.page.goto(`${openLink}?PROLIFIC_PID=ada`);
+  await elsewhere.page.getByText("Somebody with this id already takes part.").waitFor();
+
+  // Bo does not agree.
+  const bo = await person(browser);
+  await bo.page.goto(`${openLink}?PROLIFIC_PID=bo`);
+  await bo.page.getByRole("button", { name: "I do not agree…" }).click();
+  await bo.page.getByRole("button", { name: "I do not take part" }).click();
+  await bo.page.getByText("your data were deleted").waitFor();
+  const onward = ({ page }: typeof bo) => page.locator('[data-part~="go-on"]').getAttribute("href");
+  expect(await onward(bo)).toBe("https://panel.example/left");
+
+  await ada.page.getByLabel("I have read this text").check();
+  await ada.page.getByRole("button", { name: "Agree and continue" }).click();
+  await ada.page.getByRole("button", { name: "Continue" }).click();
+  await ada.page.getByRole("link", { name: "Go on to panel.example" }).waitFor();
+  expect(await onward(ada)).toBe("https://panel.example/done?id=ada");
+  expect(await inaccessible(ada.page)).toEqual([]);
+
+  const late = await person(browser);
+  await late.page.goto(`${openLink}?PROLIFIC_PID=cy`);
+  await late.page.getByText("All places in this study are taken.").waitFor();
+  expect(await onward(late)).toBe("https://panel.example/full");
+  const rows = researcher.page.locator('[data-part~="participants"] tbody tr');
+  await expect.poll(() => rows.allInnerTexts()).toHaveLength(2);
+  expect((await rows.allInnerTexts()).join()).toMatch(/ada[\s\S]*completed/);
+});

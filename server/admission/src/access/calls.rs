@@ -261,6 +261,12 @@ pub const CALLS: &[Call] = &[
     .forwarded(),
     call("/chefshat.v1.StudyService/DeleteStudy", Host, Refused).forwarded(),
     call(
+        "/chefshat.v1.ParticipationService/JoinStudy",
+        Player,
+        Refused,
+    )
+    .forwarded(),
+    call(
         "/chefshat.v1.ParticipationService/OpenStudy",
         Player,
         Refused,

@@ -116,6 +116,10 @@ impl Create {
             Some(file) => say(format_args!("owner token  in {}", file.display()))?,
             None => say(format_args!("owner token  {owner}"))?,
         }
+        if !study.open_link.is_empty() {
+            let address = owner::address(self.server.url(), &study.open_link);
+            say(format_args!("open link    {address}"))?;
+        }
         say(format_args!(
             "seeds sha256 {}",
             hex::encode(&study.seeds_sha256)

@@ -171,7 +171,12 @@ impl Show {
         if owned.json {
             return say(json!(shown));
         }
-        say(summary(&shown.study.unwrap_or_default()))?;
+        let study = shown.study.unwrap_or_default();
+        say(summary(&study))?;
+        if !study.open_link.is_empty() {
+            let address = address(owned.server.url(), &study.open_link);
+            say(format_args!("open link {address}"))?;
+        }
         shown.participants.iter().try_for_each(|it| say(line(it)))
     }
 }
@@ -350,7 +355,7 @@ impl DeleteParticipant {
 }
 
 fn print_link(link: &v1::StudyLink, server: &str, json: bool) -> Result<(), CommandError> {
-    let address = format!("{}/study/{}", server.trim_end_matches('/'), link.link);
+    let address = address(server, &link.link);
     if json {
         let (number, pseudonym) = (link.number, &link.pseudonym);
         return say(json!({
@@ -361,6 +366,11 @@ fn print_link(link: &v1::StudyLink, server: &str, json: bool) -> Result<(), Comm
         "{}\t{}\t{address}",
         link.number, link.pseudonym
     ))
+}
+
+/// The page's address for a link.
+pub(super) fn address(server: &str, link: &str) -> String {
+    format!("{}/study/{link}", server.trim_end_matches('/'))
 }
 
 /// A study in a line.

@@ -510,6 +510,11 @@ fn refused(refusal: StudyRefusal) -> Status {
         StudyRefusal::TooManySaves => (Code::ResourceExhausted, "TOO_MANY_SAVES"),
         StudyRefusal::NameTaken(_) => (Code::AlreadyExists, "NAME_TAKEN"),
         StudyRefusal::TooManyParticipants => (Code::ResourceExhausted, "TOO_MANY_PARTICIPANTS"),
+        StudyRefusal::PanelIdTaken => (Code::AlreadyExists, "PANEL_ID_TAKEN"),
+        StudyRefusal::PanelId(problem) => {
+            let problem = FieldProblem::new("panel_id", problem.clone());
+            return field("PANEL_ID_REFUSED", &problem);
+        }
         StudyRefusal::Answers(problem) => {
             return status(
                 Code::InvalidArgument,

@@ -164,7 +164,9 @@ impl ParticipantData {
             };
             let Some(stored) = stored else { continue };
             let number = stored.changes.iter().find_map(|change| match change {
-                Change::Added { number, pseudonym } if who.is(pseudonym, "") => Some(*number),
+                Change::Added {
+                    number, pseudonym, ..
+                } if who.is(pseudonym, "") => Some(*number),
                 _ => None,
             });
             found.extend(number.map(|number| (stored, number)));

@@ -44,7 +44,7 @@ impl StudyData {
         let take = |bytes| budget.take_many_anyway(Key::Study(id), bytes);
         let participants = study.participants();
         let bytes: usize = (participants.values())
-            .map(|it| memory_of_participant(it.pseudonym.len()))
+            .map(|it| memory_of_participant(it.pseudonym.len() + it.panel_id().len()))
             .sum();
         let answers = participants.iter().map(|(number, participant)| {
             let given = participant.answers.values();
@@ -127,10 +127,10 @@ impl StudyData {
     }
 }
 
-/// Bytes of a participant with a name of this length, of which the task and its handle have a copy
+/// Bytes of a participant with a name, and an id at a panel, of this length together, of which the task and its handle have a copy
 /// each.
-fn memory_of_participant(name: usize) -> usize {
-    2 * (size_of::<Participant>() + name)
+fn memory_of_participant(names: usize) -> usize {
+    2 * (size_of::<Participant>() + names)
 }
 
 /// Bytes of answers, which the copies share.

@@ -6,7 +6,8 @@ use std::sync::{Arc, MutexGuard};
 
 use chefshat_proto::v1;
 use chefshat_study::{
-    At, Change, Content, ItemAnswer, ParticipantLink, Refusal, SessionSecret, Study,
+    At, Change, Content, ItemAnswer, Joined, ParticipantLink, Recruiting, Refusal, SessionSecret,
+    Study,
 };
 use tokio::sync::watch;
 
@@ -75,7 +76,18 @@ impl StudyHandle {
     pub fn describe(&self) -> v1::Study {
         let study = self.committed();
         let header = &self.header;
-        convert::study_to_proto(header.id, &header.settings, header.created_at_ms, &study)
+        let open_link = match study.settings().recruiting.open_link {
+            true => ParticipantLink::open(&header.key, self.short_id()).to_text(),
+            false => String::new(),
+        };
+        let created_at_ms = header.created_at_ms;
+        convert::study_to_proto(
+            header.id,
+            &header.settings,
+            created_at_ms,
+            open_link,
+            &study,
+        )
     }
 
     /// A participant as a message, for researchers.
@@ -120,6 +132,23 @@ impl StudyHandle {
     pub fn number_of(&self, link: &ParticipantLink) -> Option<u32> {
         let number = link.verify(&self.header.key)?;
         self.committed().participant(number).map(|_| number)
+    }
+
+    /// Whether this is the open link of the study.
+    pub fn is_open_link(&self, link: &ParticipantLink) -> bool {
+        link.is_open() && link.verify(&self.header.key).is_some() && self.recruiting().open_link
+    }
+
+    /// How people without a link of their own take part.
+    pub fn recruiting(&self) -> &Recruiting {
+        &self.plan.core.recruiting
+    }
+
+    /// The id of a participant at the panel; empty if there is none.
+    pub fn panel_id(&self, number: u32) -> String {
+        let study = self.committed();
+        let participant = study.participant(number);
+        participant.map_or_else(String::new, |it| it.panel_id().to_owned())
     }
 
     /// The participant and the number of its session with this secret.
@@ -185,12 +214,33 @@ impl StudyHandle {
         };
         let data = Arc::clone(&self.shared.data);
         let added = self.command(move |study, _| {
-            let first = study.participants().len() + 1;
-            let first = u32::try_from(first).unwrap_or(u32::MAX);
+            let first = study.next_number();
             let changes = study.add(&pseudonyms)?;
             // Here, because the caller may go before it gets its answer.
             data.keep_participants(memory);
             Ok((changes, first))
+        });
+        Ok(added.await?.map_err(NotAdded::from))
+    }
+
+    /// Adds a participant who joins by the open link, unless the request is repeated, and charges a
+    /// caller for its memory. Returns its number.
+    ///
+    /// # Errors
+    /// As [`StudyHandle::add`].
+    pub async fn join(&self, key: Key, joined: Joined) -> Result<Result<u32, NotAdded>, Stopped> {
+        let names = [joined.panel_id.clone()];
+        let memory = match self.shared.data.for_participants(key, &names) {
+            Ok(memory) => memory,
+            Err(refused) => return Ok(Err(refused.into())),
+        };
+        let data = Arc::clone(&self.shared.data);
+        let added = self.command(move |study, _| {
+            let (number, change) = study.join(joined)?;
+            if change.is_some() {
+                data.keep_participants(memory);
+            }
+            Ok((Vec::from_iter(change), number))
         });
         Ok(added.await?.map_err(NotAdded::from))
     }
@@ -354,7 +404,7 @@ impl StudyHandle {
             let Some(memory) = memory else {
                 return Ok((changes, 0));
             };
-            let next = u32::try_from(study.participants().len() + 1).unwrap_or(u32::MAX);
+            let next = study.next_number();
             changes.extend(study.add(&[String::new()])?);
             data.keep_participants(memory);
             Ok((changes, next))

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use chefshat_proto::v1;
-use chefshat_study::{Answer, Change, ConsentGiven, ItemAnswer, Outcome, PlacedGame};
+use chefshat_study::{Answer, Change, ConsentGiven, ItemAnswer, Joined, Outcome, PlacedGame};
 use prost::Message;
 
 use super::{Unreadable, array};
@@ -67,6 +67,16 @@ struct AddedForm {
     number: u32,
     #[prost(string, tag = "2")]
     pseudonym: String,
+    #[prost(message, optional, tag = "3")]
+    joined: Option<JoinedForm>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct JoinedForm {
+    #[prost(bytes = "vec", tag = "1")]
+    request_sha256: Vec<u8>,
+    #[prost(string, tag = "2")]
+    panel_id: String,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -296,9 +306,17 @@ fn kind_of(change: &Change) -> KindForm {
         flag,
     };
     match change {
-        Change::Added { number, pseudonym } => KindForm::Added(AddedForm {
+        Change::Added {
+            number,
+            pseudonym,
+            joined,
+        } => KindForm::Added(AddedForm {
             number: *number,
             pseudonym: pseudonym.clone(),
+            joined: joined.as_ref().map(|joined| JoinedForm {
+                request_sha256: joined.request_sha256.to_vec(),
+                panel_id: joined.panel_id.clone(),
+            }),
         }),
         Change::Opened {
             number,
@@ -372,6 +390,13 @@ fn change_of(kind: KindForm) -> Result<Change, Unreadable> {
         KindForm::Added(form) => Change::Added {
             number: form.number,
             pseudonym: form.pseudonym,
+            joined: match form.joined {
+                None => None,
+                Some(joined) => Some(Joined {
+                    request_sha256: array(&joined.request_sha256, "the hash of a request id")?,
+                    panel_id: joined.panel_id,
+                }),
+            },
         },
         KindForm::Opened(form) => Change::Opened {
             number: form.number,

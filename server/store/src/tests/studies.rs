@@ -1,6 +1,6 @@
 //! Stored studies, in each store that has them.
 
-use chefshat_study::{Answer, Change, ConsentGiven, ItemAnswer, Outcome, PlacedGame};
+use chefshat_study::{Answer, Change, ConsentGiven, ItemAnswer, Joined, Outcome, PlacedGame};
 
 use super::*;
 use crate::studies::StudyHeader;
@@ -22,6 +22,7 @@ fn added(number: u32) -> Change {
     Change::Added {
         number,
         pseudonym: format!("Pseudonym {number}"),
+        joined: None,
     }
 }
 
@@ -44,6 +45,14 @@ fn every_change() -> Vec<Change> {
     let (number, at_ms) = (1, 5000);
     vec![
         added(number),
+        Change::Added {
+            number: 2,
+            pseudonym: "P02".to_owned(),
+            joined: Some(Joined {
+                request_sha256: [6; 32],
+                panel_id: "5f2".to_owned(),
+            }),
+        },
         Change::Opened {
             number,
             slot: Some(0),

@@ -9,6 +9,7 @@ mod games;
 mod invariants;
 mod participants;
 mod questionnaires;
+mod recruiting;
 mod settings;
 mod support;
 mod views;

@@ -13,6 +13,11 @@ fn slot(lab: &Lab, number: u32) -> Option<u32> {
     lab.study.participant(number).unwrap().slot
 }
 
+/// The end of a participation without an address to go on to.
+fn over(reason: End) -> Content {
+    Content::End { reason, url: None }
+}
+
 #[test]
 fn a_participant_completes_all_steps() {
     let mut lab = Lab::new(within(2), 1);
@@ -30,10 +35,7 @@ fn a_participant_completes_all_steps() {
     );
     // printf 'I take part.' | sha256sum
     assert_eq!(consent.text_sha256[..4], [0x80, 0xf3, 0x13, 0x13]);
-    assert_eq!(
-        lab.study.view(1).unwrap().content,
-        Content::End(End::Completed)
-    );
+    assert_eq!(lab.study.view(1).unwrap().content, over(End::Completed));
     assert!(lab.folded_again() == lab.study);
 }
 
@@ -110,10 +112,7 @@ fn who_is_away_too_long_drops_out_and_may_return_until_the_slot_is_given_again()
     assert_eq!(slot(&lab, 2), Some(0));
     lab.open(1).unwrap();
     assert_eq!(status(&lab, 1), Status::DroppedOut);
-    assert_eq!(
-        lab.study.view(1).unwrap().content,
-        Content::End(End::DroppedOut)
-    );
+    assert_eq!(lab.study.view(1).unwrap().content, over(End::DroppedOut));
     assert_eq!(lab.study.consent(lab.at(1), 0), Err(Refusal::Over));
 }
 
@@ -137,7 +136,7 @@ fn withdrawing_is_always_possible_and_does_what_it_says() {
         assert_eq!(lab.study.withdraw(number, false, lab.now_ms), Ok(None));
         assert_eq!(
             lab.study.view(number).unwrap().content,
-            Content::End(End::Withdrawn)
+            over(End::Withdrawn)
         );
     }
     let kept = lab.study.participant(1).unwrap();
@@ -149,10 +148,7 @@ fn withdrawing_is_always_possible_and_does_what_it_says() {
     let participant = lab.study.participant(1).unwrap();
     assert!(participant.answers.is_empty() && participant.pseudonym.is_empty());
     assert!(participant.consent.is_some() && participant.games.len() == 5);
-    assert_eq!(
-        lab.study.view(1).unwrap().content,
-        Content::End(End::DataDeleted)
-    );
+    assert_eq!(lab.study.view(1).unwrap().content, over(End::DataDeleted));
 
     // The stored changes lose the data too, and fold to the same study.
     let stored_again = lab.changes.iter_mut().map(|change| change.forget(1));
@@ -173,10 +169,7 @@ fn a_slot_is_given_again_first() {
     assert_eq!(lab.study.remove(1, 0), Ok(None));
     assert_eq!(lab.study.remove(2, 0), Err(Refusal::Over));
     assert_eq!(lab.open(1), Ok(()));
-    assert_eq!(
-        lab.study.view(1).unwrap().content,
-        Content::End(End::Removed)
-    );
+    assert_eq!(lab.study.view(1).unwrap().content, over(End::Removed));
     assert!(lab.study.withdraw(1, true, 0).unwrap().is_some());
     (4..=6).for_each(|number| lab.begin(number));
     let slots: Vec<_> = (3..=6).map(|number| slot(&lab, number)).collect();
@@ -233,7 +226,7 @@ fn who_completed_the_study_has_done_so_without_data_too_but_its_slot_is_free() {
     assert_eq!(status(&lab, 1), Status::Completed);
     assert!(lab.study.participant(1).unwrap().answers.is_empty());
     let view = lab.study.view(1).unwrap();
-    assert_eq!(view.content, Content::End(End::DataDeleted));
+    assert_eq!(view.content, over(End::DataDeleted));
     lab.open(2).unwrap();
     lab.complete(2);
     assert_eq!(status(&lab, 2), Status::Completed);

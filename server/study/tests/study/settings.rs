@@ -112,6 +112,22 @@ fn a_problem_of_the_design_names_its_field() {
     check("drop_out_after_ms", settings(), |it| {
         it.drop_out_after_ms = 1000
     });
+    check("recruiting.id_parameter", settings(), |it| {
+        it.recruiting.open_link = true;
+        it.recruiting.id_parameter = "a b".to_owned();
+    });
+    check("recruiting.id_parameter", settings(), |it| {
+        it.recruiting.id_parameter = "id".to_owned()
+    });
+    check("recruiting.completed_url", settings(), |it| {
+        it.recruiting.completed_url = "javascript:alert(1)".to_owned()
+    });
+    check("recruiting.withdrawn_url", settings(), |it| {
+        it.recruiting.withdrawn_url = "https://{id}.example".to_owned()
+    });
+    check("recruiting.full_url", settings(), |it| {
+        it.recruiting.full_url = "https://panel.example/{id}".to_owned()
+    });
 }
 
 #[test]

@@ -83,7 +83,7 @@ impl Lab {
             Content::Game(_) | Content::External(_) | Content::Text(_) => {
                 self.study.proceed(at, now_ms).unwrap()
             }
-            Content::End(_) => return None,
+            Content::End { .. } => return None,
         };
         self.fold(change);
         due

@@ -16,7 +16,7 @@ fn views(lab: &mut Lab, number: u32) -> Vec<View> {
             // The ids of rooms and games are random.
             game.place = game.place.map(|_| ([0; 16], [0; 16]));
         }
-        let is_end = matches!(view.content, Content::End(_));
+        let is_end = matches!(view.content, Content::End { .. });
         views.push(view);
         if is_end {
             return views;

@@ -12,8 +12,8 @@ use chefshat_room::journal::{Fill, ParticipantKind, SeatLabels};
 use chefshat_room::policy::{Durability, Policy, Visibility};
 use chefshat_study::{
     Condition, Consent, ExternalQuestionnaire, Factor, Hide, Item, ItemKind, Labels, Language,
-    Order, Outcome, Participant, PlayedGame, Questionnaire, Settings, SettingsProblem, Stage,
-    Status, Study, Task, Template, Text,
+    Order, Outcome, Participant, PlayedGame, Questionnaire, Recruiting, Settings, SettingsProblem,
+    Stage, Status, Study, Task, Template, Text,
 };
 
 use super::agent::check_budget;
@@ -93,6 +93,7 @@ pub fn complete_settings(
     if message.drop_out_after_ms == 0 {
         message.drop_out_after_ms = DEFAULT_DROP_OUT_MS;
     }
+    message.recruiting.get_or_insert_default();
     for (index, condition) in message.conditions.iter_mut().enumerate() {
         complete_condition(&format!("conditions[{index}]"), condition, durable)?;
     }
@@ -243,10 +244,21 @@ pub fn study_plan(message: &v1::StudySettings) -> Result<StudyPlan, SettingsProb
             traces: message.traces,
             drop_out_after_ms: message.drop_out_after_ms,
             closes_at_ms: Some(message.closes_at_ms).filter(|at_ms| *at_ms > 0),
+            recruiting: recruiting(message.recruiting.clone().unwrap_or_default()),
         }),
         name: message.name.clone(),
         conditions: plans,
     })
+}
+
+fn recruiting(message: v1::StudyRecruiting) -> Recruiting {
+    Recruiting {
+        open_link: message.open_link,
+        id_parameter: message.id_parameter,
+        completed_url: message.completed_url,
+        withdrawn_url: message.withdrawn_url,
+        full_url: message.full_url,
+    }
 }
 
 fn condition_of(
@@ -517,6 +529,7 @@ pub fn study_to_proto(
     id: Id,
     settings: &v1::StudySettings,
     created_at_ms: u64,
+    open_link: String,
     study: &Study,
 ) -> v1::Study {
     let (games, practice_games) = study.settings().games();
@@ -544,6 +557,7 @@ pub fn study_to_proto(
         active,
         completed,
         left,
+        open_link,
     }
 }
 
@@ -583,6 +597,7 @@ pub fn study_participant(
             .map(|game| study_game(study, plan, participant, game, &join_code))
             .collect(),
         data_deleted: participant.data_deleted,
+        panel_id: participant.panel_id().to_owned(),
     })
 }
 

@@ -37,8 +37,9 @@ pub fn study_view(view: View, ticket_of: impl FnOnce(Id) -> String) -> v1::Study
                 text: text.text,
             }),
             Content::Game(game) => Message::Game(shown_game(&game, ticket_of)),
-            Content::End(end) => Message::End(v1::StudyEnd {
-                reason: end_reason(end).into(),
+            Content::End { reason, url } => Message::End(v1::StudyEnd {
+                reason: end_reason(reason).into(),
+                url: url.unwrap_or_default(),
             }),
         }),
     }

@@ -14,7 +14,7 @@ export const faults: Texts["faults"] = {
     TOKEN_MISSING:
       "Dieser Server ist nur für Eingeladene offen. Bitte die Person, die ihn betreibt, um einen Link mit Token und öffne ihn hier.",
     TOKEN_UNKNOWN:
-      "Der Server kennt das Token deines Links nicht. Prüfe, ob du den vollständigen Link geöffnet hast, oder bitte die Person, die den Server betreibt, um einen neuen.",
+      "Der Server kennt das Token deines Links nicht. Prüfen Sie, ob Sie den vollständigen Link geöffnet haben, oder bitte die Person, die den Server betreibt, um einen neuen.",
     TOKEN_EXPIRED:
       "Das Token deines Links ist abgelaufen. Bitte die Person, die den Server betreibt, um einen neuen Link.",
     ROLE_TOO_LOW: "Dein Link erlaubt das nicht. Bitte die Person, die den Server betreibt, um einen passenden.",
@@ -100,19 +100,23 @@ export const faults: Texts["faults"] = {
     TOO_MANY_CHANGES: "Dieses Turnier wurde zu oft geändert.",
     NAME_TAKEN: "Diesen Namen hat schon jemand anders. Wähle einen anderen.",
     LINK_UNKNOWN:
-      "Dieser Link gehört zu keiner Studie auf diesem Server. Prüfe, ob du den vollständigen Link geöffnet hast, oder frage die Person, die ihn dir gegeben hat.",
-    SESSION_UNKNOWN: "Die Verbindung zur Studie wurde unterbrochen. Öffne deinen Link noch einmal.",
+      "Dieser Link gehört zu keiner Studie auf diesem Server. Prüfen Sie, ob Sie den vollständigen Link geöffnet haben, oder fragen Sie die Person, die ihn Ihnen gegeben hat.",
+    PANEL_ID_TAKEN:
+      "Mit dieser Kennung nimmt schon jemand teil. Machen Sie in dem Browser weiter, in dem Sie begonnen haben.",
+    PANEL_ID_REFUSED:
+      "Der Link hat keine gültige Kennung. Öffnen Sie ihn noch einmal von der Seite, die Sie eingeladen hat.",
+    SESSION_UNKNOWN: "Die Verbindung zur Studie wurde unterbrochen. Öffnen Sie Ihren Link noch einmal.",
     SESSION_SUPERSEDED:
       "Die Studie wurde in einem anderen Fenster oder auf einem anderen Gerät geöffnet. Sie geht dort weiter.",
-    STUDY_FULL: "Alle Plätze dieser Studie sind vergeben. Danke für dein Interesse.",
-    STUDY_CLOSED: "Diese Studie ist geschlossen. Danke für dein Interesse.",
+    STUDY_FULL: "Alle Plätze dieser Studie sind vergeben. Danke für Ihr Interesse.",
+    STUDY_CLOSED: "Diese Studie ist geschlossen. Danke für Ihr Interesse.",
     STUDY_RUNNING: "Einige sind mitten in dieser Studie. Warte, bis sie fertig sind, oder entferne sie.",
     STUDY_UNKNOWN: "Diese Studie gibt es nicht, oder der Schlüssel gehört nicht zu ihr.",
     TOO_MANY_STUDIES: "Auf diesem Server können keine Studien mehr erstellt werden.",
-    TOO_MANY_SESSIONS: "Diese Studie wurde in kurzer Zeit zu oft geöffnet. Versuche es gleich noch einmal.",
+    TOO_MANY_SESSIONS: "Diese Studie wurde in kurzer Zeit zu oft geöffnet. Versuchen Sie es gleich noch einmal.",
     TOO_MANY_PARTICIPANTS: "Zu dieser Studie können keine Teilnehmer mehr hinzugefügt werden.",
     PARTICIPATION_OVER: "Diese Teilnahme ist zu Ende.",
-    ANSWER_REFUSED: "Eine Antwort gehört nicht zu den möglichen. Prüfe deine Antworten.",
+    ANSWER_REFUSED: "Eine Antwort gehört nicht zu den möglichen. Prüfen Sie Ihre Antworten.",
     TOO_MANY_ANSWERS:
       "Der Server hat keinen Speicher für weitere Antworten. Kürze deine, oder frage die Person, von der du den Link hast.",
     GAME_NOT_OVER: "Die Partie ist noch nicht zu Ende.",

@@ -20,8 +20,13 @@ export const studies: Texts["studies"] = {
     textLabel: "Einwilligungstext",
     version: (version) => `Version ${version} dieses Textes.`,
     agree: "Ich habe diesen Text gelesen und bin einverstanden, teilzunehmen",
-    must: "Kreuzen Sie das Kästchen an, wenn Sie einverstanden sind. Wenn nicht, schließen Sie diese Seite oder ziehen Sie unten Ihre Teilnahme zurück.",
+    must: "Kreuzen Sie das Kästchen an, wenn Sie einverstanden sind. Wenn nicht, wählen Sie „Ich bin nicht einverstanden“.",
     submit: "Zustimmen und weiter",
+    copy: "Diesen Text speichern",
+    decline: "Ich bin nicht einverstanden…",
+    declineDo: "Ich nehme nicht teil",
+    declineText:
+      "Sie nehmen nicht teil, und was über Sie gespeichert wurde, wird gelöscht. Mit diesem Link können Sie nicht zurückkommen.",
   },
   questionnaire: {
     title: "Fragen",
@@ -70,6 +75,7 @@ export const studies: Texts["studies"] = {
     pseudonym: (pseudonym) =>
       `Ihr Code in der Studie ist ${pseudonym}. Nennen Sie ihn, wenn Sie Fragen zu Ihren Daten haben.`,
     close: "Sie können diese Seite schließen.",
+    goOn: (host) => `Weiter zu ${host}`,
   },
   withdraw: {
     button: "Teilnahme zurückziehen…",
@@ -130,6 +136,11 @@ export const studies: Texts["studies"] = {
       namesHint: "Pseudonyme, keine Namen von Personen. Alle sehen ihr eigenes.",
       submit: "Hinzufügen",
       problem: "Gib eine Zahl von 1 bis 1000 ein oder Codes mit höchstens 64 Zeichen.",
+    },
+    openLink: {
+      title: "Link für alle",
+      text: "Wer diesen Link öffnet, nimmt teil, solange es Plätze gibt. Gib ihn dem Panel, das einlädt.",
+      label: "Offener Link",
     },
     links: {
       title: "Links",
@@ -205,6 +216,13 @@ export const studies: Texts["studies"] = {
     debriefing: "Text am Ende",
     debriefingTitle: "Über diese Studie",
     traces: "Bedienung aufzeichnen (gewählte und zurückgelegte Karten, Mauszeiger, Fokus)",
+    openLink: "Ein Link für alle, zum Beispiel für ein Panel wie Prolific",
+    idParameter: "Parameter des Links mit der Kennung im Panel",
+    idParameterHint: "Zum Beispiel PROLIFIC_PID. Ohne ihn wird nach keiner Kennung gefragt.",
+    completedUrl: "Adresse nach der Studie",
+    withdrawnUrl: "Adresse für die, die nicht einverstanden sind oder zurückziehen",
+    fullUrl: "Adresse, wenn die Studie voll oder geschlossen ist",
+    panelUrlHint: "https://…; {id} wird durch die Kennung im Panel ersetzt.",
     shifts: "Shifts pro Partie",
     submit: "Studie erstellen",
     problems: {

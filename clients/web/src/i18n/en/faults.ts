@@ -95,6 +95,8 @@ export const faults = {
     NAME_TAKEN: "Someone else already has this name. Choose another.",
     LINK_UNKNOWN:
       "This link does not belong to a study on this server. Check that you opened the complete link, or ask the person who gave it to you.",
+    PANEL_ID_TAKEN: "Somebody with this id already takes part. Go on in the browser in which you began.",
+    PANEL_ID_REFUSED: "The link has no valid id. Open it again from the site that invited you.",
     SESSION_UNKNOWN: "The connection to the study was interrupted. Open your link again.",
     SESSION_SUPERSEDED: "The study was opened in another window or on another device. It continues there.",
     STUDY_FULL: "All places in this study are taken. Thank you for your interest.",

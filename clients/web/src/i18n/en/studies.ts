@@ -19,8 +19,12 @@ export const studies = {
     textLabel: "Consent text",
     version: (version: string) => `Version ${version} of this text.`,
     agree: "I have read this text and agree to take part",
-    must: "Tick the box if you agree. If you do not agree, close this page, or withdraw below.",
+    must: "Tick the box if you agree. If you do not, choose “I do not agree”.",
     submit: "Agree and continue",
+    copy: "Save a copy of this text",
+    decline: "I do not agree…",
+    declineDo: "I do not take part",
+    declineText: "You do not take part, and what was stored about you is deleted. You cannot come back with this link.",
   },
   questionnaire: {
     title: "Questions",
@@ -68,6 +72,7 @@ export const studies = {
     pseudonym: (pseudonym: string) =>
       `Your code in the study is ${pseudonym}. Give it if you have questions about your data.`,
     close: "You can close this page.",
+    goOn: (host: string) => `Go on to ${host}`,
   },
   withdraw: {
     button: "Withdraw from the study…",
@@ -127,6 +132,11 @@ export const studies = {
       namesHint: "Pseudonyms, not names of people. They see their own.",
       submit: "Add",
       problem: "Enter a number from 1 to 1000, or codes of at most 64 characters.",
+    },
+    openLink: {
+      title: "Link for everyone",
+      text: "Whoever opens this link takes part, as long as there are places. Give it to the panel that invites people.",
+      label: "Open link",
     },
     links: {
       title: "Links",
@@ -202,6 +212,13 @@ export const studies = {
     debriefing: "Text at the end",
     debriefingTitle: "About this study",
     traces: "Record interface traces (cards picked and put back, hover, focus)",
+    openLink: "A link for everyone, for example for a panel such as Prolific",
+    idParameter: "Parameter of the link with the id at the panel",
+    idParameterHint: "For example PROLIFIC_PID. Without one, nobody is asked for an id.",
+    completedUrl: "Address after the study",
+    withdrawnUrl: "Address of those who do not agree or withdraw",
+    fullUrl: "Address when the study is full or closed",
+    panelUrlHint: "https://…; {id} is replaced by the id at the panel.",
     shifts: "Shifts per game",
     submit: "Create the study",
     problems: {

@@ -20,8 +20,12 @@ export const studies: Texts["studies"] = {
     textLabel: "Texto del consentimiento",
     version: (version) => `Versión ${version} de este texto.`,
     agree: "He leído este texto y acepto participar",
-    must: "Marque la casilla si está de acuerdo. Si no, cierre esta página o retírese más abajo.",
+    must: "Marque la casilla si está de acuerdo. Si no, elija «No estoy de acuerdo».",
     submit: "Aceptar y continuar",
+    copy: "Guardar una copia de este texto",
+    decline: "No estoy de acuerdo…",
+    declineDo: "No participo",
+    declineText: "No participa, y lo que se ha guardado sobre usted se borra. No puede volver con este enlace.",
   },
   questionnaire: {
     title: "Preguntas",
@@ -68,6 +72,7 @@ export const studies: Texts["studies"] = {
     },
     pseudonym: (pseudonym) => `Su código en el estudio es ${pseudonym}. Indíquelo si tiene preguntas sobre sus datos.`,
     close: "Puede cerrar esta página.",
+    goOn: (host) => `Seguir en ${host}`,
   },
   withdraw: {
     button: "Retirarse del estudio…",
@@ -128,6 +133,11 @@ export const studies: Texts["studies"] = {
       namesHint: "Seudónimos, no nombres de personas. Cada cual ve el suyo.",
       submit: "Añadir",
       problem: "Escribe un número del 1 al 1000, o códigos de 64 caracteres como máximo.",
+    },
+    openLink: {
+      title: "Enlace para todos",
+      text: "Quien abre este enlace participa mientras haya plazas. Dáselo al panel que invita.",
+      label: "Enlace abierto",
     },
     links: {
       title: "Enlaces",
@@ -203,6 +213,13 @@ export const studies: Texts["studies"] = {
     debriefing: "Texto al final",
     debriefingTitle: "Sobre este estudio",
     traces: "Registrar el uso de la interfaz (cartas elegidas y devueltas, puntero, foco)",
+    openLink: "Un enlace para todos, por ejemplo para un panel como Prolific",
+    idParameter: "Parámetro del enlace con el identificador en el panel",
+    idParameterHint: "Por ejemplo PROLIFIC_PID. Sin él no se pide ningún identificador.",
+    completedUrl: "Dirección después del estudio",
+    withdrawnUrl: "Dirección para quienes no están de acuerdo o se retiran",
+    fullUrl: "Dirección cuando el estudio está completo o cerrado",
+    panelUrlHint: "https://…; {id} se sustituye por el identificador en el panel.",
     shifts: "Shifts por partida",
     submit: "Crear el estudio",
     problems: {

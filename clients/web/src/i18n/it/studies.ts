@@ -20,8 +20,13 @@ export const studies: Texts["studies"] = {
     textLabel: "Testo del consenso",
     version: (version) => `Versione ${version} di questo testo.`,
     agree: "Ho letto questo testo e accetto di partecipare",
-    must: "Spunti la casella se è d’accordo. Altrimenti chiuda questa pagina, o si ritiri qui sotto.",
+    must: "Spunti la casella se è d’accordo. Altrimenti scelga «Non sono d’accordo».",
     submit: "Accettare e continuare",
+    copy: "Salvare una copia di questo testo",
+    decline: "Non sono d’accordo…",
+    declineDo: "Non partecipo",
+    declineText:
+      "Non partecipa, e ciò che è stato salvato su di Lei viene cancellato. Non può rientrare con questo link.",
   },
   questionnaire: {
     title: "Domande",
@@ -68,6 +73,7 @@ export const studies: Texts["studies"] = {
     },
     pseudonym: (pseudonym) => `Il Suo codice nello studio è ${pseudonym}. Lo indichi se ha domande sui Suoi dati.`,
     close: "Può chiudere questa pagina.",
+    goOn: (host) => `Continuare su ${host}`,
   },
   withdraw: {
     button: "Ritirarsi dallo studio…",
@@ -128,6 +134,11 @@ export const studies: Texts["studies"] = {
       namesHint: "Pseudonimi, non nomi di persone. Ognuno vede il proprio.",
       submit: "Aggiungi",
       problem: "Inserisci un numero da 1 a 1000, o codici di al massimo 64 caratteri.",
+    },
+    openLink: {
+      title: "Link per tutti",
+      text: "Chi apre questo link partecipa, finché ci sono posti. Dallo al panel che invita.",
+      label: "Link aperto",
     },
     links: {
       title: "Link",
@@ -203,6 +214,13 @@ export const studies: Texts["studies"] = {
     debriefing: "Testo alla fine",
     debriefingTitle: "Informazioni su questo studio",
     traces: "Registra le tracce dell’interfaccia (carte prese e rimesse, puntatore, fuoco)",
+    openLink: "Un link per tutti, per esempio per un panel come Prolific",
+    idParameter: "Parametro del link con l’identificativo nel panel",
+    idParameterHint: "Per esempio PROLIFIC_PID. Senza, non si chiede nessun identificativo.",
+    completedUrl: "Indirizzo dopo lo studio",
+    withdrawnUrl: "Indirizzo per chi non è d’accordo o si ritira",
+    fullUrl: "Indirizzo quando lo studio è pieno o chiuso",
+    panelUrlHint: "https://…; {id} diventa l’identificativo nel panel.",
     shifts: "Shift per partita",
     submit: "Crea lo studio",
     problems: {

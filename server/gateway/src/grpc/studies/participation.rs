@@ -5,8 +5,11 @@ use std::sync::Arc;
 
 use chefshat_proto::v1::{self, participation_service_server::ParticipationService};
 use chefshat_record::convert::FieldProblem;
-use chefshat_study::{At, ItemAnswer, ParticipantLink, Refusal as StudyRefusal, SessionSecret};
+use chefshat_study::{
+    At, ItemAnswer, Joined, ParticipantLink, Refusal as StudyRefusal, SessionSecret,
+};
 use prost::Message as _;
+use sha2::{Digest as _, Sha256};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status};
@@ -15,35 +18,44 @@ use super::{Responses, StudyCalls, not_added, refused, stopped};
 use crate::grpc::follow::{changed, end};
 use crate::grpc::limits::charged;
 use crate::grpc::status::{Refusal, field, shutting_down, status, store_failed};
-use chefshat_admission::limits::{Key, Refused};
+use chefshat_admission::limits::{COST_OF_ROOM, Key, Refused};
 use chefshat_base::clock::since_epoch_ms;
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named};
 use chefshat_hosting::config::FOLLOW_SEND_TIMEOUT;
 use chefshat_hosting::rooms::Rooms;
-use chefshat_hosting::studies::{Studies, StudyHandle, TraceRefusal};
+use chefshat_hosting::studies::{NotAdded, Studies, StudyHandle, TraceRefusal};
 use chefshat_room::ids::Id;
 use chefshat_wire::convert;
 
 impl StudyCalls {
-    /// The study and the participant of a link. Wrong links are charged like wrong join codes.
-    async fn of_link(&self, link: &str, key: Key) -> Result<(Arc<StudyHandle>, u32), Status> {
+    /// The study of a link, and the participant unless it is the open link. Wrong links are charged
+    /// like wrong join codes.
+    async fn of_any_link(
+        &self,
+        link: &str,
+        key: Key,
+    ) -> Result<(Arc<StudyHandle>, Option<u32>), Status> {
         self.calls.may_try_code(key).map_err(Refusal::from)?;
         let mut found = None;
-        if let Some(link) = ParticipantLink::parse(link) {
-            let handle = self.here(Studies::full_id(link.study()), key).await?;
-            found = handle.and_then(|handle| Some((handle.number_of(&link)?, handle)));
+        if let Some(link) = ParticipantLink::parse(link)
+            && let Some(handle) = self.here(Studies::full_id(link.study()), key).await?
+        {
+            let number = handle.number_of(&link);
+            found = (number.is_some() || handle.is_open_link(&link)).then_some((handle, number));
         }
-        let found = found.map(|(number, handle)| (handle, number));
         found.ok_or_else(|| {
             self.calls.wrong_code(key);
-            status(
-                Code::Unauthenticated,
-                "LINK_UNKNOWN",
-                "this is not a link of a study on this server; check that it is complete",
-                [("field", "link")],
-            )
+            link_unknown()
         })
+    }
+
+    /// The study and the participant of a link of its own.
+    async fn of_link(&self, link: &str, key: Key) -> Result<(Arc<StudyHandle>, u32), Status> {
+        match self.of_any_link(link, key).await? {
+            (handle, Some(number)) => Ok((handle, number)),
+            (_, None) => Err(link_unknown()),
+        }
     }
 
     /// The study, the participant and the session of a secret.
@@ -90,6 +102,33 @@ impl StudyCalls {
     }
 }
 
+fn link_unknown() -> Status {
+    status(
+        Code::Unauthenticated,
+        "LINK_UNKNOWN",
+        "this is not a link of a study on this server; check that it is complete",
+        [("field", "link")],
+    )
+}
+
+/// The status for somebody with this id at the panel who may not begin: it names where to go on.
+fn not_admitted(handle: &StudyHandle, panel_id: &str, refusal: StudyRefusal) -> Status {
+    let url = handle.recruiting().full_url(panel_id);
+    let (Some(url), StudyRefusal::Closed | StudyRefusal::Full) = (url, &refusal) else {
+        return refused(refusal);
+    };
+    let reason = match refusal {
+        StudyRefusal::Closed => "STUDY_CLOSED",
+        _ => "STUDY_FULL",
+    };
+    status(
+        Code::FailedPrecondition,
+        reason,
+        refusal.to_string(),
+        [("url", url.as_str())],
+    )
+}
+
 /// What to show next.
 fn view_of(handle: &StudyHandle, number: u32, rooms: &Rooms) -> Result<v1::StudyView, Status> {
     // It has begun, so there is something to show.
@@ -108,14 +147,54 @@ fn at(number: u32, session: u32, step: u32) -> At {
 impl ParticipationService for StudyCalls {
     type FollowParticipationStream = Responses<v1::FollowParticipationResponse>;
 
+    async fn join_study(
+        &self,
+        request: Request<v1::JoinStudyRequest>,
+    ) -> Result<Response<v1::JoinStudyResponse>, Status> {
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let (handle, number) = self.of_any_link(&request.open_link, key).await?;
+        if number.is_some() {
+            return Err(link_unknown());
+        }
+        let request_id = <[u8; 32]>::try_from(request.request_id).map_err(|bytes| {
+            let problem = format!("{} bytes; give 32 random ones", bytes.len());
+            field(
+                "REQUEST_ID_REFUSED",
+                &FieldProblem::new("request_id", problem),
+            )
+        })?;
+        let panel_id = request.panel_id;
+        let joined = Joined {
+            request_sha256: Sha256::digest(request_id).into(),
+            panel_id: panel_id.clone(),
+        };
+        self.calls.charge(key, COST_OF_ROOM);
+        let joined = handle.join(key, joined).await.map_err(stopped)?;
+        let number = joined.map_err(|problem| match problem {
+            NotAdded::Study(refusal) => not_admitted(&handle, &panel_id, refusal),
+            NotAdded::Memory(_) => not_added(problem),
+        })?;
+        let link = handle.link(number).link;
+        Ok(Response::new(v1::JoinStudyResponse { link }))
+    }
+
     async fn open_study(
         &self,
         request: Request<v1::OpenStudyRequest>,
     ) -> Result<Response<v1::OpenStudyResponse>, Status> {
         let key = charged(request.extensions());
-        let (handle, number) = self.of_link(&request.into_inner().link, key).await?;
+        let (handle, number) = self.of_any_link(&request.into_inner().link, key).await?;
+        let Some(number) = number else {
+            return Err(status(
+                Code::FailedPrecondition,
+                "LINK_OPEN",
+                "this link is for everyone; take part with JoinStudy, which returns a link of your own",
+                [("id_parameter", handle.recruiting().id_parameter.as_str())],
+            ));
+        };
         let opened = handle.open(number).await.map_err(stopped)?;
-        let session = opened.map_err(refused)?;
+        let session = opened.map_err(|it| not_admitted(&handle, &handle.panel_id(number), it))?;
         let (saved_answers, step_age_ms) = handle.progress(number, since_epoch_ms());
         Ok(Response::new(v1::OpenStudyResponse {
             saved_answers,
@@ -170,7 +249,8 @@ impl ParticipationService for StudyCalls {
         let request = request.into_inner();
         let (handle, number, session) = self.of_session(&request.session, key).await?;
         let given = handle.consent(at(number, session, request.step)).await;
-        given.map_err(stopped)?.map_err(refused)?;
+        (given.map_err(stopped)?)
+            .map_err(|it| not_admitted(&handle, &handle.panel_id(number), it))?;
         let view = Some(view_of(&handle, number, self.studies.rooms())?);
         Ok(Response::new(v1::GiveConsentResponse { view }))
     }
@@ -345,7 +425,7 @@ mod tests {
                 waiting.push(method.output_type().to_owned());
             }
         }
-        assert_eq!(waiting.len(), 8);
+        assert_eq!(waiting.len(), 9);
         let mut seen = BTreeSet::new();
         while let Some(path) = waiting.pop() {
             if !seen.insert(path.clone()) {

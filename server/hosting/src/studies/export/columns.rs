@@ -99,6 +99,7 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
         left the slot it had, which another may have now";
     const AT_STEP: &str =
         "step it is at, from 0; the number of steps once it has completed the study";
+    const PANEL_ID: &str = "its id at the panel that recruited it";
     const NO_CONSENT: &str = "it has not consented";
     let states = STATES.map(|(status, label)| Code::new(state_name(status), label));
     let conditions = Kind::Codes {
@@ -111,6 +112,10 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
             row.participant.pseudonym.clone()
         })
         .empty(DELETED)
+        .with("panel_id", Kind::Text, PANEL_ID, |row| {
+            row.participant.panel_id().to_owned()
+        })
+        .empty("it did not join from a panel, or its data were deleted")
         .with(
             "state",
             Kind::one_of(states),

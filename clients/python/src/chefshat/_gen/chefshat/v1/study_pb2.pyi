@@ -846,6 +846,53 @@ class StudyStage(_message.Message):
 Global___StudyStage: _TypeAlias = StudyStage  # noqa: Y015
 
 @_typing.final
+class StudyRecruiting(_message.Message):
+    """How people take part who were not given a link of their own, for example from a panel such as
+    Prolific, SONA or MTurk.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    OPEN_LINK_FIELD_NUMBER: _builtins.int
+    ID_PARAMETER_FIELD_NUMBER: _builtins.int
+    COMPLETED_URL_FIELD_NUMBER: _builtins.int
+    WITHDRAWN_URL_FIELD_NUMBER: _builtins.int
+    FULL_URL_FIELD_NUMBER: _builtins.int
+    open_link: _builtins.bool
+    """Whether the study has an open link (`open_link` of Study): whoever opens it takes part."""
+    id_parameter: _builtins.str
+    """Name of the query parameter of the open link in which the panel gives a person's id there, for
+    example "PROLIFIC_PID": 1..=64 letters, digits, `_`, `-` or `.`. Nobody takes part without such
+    an id, or twice with the same. Empty: no id is asked for.
+    """
+    completed_url: _builtins.str
+    """Where those who complete the study go on: empty, or an address that begins with https://, at
+    most 2000 characters. "{id}" stands for the id at the panel; those without one have no address.
+    """
+    withdrawn_url: _builtins.str
+    """As `completed_url`, for those who do not agree or withdraw. The id at the panel is deleted with
+    the data of those who have them deleted.
+    """
+    full_url: _builtins.str
+    """As `completed_url`, for those who cannot begin because the study is closed or full."""
+    def __init__(
+        self,
+        *,
+        open_link: _builtins.bool = ...,
+        id_parameter: _builtins.str = ...,
+        completed_url: _builtins.str = ...,
+        withdrawn_url: _builtins.str = ...,
+        full_url: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["completed_url", b"completed_url", "full_url", b"full_url", "id_parameter", b"id_parameter", "open_link", b"open_link", "withdrawn_url", b"withdrawn_url"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___StudyRecruiting: _TypeAlias = StudyRecruiting  # noqa: Y015
+
+@_typing.final
 class StudySettings(_message.Message):
     """The settings of a study. In a request an unset field means its default; in a response every field
     is set.
@@ -867,6 +914,7 @@ class StudySettings(_message.Message):
     TRACES_FIELD_NUMBER: _builtins.int
     DROP_OUT_AFTER_MS_FIELD_NUMBER: _builtins.int
     CLOSES_AT_MS_FIELD_NUMBER: _builtins.int
+    RECRUITING_FIELD_NUMBER: _builtins.int
     name: _builtins.str
     """Name for researchers, 1..=64 characters. Participants never see it."""
     title: _builtins.str
@@ -911,6 +959,10 @@ class StudySettings(_message.Message):
     def stages(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyStage]:
         """What participants do, 1..=50 stages, of which each participant has at most 200 steps."""
 
+    @_builtins.property
+    def recruiting(self) -> Global___StudyRecruiting:
+        """How people without a link of their own take part; by default nobody does."""
+
     def __init__(
         self,
         *,
@@ -928,10 +980,11 @@ class StudySettings(_message.Message):
         traces: _builtins.bool = ...,
         drop_out_after_ms: _builtins.int = ...,
         closes_at_ms: _builtins.int = ...,
+        recruiting: Global___StudyRecruiting | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["recruiting", b"recruiting"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["assignment_seed", b"assignment_seed", "block_size", b"block_size", "closes_at_ms", b"closes_at_ms", "conditions", b"conditions", "drop_out_after_ms", b"drop_out_after_ms", "factors", b"factors", "language", b"language", "name", b"name", "order", b"order", "participants", b"participants", "seeds", b"seeds", "stages", b"stages", "title", b"title", "traces", b"traces"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["assignment_seed", b"assignment_seed", "block_size", b"block_size", "closes_at_ms", b"closes_at_ms", "conditions", b"conditions", "drop_out_after_ms", b"drop_out_after_ms", "factors", b"factors", "language", b"language", "name", b"name", "order", b"order", "participants", b"participants", "recruiting", b"recruiting", "seeds", b"seeds", "stages", b"stages", "title", b"title", "traces", b"traces"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -1062,6 +1115,7 @@ class StudyParticipant(_message.Message):
     CONSENT_FIELD_NUMBER: _builtins.int
     GAMES_FIELD_NUMBER: _builtins.int
     DATA_DELETED_FIELD_NUMBER: _builtins.int
+    PANEL_ID_FIELD_NUMBER: _builtins.int
     number: _builtins.int
     """Number, from 1."""
     pseudonym: _builtins.str
@@ -1084,6 +1138,8 @@ class StudyParticipant(_message.Message):
     """When it completed the study or left it, milliseconds since the Unix epoch; 0 until then."""
     data_deleted: _builtins.bool
     """Whether its data were deleted."""
+    panel_id: _builtins.str
+    """Its id at the panel (StudyRecruiting); empty if there is none, and after its data were deleted."""
     @_builtins.property
     def conditions(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
         """Ids of its conditions in their order; empty until it begins."""
@@ -1112,10 +1168,11 @@ class StudyParticipant(_message.Message):
         consent: Global___StudyConsentGiven | None = ...,
         games: _abc.Iterable[Global___StudyGame] | None = ...,
         data_deleted: _builtins.bool = ...,
+        panel_id: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_slot", b"_slot", "consent", b"consent", "slot", b"slot"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_slot", b"_slot", "began_at_ms", b"began_at_ms", "conditions", b"conditions", "connected", b"connected", "consent", b"consent", "data_deleted", b"data_deleted", "ended_at_ms", b"ended_at_ms", "games", b"games", "number", b"number", "pseudonym", b"pseudonym", "sessions", b"sessions", "slot", b"slot", "state", b"state", "step", b"step"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_slot", b"_slot", "began_at_ms", b"began_at_ms", "conditions", b"conditions", "connected", b"connected", "consent", b"consent", "data_deleted", b"data_deleted", "ended_at_ms", b"ended_at_ms", "games", b"games", "number", b"number", "panel_id", b"panel_id", "pseudonym", b"pseudonym", "sessions", b"sessions", "slot", b"slot", "state", b"state", "step", b"step"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__slot: _TypeAlias = _typing.Literal["slot"]  # noqa: Y015
     _WhichOneofArgType__slot: _TypeAlias = _typing.Literal["_slot", b"_slot"]  # noqa: Y015
@@ -1174,6 +1231,7 @@ class Study(_message.Message):
     ACTIVE_FIELD_NUMBER: _builtins.int
     COMPLETED_FIELD_NUMBER: _builtins.int
     LEFT_FIELD_NUMBER: _builtins.int
+    OPEN_LINK_FIELD_NUMBER: _builtins.int
     study_id: _builtins.str
     """Identifies it: 32 hexadecimal digits."""
     seeds_sha256: _builtins.bytes
@@ -1198,6 +1256,10 @@ class Study(_message.Message):
     """Number of participants who have completed it, also if their data were deleted since."""
     left: _builtins.int
     """Number of participants who have withdrawn, dropped out or were removed."""
+    open_link: _builtins.str
+    """The open link, if the settings have one: 30 characters that need no escaping. The page's address
+    for it is the path "/study/" and this text.
+    """
     @_builtins.property
     def settings(self) -> Global___StudySettings:
         """Its settings, every field set."""
@@ -1218,10 +1280,11 @@ class Study(_message.Message):
         active: _builtins.int = ...,
         completed: _builtins.int = ...,
         left: _builtins.int = ...,
+        open_link: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["settings", b"settings"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["active", b"active", "added", b"added", "closed", b"closed", "completed", b"completed", "created_at_ms", b"created_at_ms", "games", b"games", "invited", b"invited", "left", b"left", "practice_games", b"practice_games", "seeds_sha256", b"seeds_sha256", "settings", b"settings", "steps", b"steps", "study_id", b"study_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["active", b"active", "added", b"added", "closed", b"closed", "completed", b"completed", "created_at_ms", b"created_at_ms", "games", b"games", "invited", b"invited", "left", b"left", "open_link", b"open_link", "practice_games", b"practice_games", "seeds_sha256", b"seeds_sha256", "settings", b"settings", "steps", b"steps", "study_id", b"study_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -1466,16 +1529,20 @@ class StudyEnd(_message.Message):
     DESCRIPTOR: _descriptor.Descriptor
 
     REASON_FIELD_NUMBER: _builtins.int
+    URL_FIELD_NUMBER: _builtins.int
     reason: Global___StudyEndReason.ValueType
     """The reason."""
+    url: _builtins.str
+    """Where the participant goes on (StudyRecruiting); empty if nowhere."""
     def __init__(
         self,
         *,
         reason: Global___StudyEndReason.ValueType = ...,
+        url: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["reason", b"reason"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["reason", b"reason", "url", b"url"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -638,6 +638,62 @@ class DeleteStudyResponse(_message.Message):
 Global___DeleteStudyResponse: _TypeAlias = DeleteStudyResponse  # noqa: Y015
 
 @_typing.final
+class JoinStudyRequest(_message.Message):
+    """Requests to take part by an open link."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    OPEN_LINK_FIELD_NUMBER: _builtins.int
+    PANEL_ID_FIELD_NUMBER: _builtins.int
+    REQUEST_ID_FIELD_NUMBER: _builtins.int
+    open_link: _builtins.str
+    """`open_link` of Study."""
+    panel_id: _builtins.str
+    """The person's id at the panel, 1..=128 characters, the value of the query parameter
+    `id_parameter` of StudyRecruiting; empty if that is empty.
+    """
+    request_id: _builtins.bytes
+    """32 random bytes, which must be kept secret. A repeated call with the same ones, after a lost
+    response, adds nobody and returns the same link.
+    """
+    def __init__(
+        self,
+        *,
+        open_link: _builtins.str = ...,
+        panel_id: _builtins.str = ...,
+        request_id: _builtins.bytes = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["open_link", b"open_link", "panel_id", b"panel_id", "request_id", b"request_id"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___JoinStudyRequest: _TypeAlias = JoinStudyRequest  # noqa: Y015
+
+@_typing.final
+class JoinStudyResponse(_message.Message):
+    """The participant takes part."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    LINK_FIELD_NUMBER: _builtins.int
+    link: _builtins.str
+    """The secret of its link, as `link` of StudyLink."""
+    def __init__(
+        self,
+        *,
+        link: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["link", b"link"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___JoinStudyResponse: _TypeAlias = JoinStudyResponse  # noqa: Y015
+
+@_typing.final
 class OpenStudyRequest(_message.Message):
     """Requests to open the study."""
 

@@ -581,6 +581,11 @@ class ParticipationServiceStub(object):
         Args:
             channel: A grpc.Channel.
         """
+        self.JoinStudy = channel.unary_unary(
+                '/chefshat.v1.ParticipationService/JoinStudy',
+                request_serializer=chefshat_dot_v1_dot_study__service__pb2.JoinStudyRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_study__service__pb2.JoinStudyResponse.FromString,
+                _registered_method=True)
         self.OpenStudy = channel.unary_unary(
                 '/chefshat.v1.ParticipationService/OpenStudy',
                 request_serializer=chefshat_dot_v1_dot_study__service__pb2.OpenStudyRequest.SerializeToString,
@@ -630,11 +635,24 @@ class ParticipationServiceServicer(object):
     FollowParticipation has sent meanwhile: then show that of the stream.
     """
 
+    def JoinStudy(self, request, context):
+        """Takes part by an open link (`open_link` of Study), and returns a link of one's own, which
+        OpenStudy opens. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+        INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
+        RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN). STUDY_CLOSED and
+        STUDY_FULL, also of OpenStudy and GiveConsent, have the metadata `url` if the study has a
+        `full_url`.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def OpenStudy(self, request, context):
         """Opens the study on this device: the participant's earlier session ends. For a participant whose
         participation is over there is only the end to show, and no session. UNAUTHENTICATED
-        (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL); RESOURCE_EXHAUSTED
-        (TOO_MANY_SESSIONS); UNAVAILABLE (SHUTTING_DOWN).
+        (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; LINK_OPEN for an open link, with the
+        metadata `id_parameter`: take part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS);
+        UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -707,6 +725,11 @@ class ParticipationServiceServicer(object):
 
 def add_ParticipationServiceServicer_to_server(servicer, server):
     rpc_method_handlers = {
+            'JoinStudy': grpc.unary_unary_rpc_method_handler(
+                    servicer.JoinStudy,
+                    request_deserializer=chefshat_dot_v1_dot_study__service__pb2.JoinStudyRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_study__service__pb2.JoinStudyResponse.SerializeToString,
+            ),
             'OpenStudy': grpc.unary_unary_rpc_method_handler(
                     servicer.OpenStudy,
                     request_deserializer=chefshat_dot_v1_dot_study__service__pb2.OpenStudyRequest.FromString,
@@ -761,6 +784,33 @@ class ParticipationService(object):
     text that is not a link of this server. The view in a response may be older than one that
     FollowParticipation has sent meanwhile: then show that of the stream.
     """
+
+    @staticmethod
+    def JoinStudy(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.ParticipationService/JoinStudy',
+            chefshat_dot_v1_dot_study__service__pb2.JoinStudyRequest.SerializeToString,
+            chefshat_dot_v1_dot_study__service__pb2.JoinStudyResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
 
     @staticmethod
     def OpenStudy(request,

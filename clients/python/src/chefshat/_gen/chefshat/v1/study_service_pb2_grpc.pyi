@@ -293,11 +293,20 @@ class ParticipationServiceStub:
     def __new__(cls, channel: _grpc.Channel) -> _Self: ...
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> ParticipationServiceAsyncStub: ...
+    JoinStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.JoinStudyRequest, _study_service_pb2.JoinStudyResponse]
+    """Takes part by an open link (`open_link` of Study), and returns a link of one's own, which
+    OpenStudy opens. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+    INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
+    RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN). STUDY_CLOSED and
+    STUDY_FULL, also of OpenStudy and GiveConsent, have the metadata `url` if the study has a
+    `full_url`.
+    """
     OpenStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.OpenStudyRequest, _study_service_pb2.OpenStudyResponse]
     """Opens the study on this device: the participant's earlier session ends. For a participant whose
     participation is over there is only the end to show, and no session. UNAUTHENTICATED
-    (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL); RESOURCE_EXHAUSTED
-    (TOO_MANY_SESSIONS); UNAVAILABLE (SHUTTING_DOWN).
+    (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; LINK_OPEN for an open link, with the
+    metadata `id_parameter`: take part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS);
+    UNAVAILABLE (SHUTTING_DOWN).
     """
     FollowParticipation: _grpc.UnaryStreamMultiCallable[_study_service_pb2.FollowParticipationRequest, _study_service_pb2.FollowParticipationResponse]
     """Streams what to show, now and after every change; a message without a view is a heartbeat. The
@@ -345,11 +354,20 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
     """
 
     def __init__(self, channel: _aio.Channel) -> None: ...
+    JoinStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.JoinStudyRequest, _study_service_pb2.JoinStudyResponse]  # type: ignore[assignment]
+    """Takes part by an open link (`open_link` of Study), and returns a link of one's own, which
+    OpenStudy opens. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+    INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
+    RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN). STUDY_CLOSED and
+    STUDY_FULL, also of OpenStudy and GiveConsent, have the metadata `url` if the study has a
+    `full_url`.
+    """
     OpenStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.OpenStudyRequest, _study_service_pb2.OpenStudyResponse]  # type: ignore[assignment]
     """Opens the study on this device: the participant's earlier session ends. For a participant whose
     participation is over there is only the end to show, and no session. UNAUTHENTICATED
-    (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL); RESOURCE_EXHAUSTED
-    (TOO_MANY_SESSIONS); UNAVAILABLE (SHUTTING_DOWN).
+    (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; LINK_OPEN for an open link, with the
+    metadata `id_parameter`: take part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS);
+    UNAVAILABLE (SHUTTING_DOWN).
     """
     FollowParticipation: _aio.UnaryStreamMultiCallable[_study_service_pb2.FollowParticipationRequest, _study_service_pb2.FollowParticipationResponse]  # type: ignore[assignment]
     """Streams what to show, now and after every change; a message without a view is a heartbeat. The
@@ -396,6 +414,20 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
     """
 
     @_abc_1.abstractmethod
+    def JoinStudy(
+        self,
+        request: _study_service_pb2.JoinStudyRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_study_service_pb2.JoinStudyResponse, _abc.Awaitable[_study_service_pb2.JoinStudyResponse]]:
+        """Takes part by an open link (`open_link` of Study), and returns a link of one's own, which
+        OpenStudy opens. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+        INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
+        RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN). STUDY_CLOSED and
+        STUDY_FULL, also of OpenStudy and GiveConsent, have the metadata `url` if the study has a
+        `full_url`.
+        """
+
+    @_abc_1.abstractmethod
     def OpenStudy(
         self,
         request: _study_service_pb2.OpenStudyRequest,
@@ -403,8 +435,9 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_study_service_pb2.OpenStudyResponse, _abc.Awaitable[_study_service_pb2.OpenStudyResponse]]:
         """Opens the study on this device: the participant's earlier session ends. For a participant whose
         participation is over there is only the end to show, and no session. UNAUTHENTICATED
-        (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL); RESOURCE_EXHAUSTED
-        (TOO_MANY_SESSIONS); UNAVAILABLE (SHUTTING_DOWN).
+        (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; LINK_OPEN for an open link, with the
+        metadata `id_parameter`: take part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS);
+        UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod

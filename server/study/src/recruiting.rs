@@ -1,0 +1,83 @@
+//! How people take part who were not given a link of their own, and where they go on at the end.
+
+use crate::address;
+use crate::checks::{Checked, identifier, refuse};
+
+/// Maximum length of an id at a panel, in characters.
+const MAX_PANEL_ID: usize = 128;
+/// What an address may contain, to be replaced by the participant's id at the panel.
+const PLACEHOLDER: &str = "{id}";
+
+/// How people take part who were not given a link of their own.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Recruiting {
+    /// Whether the study has an open link.
+    pub open_link: bool,
+    /// The query parameter of the open link that has a person's id at the panel; empty: none.
+    pub id_parameter: String,
+    /// Where those who complete the study go on; empty: nowhere.
+    pub completed_url: String,
+    /// Where those who do not agree or withdraw go on; empty: nowhere.
+    pub withdrawn_url: String,
+    /// Where those go on who cannot begin; empty: nowhere.
+    pub full_url: String,
+}
+
+impl Recruiting {
+    /// Returns the first invalid setting.
+    pub(crate) fn check(&self, field: &str) -> Checked {
+        let id = format!("{field}.id_parameter");
+        if !self.id_parameter.is_empty() {
+            identifier(&id, &self.id_parameter)?;
+            if !self.open_link {
+                return refuse(id, "only an open link has parameters: set open_link");
+            }
+        }
+        for (name, url) in [
+            ("completed_url", &self.completed_url),
+            ("withdrawn_url", &self.withdrawn_url),
+            ("full_url", &self.full_url),
+        ] {
+            let field = format!("{field}.{name}");
+            if url.is_empty() {
+                continue;
+            }
+            address::check(&field, url, PLACEHOLDER)?;
+            if url.contains(PLACEHOLDER) && self.id_parameter.is_empty() {
+                return refuse(field, "{id} is filled in only if id_parameter is set");
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns what is wrong with the id with which somebody joins.
+    pub(crate) fn check_panel_id(&self, id: &str) -> Result<(), String> {
+        let parameter = &self.id_parameter;
+        match (parameter.is_empty(), id.is_empty()) {
+            (true, true) => Ok(()),
+            (true, false) => Err("this study asks for no id".to_owned()),
+            (false, true) => Err(format!(
+                "the address has no {parameter}; open the link from the site that invited you"
+            )),
+            (false, false) if id.chars().any(char::is_control) => {
+                Err(format!("{parameter} has control characters"))
+            }
+            (false, false) if id.chars().count() > MAX_PANEL_ID => Err(format!(
+                "{parameter} has more than {MAX_PANEL_ID} characters"
+            )),
+            (false, false) => Ok(()),
+        }
+    }
+
+    /// The complete address for somebody with this id; `None` if there is none, or it needs an id and
+    /// this one is empty.
+    pub(crate) fn filled_in(url: &str, id: &str) -> Option<String> {
+        let lacks_id = url.contains(PLACEHOLDER) && id.is_empty();
+        (!url.is_empty() && !lacks_id).then(|| address::filled_in(url, PLACEHOLDER, id))
+    }
+
+    /// Where somebody with this id goes on who cannot begin.
+    pub fn full_url(&self, id: &str) -> Option<String> {
+        Self::filled_in(&self.full_url, id)
+    }
+}

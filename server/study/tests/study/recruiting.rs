@@ -1,0 +1,137 @@
+//! The open link: who joins by it, and where participants go on at the end.
+
+use chefshat_study::testing::settings;
+use chefshat_study::{Change, Content, End, Joined, Recruiting, Refusal, Settings, Study};
+
+use super::support::Lab;
+
+const ID: &str = "PROLIFIC_PID";
+
+/// A study for two, recruited from a panel.
+fn recruited() -> Settings {
+    Settings {
+        participants: 2,
+        recruiting: Recruiting {
+            open_link: true,
+            id_parameter: ID.to_owned(),
+            completed_url: "https://panel.example/done?id={id}&cc=ABC".to_owned(),
+            withdrawn_url: "https://panel.example/left".to_owned(),
+            full_url: "https://panel.example/full?id={id}".to_owned(),
+        },
+        ..settings()
+    }
+}
+
+fn joining(request: u8, panel_id: &str) -> Joined {
+    Joined {
+        request_sha256: [request; 32],
+        panel_id: panel_id.to_owned(),
+    }
+}
+
+fn join(study: &mut Study, request: u8, panel_id: &str) -> Result<u32, Refusal> {
+    let (number, change) = study.join(joining(request, panel_id))?;
+    if let Some(change) = change {
+        study.fold(&change);
+    }
+    Ok(number)
+}
+
+fn folded(changes: &[Change]) -> Study {
+    let mut study = Study::new(recruited()).unwrap();
+    changes.iter().for_each(|change| study.fold(change));
+    study
+}
+
+#[test]
+fn each_id_joins_once_and_a_repeated_request_adds_nobody() {
+    let mut lab = Lab::new(recruited(), 0);
+    let study = &mut lab.study;
+    assert_eq!(join(study, 1, "a b/5"), Ok(1));
+    assert_eq!(join(study, 1, "a b/5"), Ok(1));
+    assert_eq!(join(study, 2, "a b/5"), Err(Refusal::PanelIdTaken));
+    assert_eq!(join(study, 2, "other"), Ok(2));
+    let pseudonyms = study.participants().values().map(|it| &it.pseudonym);
+    assert_eq!(pseudonyms.collect::<Vec<_>>(), ["P01", "P02"]);
+    for refused in ["", "a\nb", &"x".repeat(129)] {
+        let refusal = join(study, 3, refused).unwrap_err();
+        assert!(matches!(refusal, Refusal::PanelId(_)), "{refused:?}");
+        assert!(refusal.to_string().contains(ID), "{refusal}");
+    }
+}
+
+#[test]
+fn nobody_joins_a_study_that_is_full_closed_or_has_no_open_link() {
+    let mut lab = Lab::new(recruited(), 0);
+    for number in 1..=2 {
+        let id = format!("id {number}");
+        assert_eq!(join(&mut lab.study, number, &id), Ok(number.into()));
+        lab.complete(number.into());
+    }
+    assert_eq!(join(&mut lab.study, 3, "late"), Err(Refusal::Full));
+    let close = lab.study.close().expect("it is open");
+    lab.study.fold(&close);
+    assert_eq!(join(&mut lab.study, 3, "late"), Err(Refusal::Closed));
+    // Who has joined finds the link again.
+    assert_eq!(join(&mut lab.study, 1, "id 1"), Ok(1));
+
+    let mut personal = Study::new(settings()).unwrap();
+    assert_eq!(join(&mut personal, 1, ""), Err(Refusal::Unknown));
+}
+
+#[test]
+fn without_a_panel_an_id_is_not_kept() {
+    let mut study = Study::new(Settings {
+        recruiting: Recruiting {
+            open_link: true,
+            ..Recruiting::default()
+        },
+        ..settings()
+    })
+    .unwrap();
+    assert_eq!(join(&mut study, 1, ""), Ok(1));
+    assert_eq!(join(&mut study, 2, ""), Ok(2));
+    let refusal = join(&mut study, 3, "somebody").unwrap_err();
+    assert!(matches!(refusal, Refusal::PanelId(_)), "{refusal:?}");
+}
+
+#[test]
+fn participants_go_on_where_the_panel_says() {
+    let end = |lab: &Lab, number| match lab.study.view(number).unwrap().content {
+        Content::End { reason, url } => (reason, url),
+        content => panic!("it is not over: {content:?}"),
+    };
+    let mut lab = Lab::new(recruited(), 1);
+    join(&mut lab.study, 1, "a b/5&x=é").unwrap();
+    lab.complete(2);
+    let filled = "https://panel.example/done?id=a%20b%2F5%26x%3D%C3%A9&cc=ABC";
+    assert_eq!(end(&lab, 2), (End::Completed, Some(filled.to_owned())));
+    // Who got its link from a researcher has no id that could be filled in.
+    lab.complete(1);
+    assert_eq!(end(&lab, 1), (End::Completed, None));
+
+    let full = |id| lab.study.settings().recruiting.full_url(id);
+    let filled = "https://panel.example/full?id=late";
+    assert_eq!(full("late").as_deref(), Some(filled));
+    assert_eq!(full(""), None);
+}
+
+#[test]
+fn the_id_at_the_panel_is_deleted_with_the_data() {
+    let (_, added) = folded(&[]).join(joining(1, "secret")).unwrap();
+    let mut changes = vec![added.unwrap()];
+    changes.extend(folded(&changes).open(1, 1000).unwrap());
+    changes.extend(folded(&changes).withdraw(1, true, 2000).unwrap());
+    let before = folded(&changes);
+    assert_eq!(before.participant(1).unwrap().panel_id(), "");
+    let Content::End { reason, url } = before.view(1).unwrap().content else {
+        panic!("it is over");
+    };
+    assert_eq!(reason, End::DataDeleted);
+    assert_eq!(url.as_deref(), Some("https://panel.example/left"));
+
+    assert!(changes[0].forget(1));
+    assert!(!format!("{changes:?}").contains("secret"));
+    assert!(!changes[0].forget(1));
+    assert_eq!(folded(&changes).participants(), before.participants());
+}
