@@ -83,6 +83,9 @@ pub struct PostgresOptions {
     pub lease: LeaseTimes,
     /// How long work is tried again while the database does not answer.
     pub retry_for: Duration,
+    /// How long a write waits for what somebody else has locked in the database, before it makes
+    /// way for others.
+    pub lock_limit: Duration,
     /// How long it is known where a room was after it is over.
     pub retention: Duration,
     /// Whether records are written to files, so that only games whose record has been written may
@@ -95,6 +98,7 @@ impl Default for PostgresOptions {
         Self {
             lease: LeaseTimes::DEFAULT,
             retry_for: Duration::from_secs(300),
+            lock_limit: Duration::from_secs(1),
             retention: Duration::from_secs(600),
             record_files: true,
         }
@@ -162,7 +166,7 @@ impl PostgresStore {
         let metrics = StoreMetrics::default();
         let closing = CancellationToken::new();
         let shared = Shared {
-            options: open::writers(sessions.clone()),
+            options: open::with_lock_limit(open::writers(sessions.clone()), options.lock_limit),
             retry_for: options.retry_for,
             metrics: metrics.clone(),
             closing: closing.clone(),

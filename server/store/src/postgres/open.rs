@@ -112,6 +112,11 @@ pub(super) fn writers(sessions: PgConnectOptions) -> PgConnectOptions {
     sessions.options([("enable_seqscan", "off")])
 }
 
+/// Sessions that wait this long for a lock.
+pub(super) fn with_lock_limit(sessions: PgConnectOptions, limit: Duration) -> PgConnectOptions {
+    sessions.options([("lock_timeout", format!("{}ms", limit.as_millis()))])
+}
+
 /// Connects, in bounded time.
 pub(super) async fn connect(options: &PgConnectOptions) -> sqlx::Result<PgConnection> {
     let connecting = timeout(CONNECT_LIMIT, PgConnection::connect_with(options));

@@ -28,9 +28,16 @@ use crate::testing::TypedUnits as _;
 use crate::tournaments::{TournamentEntry, TournamentHeader};
 use crate::units::UnitKind;
 
-/// A node that has just joined.
+/// A node that has just joined, whose writes wait for a lock as long as a test wants.
 pub(crate) async fn node(database: &Database) -> PostgresStore {
-    node_with(database, PostgresOptions::default()).await
+    node_with(database, patient()).await
+}
+
+fn patient() -> PostgresOptions {
+    PostgresOptions {
+        lock_limit: Duration::from_secs(60),
+        ..PostgresOptions::default()
+    }
 }
 
 async fn node_with(database: &Database, options: PostgresOptions) -> PostgresStore {

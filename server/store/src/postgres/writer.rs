@@ -1,7 +1,8 @@
 //! The writers of a node: each commits what waits for it in one transaction, so that many rooms
 //! share a commit. A commit without an answer may have happened or not: the same work is then done
 //! again on a new connection, until its outcome is certain. So work must be *idempotent*: what it
-//! finds done by itself counts as done.
+//! finds done by itself counts as done. Work that meets a lock of somebody else is set *aside*, where
+//! one more writer tries it again, so that it holds up nothing but itself.
 
 use std::collections::VecDeque;
 use std::io;
@@ -15,10 +16,10 @@ use tokio::time::{Instant, sleep, timeout};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info, warn};
 
-use super::errors::{failure, is_temporary};
-use super::open::connect_writer;
+use super::errors::{failure, is_locked, is_temporary};
+use super::open::{connect_writer, with_lock_limit};
 use crate::StoreError;
-use chefshat_base::metrics::StoreMetrics;
+use chefshat_base::metrics::{StoreMetrics, Waits};
 use chefshat_base::tasks::{LongTask, named};
 
 /// Work that may wait for a writer.
@@ -30,6 +31,8 @@ const ATTEMPTS_TOGETHER: u32 = 2;
 /// Pauses before a transaction is tried again.
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+/// How long what was set aside waits for a lock each time. What else is there waits as long.
+const ASIDE_LOCK_LIMIT: Duration = Duration::from_millis(50);
 /// How long work is tried again after the store was closed.
 const CLOSING_LIMIT: Duration = Duration::from_secs(5);
 
@@ -119,28 +122,46 @@ pub(super) fn start<W: Work>(
 ) -> Queue<W> {
     let (queue, waiting) = mpsc::channel(QUEUE);
     let waiting = Arc::new(Mutex::new(waiting));
+    let (aside, set_aside) = mpsc::unbounded_channel();
     for _ in 0..writers {
-        let writer = Writer {
-            shared: shared.clone(),
-            connection: None,
-        };
-        tasks.push(tokio::spawn(named(
-            LongTask::PostgresWriter,
-            writer.run(Arc::clone(&waiting)),
-        )));
+        let writer = Writer::new(shared.clone(), Some(aside.clone()));
+        let writing = writer.run(Arc::clone(&waiting));
+        tasks.push(tokio::spawn(named(LongTask::PostgresWriter, writing)));
     }
+    let writer = Writer::new(
+        Shared {
+            options: with_lock_limit(shared.options.clone(), ASIDE_LOCK_LIMIT),
+            ..shared.clone()
+        },
+        None,
+    );
+    let writing = writer.run_aside(set_aside);
+    tasks.push(tokio::spawn(named(LongTask::PostgresWriter, writing)));
     Queue(queue)
 }
 
-struct Writer {
+struct Writer<W: Work> {
     shared: Shared,
     connection: Option<PgConnection>,
+    /// Where work that meets a lock is set aside; `None` if it is there already.
+    aside: Option<mpsc::UnboundedSender<Batch<W>>>,
+    /// How long to wait after the next failure.
+    pause: Duration,
 }
 
-impl Writer {
+impl<W: Work> Writer<W> {
+    fn new(shared: Shared, aside: Option<mpsc::UnboundedSender<Batch<W>>>) -> Self {
+        Self {
+            shared,
+            connection: None,
+            aside,
+            pause: FIRST_PAUSE,
+        }
+    }
+
     /// Commits work until the store is closed or all senders are gone. While one writer commits,
     /// the next one takes what arrives.
-    async fn run<W: Work>(mut self, waiting: Arc<Mutex<mpsc::Receiver<Pending<W>>>>) {
+    async fn run(mut self, waiting: Arc<Mutex<mpsc::Receiver<Pending<W>>>>) {
         let mut batch = Vec::new();
         loop {
             {
@@ -160,66 +181,98 @@ impl Writer {
             }
             let began = Instant::now();
             let pieces = batch.len();
-            let waits = self.shared.metrics.waits();
-            self.commit(std::mem::take(&mut batch)).await;
-            drop(waits);
+            let waits = Arc::new(self.shared.metrics.waits());
+            let taken = Batch::new(std::mem::take(&mut batch), false, waits);
+            let mut batches = VecDeque::from([taken]);
+            self.pause = FIRST_PAUSE;
+            while let Some(batch) = batches.pop_front() {
+                self.commit(batch, &mut batches).await;
+            }
             self.shared.metrics.committed(pieces, began.elapsed());
         }
     }
 
-    /// Commits work and answers its senders. What gets no answer twice is sent in halves, so that
-    /// one piece that cannot proceed does not hold up the others for long.
-    async fn commit<W: Work>(&mut self, pieces: Vec<Pending<W>>) {
-        let mut pause = FIRST_PAUSE;
-        let mut batches = VecDeque::from([Batch::new(pieces, false)]);
-        while let Some(mut batch) = batches.pop_front() {
-            let cause = match self.attempt(&mut batch).await {
-                Ok(answers) => {
-                    if batch.again {
-                        info!("the database answers again");
-                    }
-                    batch.answer(answers);
-                    pause = FIRST_PAUSE;
-                    continue;
-                }
-                Err(cause) => cause,
-            };
-            let failed = failure(&cause);
-            if !is_temporary(&cause) {
-                let pieces = batch.pieces.len();
-                error!(error = %failed, pieces, "a commit was refused");
-                // One piece must not make the others fail.
-                match pieces {
-                    1 => batch.answer(vec![Err(failed)]),
-                    _ => batches.extend(batch.split(1)),
-                }
-                continue;
+    /// Commits what was set aside, in turn, until all other writers have ended.
+    async fn run_aside(mut self, mut set_aside: mpsc::UnboundedReceiver<Batch<W>>) {
+        let mut batches = VecDeque::new();
+        loop {
+            if batches.is_empty() {
+                self.connection = None;
+                let Some(batch) = set_aside.recv().await else {
+                    return;
+                };
+                batches.push_back(batch);
             }
-            self.shared.metrics.retried();
-            if !batch.again {
-                warn!(error = %failed, "a commit has no answer; it is tried again");
+            while let Ok(batch) = set_aside.try_recv() {
+                batches.push_back(batch);
             }
-            batch.again = true;
-            let limit = match self.shared.closing.is_cancelled() {
-                true => CLOSING_LIMIT.min(self.shared.retry_for),
-                false => self.shared.retry_for,
-            };
-            batch.fail_late(limit, &failed);
-            if batch.pieces.is_empty() {
-                continue;
+            if let Some(batch) = batches.pop_front() {
+                self.commit(batch, &mut batches).await;
             }
-            let half = batch.pieces.len().div_ceil(2);
-            match batch.unanswered {
-                0..ATTEMPTS_TOGETHER => batches.push_back(batch),
-                _ => batches.extend(batch.split(half)),
-            }
-            sleep(pause).await;
-            pause = LONGEST_PAUSE.min(pause * 2);
         }
     }
 
+    /// Tries to commit work and answers its senders, or adds it to `batches` again. What gets no
+    /// answer twice is sent in halves, so that one piece that cannot proceed does not hold up the
+    /// others for long.
+    async fn commit(&mut self, mut batch: Batch<W>, batches: &mut VecDeque<Batch<W>>) {
+        let cause = match self.attempt(&mut batch).await {
+            Ok(answers) => {
+                if batch.again {
+                    info!("the database answers again");
+                }
+                batch.answer(answers);
+                self.pause = FIRST_PAUSE;
+                return;
+            }
+            Err(cause) => cause,
+        };
+        let failed = failure(&cause);
+        if !is_temporary(&cause) {
+            let pieces = batch.pieces.len();
+            error!(error = %failed, pieces, "a commit was refused");
+            // One piece must not make the others fail.
+            match pieces {
+                1 => batch.answer(vec![Err(failed)]),
+                _ => batches.extend(batch.split(1)),
+            }
+            return;
+        }
+        self.shared.metrics.retried();
+        if !batch.again {
+            warn!(error = %failed, "a commit has no answer; it is tried again");
+        }
+        batch.again = true;
+        let limit = match self.shared.closing.is_cancelled() {
+            true => CLOSING_LIMIT.min(self.shared.retry_for),
+            false => self.shared.retry_for,
+        };
+        batch.fail_late(limit, &failed);
+        if batch.pieces.is_empty() {
+            return;
+        }
+        let half = batch.pieces.len().div_ceil(2);
+        if is_locked(&cause) {
+            match &self.aside {
+                // It outlives all other writers.
+                Some(aside) => drop(aside.send(batch)),
+                None => {
+                    batches.extend(batch.split(half));
+                    sleep(FIRST_PAUSE).await;
+                }
+            }
+            return;
+        }
+        match batch.unanswered {
+            0..ATTEMPTS_TOGETHER => batches.push_back(batch),
+            _ => batches.extend(batch.split(half)),
+        }
+        sleep(self.pause).await;
+        self.pause = LONGEST_PAUSE.min(self.pause * 2);
+    }
+
     /// Tries once. After an error the connection is gone.
-    async fn attempt<W: Work>(&mut self, batch: &mut Batch<W>) -> sqlx::Result<Answers<W>> {
+    async fn attempt(&mut self, batch: &mut Batch<W>) -> sqlx::Result<Answers<W>> {
         let work: Vec<_> = (batch.pieces.iter())
             .map(|piece| Arc::clone(&piece.work))
             .collect();
@@ -249,14 +302,17 @@ struct Batch<W: Work> {
     again: bool,
     /// How often it was sent to the database and not answered.
     unanswered: u32,
+    /// Says that it waits, with all batches that it was one with.
+    waits: Arc<Waits>,
 }
 
 impl<W: Work> Batch<W> {
-    fn new(pieces: Vec<Pending<W>>, again: bool) -> Self {
+    fn new(pieces: Vec<Pending<W>>, again: bool, waits: Arc<Waits>) -> Self {
         Self {
             pieces,
             again,
             unanswered: 0,
+            waits,
         }
     }
 
@@ -277,11 +333,11 @@ impl<W: Work> Batch<W> {
 
     /// Batches of at most this size.
     fn split(self, size: usize) -> impl Iterator<Item = Self> {
-        let (mut pieces, again) = (self.pieces, self.again);
+        let (mut pieces, again, waits) = (self.pieces, self.again, self.waits);
         std::iter::from_fn(move || {
             let rest = pieces.split_off(size.min(pieces.len()));
             let first = std::mem::replace(&mut pieces, rest);
-            (!first.is_empty()).then(|| Self::new(first, again))
+            (!first.is_empty()).then(|| Self::new(first, again, Arc::clone(&waits)))
         })
     }
 }

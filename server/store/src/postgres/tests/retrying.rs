@@ -49,7 +49,7 @@ impl Line {
     }
 
     async fn node(&self) -> Arc<PostgresStore> {
-        let store = PostgresStore::open(&self.url, PostgresOptions::default()).await;
+        let store = PostgresStore::open(&self.url, patient()).await;
         let store = store.expect("an empty database, or one of ours");
         store.join(NodeInfo::default()).await.expect("it joins");
         Arc::new(store)
@@ -389,5 +389,40 @@ async fn a_transaction_that_is_given_up_when_it_begins_does_not_stay_open() {
     let second = transaction().await.expect("it answers");
     assert_ne!(first, second, "each by itself");
     drop(others);
+    store.close().await;
+}
+
+#[tokio::test]
+async fn what_is_locked_holds_up_nothing_else() {
+    let database = chefshat_postgres::database();
+    let store = node_with(&database, PostgresOptions::default()).await;
+    let mut journals = Vec::new();
+    for room in 1..=6 {
+        let created = store.create(durable(room), vec![entry(1)]);
+        journals.push(created.await.expect("created"));
+    }
+    let mut others = journals.split_off(2);
+    let locked = "TRIGGER wait BEFORE INSERT ON journal FOR EACH ROW WHEN (NEW.game <= 2)";
+    let mut holder = hold(&database, locked).await;
+    let mut waiting_rooms = Vec::new();
+    for mut journal in journals {
+        waiting_rooms.push(tokio::spawn(async move { append(&mut journal, 2).await }));
+        waiting(&mut holder, "advisory").await;
+    }
+    let appending = async {
+        for number in 2..6 {
+            for journal in &mut others {
+                append(journal, number).await.expect("nobody has locked it");
+            }
+        }
+    };
+    let appended = tokio::time::timeout(Duration::from_secs(60), appending).await;
+    appended.expect("no room waits for another");
+    assert!(waiting_rooms.iter().all(|room| !room.is_finished()));
+    run(&mut holder, "SELECT pg_advisory_unlock(1)").await;
+    for room in waiting_rooms {
+        assert_eq!(room.await.expect("no panic"), Ok(()));
+    }
+    assert_eq!(database.run("SELECT count(*) FROM journal"), "24");
     store.close().await;
 }
