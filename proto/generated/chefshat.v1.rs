@@ -8876,28 +8876,30 @@ pub mod study_stage {
 /// Prolific, SONA or MTurk.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StudyRecruiting {
-    /// Whether the study has an open link (`open_link` of Study): whoever opens it takes part.
+    /// Whether the study has an open link (`open_link` of Study): everyone who opens it takes part.
     #[prost(bool, tag = "1")]
     pub open_link: bool,
     /// Name of the query parameter of the open link in which the panel gives a person's id there, for
     /// example "PROLIFIC_PID": 1..=64 letters, digits, `_`, `-` or `.`. Nobody takes part without such
-    /// an id, or twice with the same. Empty: no id is asked for.
+    /// an id, or with that of another participant whose data were not deleted. Empty: no id is asked
+    /// for.
     #[prost(string, tag = "2")]
     pub id_parameter: ::prost::alloc::string::String,
-    /// Where those who complete the study go on: empty, or an address that begins with <https://,> at
-    /// most 2000 characters. "{id}" stands for the id at the panel; those without one have no address.
+    /// Where the page sends those who complete the study: empty, or an address that begins with
+    /// <https://,> at most 2000 characters. "{id}" (once) stands for the id at the panel; those without
+    /// one have no address.
     #[prost(string, tag = "3")]
     pub completed_url: ::prost::alloc::string::String,
-    /// As `completed_url`, for those who do not agree or withdraw. The id at the panel is deleted with
-    /// the data of those who have them deleted.
+    /// As `completed_url`, for those who do not agree, withdraw, are away for too long or are removed;
+    /// without "{id}", which is deleted with the data of those who do not agree.
     #[prost(string, tag = "4")]
-    pub withdrawn_url: ::prost::alloc::string::String,
+    pub left_url: ::prost::alloc::string::String,
     /// As `completed_url`, for those who cannot begin because the study is closed or full.
     #[prost(string, tag = "5")]
     pub full_url: ::prost::alloc::string::String,
 }
 /// The settings of a study. In a request an unset field means its default; in a response every field
-/// is set.
+/// is set that the server knew when the study was created.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StudySettings {
     /// Name for researchers, 1..=64 characters. Participants never see it.
@@ -9069,6 +9071,9 @@ pub struct StudyLink {
     /// path "/study/" and this text.
     #[prost(string, tag = "3")]
     pub link: ::prost::alloc::string::String,
+    /// Whether the participant joined by the open link, and has its own link already.
+    #[prost(bool, tag = "4")]
+    pub joined: bool,
 }
 /// A study. Only for researchers.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -9256,7 +9261,7 @@ pub struct StudyEnd {
     /// The reason.
     #[prost(enumeration = "StudyEndReason", tag = "1")]
     pub reason: i32,
-    /// Where the participant goes on (StudyRecruiting); empty if nowhere.
+    /// Where the page sends the participant next (StudyRecruiting); empty if nowhere.
     #[prost(string, tag = "2")]
     pub url: ::prost::alloc::string::String,
 }
@@ -9822,8 +9827,8 @@ pub struct JoinStudyRequest {
     /// `open_link` of Study.
     #[prost(string, tag = "1")]
     pub open_link: ::prost::alloc::string::String,
-    /// The person's id at the panel, 1..=128 characters, the value of the query parameter
-    /// `id_parameter` of StudyRecruiting; empty if that is empty.
+    /// The person's id at the panel, 1..=128 ASCII characters without spaces: the value of the query
+    /// parameter `id_parameter` of StudyRecruiting. Empty if that is empty.
     #[prost(string, tag = "2")]
     pub panel_id: ::prost::alloc::string::String,
     /// 32 random bytes, which must be kept secret. A repeated call with the same ones, after a lost
@@ -10319,7 +10324,7 @@ pub mod study_service_client {
                 .insert(GrpcMethod::new("chefshat.v1.StudyService", "ExportStudy"));
             self.inner.server_streaming(req, path, codec).await
         }
-        /// Deletes the data of a participant: its pseudonym, answers, interface traces, and its games with
+        /// Deletes the data of a participant: its pseudonym, id at the panel, answers, interface traces, and its games with
         /// their records. What stays is that a participant with this number took part, when, in which
         /// conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
         /// deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
@@ -10495,7 +10500,7 @@ pub mod study_service_server {
             tonic::Response<Self::ExportStudyStream>,
             tonic::Status,
         >;
-        /// Deletes the data of a participant: its pseudonym, answers, interface traces, and its games with
+        /// Deletes the data of a participant: its pseudonym, id at the panel, answers, interface traces, and its games with
         /// their records. What stays is that a participant with this number took part, when, in which
         /// conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
         /// deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
@@ -11239,12 +11244,12 @@ pub mod participation_service_client {
             self.inner = self.inner.max_encoding_message_size(limit);
             self
         }
-        /// Takes part by an open link (`open_link` of Study), and returns a link of one's own, which
-        /// OpenStudy opens. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+        /// Adds a participant who has the open link (`open_link` of Study), and returns its own link for
+        /// OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
         /// INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
-        /// RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN). STUDY_CLOSED and
-        /// STUDY_FULL, also of OpenStudy and GiveConsent, have the metadata `url` if the study has a
-        /// `full_url`.
+        /// RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
+        /// study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
+        /// `url`, and so has the STUDY_FULL of OpenStudy and GiveConsent.
         pub async fn join_study(
             &mut self,
             request: impl tonic::IntoRequest<super::JoinStudyRequest>,
@@ -11531,12 +11536,12 @@ pub mod participation_service_server {
     /// Generated trait containing gRPC methods that should be implemented for use with ParticipationServiceServer.
     #[async_trait]
     pub trait ParticipationService: std::marker::Send + std::marker::Sync + 'static {
-        /// Takes part by an open link (`open_link` of Study), and returns a link of one's own, which
-        /// OpenStudy opens. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+        /// Adds a participant who has the open link (`open_link` of Study), and returns its own link for
+        /// OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
         /// INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
-        /// RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN). STUDY_CLOSED and
-        /// STUDY_FULL, also of OpenStudy and GiveConsent, have the metadata `url` if the study has a
-        /// `full_url`.
+        /// RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
+        /// study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
+        /// `url`, and so has the STUDY_FULL of OpenStudy and GiveConsent.
         async fn join_study(
             &self,
             request: tonic::Request<super::JoinStudyRequest>,

@@ -38310,6 +38310,9 @@ impl serde::Serialize for StudyLink {
         if !self.link.is_empty() {
             len += 1;
         }
+        if self.joined {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyLink", len)?;
         if self.number != 0 {
             struct_ser.serialize_field("number", &self.number)?;
@@ -38319,6 +38322,9 @@ impl serde::Serialize for StudyLink {
         }
         if !self.link.is_empty() {
             struct_ser.serialize_field("link", &self.link)?;
+        }
+        if self.joined {
+            struct_ser.serialize_field("joined", &self.joined)?;
         }
         struct_ser.end()
     }
@@ -38333,6 +38339,7 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
             "number",
             "pseudonym",
             "link",
+            "joined",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -38340,6 +38347,7 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
             Number,
             Pseudonym,
             Link,
+            Joined,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -38364,6 +38372,7 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
                             "number" => Ok(GeneratedField::Number),
                             "pseudonym" => Ok(GeneratedField::Pseudonym),
                             "link" => Ok(GeneratedField::Link),
+                            "joined" => Ok(GeneratedField::Joined),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -38386,6 +38395,7 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
                 let mut number__ = None;
                 let mut pseudonym__ = None;
                 let mut link__ = None;
+                let mut joined__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Number => {
@@ -38408,12 +38418,19 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
                             }
                             link__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::Joined => {
+                            if joined__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("joined"));
+                            }
+                            joined__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(StudyLink {
                     number: number__.unwrap_or_default(),
                     pseudonym: pseudonym__.unwrap_or_default(),
                     link: link__.unwrap_or_default(),
+                    joined: joined__.unwrap_or_default(),
                 })
             }
         }
@@ -39491,7 +39508,7 @@ impl serde::Serialize for StudyRecruiting {
         if !self.completed_url.is_empty() {
             len += 1;
         }
-        if !self.withdrawn_url.is_empty() {
+        if !self.left_url.is_empty() {
             len += 1;
         }
         if !self.full_url.is_empty() {
@@ -39507,8 +39524,8 @@ impl serde::Serialize for StudyRecruiting {
         if !self.completed_url.is_empty() {
             struct_ser.serialize_field("completedUrl", &self.completed_url)?;
         }
-        if !self.withdrawn_url.is_empty() {
-            struct_ser.serialize_field("withdrawnUrl", &self.withdrawn_url)?;
+        if !self.left_url.is_empty() {
+            struct_ser.serialize_field("leftUrl", &self.left_url)?;
         }
         if !self.full_url.is_empty() {
             struct_ser.serialize_field("fullUrl", &self.full_url)?;
@@ -39529,8 +39546,8 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
             "idParameter",
             "completed_url",
             "completedUrl",
-            "withdrawn_url",
-            "withdrawnUrl",
+            "left_url",
+            "leftUrl",
             "full_url",
             "fullUrl",
         ];
@@ -39540,7 +39557,7 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
             OpenLink,
             IdParameter,
             CompletedUrl,
-            WithdrawnUrl,
+            LeftUrl,
             FullUrl,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
@@ -39566,7 +39583,7 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
                             "openLink" | "open_link" => Ok(GeneratedField::OpenLink),
                             "idParameter" | "id_parameter" => Ok(GeneratedField::IdParameter),
                             "completedUrl" | "completed_url" => Ok(GeneratedField::CompletedUrl),
-                            "withdrawnUrl" | "withdrawn_url" => Ok(GeneratedField::WithdrawnUrl),
+                            "leftUrl" | "left_url" => Ok(GeneratedField::LeftUrl),
                             "fullUrl" | "full_url" => Ok(GeneratedField::FullUrl),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
@@ -39590,7 +39607,7 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
                 let mut open_link__ = None;
                 let mut id_parameter__ = None;
                 let mut completed_url__ = None;
-                let mut withdrawn_url__ = None;
+                let mut left_url__ = None;
                 let mut full_url__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
@@ -39612,11 +39629,11 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
                             }
                             completed_url__ = Some(map_.next_value()?);
                         }
-                        GeneratedField::WithdrawnUrl => {
-                            if withdrawn_url__.is_some() {
-                                return Err(serde::de::Error::duplicate_field("withdrawnUrl"));
+                        GeneratedField::LeftUrl => {
+                            if left_url__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("leftUrl"));
                             }
-                            withdrawn_url__ = Some(map_.next_value()?);
+                            left_url__ = Some(map_.next_value()?);
                         }
                         GeneratedField::FullUrl => {
                             if full_url__.is_some() {
@@ -39630,7 +39647,7 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
                     open_link: open_link__.unwrap_or_default(),
                     id_parameter: id_parameter__.unwrap_or_default(),
                     completed_url: completed_url__.unwrap_or_default(),
-                    withdrawn_url: withdrawn_url__.unwrap_or_default(),
+                    left_url: left_url__.unwrap_or_default(),
                     full_url: full_url__.unwrap_or_default(),
                 })
             }

@@ -90,7 +90,7 @@ test("the form makes the settings of a study, and says what is missing", async (
   expect(settings.recruiting).toBe(undefined);
   const panel = { openLink: true, idParameter: "PROLIFIC_PID", fullUrl: "https://panel.example/full" };
   const recruited = await settingsOf({ ...filled, ...panel });
-  expect(recruited.recruiting).toEqual({ ...panel, completedUrl: "", withdrawnUrl: "" });
+  expect(recruited.recruiting).toEqual({ ...panel, completedUrl: "", leftUrl: "" });
   expect(Object.keys(faultsOf({ ...filled, ...panel, fullUrl: "http://x", idParameter: "a b" }))).toEqual([
     "fullUrl",
     "idParameter",

@@ -126,6 +126,15 @@ impl Study {
         self.participants().len() as u32 + 1
     }
 
+    /// The participant who joined by the open link with the request of this hash.
+    pub fn joined_by(&self, request_sha256: &[u8; 32]) -> Option<u32> {
+        let is_by = |joined: &Joined| joined.request_sha256 == *request_sha256;
+        let mut participants = self.participants().iter();
+        participants
+            .find(|(_, it)| it.joined.as_ref().is_some_and(is_by))
+            .map(|(number, _)| *number)
+    }
+
     /// The participant who joined by the open link with a request, and the change that adds it unless
     /// the request is repeated.
     ///
@@ -137,18 +146,15 @@ impl Study {
         if !recruiting.open_link {
             return Err(Refusal::Unknown);
         }
-        let mut by_link = (self.participants().iter())
-            .filter_map(|(number, it)| Some((*number, it.joined.as_ref()?)));
-        let is_repeated =
-            |(_, other): &(u32, &Joined)| other.request_sha256 == joined.request_sha256;
-        if let Some((number, _)) = by_link.clone().find(is_repeated) {
+        if let Some(number) = self.joined_by(&joined.request_sha256) {
             return Ok((number, None));
         }
         recruiting
             .check_panel_id(&joined.panel_id)
             .map_err(Refusal::PanelId)?;
         let has_id = !joined.panel_id.is_empty();
-        if has_id && by_link.any(|(_, other)| other.panel_id == joined.panel_id) {
+        let mut others = self.participants().values();
+        if has_id && others.any(|other| other.panel_id() == joined.panel_id) {
             return Err(Refusal::PanelIdTaken);
         }
         let mut changes = self.add(&[String::new()])?;

@@ -1,5 +1,6 @@
 //! Links of participants: the study, the participant's number, and a code that only the server can
-//! compute. Number 0 is the open link of a study. Sessions have the number of the session as well. Nothing is stored for them.
+//! compute. Number 0 is in the open link of a study. Sessions have the number of the session as well.
+//! Nothing is stored for them.
 
 use std::fmt;
 

@@ -1,4 +1,5 @@
-//! How people take part who were not given a link of their own, and where they go on at the end.
+//! How people take part who were not given a link of their own, and where the page sends them at the
+//! end.
 
 use crate::address;
 use crate::checks::{Checked, identifier, refuse};
@@ -15,11 +16,11 @@ pub struct Recruiting {
     pub open_link: bool,
     /// The query parameter of the open link that has a person's id at the panel; empty: none.
     pub id_parameter: String,
-    /// Where those who complete the study go on; empty: nowhere.
+    /// Where the page sends those who complete the study; empty: nowhere.
     pub completed_url: String,
-    /// Where those who do not agree or withdraw go on; empty: nowhere.
-    pub withdrawn_url: String,
-    /// Where those go on who cannot begin; empty: nowhere.
+    /// Where it sends those who do not agree or leave; empty: nowhere.
+    pub left_url: String,
+    /// Where it sends those who cannot begin; empty: nowhere.
     pub full_url: String,
 }
 
@@ -35,7 +36,7 @@ impl Recruiting {
         }
         for (name, url) in [
             ("completed_url", &self.completed_url),
-            ("withdrawn_url", &self.withdrawn_url),
+            ("left_url", &self.left_url),
             ("full_url", &self.full_url),
         ] {
             let field = format!("{field}.{name}");
@@ -43,8 +44,16 @@ impl Recruiting {
                 continue;
             }
             address::check(&field, url, PLACEHOLDER)?;
-            if url.contains(PLACEHOLDER) && self.id_parameter.is_empty() {
+            let places = url.matches(PLACEHOLDER).count();
+            if places > 0 && self.id_parameter.is_empty() {
                 return refuse(field, "{id} is filled in only if id_parameter is set");
+            }
+            if places > 0 && name == "left_url" {
+                let problem = "{id} is deleted with the data of those who do not agree";
+                return refuse(field, problem);
+            }
+            if places > 1 {
+                return refuse(field, "{id} is filled in once");
             }
         }
         Ok(())
@@ -59,12 +68,13 @@ impl Recruiting {
             (false, true) => Err(format!(
                 "the address has no {parameter}; open the link from the site that invited you"
             )),
-            (false, false) if id.chars().any(char::is_control) => {
-                Err(format!("{parameter} has control characters"))
+            (false, false)
+                if id.len() > MAX_PANEL_ID || !id.bytes().all(|byte| byte.is_ascii_graphic()) =>
+            {
+                Err(format!(
+                    "{parameter} is not 1..={MAX_PANEL_ID} letters, digits and signs of ASCII"
+                ))
             }
-            (false, false) if id.chars().count() > MAX_PANEL_ID => Err(format!(
-                "{parameter} has more than {MAX_PANEL_ID} characters"
-            )),
             (false, false) => Ok(()),
         }
     }
@@ -76,7 +86,7 @@ impl Recruiting {
         (!url.is_empty() && !lacks_id).then(|| address::filled_in(url, PLACEHOLDER, id))
     }
 
-    /// Where somebody with this id goes on who cannot begin.
+    /// Where somebody with this id is sent who cannot begin.
     pub fn full_url(&self, id: &str) -> Option<String> {
         Self::filled_in(&self.full_url, id)
     }

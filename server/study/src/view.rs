@@ -49,7 +49,7 @@ pub enum Content {
     End {
         /// Why.
         reason: End,
-        /// Where the participant goes on, if anywhere.
+        /// Where the page sends the participant next, if anywhere.
         url: Option<String>,
     },
 }
@@ -141,8 +141,8 @@ impl Study {
         let recruiting = &self.settings().recruiting;
         let url = match participant.status {
             Status::Completed => &recruiting.completed_url,
-            Status::Withdrawn => &recruiting.withdrawn_url,
-            _ => "",
+            Status::Withdrawn | Status::DroppedOut | Status::Removed => &recruiting.left_url,
+            Status::Invited | Status::Active => "",
         };
         let url = Recruiting::filled_in(url, participant.panel_id());
         Content::End { reason, url }

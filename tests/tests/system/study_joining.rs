@@ -20,7 +20,7 @@ fn recruited() -> v1::StudySettings {
             open_link: true,
             id_parameter: "PROLIFIC_PID".to_owned(),
             completed_url: "https://panel.example/done?id={id}".to_owned(),
-            withdrawn_url: "https://panel.example/left?id={id}".to_owned(),
+            left_url: "https://panel.example/left".to_owned(),
             full_url: FULL.to_owned(),
         }),
         ..settings()
@@ -135,11 +135,20 @@ async fn people_of_a_panel_join_once_each_until_the_study_is_full() {
     let Some(Content::End(end)) = view.expect("a view").content else {
         panic!("it is the end");
     };
-    assert_eq!(end.url, "https://panel.example/left?id=ada");
+    assert_eq!(end.url, "https://panel.example/left");
 
     let mut lab = Lab::connect(&second, owner).await;
     let ids = lab.participants().await.into_iter().map(|it| it.panel_id);
     assert_eq!(ids.collect::<Vec<_>>(), ["ada", "bo"]);
+    let data = lab.export().await;
+    let text = |file: &str| String::from_utf8_lossy(&data[file]).into_owned();
+    assert!(text("participants.csv").contains("ada"));
+    // Data are published: nothing in them lets anybody take part, or be paid.
+    for file in data.keys() {
+        let secret = [open_link.as_str(), "panel.example"];
+        let found = secret.iter().find(|secret| text(file).contains(**secret));
+        assert_eq!(found, None, "{file}");
+    }
     let request = v1::CloseStudyRequest {
         study_id: lab.study_id.clone(),
         owner_token: lab.owner_token.clone(),

@@ -228,7 +228,7 @@ function FromForm() {
       {form.openLink && (
         <div class={css.fields} data-part="panel">
           {text("idParameter", words.idParameter, words.idParameterHint)}
-          {PANEL_URLS.map((name) => text(name, words[name], words.panelUrlHint))}
+          {PANEL_URLS.map((name) => text(name, words[name], name === "leftUrl" ? "https://…" : words.panelUrlHint))}
         </div>
       )}
       {fault && <Notice kind="fault">{fault}</Notice>}

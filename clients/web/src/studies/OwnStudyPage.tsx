@@ -129,7 +129,7 @@ export function OwnStudy({ study, participants }: FollowedStudy) {
       </header>
       {closed && <Notice kind="hint">{words.isClosed}</Notice>}
       <Counts study={study} participants={participants} />
-      {!closed && study.openLink && <OpenLink link={study.openLink} />}
+      {!closed && study.openLink && <OpenLink study={study} />}
       {!closed && <Add studyId={studyId} />}
       <Links key={participants.length} studyId={studyId} />
       <Participants study={study} participants={participants} />
@@ -213,15 +213,25 @@ function Counts({ study, participants }: FollowedStudy) {
 }
 
 /** The link for everyone. */
-function OpenLink({ link }: { link: string }) {
+function OpenLink({ study: { openLink, settings } }: { study: Study }) {
   const words = t().studies.own.openLink;
-  const address = addressOf({ link });
+  const parameter = settings?.recruiting?.idParameter ?? "";
+  const address = addressOf({ link: openLink });
   return (
     <section class={`sheet ${css.part}`} data-part="open-link">
       <h2>{words.title}</h2>
       <p class="soft">{words.text}</p>
-      <CopyLine label={words.label} text={address} />
-      <QrCode text={address} label={words.label} />
+      {parameter === "" ? (
+        <>
+          <CopyLine label={words.label} text={address} />
+          <QrCode text={address} label={words.label} />
+        </>
+      ) : (
+        <>
+          <CopyLine label={words.label} text={`${address}?${parameter}=`} />
+          <p class="soft">{words.withId}</p>
+        </>
+      )}
     </section>
   );
 }
@@ -277,7 +287,8 @@ function Links({ studyId }: { studyId: string }) {
   const { busy, fault, run } = useAttempt();
   const show = () =>
     run(async () => {
-      setLinks(await linksOf(studyId));
+      // Those who joined have theirs.
+      setLinks((await linksOf(studyId)).filter(({ joined }) => !joined));
       return false;
     });
   return (

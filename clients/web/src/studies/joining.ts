@@ -1,22 +1,59 @@
-// Taking part by a study's open link. This device keeps the request, so that the open link leads the
-// same person to the same participation.
+// Taking part by a study's open link. For somebody with an id at a panel, this device keeps the
+// request, so that the same link leads to the same participation.
 
 import { CALL_LIMIT_MS } from "../api/client";
+import { faultOf } from "../api/faults";
 import { fromHex, hex } from "../hex";
-import { recall, remember } from "../store";
+import { recallObject, remember, remembered } from "../store";
 import { participationApi } from "./client";
 
 const STORED = "study-join.";
+const REQUEST_BYTES = 32;
+/** The request of somebody without an id, until the page is loaded again: others may use this device. */
+const unnamed = crypto.getRandomValues(new Uint8Array(REQUEST_BYTES));
 
 /**
- * Takes part by an open link, with the id of the panel that the page's address has in this query
- * parameter, if any is asked for; returns the secret of one's own link.
+ * Takes part by an open link, with the id at the panel that the page's address has in this query
+ * parameter, if any is asked for; returns the secret of the participant's own link.
  */
 export async function join(openLink: string, idParameter: string): Promise<string> {
   const panelId = idParameter === "" ? "" : (new URLSearchParams(location.search).get(idParameter) ?? "");
-  const stored = `${STORED}${openLink}.${panelId}`;
-  const kept = fromHex(recall(stored) ?? "");
-  const requestId = kept.length === 32 ? kept : crypto.getRandomValues(new Uint8Array(32));
-  remember(stored, hex(requestId));
-  return (await participationApi.joinStudy({ openLink, panelId, requestId }, { timeoutMs: CALL_LIMIT_MS })).link;
+  const stored = panelId === "" ? undefined : `${STORED}${openLink}.${panelId}`;
+  const requestId = stored === undefined ? unnamed : (keptRequest(stored) ?? newRequest());
+  const keep = (link: string) => {
+    if (stored !== undefined) remember(stored, JSON.stringify({ request: hex(requestId), link }));
+  };
+  keep("");
+  try {
+    const { link } = await participationApi.joinStudy({ openLink, panelId, requestId }, { timeoutMs: CALL_LIMIT_MS });
+    keep(link);
+    return link;
+  } catch (thrown) {
+    if (stored !== undefined && FINAL.includes(faultOf(thrown).reason)) remember(stored, null);
+    throw thrown;
+  }
+}
+
+/** Refusals after which nobody takes part by this request. */
+const FINAL = ["STUDY_FULL", "STUDY_CLOSED", "PANEL_ID_TAKEN", "PANEL_ID_REFUSED", "TOO_MANY_PARTICIPANTS"];
+
+/** Forgets how the participant with this link of its own joined. */
+export function forgetJoined(link: string): void {
+  for (const name of remembered().keys())
+    if (
+      name.startsWith(STORED) &&
+      recallObject(name, (kept) => (typeof kept.link === "string" ? kept.link : null)) === link
+    )
+      remember(name, null);
+}
+
+function newRequest(): Uint8Array<ArrayBuffer> {
+  return crypto.getRandomValues(new Uint8Array(REQUEST_BYTES));
+}
+
+function keptRequest(stored: string): Uint8Array<ArrayBuffer> | undefined {
+  const request = fromHex(
+    recallObject(stored, (kept) => (typeof kept.request === "string" ? kept.request : null)) ?? "",
+  );
+  return request.length === REQUEST_BYTES ? request : undefined;
 }

@@ -9,7 +9,7 @@ import { type Following, follow, type Link } from "../api/follow";
 import type { StudyItemAnswer, StudyItemAnswerSchema, StudyTraceSchema, StudyView } from "../gen/chefshat/v1/study_pb";
 import { replaceAddress } from "../router";
 import { participationApi } from "./client";
-import { join } from "./joining";
+import { forgetJoined, join } from "./joining";
 
 /**
  * How this page takes part: opening the study, open, taken over by another page or device, or
@@ -57,10 +57,12 @@ export interface Participating {
 
 const SHORTEST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 8_000;
+/** Nothing more can be done here. */
+const ENDING = ["SESSION_SUPERSEDED", "STUDY_FULL", "STUDY_CLOSED"];
 /** The page is behind: the newest view says what to do. */
 const OUTDATED = ["STEP_OVER", "STEP_MISMATCH", "PARTICIPATION_OVER"];
 
-/** Takes part with the secret of a link: one's own, or the open link of the study. */
+/** Takes part with the secret of a link: the participant's own, or the open link of the study. */
 export function startParticipating(given: string): Participating {
   let secret = given;
   const presence = signal<Presence>("opening");
@@ -93,7 +95,7 @@ export function startParticipating(given: string): Participating {
     view.value = next;
   };
 
-  /** An open link leads to one's own, which the page's address has from then on. */
+  /** An open link leads to the participant's own, which the page's address has from then on. */
   const joinFirst = async (thrown: unknown) => {
     const { reason, metadata } = faultOf(thrown);
     if (reason !== "LINK_OPEN") throw thrown;
@@ -170,7 +172,7 @@ export function startParticipating(given: string): Participating {
       if (view.peek() === at) show(next);
     } catch (thrown) {
       const found = faultOf(thrown);
-      if (found.reason === "SESSION_SUPERSEDED") return fail(found);
+      if (ENDING.includes(found.reason)) return fail(found);
       if (OUTDATED.includes(found.reason)) return open();
       if (found.reason === "SESSION_UNKNOWN") await open();
       throw thrown;
@@ -200,6 +202,7 @@ export function startParticipating(given: string): Participating {
     },
     withdraw: async (deleteData) => {
       const answer = await participationApi.withdrawFromStudy({ link: secret, deleteData }, call);
+      if (deleteData) forgetJoined(secret);
       leave();
       presence.value = "open";
       view.value = answer.view;

@@ -34,12 +34,12 @@ export interface StudyForm {
   readonly openLink: boolean;
   readonly idParameter: string;
   readonly completedUrl: string;
-  readonly withdrawnUrl: string;
+  readonly leftUrl: string;
   readonly fullUrl: string;
 }
 
 /** The addresses of a panel, by their names in the form and in the protocol. */
-export const PANEL_URLS = ["completedUrl", "withdrawnUrl", "fullUrl"] as const;
+export const PANEL_URLS = ["completedUrl", "leftUrl", "fullUrl"] as const;
 
 /** Whether the questionnaires Godspeed and NASA-TLX have texts in this language. */
 export function hasTemplates(language: Language): boolean {
@@ -71,7 +71,7 @@ export function emptyForm(language: Language): StudyForm {
     openLink: false,
     idParameter: "",
     completedUrl: "",
-    withdrawnUrl: "",
+    leftUrl: "",
     fullUrl: "",
   };
 }
@@ -154,6 +154,6 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
   };
 }
 
-function recruitingOf({ idParameter, completedUrl, withdrawnUrl, fullUrl }: StudyForm) {
-  return { openLink: true, idParameter, completedUrl, withdrawnUrl, fullUrl };
+function recruitingOf({ idParameter, completedUrl, leftUrl, fullUrl }: StudyForm) {
+  return { openLink: true, idParameter, completedUrl, leftUrl, fullUrl };
 }

@@ -165,7 +165,7 @@ test("people of a panel take part by the open link, once each, and go on where t
     openLink: true,
     idParameter: "PROLIFIC_PID",
     completedUrl: "https://panel.example/done?id={id}",
-    withdrawnUrl: "https://panel.example/left",
+    leftUrl: "https://panel.example/left",
     fullUrl: "https://panel.example/full",
   };
   const condition = {
@@ -180,7 +180,9 @@ test("people of a panel take part by the open link, once each, and go on where t
   await researcher.page.getByLabel("Owner token").fill(ownerToken);
   await researcher.page.getByRole("button", { name: "Use this key" }).click();
   const shown = researcher.page.locator('[data-part~="open-link"] [data-part~="invite-link"]');
-  const openLink = ((await shown.textContent()) ?? "").trim();
+  const asked = ((await shown.textContent()) ?? "").trim();
+  const openLink = asked.replace("?PROLIFIC_PID=", "");
+  expect(asked).not.toBe(openLink);
   expect(await inaccessible(researcher.page)).toEqual([]);
 
   const ada = await person(browser, { viewport: PHONE });
@@ -205,12 +207,17 @@ test("people of a panel take part by the open link, once each, and go on where t
   await elsewhere.page.goto(`${openLink}?PROLIFIC_PID=ada`);
   await elsewhere.page.getByText("Somebody with this id already takes part.").waitFor();
 
-  // Bo does not agree.
+  const slow = await person(browser);
+  await slow.page.goto(`${openLink}?PROLIFIC_PID=dee`);
+  await slow.page.getByRole("heading", { name: "Before you begin" }).waitFor();
+
+  // Bo does not agree, and nothing of him stays.
   const bo = await person(browser);
   await bo.page.goto(`${openLink}?PROLIFIC_PID=bo`);
   await bo.page.getByRole("button", { name: "I do not agree…" }).click();
   await bo.page.getByRole("button", { name: "I do not take part" }).click();
   await bo.page.getByText("your data were deleted").waitFor();
+  expect(await bo.page.evaluate(() => Object.keys(localStorage).join())).not.toContain("study-join");
   const onward = ({ page }: typeof bo) => page.locator('[data-part~="go-on"]').getAttribute("href");
   expect(await onward(bo)).toBe("https://panel.example/left");
 
@@ -221,11 +228,16 @@ test("people of a panel take part by the open link, once each, and go on where t
   expect(await onward(ada)).toBe("https://panel.example/done?id=ada");
   expect(await inaccessible(ada.page)).toEqual([]);
 
+  // Somebody who has read the text meanwhile finds no place.
+  await slow.page.getByLabel("I have read this text").check();
+  await slow.page.getByRole("button", { name: "Agree and continue" }).click();
+  await slow.page.getByText("All places in this study are taken.").waitFor();
+  expect(await onward(slow)).toBe("https://panel.example/full");
   const late = await person(browser);
   await late.page.goto(`${openLink}?PROLIFIC_PID=cy`);
   await late.page.getByText("All places in this study are taken.").waitFor();
   expect(await onward(late)).toBe("https://panel.example/full");
   const rows = researcher.page.locator('[data-part~="participants"] tbody tr');
-  await expect.poll(() => rows.allInnerTexts()).toHaveLength(2);
+  await expect.poll(() => rows.allInnerTexts()).toHaveLength(3);
   expect((await rows.allInnerTexts()).join()).toMatch(/ada[\s\S]*completed/);
 });

@@ -116,8 +116,7 @@ impl Create {
             Some(file) => say(format_args!("owner token  in {}", file.display()))?,
             None => say(format_args!("owner token  {owner}"))?,
         }
-        if !study.open_link.is_empty() {
-            let address = owner::address(self.server.url(), &study.open_link);
+        if let Some(address) = owner::open_address(self.server.url(), &study) {
             say(format_args!("open link    {address}"))?;
         }
         say(format_args!(

@@ -173,8 +173,7 @@ impl Show {
         }
         let study = shown.study.unwrap_or_default();
         say(summary(&study))?;
-        if !study.open_link.is_empty() {
-            let address = address(owned.server.url(), &study.open_link);
+        if let Some(address) = open_address(owned.server.url(), &study) {
             say(format_args!("open link {address}"))?;
         }
         shown.participants.iter().try_for_each(|it| say(line(it)))
@@ -360,6 +359,7 @@ fn print_link(link: &v1::StudyLink, server: &str, json: bool) -> Result<(), Comm
         let (number, pseudonym) = (link.number, &link.pseudonym);
         return say(json!({
             "number": number, "pseudonym": pseudonym, "link": link.link, "address": address,
+            "joined": link.joined,
         }));
     }
     say(format_args!(
@@ -369,8 +369,26 @@ fn print_link(link: &v1::StudyLink, server: &str, json: bool) -> Result<(), Comm
 }
 
 /// The page's address for a link.
-pub(super) fn address(server: &str, link: &str) -> String {
+fn address(server: &str, link: &str) -> String {
     format!("{}/study/{link}", server.trim_end_matches('/'))
+}
+
+/// The page's address for the open link, if there is one: the id at the panel belongs at its end if
+/// one is asked for.
+pub(super) fn open_address(server: &str, study: &v1::Study) -> Option<String> {
+    if study.open_link.is_empty() {
+        return None;
+    }
+    let recruiting = study
+        .settings
+        .as_ref()
+        .and_then(|it| it.recruiting.as_ref());
+    let parameter = recruiting.map_or("", |it| &it.id_parameter);
+    let address = address(server, &study.open_link);
+    Some(match parameter {
+        "" => address,
+        parameter => format!("{address}?{parameter}="),
+    })
 }
 
 /// A study in a line.
@@ -394,8 +412,12 @@ fn line(participant: &v1::StudyParticipant) -> String {
     } else {
         ""
     };
+    let id = match participant.panel_id.as_str() {
+        "" => String::new(),
+        id => format!(" ({id})"),
+    };
     format!(
-        "{}\t{}\t{state}{present}\tstep {}\t{}",
+        "{}\t{}{id}\t{state}{present}\tstep {}\t{}",
         participant.number,
         participant.pseudonym,
         participant.step,

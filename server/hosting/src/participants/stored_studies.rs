@@ -92,6 +92,7 @@ impl ParticipantData {
                 "studyId": id.to_string(),
                 "name": stored.header.settings.name,
                 "number": number,
+                "panelId": participant.panel_id(),
                 "state": state.as_str_name(),
                 "consent": consent,
                 "reachedAtMs": participant.reached_at_ms,

@@ -127,8 +127,8 @@ impl StudyData {
     }
 }
 
-/// Bytes of a participant with a name, and an id at a panel, of this length together, of which the task and its handle have a copy
-/// each.
+/// Bytes of a participant with a name, and an id at a panel, of this length together. The task and its
+/// handle have a copy each.
 fn memory_of_participant(names: usize) -> usize {
     2 * (size_of::<Participant>() + names)
 }

@@ -125,6 +125,7 @@ impl StudyHandle {
             number,
             pseudonym: participant.map_or_else(String::new, |it| it.pseudonym.clone()),
             link: ParticipantLink::new(&self.header.key, self.short_id(), number).to_text(),
+            joined: participant.is_some_and(|it| it.joined.is_some()),
         }
     }
 
@@ -229,6 +230,10 @@ impl StudyHandle {
     /// # Errors
     /// As [`StudyHandle::add`].
     pub async fn join(&self, key: Key, joined: Joined) -> Result<Result<u32, NotAdded>, Stopped> {
+        // A repeated request takes no memory.
+        if let Some(number) = self.committed().joined_by(&joined.request_sha256) {
+            return Ok(Ok(number));
+        }
         let names = [joined.panel_id.clone()];
         let memory = match self.shared.data.for_participants(key, &names) {
             Ok(memory) => memory,

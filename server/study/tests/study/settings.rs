@@ -122,8 +122,18 @@ fn a_problem_of_the_design_names_its_field() {
     check("recruiting.completed_url", settings(), |it| {
         it.recruiting.completed_url = "javascript:alert(1)".to_owned()
     });
-    check("recruiting.withdrawn_url", settings(), |it| {
-        it.recruiting.withdrawn_url = "https://{id}.example".to_owned()
+    check("recruiting.left_url", settings(), |it| {
+        it.recruiting.left_url = "https://{id}.example".to_owned()
+    });
+    check("recruiting.left_url", settings(), |it| {
+        it.recruiting.open_link = true;
+        it.recruiting.id_parameter = "id".to_owned();
+        it.recruiting.left_url = "https://panel.example/{id}".to_owned();
+    });
+    check("recruiting.completed_url", settings(), |it| {
+        it.recruiting.open_link = true;
+        it.recruiting.id_parameter = "id".to_owned();
+        it.recruiting.completed_url = "https://panel.example/{id}/{id}".to_owned();
     });
     check("recruiting.full_url", settings(), |it| {
         it.recruiting.full_url = "https://panel.example/{id}".to_owned()

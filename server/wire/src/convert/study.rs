@@ -256,7 +256,7 @@ fn recruiting(message: v1::StudyRecruiting) -> Recruiting {
         open_link: message.open_link,
         id_parameter: message.id_parameter,
         completed_url: message.completed_url,
-        withdrawn_url: message.withdrawn_url,
+        left_url: message.left_url,
         full_url: message.full_url,
     }
 }

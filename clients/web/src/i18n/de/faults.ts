@@ -14,7 +14,7 @@ export const faults: Texts["faults"] = {
     TOKEN_MISSING:
       "Dieser Server ist nur für Eingeladene offen. Bitte die Person, die ihn betreibt, um einen Link mit Token und öffne ihn hier.",
     TOKEN_UNKNOWN:
-      "Der Server kennt das Token deines Links nicht. Prüfen Sie, ob Sie den vollständigen Link geöffnet haben, oder bitte die Person, die den Server betreibt, um einen neuen.",
+      "Der Server kennt das Token deines Links nicht. Prüfe, ob du den vollständigen Link geöffnet hast, oder bitte die Person, die den Server betreibt, um einen neuen.",
     TOKEN_EXPIRED:
       "Das Token deines Links ist abgelaufen. Bitte die Person, die den Server betreibt, um einen neuen Link.",
     ROLE_TOO_LOW: "Dein Link erlaubt das nicht. Bitte die Person, die den Server betreibt, um einen passenden.",
@@ -118,7 +118,7 @@ export const faults: Texts["faults"] = {
     PARTICIPATION_OVER: "Diese Teilnahme ist zu Ende.",
     ANSWER_REFUSED: "Eine Antwort gehört nicht zu den möglichen. Prüfen Sie Ihre Antworten.",
     TOO_MANY_ANSWERS:
-      "Der Server hat keinen Speicher für weitere Antworten. Kürze deine, oder frage die Person, von der du den Link hast.",
+      "Der Server hat keinen Speicher für weitere Antworten. Kürzen Sie Ihre, oder fragen Sie die Person, von der Sie den Link haben.",
     GAME_NOT_OVER: "Die Partie ist noch nicht zu Ende.",
     COUNT_REFUSED: "Gib eine Zahl von 1 bis 1000 ein.",
   },

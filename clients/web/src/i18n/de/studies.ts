@@ -139,7 +139,8 @@ export const studies: Texts["studies"] = {
     },
     openLink: {
       title: "Link für alle",
-      text: "Wer diesen Link öffnet, nimmt teil, solange es Plätze gibt. Gib ihn dem Panel, das einlädt.",
+      text: "Alle, die diesen Link öffnen, nehmen teil, solange es Plätze gibt. Gib ihn dem Panel, das einlädt.",
+      withId: "Hinter das Zeichen = setzt das Panel die Kennung der Person. Ohne Kennung nimmt niemand teil.",
       label: "Offener Link",
     },
     links: {
@@ -220,7 +221,7 @@ export const studies: Texts["studies"] = {
     idParameter: "Parameter des Links mit der Kennung im Panel",
     idParameterHint: "Zum Beispiel PROLIFIC_PID. Ohne ihn wird nach keiner Kennung gefragt.",
     completedUrl: "Adresse nach der Studie",
-    withdrawnUrl: "Adresse für die, die nicht einverstanden sind oder zurückziehen",
+    leftUrl: "Adresse für die, die nicht einverstanden sind oder ausscheiden",
     fullUrl: "Adresse, wenn die Studie voll oder geschlossen ist",
     panelUrlHint: "https://…; {id} wird durch die Kennung im Panel ersetzt.",
     shifts: "Shifts pro Partie",

@@ -135,7 +135,8 @@ export const studies = {
     },
     openLink: {
       title: "Link for everyone",
-      text: "Whoever opens this link takes part, as long as there are places. Give it to the panel that invites people.",
+      text: "Everyone who opens this link takes part, as long as there are places. Give it to the panel that invites people.",
+      withId: "After the sign =, the panel puts the id of the person. Without an id nobody takes part.",
       label: "Open link",
     },
     links: {
@@ -216,7 +217,7 @@ export const studies = {
     idParameter: "Parameter of the link with the id at the panel",
     idParameterHint: "For example PROLIFIC_PID. Without one, nobody is asked for an id.",
     completedUrl: "Address after the study",
-    withdrawnUrl: "Address of those who do not agree or withdraw",
+    leftUrl: "Address of those who do not agree or leave",
     fullUrl: "Address when the study is full or closed",
     panelUrlHint: "https://…; {id} is replaced by the id at the panel.",
     shifts: "Shifts per game",

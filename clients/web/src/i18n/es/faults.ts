@@ -113,7 +113,7 @@ export const faults: Texts["faults"] = {
     PARTICIPATION_OVER: "Esta participación ha terminado.",
     ANSWER_REFUSED: "Una respuesta no está entre las posibles. Revise sus respuestas.",
     TOO_MANY_ANSWERS:
-      "El servidor no tiene memoria para más respuestas. Acorta las tuyas, o pregunta a quien te dio el enlace.",
+      "El servidor no tiene memoria para más respuestas. Acorte las suyas, o pregunte a quien le dio el enlace.",
     GAME_NOT_OVER: "La partida todavía no ha terminado.",
     COUNT_REFUSED: "Escribe un número del 1 al 1000.",
   },

@@ -136,7 +136,8 @@ export const studies: Texts["studies"] = {
     },
     openLink: {
       title: "Enlace para todos",
-      text: "Quien abre este enlace participa mientras haya plazas. Dáselo al panel que invita.",
+      text: "Todas las personas que abren este enlace participan mientras haya plazas. Dáselo al panel que invita.",
+      withId: "Tras el signo =, el panel pone el identificador de la persona. Sin identificador nadie participa.",
       label: "Enlace abierto",
     },
     links: {
@@ -217,7 +218,7 @@ export const studies: Texts["studies"] = {
     idParameter: "Parámetro del enlace con el identificador en el panel",
     idParameterHint: "Por ejemplo PROLIFIC_PID. Sin él no se pide ningún identificador.",
     completedUrl: "Dirección después del estudio",
-    withdrawnUrl: "Dirección para quienes no están de acuerdo o se retiran",
+    leftUrl: "Dirección para quienes no están de acuerdo o dejan el estudio",
     fullUrl: "Dirección cuando el estudio está completo o cerrado",
     panelUrlHint: "https://…; {id} se sustituye por el identificador en el panel.",
     shifts: "Shifts por partida",

@@ -109,7 +109,7 @@ export const faults: Texts["faults"] = {
     PARTICIPATION_OVER: "Questa partecipazione è finita.",
     ANSWER_REFUSED: "Una risposta non è fra quelle possibili. Controlli le Sue risposte.",
     TOO_MANY_ANSWERS:
-      "Il server non ha memoria per altre risposte. Accorcia le tue, oppure chiedi a chi ti ha dato il link.",
+      "Il server non ha memoria per altre risposte. Accorci le Sue, oppure chieda a chi Le ha dato il link.",
     GAME_NOT_OVER: "La partita non è ancora finita.",
     COUNT_REFUSED: "Inserisci un numero da 1 a 1000.",
   },

@@ -137,7 +137,8 @@ export const studies: Texts["studies"] = {
     },
     openLink: {
       title: "Link per tutti",
-      text: "Chi apre questo link partecipa, finché ci sono posti. Dallo al panel che invita.",
+      text: "Tutti quelli che aprono questo link partecipano, finché ci sono posti. Dallo al panel che invita.",
+      withId: "Dopo il segno =, il panel mette l’identificativo della persona. Senza identificativo nessuno partecipa.",
       label: "Link aperto",
     },
     links: {
@@ -218,7 +219,7 @@ export const studies: Texts["studies"] = {
     idParameter: "Parametro del link con l’identificativo nel panel",
     idParameterHint: "Per esempio PROLIFIC_PID. Senza, non si chiede nessun identificativo.",
     completedUrl: "Indirizzo dopo lo studio",
-    withdrawnUrl: "Indirizzo per chi non è d’accordo o si ritira",
+    leftUrl: "Indirizzo per chi non è d’accordo o lascia lo studio",
     fullUrl: "Indirizzo quando lo studio è pieno o chiuso",
     panelUrlHint: "https://…; {id} diventa l’identificativo nel panel.",
     shifts: "Shift per partita",

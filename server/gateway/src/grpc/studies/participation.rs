@@ -18,7 +18,7 @@ use super::{Responses, StudyCalls, not_added, refused, stopped};
 use crate::grpc::follow::{changed, end};
 use crate::grpc::limits::charged;
 use crate::grpc::status::{Refusal, field, shutting_down, status, store_failed};
-use chefshat_admission::limits::{COST_OF_ROOM, Key, Refused};
+use chefshat_admission::limits::{COST_OF_ROOM, COST_OF_TOURNAMENT, Key, Refused};
 use chefshat_base::clock::since_epoch_ms;
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named};
@@ -111,22 +111,19 @@ fn link_unknown() -> Status {
     )
 }
 
-/// The status for somebody with this id at the panel who may not begin: it names where to go on.
+/// The status for somebody with this id at the panel who may not begin: it names where the page sends
+/// them.
 fn not_admitted(handle: &StudyHandle, panel_id: &str, refusal: StudyRefusal) -> Status {
-    let url = handle.recruiting().full_url(panel_id);
-    let (Some(url), StudyRefusal::Closed | StudyRefusal::Full) = (url, &refusal) else {
-        return refused(refusal);
+    let (code, reason) = match refusal {
+        StudyRefusal::Closed => (Code::FailedPrecondition, "STUDY_CLOSED"),
+        StudyRefusal::Full => (Code::FailedPrecondition, "STUDY_FULL"),
+        StudyRefusal::TooManyParticipants => (Code::ResourceExhausted, "TOO_MANY_PARTICIPANTS"),
+        _ => return refused(refusal),
     };
-    let reason = match refusal {
-        StudyRefusal::Closed => "STUDY_CLOSED",
-        _ => "STUDY_FULL",
-    };
-    status(
-        Code::FailedPrecondition,
-        reason,
-        refusal.to_string(),
-        [("url", url.as_str())],
-    )
+    match handle.recruiting().full_url(panel_id) {
+        Some(url) => status(code, reason, refusal.to_string(), [("url", url.as_str())]),
+        None => refused(refusal),
+    }
 }
 
 /// What to show next.
@@ -170,10 +167,15 @@ impl ParticipationService for StudyCalls {
             panel_id: panel_id.clone(),
         };
         self.calls.charge(key, COST_OF_ROOM);
+        let rooms = self.studies.rooms();
+        (rooms.may_store(key, panel_id.len())).map_err(Refusal::from)?;
         let joined = handle.join(key, joined).await.map_err(stopped)?;
         let number = joined.map_err(|problem| match problem {
             NotAdded::Study(refusal) => not_admitted(&handle, &panel_id, refusal),
-            NotAdded::Memory(_) => not_added(problem),
+            // Somebody from a panel does not wait until others have deleted their studies.
+            NotAdded::Memory(_) => {
+                not_admitted(&handle, &panel_id, StudyRefusal::TooManyParticipants)
+            }
         })?;
         let link = handle.link(number).link;
         Ok(Response::new(v1::JoinStudyResponse { link }))
@@ -325,6 +327,10 @@ impl ParticipationService for StudyCalls {
         let key = charged(request.extensions());
         let request = request.into_inner();
         let (handle, number) = self.of_link(&request.link, key).await?;
+        if request.delete_data {
+            // The journal of the study is written again.
+            self.calls.charge(key, COST_OF_TOURNAMENT);
+        }
         let withdrawn = handle.withdraw(number, request.delete_data).await;
         withdrawn.map_err(stopped)?.map_err(refused)?;
         let view = Some(view_of(&handle, number, self.studies.rooms())?);

@@ -137,6 +137,19 @@ impl<'s, R> TableFile<'s, R> {
 }
 
 impl StudyHandle {
+    /// The study as a message without what lets anybody take part, or count as having taken part at a
+    /// panel: data are published.
+    fn publishable(&self) -> v1::Study {
+        let mut study = self.describe();
+        study.open_link.clear();
+        if let Some(recruiting) = (study.settings.as_mut()).and_then(|it| it.recruiting.as_mut()) {
+            recruiting.completed_url.clear();
+            recruiting.left_url.clear();
+            recruiting.full_url.clear();
+        }
+        study
+    }
+
     /// Sends the data of the study, file by file.
     ///
     /// # Errors
@@ -147,7 +160,7 @@ impl StudyHandle {
         sender: &mpsc::Sender<ExportedFile>,
     ) -> Result<(), ExportError> {
         let study = self.committed().clone();
-        json_file("study.json", &self.describe(), sender).await?;
+        json_file("study.json", &self.publishable(), sender).await?;
         let mut sheets = vec![participants(&study, sender).await?];
         sheets.extend(games(self, &study, rooms, sender).await?);
         sheets.push(items(&study, sender).await?);

@@ -856,22 +856,24 @@ class StudyRecruiting(_message.Message):
     OPEN_LINK_FIELD_NUMBER: _builtins.int
     ID_PARAMETER_FIELD_NUMBER: _builtins.int
     COMPLETED_URL_FIELD_NUMBER: _builtins.int
-    WITHDRAWN_URL_FIELD_NUMBER: _builtins.int
+    LEFT_URL_FIELD_NUMBER: _builtins.int
     FULL_URL_FIELD_NUMBER: _builtins.int
     open_link: _builtins.bool
-    """Whether the study has an open link (`open_link` of Study): whoever opens it takes part."""
+    """Whether the study has an open link (`open_link` of Study): everyone who opens it takes part."""
     id_parameter: _builtins.str
     """Name of the query parameter of the open link in which the panel gives a person's id there, for
     example "PROLIFIC_PID": 1..=64 letters, digits, `_`, `-` or `.`. Nobody takes part without such
-    an id, or twice with the same. Empty: no id is asked for.
+    an id, or with that of another participant whose data were not deleted. Empty: no id is asked
+    for.
     """
     completed_url: _builtins.str
-    """Where those who complete the study go on: empty, or an address that begins with https://, at
-    most 2000 characters. "{id}" stands for the id at the panel; those without one have no address.
+    """Where the page sends those who complete the study: empty, or an address that begins with
+    https://, at most 2000 characters. "{id}" (once) stands for the id at the panel; those without
+    one have no address.
     """
-    withdrawn_url: _builtins.str
-    """As `completed_url`, for those who do not agree or withdraw. The id at the panel is deleted with
-    the data of those who have them deleted.
+    left_url: _builtins.str
+    """As `completed_url`, for those who do not agree, withdraw, are away for too long or are removed;
+    without "{id}", which is deleted with the data of those who do not agree.
     """
     full_url: _builtins.str
     """As `completed_url`, for those who cannot begin because the study is closed or full."""
@@ -881,12 +883,12 @@ class StudyRecruiting(_message.Message):
         open_link: _builtins.bool = ...,
         id_parameter: _builtins.str = ...,
         completed_url: _builtins.str = ...,
-        withdrawn_url: _builtins.str = ...,
+        left_url: _builtins.str = ...,
         full_url: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["completed_url", b"completed_url", "full_url", b"full_url", "id_parameter", b"id_parameter", "open_link", b"open_link", "withdrawn_url", b"withdrawn_url"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["completed_url", b"completed_url", "full_url", b"full_url", "id_parameter", b"id_parameter", "left_url", b"left_url", "open_link", b"open_link"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -895,7 +897,7 @@ Global___StudyRecruiting: _TypeAlias = StudyRecruiting  # noqa: Y015
 @_typing.final
 class StudySettings(_message.Message):
     """The settings of a study. In a request an unset field means its default; in a response every field
-    is set.
+    is set that the server knew when the study was created.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -1189,6 +1191,7 @@ class StudyLink(_message.Message):
     NUMBER_FIELD_NUMBER: _builtins.int
     PSEUDONYM_FIELD_NUMBER: _builtins.int
     LINK_FIELD_NUMBER: _builtins.int
+    JOINED_FIELD_NUMBER: _builtins.int
     number: _builtins.int
     """Number of the participant."""
     pseudonym: _builtins.str
@@ -1197,16 +1200,19 @@ class StudyLink(_message.Message):
     """The secret of the link, 30 characters that need no escaping. The page's address for it is the
     path "/study/" and this text.
     """
+    joined: _builtins.bool
+    """Whether the participant joined by the open link, and has its own link already."""
     def __init__(
         self,
         *,
         number: _builtins.int = ...,
         pseudonym: _builtins.str = ...,
         link: _builtins.str = ...,
+        joined: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["link", b"link", "number", b"number", "pseudonym", b"pseudonym"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["joined", b"joined", "link", b"link", "number", b"number", "pseudonym", b"pseudonym"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -1533,7 +1539,7 @@ class StudyEnd(_message.Message):
     reason: Global___StudyEndReason.ValueType
     """The reason."""
     url: _builtins.str
-    """Where the participant goes on (StudyRecruiting); empty if nowhere."""
+    """Where the page sends the participant next (StudyRecruiting); empty if nowhere."""
     def __init__(
         self,
         *,

@@ -649,8 +649,8 @@ class JoinStudyRequest(_message.Message):
     open_link: _builtins.str
     """`open_link` of Study."""
     panel_id: _builtins.str
-    """The person's id at the panel, 1..=128 characters, the value of the query parameter
-    `id_parameter` of StudyRecruiting; empty if that is empty.
+    """The person's id at the panel, 1..=128 ASCII characters without spaces: the value of the query
+    parameter `id_parameter` of StudyRecruiting. Empty if that is empty.
     """
     request_id: _builtins.bytes
     """32 random bytes, which must be kept secret. A repeated call with the same ones, after a lost

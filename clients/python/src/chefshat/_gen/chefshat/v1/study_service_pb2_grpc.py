@@ -179,7 +179,7 @@ class StudyServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def DeleteStudyParticipant(self, request, context):
-        """Deletes the data of a participant: its pseudonym, answers, interface traces, and its games with
+        """Deletes the data of a participant: its pseudonym, id at the panel, answers, interface traces, and its games with
         their records. What stays is that a participant with this number took part, when, in which
         conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
         deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
@@ -636,12 +636,12 @@ class ParticipationServiceServicer(object):
     """
 
     def JoinStudy(self, request, context):
-        """Takes part by an open link (`open_link` of Study), and returns a link of one's own, which
-        OpenStudy opens. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+        """Adds a participant who has the open link (`open_link` of Study), and returns its own link for
+        OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
         INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
-        RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN). STUDY_CLOSED and
-        STUDY_FULL, also of OpenStudy and GiveConsent, have the metadata `url` if the study has a
-        `full_url`.
+        RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
+        study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
+        `url`, and so has the STUDY_FULL of OpenStudy and GiveConsent.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

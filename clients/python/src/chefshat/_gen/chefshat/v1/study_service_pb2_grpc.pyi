@@ -78,7 +78,7 @@ class StudyServiceStub:
     NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteStudyParticipant: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]
-    """Deletes the data of a participant: its pseudonym, answers, interface traces, and its games with
+    """Deletes the data of a participant: its pseudonym, id at the panel, answers, interface traces, and its games with
     their records. What stays is that a participant with this number took part, when, in which
     conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
     deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
@@ -141,7 +141,7 @@ class StudyServiceAsyncStub(StudyServiceStub):
     NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteStudyParticipant: _aio.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]  # type: ignore[assignment]
-    """Deletes the data of a participant: its pseudonym, answers, interface traces, and its games with
+    """Deletes the data of a participant: its pseudonym, id at the panel, answers, interface traces, and its games with
     their records. What stays is that a participant with this number took part, when, in which
     conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
     deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
@@ -261,7 +261,7 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _study_service_pb2.DeleteStudyParticipantRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.DeleteStudyParticipantResponse, _abc.Awaitable[_study_service_pb2.DeleteStudyParticipantResponse]]:
-        """Deletes the data of a participant: its pseudonym, answers, interface traces, and its games with
+        """Deletes the data of a participant: its pseudonym, id at the panel, answers, interface traces, and its games with
         their records. What stays is that a participant with this number took part, when, in which
         conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
         deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
@@ -294,12 +294,12 @@ class ParticipationServiceStub:
     @_typing.overload
     def __new__(cls, channel: _aio.Channel) -> ParticipationServiceAsyncStub: ...
     JoinStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.JoinStudyRequest, _study_service_pb2.JoinStudyResponse]
-    """Takes part by an open link (`open_link` of Study), and returns a link of one's own, which
-    OpenStudy opens. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+    """Adds a participant who has the open link (`open_link` of Study), and returns its own link for
+    OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
     INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
-    RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN). STUDY_CLOSED and
-    STUDY_FULL, also of OpenStudy and GiveConsent, have the metadata `url` if the study has a
-    `full_url`.
+    RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
+    study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
+    `url`, and so has the STUDY_FULL of OpenStudy and GiveConsent.
     """
     OpenStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.OpenStudyRequest, _study_service_pb2.OpenStudyResponse]
     """Opens the study on this device: the participant's earlier session ends. For a participant whose
@@ -355,12 +355,12 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
 
     def __init__(self, channel: _aio.Channel) -> None: ...
     JoinStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.JoinStudyRequest, _study_service_pb2.JoinStudyResponse]  # type: ignore[assignment]
-    """Takes part by an open link (`open_link` of Study), and returns a link of one's own, which
-    OpenStudy opens. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+    """Adds a participant who has the open link (`open_link` of Study), and returns its own link for
+    OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
     INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
-    RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN). STUDY_CLOSED and
-    STUDY_FULL, also of OpenStudy and GiveConsent, have the metadata `url` if the study has a
-    `full_url`.
+    RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
+    study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
+    `url`, and so has the STUDY_FULL of OpenStudy and GiveConsent.
     """
     OpenStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.OpenStudyRequest, _study_service_pb2.OpenStudyResponse]  # type: ignore[assignment]
     """Opens the study on this device: the participant's earlier session ends. For a participant whose
@@ -419,12 +419,12 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _study_service_pb2.JoinStudyRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.JoinStudyResponse, _abc.Awaitable[_study_service_pb2.JoinStudyResponse]]:
-        """Takes part by an open link (`open_link` of Study), and returns a link of one's own, which
-        OpenStudy opens. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+        """Adds a participant who has the open link (`open_link` of Study), and returns its own link for
+        OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
         INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
-        RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN). STUDY_CLOSED and
-        STUDY_FULL, also of OpenStudy and GiveConsent, have the metadata `url` if the study has a
-        `full_url`.
+        RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
+        study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
+        `url`, and so has the STUDY_FULL of OpenStudy and GiveConsent.
         """
 
     @_abc_1.abstractmethod
