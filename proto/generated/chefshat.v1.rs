@@ -8953,6 +8953,25 @@ pub struct StudySettings {
     #[prost(message, optional, tag = "15")]
     pub recruiting: ::core::option::Option<StudyRecruiting>,
 }
+/// A participant's device, as its page describes it. Sent by participants; exported data have it.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct StudyDevice {
+    /// Width of the page, in CSS pixels, 1..=65535.
+    #[prost(uint32, tag = "1")]
+    pub width: u32,
+    /// Height of the page, in CSS pixels, 1..=65535.
+    #[prost(uint32, tag = "2")]
+    pub height: u32,
+    /// Pixels of the display in a hundred CSS pixels, 1..=65535.
+    #[prost(uint32, tag = "3")]
+    pub pixels: u32,
+    /// Its pointer.
+    #[prost(enumeration = "StudyPointer", tag = "4")]
+    pub pointer: i32,
+    /// Its time zone, 1..=64 letters, digits, `_`, `-`, `+` or `/`, for example "Europe/Rome".
+    #[prost(string, tag = "5")]
+    pub time_zone: ::prost::alloc::string::String,
+}
 /// A consent that was given. Only for researchers.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StudyConsentGiven {
@@ -9440,6 +9459,43 @@ impl StudyLabels {
         }
     }
 }
+/// The most exact pointer of a device, as the media features of CSS have it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum StudyPointer {
+    /// Not known.
+    Unspecified = 0,
+    /// It has none.
+    None = 1,
+    /// Such as a finger.
+    Coarse = 2,
+    /// Such as a mouse.
+    Fine = 3,
+}
+impl StudyPointer {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "STUDY_POINTER_UNSPECIFIED",
+            Self::None => "STUDY_POINTER_NONE",
+            Self::Coarse => "STUDY_POINTER_COARSE",
+            Self::Fine => "STUDY_POINTER_FINE",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "STUDY_POINTER_UNSPECIFIED" => Some(Self::Unspecified),
+            "STUDY_POINTER_NONE" => Some(Self::None),
+            "STUDY_POINTER_COARSE" => Some(Self::Coarse),
+            "STUDY_POINTER_FINE" => Some(Self::Fine),
+            _ => None,
+        }
+    }
+}
 /// The state of a participant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
@@ -9849,6 +9905,9 @@ pub struct OpenStudyRequest {
     /// The secret of the link: `link` of StudyLink.
     #[prost(string, tag = "1")]
     pub link: ::prost::alloc::string::String,
+    /// The device on which it is opened. One that is not of its form is left out.
+    #[prost(message, optional, tag = "2")]
+    pub device: ::core::option::Option<StudyDevice>,
 }
 /// The open study.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -10295,8 +10354,8 @@ pub mod study_service_client {
                 .insert(GrpcMethod::new("chefshat.v1.StudyService", "CloseStudy"));
             self.inner.unary(req, path, codec).await
         }
-        /// Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
-        /// `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
+        /// Streams the data of a study as files: `study.json`, the tables `participants.csv`, `sessions.csv`,
+        /// `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
         /// read, the records of its games under `records/` and samples under `samples/`, and last what the
         /// columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
         /// NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
@@ -10324,7 +10383,7 @@ pub mod study_service_client {
                 .insert(GrpcMethod::new("chefshat.v1.StudyService", "ExportStudy"));
             self.inner.server_streaming(req, path, codec).await
         }
-        /// Deletes the data of a participant: its pseudonym, id at the panel, answers, interface traces, and its games with
+        /// Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface traces, and its games with
         /// their records. What stays is that a participant with this number took part, when, in which
         /// conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
         /// deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
@@ -10488,8 +10547,8 @@ pub mod study_service_server {
             >
             + std::marker::Send
             + 'static;
-        /// Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
-        /// `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
+        /// Streams the data of a study as files: `study.json`, the tables `participants.csv`, `sessions.csv`,
+        /// `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
         /// read, the records of its games under `records/` and samples under `samples/`, and last what the
         /// columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
         /// NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
@@ -10500,7 +10559,7 @@ pub mod study_service_server {
             tonic::Response<Self::ExportStudyStream>,
             tonic::Status,
         >;
-        /// Deletes the data of a participant: its pseudonym, id at the panel, answers, interface traces, and its games with
+        /// Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface traces, and its games with
         /// their records. What stays is that a participant with this number took part, when, in which
         /// conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
         /// deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,

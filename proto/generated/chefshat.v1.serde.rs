@@ -21564,9 +21564,15 @@ impl serde::Serialize for OpenStudyRequest {
         if !self.link.is_empty() {
             len += 1;
         }
+        if self.device.is_some() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.OpenStudyRequest", len)?;
         if !self.link.is_empty() {
             struct_ser.serialize_field("link", &self.link)?;
+        }
+        if let Some(v) = self.device.as_ref() {
+            struct_ser.serialize_field("device", v)?;
         }
         struct_ser.end()
     }
@@ -21579,11 +21585,13 @@ impl<'de> serde::Deserialize<'de> for OpenStudyRequest {
     {
         const FIELDS: &[&str] = &[
             "link",
+            "device",
         ];
 
         #[allow(clippy::enum_variant_names)]
         enum GeneratedField {
             Link,
+            Device,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -21606,6 +21614,7 @@ impl<'de> serde::Deserialize<'de> for OpenStudyRequest {
                     {
                         match value {
                             "link" => Ok(GeneratedField::Link),
+                            "device" => Ok(GeneratedField::Device),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -21626,6 +21635,7 @@ impl<'de> serde::Deserialize<'de> for OpenStudyRequest {
                     V: serde::de::MapAccess<'de>,
             {
                 let mut link__ = None;
+                let mut device__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Link => {
@@ -21634,10 +21644,17 @@ impl<'de> serde::Deserialize<'de> for OpenStudyRequest {
                             }
                             link__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::Device => {
+                            if device__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("device"));
+                            }
+                            device__ = map_.next_value()?;
+                        }
                     }
                 }
                 Ok(OpenStudyRequest {
                     link: link__.unwrap_or_default(),
+                    device: device__,
                 })
             }
         }
@@ -36644,6 +36661,174 @@ impl<'de> serde::Deserialize<'de> for StudyConsentGiven {
         deserializer.deserialize_struct("chefshat.v1.StudyConsentGiven", FIELDS, GeneratedVisitor)
     }
 }
+impl serde::Serialize for StudyDevice {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if self.width != 0 {
+            len += 1;
+        }
+        if self.height != 0 {
+            len += 1;
+        }
+        if self.pixels != 0 {
+            len += 1;
+        }
+        if self.pointer != 0 {
+            len += 1;
+        }
+        if !self.time_zone.is_empty() {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyDevice", len)?;
+        if self.width != 0 {
+            struct_ser.serialize_field("width", &self.width)?;
+        }
+        if self.height != 0 {
+            struct_ser.serialize_field("height", &self.height)?;
+        }
+        if self.pixels != 0 {
+            struct_ser.serialize_field("pixels", &self.pixels)?;
+        }
+        if self.pointer != 0 {
+            let v = StudyPointer::try_from(self.pointer)
+                .map_err(|_| serde::ser::Error::custom(format!("Invalid variant {}", self.pointer)))?;
+            struct_ser.serialize_field("pointer", &v)?;
+        }
+        if !self.time_zone.is_empty() {
+            struct_ser.serialize_field("timeZone", &self.time_zone)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyDevice {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "width",
+            "height",
+            "pixels",
+            "pointer",
+            "time_zone",
+            "timeZone",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Width,
+            Height,
+            Pixels,
+            Pointer,
+            TimeZone,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "width" => Ok(GeneratedField::Width),
+                            "height" => Ok(GeneratedField::Height),
+                            "pixels" => Ok(GeneratedField::Pixels),
+                            "pointer" => Ok(GeneratedField::Pointer),
+                            "timeZone" | "time_zone" => Ok(GeneratedField::TimeZone),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = StudyDevice;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.StudyDevice")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<StudyDevice, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut width__ = None;
+                let mut height__ = None;
+                let mut pixels__ = None;
+                let mut pointer__ = None;
+                let mut time_zone__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Width => {
+                            if width__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("width"));
+                            }
+                            width__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::Height => {
+                            if height__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("height"));
+                            }
+                            height__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::Pixels => {
+                            if pixels__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("pixels"));
+                            }
+                            pixels__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::Pointer => {
+                            if pointer__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("pointer"));
+                            }
+                            pointer__ = Some(map_.next_value::<StudyPointer>()? as i32);
+                        }
+                        GeneratedField::TimeZone => {
+                            if time_zone__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("timeZone"));
+                            }
+                            time_zone__ = Some(map_.next_value()?);
+                        }
+                    }
+                }
+                Ok(StudyDevice {
+                    width: width__.unwrap_or_default(),
+                    height: height__.unwrap_or_default(),
+                    pixels: pixels__.unwrap_or_default(),
+                    pointer: pointer__.unwrap_or_default(),
+                    time_zone: time_zone__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.StudyDevice", FIELDS, GeneratedVisitor)
+    }
+}
 impl serde::Serialize for StudyEnd {
     #[allow(deprecated)]
     fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
@@ -38924,6 +39109,83 @@ impl<'de> serde::Deserialize<'de> for StudyParticipantState {
                     "STUDY_PARTICIPANT_STATE_WITHDRAWN" => Ok(StudyParticipantState::Withdrawn),
                     "STUDY_PARTICIPANT_STATE_DROPPED_OUT" => Ok(StudyParticipantState::DroppedOut),
                     "STUDY_PARTICIPANT_STATE_REMOVED" => Ok(StudyParticipantState::Removed),
+                    _ => Err(serde::de::Error::unknown_variant(value, FIELDS)),
+                }
+            }
+        }
+        deserializer.deserialize_any(GeneratedVisitor)
+    }
+}
+impl serde::Serialize for StudyPointer {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        let variant = match self {
+            Self::Unspecified => "STUDY_POINTER_UNSPECIFIED",
+            Self::None => "STUDY_POINTER_NONE",
+            Self::Coarse => "STUDY_POINTER_COARSE",
+            Self::Fine => "STUDY_POINTER_FINE",
+        };
+        serializer.serialize_str(variant)
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyPointer {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "STUDY_POINTER_UNSPECIFIED",
+            "STUDY_POINTER_NONE",
+            "STUDY_POINTER_COARSE",
+            "STUDY_POINTER_FINE",
+        ];
+
+        struct GeneratedVisitor;
+
+        impl serde::de::Visitor<'_> for GeneratedVisitor {
+            type Value = StudyPointer;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                write!(formatter, "expected one of: {:?}", &FIELDS)
+            }
+
+            fn visit_i64<E>(self, v: i64) -> std::result::Result<Self::Value, E>
+            where
+                E: serde::de::Error,
+            {
+                i32::try_from(v)
+                    .ok()
+                    .and_then(|x| x.try_into().ok())
+                    .ok_or_else(|| {
+                        serde::de::Error::invalid_value(serde::de::Unexpected::Signed(v), &self)
+                    })
+            }
+
+            fn visit_u64<E>(self, v: u64) -> std::result::Result<Self::Value, E>
+            where
+                E: serde::de::Error,
+            {
+                i32::try_from(v)
+                    .ok()
+                    .and_then(|x| x.try_into().ok())
+                    .ok_or_else(|| {
+                        serde::de::Error::invalid_value(serde::de::Unexpected::Unsigned(v), &self)
+                    })
+            }
+
+            fn visit_str<E>(self, value: &str) -> std::result::Result<Self::Value, E>
+            where
+                E: serde::de::Error,
+            {
+                match value {
+                    "STUDY_POINTER_UNSPECIFIED" => Ok(StudyPointer::Unspecified),
+                    "STUDY_POINTER_NONE" => Ok(StudyPointer::None),
+                    "STUDY_POINTER_COARSE" => Ok(StudyPointer::Coarse),
+                    "STUDY_POINTER_FINE" => Ok(StudyPointer::Fine),
                     _ => Err(serde::de::Error::unknown_variant(value, FIELDS)),
                 }
             }

@@ -325,7 +325,12 @@ async fn with_a_study(channel: &Channel) -> [JoinHandle<()>; 2] {
     });
     let following = following.await.expect("a stream").into_inner();
     let mut own = ParticipationServiceClient::new(channel.clone());
-    let opened = own.open_study(v1::OpenStudyRequest { link }).await;
+    let opened = own
+        .open_study(v1::OpenStudyRequest {
+            link,
+            ..Default::default()
+        })
+        .await;
     let session = opened.expect("a link").into_inner().session;
     let taking_part = own.follow_participation(v1::FollowParticipationRequest { session });
     let taking_part = taking_part.await.expect("a stream").into_inner();

@@ -133,6 +133,8 @@ pub struct StoredTraces {
     pub number: u32,
     /// The game.
     pub game: Id,
+    /// Number of the session in which they were sent, from 1; 0 if it was not stored.
+    pub session: u32,
     /// The traces, in order.
     pub traces: Vec<v1::StudyTrace>,
 }

@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use crate::device::Device;
 use crate::questionnaire::ItemAnswer;
 
 /// A step of a study. Folding the same changes again restores the study.
@@ -25,6 +26,8 @@ pub enum Change {
         slot: Option<u32>,
         /// When, in milliseconds since the Unix epoch.
         at_ms: u64,
+        /// On which device, if it is known.
+        device: Option<Device>,
     },
     /// A participant consented, and is at its next step.
     Consented {
@@ -123,7 +126,7 @@ impl Change {
     }
 
     /// Deletes the data of a participant who withdrew and had them deleted: its pseudonym, its id at
-    /// the panel and its answers. The changes fold to the same study as before. Returns whether this
+    /// the panel, its devices and its answers. The changes fold to the same study as before. Returns whether this
     /// one is different now and must be stored again.
     pub fn forget(&mut self, forgotten: u32) -> bool {
         match self {
@@ -136,6 +139,7 @@ impl Change {
                 let had_panel_id = panel_id.is_some_and(|it| !it.is_empty());
                 !std::mem::take(pseudonym).is_empty() || had_panel_id
             }
+            Self::Opened { number, device, .. } if *number == forgotten => device.take().is_some(),
             Self::Answered {
                 number, answers, ..
             }

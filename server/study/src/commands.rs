@@ -8,6 +8,7 @@ use thiserror::Error;
 
 use crate::Study;
 use crate::change::{Change, ConsentGiven, Joined};
+use crate::device::Device;
 use crate::games::Phase;
 use crate::questionnaire::{AnswerProblem, ItemAnswer};
 use crate::settings::MAX_PARTICIPANTS;
@@ -180,7 +181,12 @@ impl Study {
     ///
     /// # Errors
     /// If the participant is unknown or cannot begin.
-    pub fn open(&self, number: u32, now_ms: u64) -> Result<Option<Change>, Refusal> {
+    pub fn open(
+        &self,
+        number: u32,
+        device: Option<Device>,
+        now_ms: u64,
+    ) -> Result<Option<Change>, Refusal> {
         let participant = self.known(number)?;
         let slot = match participant.status {
             Status::Invited if self.is_closed() => return Err(Refusal::Closed),
@@ -199,6 +205,7 @@ impl Study {
             number,
             slot,
             at_ms: now_ms,
+            device,
         }))
     }
 

@@ -11,7 +11,7 @@
 //! for change in study.add(&["Ada".to_owned()])? {
 //!     study.fold(&change);
 //! }
-//! let opened = study.open(1, 1000)?.expect("Ada has not begun");
+//! let opened = study.open(1, None, 1000)?.expect("Ada has not begun");
 //! study.fold(&opened);
 //! let at = |step| At { number: 1, session: 1, step };
 //! study.fold(&study.consent(at(0), 2000)?);
@@ -35,6 +35,7 @@ mod chance;
 mod change;
 mod checks;
 mod commands;
+mod device;
 mod games;
 mod link;
 mod presence;
@@ -55,6 +56,7 @@ pub use assignment::Order;
 pub use change::{Change, ConsentGiven, Joined, Outcome, PlacedGame};
 pub use checks::SettingsProblem;
 pub use commands::{At, MAX_SAVES, MAX_SESSIONS, Refusal};
+pub use device::{Device, DeviceSession, Pointer};
 pub use games::{DueGame, MAX_ATTEMPTS};
 pub use link::{ParticipantLink, SessionSecret};
 pub use questionnaire::{

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::change::{Change, ConsentGiven, Joined, Outcome, PlacedGame};
+use crate::device::{Device, DeviceSession};
 use crate::questionnaire::ItemAnswer;
 
 /// The state of a participant.
@@ -39,6 +40,8 @@ pub struct Participant {
     pub slot: Option<u32>,
     /// Number of sessions it opened, which is the number of the newest.
     pub session: u32,
+    /// Those on a device that is known, by number.
+    pub devices: BTreeMap<u32, DeviceSession>,
     /// When it reached each step, in milliseconds since the Unix epoch, and last when it completed
     /// the study. Empty until it begins.
     pub reached_at_ms: Vec<u64>,
@@ -153,6 +156,7 @@ impl StudyState {
                     status: Status::Invited,
                     slot: None,
                     session: 0,
+                    devices: BTreeMap::new(),
                     reached_at_ms: Vec::new(),
                     ended_at_ms: None,
                     consent: None,
@@ -168,7 +172,8 @@ impl StudyState {
                 number,
                 slot,
                 at_ms,
-            } => self.open(*number, *slot, *at_ms),
+                device,
+            } => self.open(*number, *slot, *at_ms, device.clone()),
             Change::Consented {
                 number,
                 slot,
@@ -250,7 +255,7 @@ impl StudyState {
         }
     }
 
-    fn open(&mut self, number: u32, slot: Option<u32>, at_ms: u64) {
+    fn open(&mut self, number: u32, slot: Option<u32>, at_ms: u64, device: Option<Device>) {
         let Some(participant) = self.participants.get_mut(&number) else {
             return;
         };
@@ -265,6 +270,10 @@ impl StudyState {
         participant.status = Status::Active;
         participant.ended_at_ms = None;
         participant.session += 1;
+        if let Some(device) = device {
+            let session = DeviceSession { at_ms, device };
+            participant.devices.insert(participant.session, session);
+        }
     }
 
     fn withdraw(&mut self, number: u32, delete_data: bool, at_ms: u64) {
@@ -277,6 +286,7 @@ impl StudyState {
         if delete_data {
             participant.data_deleted = true;
             participant.pseudonym.clear();
+            participant.devices.clear();
             if let Some(joined) = &mut participant.joined {
                 joined.panel_id.clear();
             }

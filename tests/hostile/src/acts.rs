@@ -94,7 +94,10 @@ pub(crate) async fn worst_answers(target: &Target) -> Result<(), Status> {
     let link = added.links.into_iter().next().unwrap_or_default().link;
     let mut participation = ParticipationServiceClient::new(connection);
     let opened = participation
-        .open_study(v1::OpenStudyRequest { link })
+        .open_study(v1::OpenStudyRequest {
+            link,
+            ..Default::default()
+        })
         .await?;
     let valid = v1::AnswerQuestionnaireRequest {
         session: opened.into_inner().session,

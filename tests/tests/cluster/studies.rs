@@ -96,7 +96,14 @@ async fn open(
     let opened = settled(|| {
         let mut service = service.clone();
         let link = link.to_owned();
-        async move { service.open_study(v1::OpenStudyRequest { link }).await }
+        async move {
+            service
+                .open_study(v1::OpenStudyRequest {
+                    link,
+                    ..Default::default()
+                })
+                .await
+        }
     });
     let opened = opened.await.into_inner();
     (opened.session, opened.view.expect("a view"))

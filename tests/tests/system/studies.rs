@@ -223,11 +223,11 @@ impl Person {
     }
 
     pub(crate) async fn open(&mut self) -> Result<v1::StudyView, Status> {
-        let link = self.link.clone();
-        let opened = self
-            .service
-            .open_study(v1::OpenStudyRequest { link })
-            .await?;
+        let request = v1::OpenStudyRequest {
+            link: self.link.clone(),
+            device: Some(device()),
+        };
+        let opened = self.service.open_study(request).await?;
         let opened = opened.into_inner();
         self.session = opened.session;
         Ok(opened.view.expect("a view"))
@@ -309,7 +309,10 @@ impl Person {
         saved.expect("the answer is valid");
         let link = self.link.clone();
         let opened = (self.service)
-            .open_study(v1::OpenStudyRequest { link })
+            .open_study(v1::OpenStudyRequest {
+                link,
+                device: Some(device()),
+            })
             .await;
         let opened = opened.expect("the link is valid").into_inner();
         assert_eq!(opened.saved_answers, answers);
@@ -375,6 +378,17 @@ impl Person {
             view = next;
         }
         (view, tickets)
+    }
+}
+
+/// What everybody's device is.
+fn device() -> v1::StudyDevice {
+    v1::StudyDevice {
+        width: 390,
+        height: 844,
+        pixels: 300,
+        pointer: v1::StudyPointer::Coarse.into(),
+        time_zone: "Europe/Rome".to_owned(),
     }
 }
 
@@ -643,6 +657,7 @@ async fn a_study_from_its_links_to_its_data() {
     assert_eq!(reason(&refused), "SESSION_SUPERSEDED");
     let forged = old.service.open_study(v1::OpenStudyRequest {
         link: "A".repeat(30),
+        ..Default::default()
     });
     assert_eq!(reason(&forged.await.expect_err("forged")), "LINK_UNKNOWN");
 
@@ -737,6 +752,16 @@ async fn a_study_from_its_links_to_its_data() {
     // The one who was removed has answered, too.
     assert_eq!(table("answers.csv").len(), 6 * (PARTICIPANTS as usize + 1));
     assert!(!table("traces.csv").is_empty());
+    let sessions = table("sessions.csv");
+    for row in &sessions {
+        assert!(row.ends_with(",390,844,300,coarse,Europe/Rome"), "{row}");
+    }
+    let session_of = |row: &String| row.split(',').nth(2).map(str::to_owned);
+    assert!(
+        sessions
+            .iter()
+            .any(|row| session_of(row).as_deref() == Some("2"))
+    );
     let mut records = 0;
     for (file, bytes) in &files {
         assert!(!contains(bytes, &name(3)), "{file}");

@@ -53,7 +53,10 @@ async fn open(
     service: &mut ParticipationServiceClient<Channel>,
     link: &str,
 ) -> Result<v1::OpenStudyResponse, Status> {
-    let request = v1::OpenStudyRequest { link: link.into() };
+    let request = v1::OpenStudyRequest {
+        link: link.into(),
+        ..Default::default()
+    };
     Ok(service.open_study(request).await?.into_inner())
 }
 

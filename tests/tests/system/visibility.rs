@@ -1233,7 +1233,10 @@ async fn a_wrong_secret_of_a_study_is_answered_like_an_unknown_study() {
         .expect("added");
     let link = &added.into_inner().links[0].link;
     let mut participants = ParticipationServiceClient::new(client.channel());
-    let request = v1::OpenStudyRequest { link: link.clone() };
+    let request = v1::OpenStudyRequest {
+        link: link.clone(),
+        ..Default::default()
+    };
     let opened = participants.open_study(request).await.expect("opened");
     let session = opened.into_inner().session;
     // The first characters name the study, the last ones are the secret.

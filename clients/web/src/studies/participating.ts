@@ -9,6 +9,7 @@ import { type Following, follow, type Link } from "../api/follow";
 import type { StudyItemAnswer, StudyItemAnswerSchema, StudyTraceSchema, StudyView } from "../gen/chefshat/v1/study_pb";
 import { replaceAddress } from "../router";
 import { participationApi } from "./client";
+import { thisDevice } from "./device";
 import { forgetJoined, join } from "./joining";
 
 /**
@@ -95,6 +96,8 @@ export function startParticipating(given: string): Participating {
     view.value = next;
   };
 
+  const openStudy = (link: string) => participationApi.openStudy({ link, device: thisDevice() }, call);
+
   /** An open link leads to the participant's own, which the page's address has from then on. */
   const joinFirst = async (thrown: unknown) => {
     const { reason, metadata } = faultOf(thrown);
@@ -104,7 +107,7 @@ export function startParticipating(given: string): Participating {
       secret = own;
       replaceAddress({ page: "study", link: own });
     }
-    return participationApi.openStudy({ link: own }, call);
+    return openStudy(own);
   };
 
   const open = async () => {
@@ -118,7 +121,7 @@ export function startParticipating(given: string): Participating {
       waitMs = Math.min(LONGEST_WAIT_MS, 2 * waitMs)
     ) {
       try {
-        const answer = await participationApi.openStudy({ link: secret }, call).catch(joinFirst);
+        const answer = await openStudy(secret).catch(joinFirst);
         if (stopped || attempt !== opened) return;
         session = answer.session;
         progress = {

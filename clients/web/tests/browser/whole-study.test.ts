@@ -28,12 +28,13 @@ const FEW = 2;
 
 const COLUMNS = {
   "participants.csv":
-    "number,participant,state,slot,conditions,factor_warmth,step,sessions,began_at_ms,ended_at_ms,consent_at_ms,consent_version,consent_text_sha256,consent_language,data_deleted",
+    "number,participant,panel_id,state,slot,conditions,factor_warmth,step,sessions,began_at_ms,ended_at_ms,consent_at_ms,consent_version,consent_text_sha256,consent_language,data_deleted",
+  "sessions.csv": "number,participant,session,opened_at_ms,width,height,pixels,pointer,time_zone",
   "games.csv":
     "study,number,participant,condition,factor_warmth,step,practice,attempt,seed_index,seed,seat,game_id,outcome,started_at_ms,ended_at_ms,place,points,shifts,decisions,invalid_answers,timeouts,hints,timed_decisions,decision_time_us",
   "answers.csv":
     "number,participant,step,condition,factor_warmth,questionnaire,item,scale,position,status,answer,label,answered_after_ms,questionnaire_shown_at_ms,questionnaire_answered_at_ms",
-  "traces.csv": "number,participant,condition,factor_warmth,game_id,decision_id,at_ms,kind,target,duration_ms",
+  "traces.csv": "number,participant,condition,factor_warmth,game_id,session,decision_id,at_ms,kind,target,duration_ms",
 };
 const LEVELS: Partial<Record<string, string>> = { "cond-warm": "lvl-high", "cond-cold": "lvl-low" };
 
@@ -174,7 +175,12 @@ function expectComplete(
   expect(inState("completed")).toHaveLength(COUNT);
   expect(inState("dropped_out")).toHaveLength(DROPPING_OUT);
   expect(inState("withdrawn").map((row) => [row.participant, row.data_deleted])).toEqual([["", "true"]]);
-  expect(people.flatMap(emptyCells)).toEqual(["participant"]);
+  // None came from a panel.
+  expect(people.flatMap(emptyCells).filter((name) => name !== "panel_id")).toEqual(["participant"]);
+  const sessions = rows("sessions.csv");
+  for (const { number, sessions: opened, data_deleted: deleted } of people)
+    expect(sessions.filter((row) => row.number === number)).toHaveLength(deleted === "true" ? 0 : Number(opened));
+  expect(new Set(sessions.map(({ pointer, pixels }) => `${pointer} ${pixels}`))).toEqual(new Set(["fine 100"]));
 
   // Those who left had not finished a game that counts.
   const games = rows("games.csv");

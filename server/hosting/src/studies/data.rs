@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use chefshat_proto::cost::{Cost, shapes};
 use chefshat_proto::v1;
-use chefshat_study::{ItemAnswer, Participant, Study};
+use chefshat_study::{Device, DeviceSession, ItemAnswer, Participant, Study};
 use prost::Message as _;
 
 use chefshat_admission::limits::{FairSemaphore, Key, Permit, Refused};
@@ -29,10 +29,11 @@ pub(super) struct StudyData {
     answers: Mutex<BTreeMap<u32, Answers>>,
 }
 
-/// The memory of the answers of a participant.
+/// The memory of the answers and devices of a participant.
 #[derive(Debug, Default)]
 struct Answers {
     given: Vec<Permit>,
+    devices: Vec<Permit>,
     /// Of those that were saved while they are entered.
     saved: Option<Permit>,
 }
@@ -52,7 +53,14 @@ impl StudyData {
             let saved = &participant.saved_answers;
             let saved = (!saved.is_empty()).then(|| take(memory_of_answers(saved)));
             let given = given.collect();
-            (*number, Answers { given, saved })
+            let devices = participant.devices.values();
+            let devices = devices.map(|it| take(memory_of_device(&it.device)));
+            let answers = Answers {
+                given,
+                devices: devices.collect(),
+                saved,
+            };
+            (*number, answers)
         });
         Self {
             answers: Mutex::new(answers.collect()),
@@ -83,6 +91,17 @@ impl StudyData {
         taken.ok_or_else(|| self.refused(key))
     }
 
+    /// Takes memory for a device; `None` if the caller, or the server, has too much.
+    pub(super) fn for_device(&self, key: Key, device: &Device) -> Option<Permit> {
+        self.take(key, memory_of_device(device))
+    }
+
+    /// Keeps the memory of a device of a participant.
+    pub(super) fn keep_device(&self, number: u32, held: Permit) {
+        let mut answers = self.lock_answers();
+        answers.entry(number).or_default().devices.push(held);
+    }
+
     /// Keeps the memory of participants that were added.
     pub(super) fn keep_participants(&self, held: Permit) {
         (self.participants.lock())
@@ -103,7 +122,7 @@ impl StudyData {
         self.lock_answers().entry(number).or_default().saved = Some(held);
     }
 
-    /// Gives the memory of a participant's answers back.
+    /// Gives the memory of a participant's answers and devices back.
     pub(super) fn forget_answers(&self, number: u32) {
         let forgotten = self.lock_answers().remove(&number);
         drop(forgotten);
@@ -131,6 +150,11 @@ impl StudyData {
 /// handle have a copy each.
 fn memory_of_participant(names: usize) -> usize {
     2 * (size_of::<Participant>() + names)
+}
+
+/// Bytes of a session on a device, of which the task and its handle have a copy each.
+fn memory_of_device(device: &Device) -> usize {
+    2 * (size_of::<(u32, DeviceSession)>() + device.time_zone.len())
 }
 
 /// Bytes of answers, which the copies share.

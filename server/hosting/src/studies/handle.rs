@@ -6,8 +6,8 @@ use std::sync::{Arc, MutexGuard};
 
 use chefshat_proto::v1;
 use chefshat_study::{
-    At, Change, Content, ItemAnswer, Joined, ParticipantLink, Recruiting, Refusal, SessionSecret,
-    Study,
+    At, Change, Content, Device, ItemAnswer, Joined, ParticipantLink, Recruiting, Refusal,
+    SessionSecret, Study,
 };
 use tokio::sync::watch;
 
@@ -250,15 +250,27 @@ impl StudyHandle {
         Ok(added.await?.map_err(NotAdded::from))
     }
 
-    /// Opens a session of a participant. Returns its number; 0 if there is only the end to show.
+    /// Opens a session of a participant. Returns its number; 0 if there is only the end to show. The
+    /// device, for whose memory a caller is charged, is left out if there is none for it.
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
-    pub async fn open(&self, number: u32) -> Result<Result<u32, Refusal>, Stopped> {
+    pub async fn open(
+        &self,
+        key: Key,
+        number: u32,
+        device: Option<Device>,
+    ) -> Result<Result<u32, Refusal>, Stopped> {
+        let memory = (device.as_ref()).and_then(|device| self.shared.data.for_device(key, device));
+        let device = device.filter(|_| memory.is_some());
+        let data = Arc::clone(&self.shared.data);
         self.command(move |study, now_ms| {
-            let Some(change) = study.open(number, now_ms)? else {
+            let Some(change) = study.open(number, device, now_ms)? else {
                 return Ok((Vec::new(), 0));
             };
+            if let Some(memory) = memory {
+                data.keep_device(number, memory);
+            }
             let before = study.participant(number).map_or(0, |it| it.session);
             Ok((vec![change], before + 1))
         })
@@ -475,6 +487,7 @@ impl StudyHandle {
         *count += traces.len();
         let traces = StoredTraces {
             number,
+            session,
             game,
             traces,
         };

@@ -125,7 +125,11 @@ impl Lab {
 
     /// Lets the study execute what has been sent to it.
     async fn settled(&self) {
-        let unknown = self.study.open(99).await.expect("it runs");
+        let unknown = self
+            .study
+            .open(Key::Local, 99, None)
+            .await
+            .expect("it runs");
         assert_eq!(unknown, Err(chefshat_study::Refusal::Unknown));
     }
 }
@@ -133,7 +137,12 @@ impl Lab {
 #[tokio::test(start_paused = true)]
 async fn a_participant_who_is_away_for_long_gives_its_slot_to_the_next() {
     let lab = Lab::new().await;
-    let open = async |number| lab.study.open(number).await.expect("it runs");
+    let open = async |number| {
+        lab.study
+            .open(Key::Local, number, None)
+            .await
+            .expect("it runs")
+    };
     let consent = async |number, session| {
         let at = At {
             number,
@@ -181,7 +190,10 @@ async fn a_participant_who_is_away_for_long_gives_its_slot_to_the_next() {
 #[tokio::test(start_paused = true)]
 async fn a_study_sleeps_while_the_server_ends_although_something_is_due() {
     let lab = Lab::new().await;
-    assert_eq!(lab.study.open(1).await.expect("it runs"), Ok(1));
+    assert_eq!(
+        lab.study.open(Key::Local, 1, None).await.expect("it runs"),
+        Ok(1)
+    );
     drop(lab.study.present(1, 1).await);
     let mut changes = lab.study.changes();
     while lab.study.read(|study| study.is_connected(1)) {
@@ -202,7 +214,10 @@ async fn a_study_sleeps_when_the_one_who_waited_for_a_room_has_left() {
         ..ServerConfig::default()
     })
     .await;
-    assert_eq!(lab.study.open(1).await.expect("it runs"), Ok(1));
+    assert_eq!(
+        lab.study.open(Key::Local, 1, None).await.expect("it runs"),
+        Ok(1)
+    );
     let _present = lab.study.present(1, 1).await;
     assert_eq!(lab.study.consent(at(1, 0)).await.expect("it runs"), Ok(0));
     lab.settled().await;
@@ -253,7 +268,10 @@ async fn a_study_is_deleted_once_nobody_is_in_the_middle_of_it() {
     let lab = Lab::new().await;
     let id = lab.study.id();
     let (study, studies) = (&lab.study, &lab.studies);
-    assert_eq!(study.open(1).await.expect("it runs"), Ok(1));
+    assert_eq!(
+        study.open(Key::Local, 1, None).await.expect("it runs"),
+        Ok(1)
+    );
     let refused = studies.delete(Arc::clone(study), false).await;
     assert_eq!(refused.expect("it runs"), Err(1));
     let consented = study.consent(at(1, 0)).await.expect("it runs");
@@ -274,14 +292,20 @@ async fn a_study_is_deleted_once_nobody_is_in_the_middle_of_it() {
     assert_eq!(lab.store.studies().await, Ok(Vec::new()));
     assert!(studies.get(Studies::full_id(link.study())).is_none());
     assert!(studies.earlier(None).is_empty());
-    assert!(study.open(1).await.is_err(), "its task has ended");
+    assert!(
+        study.open(Key::Local, 1, None).await.is_err(),
+        "its task has ended"
+    );
     assert!(study.is_complete());
 }
 
 #[tokio::test(start_paused = true)]
 async fn all_who_delete_a_study_are_answered() {
     let lab = Lab::new().await;
-    assert_eq!(lab.study.open(1).await.expect("it runs"), Ok(1));
+    assert_eq!(
+        lab.study.open(Key::Local, 1, None).await.expect("it runs"),
+        Ok(1)
+    );
     let delete = || lab.studies.delete(Arc::clone(&lab.study), true);
     let (first, second) = tokio::join!(delete(), delete());
     assert_eq!(first.expect("it is deleted"), Ok((2, 0)));
@@ -340,7 +364,7 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
     let studies = server(&lab.store);
     studies.restore().await.expect("readable");
     let study = studies.get(id).expect("it is resumed");
-    let unknown = study.open(99).await.expect("it runs");
+    let unknown = study.open(Key::Local, 99, None).await.expect("it runs");
     assert_eq!(unknown, Err(chefshat_study::Refusal::Unknown));
     assert_eq!(rows().await, 2, "nothing is left to delete");
 
@@ -360,7 +384,7 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
     let studies = server(&lab.store);
     studies.restore().await.expect("readable");
     let study = studies.get(id).expect("it is resumed");
-    let unknown = study.open(99).await.expect("it runs");
+    let unknown = study.open(Key::Local, 99, None).await.expect("it runs");
     assert_eq!(unknown, Err(chefshat_study::Refusal::Unknown));
     assert_eq!(rows().await, 1, "rewritten");
     let stored = lab.store.study(id).await.expect("readable");
@@ -468,7 +492,13 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
     );
     let lab = Lab::with(&ServerConfig::default(), settings, 4).await;
     for number in 1..=3 {
-        assert_eq!(lab.study.open(number).await.expect("it runs"), Ok(1));
+        assert_eq!(
+            lab.study
+                .open(Key::Local, number, None)
+                .await
+                .expect("it runs"),
+            Ok(1)
+        );
         let consented = lab.study.consent(at(number, 0)).await;
         assert_eq!(consented.expect("it runs"), Ok(0));
     }
@@ -587,7 +617,10 @@ async fn traces_that_were_sent_again_are_exported_once() {
     let mut settings = settings();
     settings.traces = true;
     let lab = Lab::with(&ServerConfig::default(), settings, 1).await;
-    assert_eq!(lab.study.open(1).await.expect("it runs"), Ok(1));
+    assert_eq!(
+        lab.study.open(Key::Local, 1, None).await.expect("it runs"),
+        Ok(1)
+    );
     let _present = lab.study.present(1, 1).await;
     assert_eq!(lab.study.consent(at(1, 0)).await.expect("it runs"), Ok(0));
     lab.settled().await;
@@ -696,7 +729,10 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
     let (study, _) = created.expect("valid settings");
     let added = study.add(Key::Local, vec![String::new(); 2]).await;
     assert_eq!(added.expect("it runs"), Ok(1));
-    assert_eq!(study.open(1).await.expect("it runs"), Ok(1));
+    assert_eq!(
+        study.open(Key::Local, 1, None).await.expect("it runs"),
+        Ok(1)
+    );
     let address = |last| Key::Address([192, 0, 2, last].into());
     let before = studies.common.data.taken();
     let answer = |item| chefshat_study::ItemAnswer {

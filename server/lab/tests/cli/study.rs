@@ -46,7 +46,10 @@ fn a_study_is_created_and_deleted() {
 
 /// Opens the study with a participant's link: from then on it is active.
 fn open(url: &str, link: &str) {
-    let request = v1::OpenStudyRequest { link: link.into() };
+    let request = v1::OpenStudyRequest {
+        link: link.into(),
+        ..Default::default()
+    };
     in_runtime(async {
         let client = Client::connect(url).await.unwrap();
         let mut service = ParticipationServiceClient::new(client.channel());

@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use chefshat_proto::v1;
-use chefshat_study::{Answer, Change, ConsentGiven, ItemAnswer, Joined, Outcome, PlacedGame};
+use chefshat_study::{
+    Answer, Change, ConsentGiven, Device, ItemAnswer, Joined, Outcome, PlacedGame, Pointer,
+};
 use prost::Message;
 
 use super::{Unreadable, array};
@@ -87,6 +89,52 @@ struct OpenedForm {
     slot: Option<u32>,
     #[prost(uint64, tag = "3")]
     at_ms: u64,
+    #[prost(message, optional, tag = "4")]
+    device: Option<DeviceForm>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct DeviceForm {
+    #[prost(uint32, tag = "1")]
+    width: u32,
+    #[prost(uint32, tag = "2")]
+    height: u32,
+    #[prost(uint32, tag = "3")]
+    pixels: u32,
+    /// A number of [`POINTERS`]; 0: not known.
+    #[prost(uint32, tag = "4")]
+    pointer: u32,
+    #[prost(string, tag = "5")]
+    time_zone: String,
+}
+
+/// The pointers of devices, by number.
+const POINTERS: [(u32, Pointer); 3] =
+    [(1, Pointer::None), (2, Pointer::Coarse), (3, Pointer::Fine)];
+
+impl DeviceForm {
+    fn of(device: &Device) -> Self {
+        let pointer = POINTERS.iter().find(|(_, it)| Some(*it) == device.pointer);
+        Self {
+            width: device.width.into(),
+            height: device.height.into(),
+            pixels: device.pixels.into(),
+            pointer: pointer.map_or(0, |(number, _)| *number),
+            time_zone: device.time_zone.clone(),
+        }
+    }
+
+    /// The device; `None` if it is not one.
+    fn read(self) -> Option<Device> {
+        let pointer = POINTERS.iter().find(|(number, _)| *number == self.pointer);
+        Some(Device {
+            width: self.width.try_into().ok()?,
+            height: self.height.try_into().ok()?,
+            pixels: self.pixels.try_into().ok()?,
+            pointer: pointer.map(|(_, pointer)| *pointer),
+            time_zone: self.time_zone,
+        })
+    }
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -179,6 +227,8 @@ struct MarkForm {
 struct TracesForm {
     #[prost(message, repeated, tag = "1")]
     traces: Vec<v1::StudyTrace>,
+    #[prost(uint32, tag = "2")]
+    session: u32,
 }
 
 impl StudyHeader {
@@ -206,9 +256,12 @@ pub fn changes_to_bytes(changes: &[Change]) -> Vec<u8> {
 }
 
 /// Encodes interface traces.
-pub(crate) fn traces_to_bytes(traces: &[v1::StudyTrace]) -> Vec<u8> {
-    let traces = traces.to_vec();
-    TracesForm { traces }.encode_to_vec()
+pub(crate) fn traces_to_bytes(stored: &StoredTraces) -> Vec<u8> {
+    let form = TracesForm {
+        traces: stored.traces.clone(),
+        session: stored.session,
+    };
+    form.encode_to_vec()
 }
 
 /// Decodes interface traces of a game.
@@ -220,10 +273,12 @@ pub(crate) fn stored_traces(
     game: &[u8],
     bytes: &[u8],
 ) -> Result<StoredTraces, Unreadable> {
+    let form = TracesForm::decode(bytes)?;
     Ok(StoredTraces {
         number,
         game: Id(array(game, "the game's id")?),
-        traces: TracesForm::decode(bytes)?.traces,
+        session: form.session,
+        traces: form.traces,
     })
 }
 
@@ -322,10 +377,12 @@ fn kind_of(change: &Change) -> KindForm {
             number,
             slot,
             at_ms,
+            device,
         } => KindForm::Opened(OpenedForm {
             number: *number,
             slot: *slot,
             at_ms: *at_ms,
+            device: device.as_ref().map(DeviceForm::of),
         }),
         Change::Consented {
             number,
@@ -402,6 +459,7 @@ fn change_of(kind: KindForm) -> Result<Change, Unreadable> {
             number: form.number,
             slot: form.slot,
             at_ms: form.at_ms,
+            device: form.device.and_then(DeviceForm::read),
         },
         KindForm::Consented(form) => Change::Consented {
             number: form.number,

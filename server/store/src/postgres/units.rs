@@ -254,7 +254,7 @@ async fn add_traces(
     .bind(id.0.as_slice())
     .bind(i64::from(traces.number))
     .bind(traces.game.0.as_slice())
-    .bind(form::traces_to_bytes(&traces.traces))
+    .bind(form::traces_to_bytes(traces))
     .fetch_one(connection)
     .await
 }

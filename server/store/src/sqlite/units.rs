@@ -66,7 +66,7 @@ pub(super) async fn write(
             .bind(unit.id.0.as_slice())
             .bind(traces.number)
             .bind(traces.game.0.as_slice())
-            .bind(form::traces_to_bytes(&traces.traces))
+            .bind(form::traces_to_bytes(traces))
             .execute(&mut *connection)
             .await?;
         }

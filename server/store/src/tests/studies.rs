@@ -1,6 +1,8 @@
 //! Stored studies, in each store that has them.
 
-use chefshat_study::{Answer, Change, ConsentGiven, ItemAnswer, Joined, Outcome, PlacedGame};
+use chefshat_study::{
+    Answer, Change, ConsentGiven, Device, ItemAnswer, Joined, Outcome, PlacedGame, Pointer,
+};
 
 use super::*;
 use crate::studies::StudyHeader;
@@ -57,11 +59,19 @@ fn every_change() -> Vec<Change> {
             number,
             slot: Some(0),
             at_ms,
+            device: Some(Device {
+                width: 390,
+                height: 844,
+                pixels: 300,
+                pointer: Some(Pointer::Coarse),
+                time_zone: "Europe/Rome".to_owned(),
+            }),
         },
         Change::Opened {
             number,
             slot: None,
             at_ms,
+            device: None,
         },
         Change::Consented {
             number,
@@ -133,6 +143,7 @@ fn every_change() -> Vec<Change> {
 fn traces(number: u32) -> StoredTraces {
     StoredTraces {
         number,
+        session: 2,
         game: Id([9; 16]),
         traces: vec![v1::StudyTrace {
             kind: v1::StudyTraceKind::Hover.into(),

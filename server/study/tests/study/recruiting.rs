@@ -120,7 +120,7 @@ fn participants_go_on_where_the_panel_says() {
 fn the_id_at_the_panel_is_deleted_with_the_data() {
     let (_, added) = folded(&[]).join(joining(1, "secret")).unwrap();
     let mut changes = vec![added.unwrap()];
-    changes.extend(folded(&changes).open(1, 1000).unwrap());
+    changes.extend(folded(&changes).open(1, None, 1000).unwrap());
     changes.extend(folded(&changes).withdraw(1, true, 2000).unwrap());
     let before = folded(&changes);
     assert_eq!(before.participant(1).unwrap().panel_id(), "");

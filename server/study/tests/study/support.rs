@@ -33,7 +33,7 @@ impl Lab {
     }
 
     pub(crate) fn open(&mut self, number: u32) -> Result<(), Refusal> {
-        if let Some(opened) = self.study.open(number, self.now_ms)? {
+        if let Some(opened) = self.study.open(number, None, self.now_ms)? {
             self.fold(opened);
             self.study.set_connected(number, true, self.now_ms);
         }

@@ -11,9 +11,9 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::{Fill, ParticipantKind, SeatLabels};
 use chefshat_room::policy::{Durability, Policy, Visibility};
 use chefshat_study::{
-    Condition, Consent, ExternalQuestionnaire, Factor, Hide, Item, ItemKind, Labels, Language,
-    Order, Outcome, Participant, PlayedGame, Questionnaire, Recruiting, Settings, SettingsProblem,
-    Stage, Status, Study, Task, Template, Text,
+    Condition, Consent, Device, ExternalQuestionnaire, Factor, Hide, Item, ItemKind, Labels,
+    Language, Order, Outcome, Participant, PlayedGame, Pointer, Questionnaire, Recruiting,
+    Settings, SettingsProblem, Stage, Status, Study, Task, Template, Text,
 };
 
 use super::agent::check_budget;
@@ -249,6 +249,23 @@ pub fn study_plan(message: &v1::StudySettings) -> Result<StudyPlan, SettingsProb
         name: message.name.clone(),
         conditions: plans,
     })
+}
+
+/// A participant's device; `None` if it is not of the form of the protocol.
+pub fn device_from_proto(message: v1::StudyDevice) -> Option<Device> {
+    let device = Device {
+        width: message.width.try_into().ok()?,
+        height: message.height.try_into().ok()?,
+        pixels: message.pixels.try_into().ok()?,
+        pointer: match message.pointer() {
+            v1::StudyPointer::Unspecified => None,
+            v1::StudyPointer::None => Some(Pointer::None),
+            v1::StudyPointer::Coarse => Some(Pointer::Coarse),
+            v1::StudyPointer::Fine => Some(Pointer::Fine),
+        },
+        time_zone: message.time_zone,
+    };
+    device.is_valid().then_some(device)
 }
 
 fn recruiting(message: v1::StudyRecruiting) -> Recruiting {

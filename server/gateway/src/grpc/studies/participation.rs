@@ -186,7 +186,8 @@ impl ParticipationService for StudyCalls {
         request: Request<v1::OpenStudyRequest>,
     ) -> Result<Response<v1::OpenStudyResponse>, Status> {
         let key = charged(request.extensions());
-        let (handle, number) = self.of_any_link(&request.into_inner().link, key).await?;
+        let request = request.into_inner();
+        let (handle, number) = self.of_any_link(&request.link, key).await?;
         let Some(number) = number else {
             return Err(status(
                 Code::FailedPrecondition,
@@ -195,7 +196,8 @@ impl ParticipationService for StudyCalls {
                 [("id_parameter", handle.recruiting().id_parameter.as_str())],
             ));
         };
-        let opened = handle.open(number).await.map_err(stopped)?;
+        let device = request.device.and_then(convert::device_from_proto);
+        let opened = handle.open(key, number, device).await.map_err(stopped)?;
         let session = opened.map_err(|it| not_admitted(&handle, &handle.panel_id(number), it))?;
         let (saved_answers, step_age_ms) = handle.progress(number, since_epoch_ms());
         Ok(Response::new(v1::OpenStudyResponse {

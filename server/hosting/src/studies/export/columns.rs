@@ -4,8 +4,8 @@ use chefshat_engine::SeatStatistics;
 use chefshat_proto::v1::{self, StudyTraceKind, game_event::Kind as EventKind, record_line::Line};
 use chefshat_record::outcome;
 use chefshat_study::{
-    Answer, Condition, Item, ItemAnswer, ItemKind, Outcome, Participant, PlayedGame, Questionnaire,
-    Settings, Status, Study,
+    Answer, Condition, DeviceSession, Item, ItemAnswer, ItemKind, Outcome, Participant, PlayedGame,
+    Pointer, Questionnaire, Settings, Status, Study,
 };
 
 use super::table::{Code, Column, Kind, Sheet, Table};
@@ -15,12 +15,14 @@ use chefshat_wire::convert;
 /// A time of day.
 const SINCE_EPOCH: Kind = Kind::Integer("milliseconds since 1970-01-01 00:00 UTC");
 const MILLISECONDS: Kind = Kind::Integer("milliseconds");
+const CSS_PIXELS: Kind = Kind::Integer("CSS pixels");
 /// A number of something, or the number or index of one.
 const COUNT: Kind = Kind::Integer("");
 
 const NUMBER: &str = "number of the participant in the study, from 1";
 const PSEUDONYM: &str = "pseudonym of the participant, its name in games";
 const CONDITION: &str = "condition";
+const SESSION: &str = "number of the session of the participant, from 1";
 const STEP: &str = "step of the study, from 0";
 const DELETED: &str = "its data were deleted";
 const NO_RECORD: &str = "the game has not ended, or its record cannot be read";
@@ -679,9 +681,59 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
     .empty("it was not sent")
 }
 
+/// A session of a participant on a device that is known.
+pub(super) struct SessionRow<'s> {
+    pub(super) number: u32,
+    pub(super) participant: &'s Participant,
+    pub(super) session: u32,
+    pub(super) opened: &'s DeviceSession,
+}
+
+pub(super) fn sessions<'s>() -> Table<SessionRow<'s>> {
+    type Row<'s> = SessionRow<'s>;
+    const OF: &str =
+        "a session of a participant: the study opened on a device that says what it is";
+    const PIXELS: &str = "pixels of the display in a hundred CSS pixels";
+    const POINTER: &str = "most exact pointer of the device, as the media features of CSS have it";
+    let pointers = POINTERS.map(|(_, code, label)| Code::new(code, label));
+    Table::new("sessions.csv", OF, &["number", "session"])
+        .with("number", COUNT, NUMBER, |row: &Row<'s>| text(row.number))
+        .with("participant", Kind::Text, PSEUDONYM, |row| {
+            row.participant.pseudonym.clone()
+        })
+        .with("session", COUNT, SESSION, |row| text(row.session))
+        .with("opened_at_ms", SINCE_EPOCH, "when it was opened", |row| {
+            text(row.opened.at_ms)
+        })
+        .with("width", CSS_PIXELS, "width of the page", |row| {
+            text(row.opened.device.width)
+        })
+        .with("height", CSS_PIXELS, "height of the page", |row| {
+            text(row.opened.device.height)
+        })
+        .with("pixels", COUNT, PIXELS, |row| {
+            text(row.opened.device.pixels)
+        })
+        .with("pointer", Kind::one_of(pointers), POINTER, |row| {
+            let known = (POINTERS.iter()).find(|(it, ..)| Some(*it) == row.opened.device.pointer);
+            known.map_or_else(String::new, |(_, code, _)| (*code).to_owned())
+        })
+        .empty("it is not known")
+        .with("time_zone", Kind::Text, "time zone of the device", |row| {
+            row.opened.device.time_zone.clone()
+        })
+}
+
+const POINTERS: [(Pointer, &str, &str); 3] = [
+    (Pointer::None, "none", "there is none"),
+    (Pointer::Coarse, "coarse", "such as a finger"),
+    (Pointer::Fine, "fine", "such as a mouse"),
+];
+
 /// An event of the interface.
 pub(super) struct TraceRow<'s> {
     pub(super) number: u32,
+    pub(super) session: u32,
     pub(super) pseudonym: &'s str,
     pub(super) condition: &'s Condition,
     pub(super) game: Id,
@@ -706,6 +758,11 @@ pub(super) fn traces<'s>(settings: &Settings) -> Table<TraceRow<'s>> {
     .with("game_id", Kind::Text, "identifies the game", |row| {
         text(row.game)
     })
+    .with("session", COUNT, SESSION, |row| match row.session {
+        0 => String::new(),
+        session => text(session),
+    })
+    .empty("it was stored by an earlier version")
     .with(
         "decision_id",
         COUNT,

@@ -21,7 +21,9 @@ use crate::config::STUDY_EXPORT_CHUNK;
 use crate::rooms::Rooms;
 use chefshat_room::ids::Id;
 use chefshat_store::{StoreError, StoredGame};
-use columns::{AnswerRow, CodebookRow, GameResult, GameRow, ItemRow, ParticipantRow, TraceRow};
+use columns::{
+    AnswerRow, CodebookRow, GameResult, GameRow, ItemRow, ParticipantRow, SessionRow, TraceRow,
+};
 use table::{Sheet, Table};
 
 /// Bytes that most lines of a table do not exceed.
@@ -162,6 +164,7 @@ impl StudyHandle {
         let study = self.committed().clone();
         json_file("study.json", &self.publishable(), sender).await?;
         let mut sheets = vec![participants(&study, sender).await?];
+        sheets.push(sessions(&study, sender).await?);
         sheets.extend(games(self, &study, rooms, sender).await?);
         sheets.push(items(&study, sender).await?);
         sheets.push(answers(&study, sender).await?);
@@ -199,6 +202,25 @@ async fn participants(
             participant,
         };
         file.row(&row).await?;
+    }
+    file.end().await
+}
+
+async fn sessions(
+    study: &Study,
+    sender: &mpsc::Sender<ExportedFile>,
+) -> Result<Sheet, ExportError> {
+    let mut file = TableFile::new(columns::sessions(), sender).await?;
+    for (number, participant) in study.participants() {
+        for (session, opened) in &participant.devices {
+            let row = SessionRow {
+                number: *number,
+                participant,
+                session: *session,
+                opened,
+            };
+            file.row(&row).await?;
+        }
     }
     file.end().await
 }
@@ -420,6 +442,7 @@ async fn traces(
         for trace in new.unwrap_or(&stored.traces) {
             let row = TraceRow {
                 number: stored.number,
+                session: stored.session,
                 pseudonym: participant.map_or("", |it| &it.pseudonym),
                 condition: &settings.conditions[*condition],
                 game: stored.game,

@@ -121,6 +121,34 @@ STUDY_LABELS_PLAYERS: StudyLabels.ValueType  # 3
 """Neither: seats are named "Player 1" and so on, and their kind is UNSPECIFIED."""
 Global___StudyLabels: _TypeAlias = StudyLabels  # noqa: Y015
 
+class _StudyPointer:
+    ValueType = _typing.NewType("ValueType", _builtins.int)
+    V: _TypeAlias = ValueType  # noqa: Y015
+
+class _StudyPointerEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_StudyPointer.ValueType], _builtins.type):
+    DESCRIPTOR: _descriptor.EnumDescriptor
+    STUDY_POINTER_UNSPECIFIED: _StudyPointer.ValueType  # 0
+    """Not known."""
+    STUDY_POINTER_NONE: _StudyPointer.ValueType  # 1
+    """It has none."""
+    STUDY_POINTER_COARSE: _StudyPointer.ValueType  # 2
+    """Such as a finger."""
+    STUDY_POINTER_FINE: _StudyPointer.ValueType  # 3
+    """Such as a mouse."""
+
+class StudyPointer(_StudyPointer, metaclass=_StudyPointerEnumTypeWrapper):
+    """The most exact pointer of a device, as the media features of CSS have it."""
+
+STUDY_POINTER_UNSPECIFIED: StudyPointer.ValueType  # 0
+"""Not known."""
+STUDY_POINTER_NONE: StudyPointer.ValueType  # 1
+"""It has none."""
+STUDY_POINTER_COARSE: StudyPointer.ValueType  # 2
+"""Such as a finger."""
+STUDY_POINTER_FINE: StudyPointer.ValueType  # 3
+"""Such as a mouse."""
+Global___StudyPointer: _TypeAlias = StudyPointer  # noqa: Y015
+
 class _StudyParticipantState:
     ValueType = _typing.NewType("ValueType", _builtins.int)
     V: _TypeAlias = ValueType  # noqa: Y015
@@ -991,6 +1019,44 @@ class StudySettings(_message.Message):
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___StudySettings: _TypeAlias = StudySettings  # noqa: Y015
+
+@_typing.final
+class StudyDevice(_message.Message):
+    """A participant's device, as its page describes it. Sent by participants; exported data have it."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    WIDTH_FIELD_NUMBER: _builtins.int
+    HEIGHT_FIELD_NUMBER: _builtins.int
+    PIXELS_FIELD_NUMBER: _builtins.int
+    POINTER_FIELD_NUMBER: _builtins.int
+    TIME_ZONE_FIELD_NUMBER: _builtins.int
+    width: _builtins.int
+    """Width of the page, in CSS pixels, 1..=65535."""
+    height: _builtins.int
+    """Height of the page, in CSS pixels, 1..=65535."""
+    pixels: _builtins.int
+    """Pixels of the display in a hundred CSS pixels, 1..=65535."""
+    pointer: Global___StudyPointer.ValueType
+    """Its pointer."""
+    time_zone: _builtins.str
+    """Its time zone, 1..=64 letters, digits, `_`, `-`, `+` or `/`, for example "Europe/Rome"."""
+    def __init__(
+        self,
+        *,
+        width: _builtins.int = ...,
+        height: _builtins.int = ...,
+        pixels: _builtins.int = ...,
+        pointer: Global___StudyPointer.ValueType = ...,
+        time_zone: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["height", b"height", "pixels", b"pixels", "pointer", b"pointer", "time_zone", b"time_zone", "width", b"width"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___StudyDevice: _TypeAlias = StudyDevice  # noqa: Y015
 
 @_typing.final
 class StudyConsentGiven(_message.Message):

@@ -168,8 +168,8 @@ class StudyServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def ExportStudy(self, request, context):
-        """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
-        `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
+        """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `sessions.csv`,
+        `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
         read, the records of its games under `records/` and samples under `samples/`, and last what the
         columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
         NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
@@ -179,7 +179,7 @@ class StudyServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def DeleteStudyParticipant(self, request, context):
-        """Deletes the data of a participant: its pseudonym, id at the panel, answers, interface traces, and its games with
+        """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface traces, and its games with
         their records. What stays is that a participant with this number took part, when, in which
         conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
         deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,

@@ -71,14 +71,14 @@ class StudyServiceStub:
     (STUDY_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     ExportStudy: _grpc.UnaryStreamMultiCallable[_study_service_pb2.ExportStudyRequest, _study_service_pb2.ExportStudyResponse]
-    """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
-    `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
+    """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `sessions.csv`,
+    `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
     read, the records of its games under `records/` and samples under `samples/`, and last what the
     columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
     NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteStudyParticipant: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]
-    """Deletes the data of a participant: its pseudonym, id at the panel, answers, interface traces, and its games with
+    """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface traces, and its games with
     their records. What stays is that a participant with this number took part, when, in which
     conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
     deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
@@ -134,14 +134,14 @@ class StudyServiceAsyncStub(StudyServiceStub):
     (STUDY_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     ExportStudy: _aio.UnaryStreamMultiCallable[_study_service_pb2.ExportStudyRequest, _study_service_pb2.ExportStudyResponse]  # type: ignore[assignment]
-    """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
-    `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
+    """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `sessions.csv`,
+    `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
     read, the records of its games under `records/` and samples under `samples/`, and last what the
     columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
     NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteStudyParticipant: _aio.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]  # type: ignore[assignment]
-    """Deletes the data of a participant: its pseudonym, id at the panel, answers, interface traces, and its games with
+    """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface traces, and its games with
     their records. What stays is that a participant with this number took part, when, in which
     conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
     deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
@@ -248,8 +248,8 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _study_service_pb2.ExportStudyRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_study_service_pb2.ExportStudyResponse], _abc.AsyncIterator[_study_service_pb2.ExportStudyResponse]]:
-        """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `games.csv`,
-        `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
+        """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `sessions.csv`,
+        `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
         read, the records of its games under `records/` and samples under `samples/`, and last what the
         columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
         NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
@@ -261,7 +261,7 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _study_service_pb2.DeleteStudyParticipantRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.DeleteStudyParticipantResponse, _abc.Awaitable[_study_service_pb2.DeleteStudyParticipantResponse]]:
-        """Deletes the data of a participant: its pseudonym, id at the panel, answers, interface traces, and its games with
+        """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface traces, and its games with
         their records. What stays is that a participant with this number took part, when, in which
         conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
         deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
