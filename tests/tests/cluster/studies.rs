@@ -1,6 +1,6 @@
 //! A study on three nodes, of which the one that owns it is killed while its participants play.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -47,6 +47,10 @@ fn settings() -> v1::StudySettings {
             })),
             stage(Stage::Games(v1::StudyGames { count: 2 })),
         ],
+        recruiting: Some(v1::StudyRecruiting {
+            open_link: true,
+            ..v1::StudyRecruiting::default()
+        }),
         ..v1::StudySettings::default()
     }
 }
@@ -209,7 +213,8 @@ async fn a_study_whose_owner_is_killed_goes_on_at_another_node() {
         async move { service.create_study(request).await }
     });
     let created = created.await.into_inner();
-    let study_id = created.study.expect("a study").study_id;
+    let study = created.study.expect("a study");
+    let study_id = study.study_id;
     let owner_token = created.owner_token;
     // Each node answers the same request with the same study, and lists it.
     for node in &cluster.nodes {
@@ -232,12 +237,30 @@ async fn a_study_whose_owner_is_killed_goes_on_at_another_node() {
         study_id: study_id.clone(),
         owner_token: owner_token.clone(),
         pseudonyms: Vec::new(),
-        count: PARTICIPANTS,
+        count: PARTICIPANTS - 1,
     };
     let added = service.add_study_participants(request).await;
     let links = added.expect("its owner").into_inner().links;
+    let mut links: Vec<String> = links.into_iter().map(|it| it.link).collect();
+    // One joins by the open link, which every node knows.
+    let mut joined = BTreeSet::new();
+    for node in &cluster.nodes {
+        let service = ParticipationServiceClient::new(node.client().await.channel());
+        let request = v1::JoinStudyRequest {
+            open_link: study.open_link.clone(),
+            panel_id: String::new(),
+            request_id: vec![8; 32],
+        };
+        let answer = settled(|| {
+            let (mut service, request) = (service.clone(), request.clone());
+            async move { service.join_study(request).await }
+        });
+        joined.insert(answer.await.into_inner().link);
+    }
+    assert_eq!(joined.len(), 1, "the same request");
+    links.extend(joined);
     let url = cluster.url();
-    let people = links.into_iter().map(|it| take_part(url.clone(), it.link));
+    let people = links.into_iter().map(|it| take_part(url.clone(), it));
     let taking_part = tokio::spawn(join_all(people));
 
     let get = || {
@@ -287,7 +310,7 @@ async fn a_study_whose_owner_is_killed_goes_on_at_another_node() {
             async move { service.export_study(request).await }
         });
         let mut parts = exported.await.into_inner();
-        let mut records = std::collections::BTreeSet::new();
+        let mut records = BTreeSet::new();
         while let Some(part) = parts.message().await.expect("it ends well") {
             if part.file.starts_with("records/") {
                 records.insert(part.file);
