@@ -9905,7 +9905,7 @@ pub struct OpenStudyRequest {
     /// The secret of the link: `link` of StudyLink.
     #[prost(string, tag = "1")]
     pub link: ::prost::alloc::string::String,
-    /// The device on which it is opened. One that is not of its form is left out.
+    /// The device on which it is opened. An invalid one is ignored.
     #[prost(message, optional, tag = "2")]
     pub device: ::core::option::Option<StudyDevice>,
 }
@@ -10354,10 +10354,11 @@ pub mod study_service_client {
                 .insert(GrpcMethod::new("chefshat.v1.StudyService", "CloseStudy"));
             self.inner.unary(req, path, codec).await
         }
-        /// Streams the data of a study as files: `study.json`, the tables `participants.csv`, `sessions.csv`,
-        /// `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
-        /// read, the records of its games under `records/` and samples under `samples/`, and last what the
-        /// columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
+        /// Streams the data of a study as files: `study.json`, the tables `participants.csv`,
+        /// `sessions.csv`, `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the
+        /// record of a game cannot be read, the records of its games under `records/` and samples under
+        /// `samples/`, and last what the columns of the tables mean, `codebook.csv` for people and
+        /// `datapackage.json` for programs.
         /// NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         pub async fn export_study(
             &mut self,
@@ -10383,8 +10384,8 @@ pub mod study_service_client {
                 .insert(GrpcMethod::new("chefshat.v1.StudyService", "ExportStudy"));
             self.inner.server_streaming(req, path, codec).await
         }
-        /// Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface traces, and its games with
-        /// their records. What stays is that a participant with this number took part, when, in which
+        /// Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
+        /// traces, and its games with their records. What stays is that a participant with this number took part, when, in which
         /// conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
         /// deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
         /// STORE_FAILED).
@@ -10547,10 +10548,11 @@ pub mod study_service_server {
             >
             + std::marker::Send
             + 'static;
-        /// Streams the data of a study as files: `study.json`, the tables `participants.csv`, `sessions.csv`,
-        /// `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
-        /// read, the records of its games under `records/` and samples under `samples/`, and last what the
-        /// columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
+        /// Streams the data of a study as files: `study.json`, the tables `participants.csv`,
+        /// `sessions.csv`, `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the
+        /// record of a game cannot be read, the records of its games under `records/` and samples under
+        /// `samples/`, and last what the columns of the tables mean, `codebook.csv` for people and
+        /// `datapackage.json` for programs.
         /// NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         async fn export_study(
             &self,
@@ -10559,8 +10561,8 @@ pub mod study_service_server {
             tonic::Response<Self::ExportStudyStream>,
             tonic::Status,
         >;
-        /// Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface traces, and its games with
-        /// their records. What stays is that a participant with this number took part, when, in which
+        /// Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
+        /// traces, and its games with their records. What stays is that a participant with this number took part, when, in which
         /// conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
         /// deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
         /// STORE_FAILED).
@@ -11308,7 +11310,7 @@ pub mod participation_service_client {
         /// INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
         /// RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
         /// study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
-        /// `url`, and so has the STUDY_FULL of OpenStudy and GiveConsent.
+        /// `url`, also of OpenStudy and GiveConsent.
         pub async fn join_study(
             &mut self,
             request: impl tonic::IntoRequest<super::JoinStudyRequest>,
@@ -11600,7 +11602,7 @@ pub mod participation_service_server {
         /// INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
         /// RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
         /// study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
-        /// `url`, and so has the STUDY_FULL of OpenStudy and GiveConsent.
+        /// `url`, also of OpenStudy and GiveConsent.
         async fn join_study(
             &self,
             request: tonic::Request<super::JoinStudyRequest>,

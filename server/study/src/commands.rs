@@ -60,7 +60,7 @@ pub enum Refusal {
     #[error("{0}")]
     PanelId(String),
     /// A participant has this id at the panel.
-    #[error("somebody with this id already takes part; go on in the browser in which you began")]
+    #[error("somebody with this id already takes part; continue in the browser in which you began")]
     PanelIdTaken,
     /// Another participant has this pseudonym.
     #[error("another participant is called {0:?}")]

@@ -133,6 +133,11 @@ impl Settings {
         steps(&self.stages, sequence)
     }
 
+    /// Whether participants are asked for their consent, which is what they do first.
+    pub fn asks_for_consent(&self) -> bool {
+        matches!(self.stages.first(), Some(Stage::Once(Task::Consent(_))))
+    }
+
     /// Whether participants get their slots by their consent, so that nobody who declines takes one:
     /// they are asked for it before they play or meet a condition.
     pub fn assigns_by_consent(&self) -> bool {

@@ -23,7 +23,7 @@ export async function join(openLink: string, idParameter: string): Promise<strin
   const keep = (link: string) => {
     if (stored !== undefined) remember(stored, JSON.stringify({ request: hex(requestId), link }));
   };
-  keep("");
+  if (stored !== undefined && keptRequest(stored) === undefined) keep("");
   try {
     const { link } = await participationApi.joinStudy({ openLink, panelId, requestId }, { timeoutMs: CALL_LIMIT_MS });
     keep(link);

@@ -6,7 +6,13 @@ import { effect, type Signal, signal } from "@preact/signals";
 import { CALL_LIMIT_MS } from "../api/client";
 import { type Fault, faultOf, isPassing } from "../api/faults";
 import { type Following, follow, type Link } from "../api/follow";
-import type { StudyItemAnswer, StudyItemAnswerSchema, StudyTraceSchema, StudyView } from "../gen/chefshat/v1/study_pb";
+import {
+  StudyEndReason,
+  type StudyItemAnswer,
+  type StudyItemAnswerSchema,
+  type StudyTraceSchema,
+  type StudyView,
+} from "../gen/chefshat/v1/study_pb";
 import { replaceAddress } from "../router";
 import { participationApi } from "./client";
 import { thisDevice } from "./device";
@@ -94,6 +100,7 @@ export function startParticipating(given: string): Participating {
     const now = view.peek();
     if (!next || (now && next.step < now.step && next.content.case !== "end")) return;
     view.value = next;
+    forgetDeleted(next);
   };
 
   const openStudy = (link: string) => participationApi.openStudy({ link, device: thisDevice() }, call);
@@ -108,6 +115,12 @@ export function startParticipating(given: string): Participating {
       replaceAddress({ page: "study", link: own });
     }
     return openStudy(own);
+  };
+
+  /** What the server has deleted, this device forgets. */
+  const forgetDeleted = (shown: StudyView | undefined) => {
+    const { content } = shown ?? {};
+    if (content?.case === "end" && content.value.reason === StudyEndReason.DATA_DELETED) forgetJoined(secret);
   };
 
   const open = async () => {
@@ -130,6 +143,7 @@ export function startParticipating(given: string): Participating {
           saved: answer.savedAnswers,
         };
         view.value = answer.view;
+        forgetDeleted(answer.view);
         presence.value = "open";
         link.value = "open";
         if (session !== "") attend();
@@ -205,10 +219,10 @@ export function startParticipating(given: string): Participating {
     },
     withdraw: async (deleteData) => {
       const answer = await participationApi.withdrawFromStudy({ link: secret, deleteData }, call);
-      if (deleteData) forgetJoined(secret);
       leave();
       presence.value = "open";
       view.value = answer.view;
+      forgetDeleted(answer.view);
     },
     open: () => void open(),
     stop: () => {

@@ -368,6 +368,9 @@ impl StudyService for StudyCalls {
         let handle = self
             .owned(&caller, &request.study_id, &request.owner_token)
             .await?;
+        // The journal of the study is written again.
+        self.calls
+            .charge(Key::of_caller(&caller), COST_OF_TOURNAMENT);
         let deleted = handle.withdraw(request.number, true).await;
         deleted.map_err(stopped)?.map_err(refused)?;
         let participant = handle.participant(request.number, self.studies.rooms());

@@ -86,6 +86,11 @@ impl ParticipantData {
                     "textSha256": hex::encode(consent.text_sha256),
                 })
             });
+            let devices = participant.devices.iter().map(|(session, opened)| {
+                let device = convert::device_to_proto(&opened.device);
+                json!({ "session": session, "openedAtMs": opened.at_ms, "device": device })
+            });
+            let devices: Vec<_> = devices.collect();
             let games = games_of(&stored.changes, number);
             let games: Vec<String> = games.iter().map(Id::to_string).collect();
             let mut lines = vec![json!({ "study": {
@@ -94,6 +99,7 @@ impl ParticipantData {
                 "number": number,
                 "panelId": participant.panel_id(),
                 "state": state.as_str_name(),
+                "devices": devices,
                 "consent": consent,
                 "reachedAtMs": participant.reached_at_ms,
                 "endedAtMs": participant.ended_at_ms,
@@ -127,7 +133,9 @@ impl ParticipantData {
             for traces in all.iter().filter(|traces| traces.number == number) {
                 let game = traces.game.to_string();
                 let lines = traces.traces.iter();
-                let lines = lines.map(|trace| json!({ "trace": trace, "gameId": game }));
+                let session = traces.session;
+                let lines = lines
+                    .map(|trace| json!({ "trace": trace, "gameId": game, "session": session }));
                 sheet.send(lines.collect()).await?;
             }
         }

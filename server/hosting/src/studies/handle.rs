@@ -463,7 +463,7 @@ impl StudyHandle {
             return Ok(Err(TraceRefusal::Invalid(problem)));
         }
         // Deletion waits for it, so that nothing is added after the data were deleted.
-        let mut counts = self.shared.traces.lock().await;
+        let mut counts = Arc::clone(&self.shared.traces).lock_owned().await;
         {
             let study = self.committed();
             let participant = study.participant(number).filter(|it| !it.data_deleted);
@@ -493,7 +493,17 @@ impl StudyHandle {
         };
         let unit = UnitKind::Study.id(self.id());
         let traces = UnitWrite::Traces(traces);
-        rooms.store().write_unit(unit, traces).await.map(Ok)
+        let store = Arc::clone(rooms.store());
+        // Deletion waits for it even if the caller goes.
+        let writing = tokio::spawn(short("one write", async move {
+            let written = store.write_unit(unit, traces).await;
+            drop(counts);
+            written
+        }));
+        let written = writing.await;
+        written
+            .unwrap_or_else(|error| Err(StoreError::Failed(error.to_string())))
+            .map(Ok)
     }
 
     /// Adds a stream that shows the study to a participant. While the value lives, the participant

@@ -34,7 +34,7 @@ pub struct StudyShared {
     pub(super) deleting: Mutex<BTreeSet<u32>>,
     /// Number of interface traces by game, since the server was started. Locked while traces are
     /// added or deleted.
-    pub(super) traces: AsyncMutex<BTreeMap<Id, usize>>,
+    pub(super) traces: Arc<AsyncMutex<BTreeMap<Id, usize>>>,
     pub(super) streams: AtomicU64,
 }
 
@@ -45,7 +45,7 @@ impl StudyShared {
             data,
             views: Mutex::default(),
             deleting: Mutex::default(),
-            traces: AsyncMutex::default(),
+            traces: Arc::default(),
             streams: AtomicU64::new(0),
         }
     }

@@ -2,14 +2,16 @@
 
 use crate::StoreError;
 
+/// What is to be written is locked.
+pub(super) const LOCKED: &str =
+    "another session of the database has locked what is to be written: see pg_locks";
+
 /// Explains an error, with advice.
 pub(super) fn explain(error: &sqlx::Error) -> String {
     let code = error.as_database_error().and_then(|error| error.code());
     let advice = match code.as_deref() {
         Some("53100") => "the disk of the database is full: free some space",
-        Some("55P03") => {
-            "somebody else has locked what is to be written: see pg_locks for who; it is tried again"
-        }
+        Some("55P03") => LOCKED,
         Some("53300") => {
             "the database has no connection left: raise its max_connections, or run fewer nodes"
         }
@@ -39,7 +41,7 @@ pub(super) fn failure(error: &sqlx::Error) -> StoreError {
     StoreError::Failed(explain(error))
 }
 
-/// Whether somebody else has locked what was to be written. Nothing was.
+/// Whether another session has locked what was to be written. Nothing was.
 pub(super) fn is_locked(error: &sqlx::Error) -> bool {
     let code = error.as_database_error().and_then(|error| error.code());
     code.as_deref() == Some("55P03")

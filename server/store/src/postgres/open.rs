@@ -117,6 +117,16 @@ pub(super) fn with_lock_limit(sessions: PgConnectOptions, limit: Duration) -> Pg
     sessions.options([("lock_timeout", format!("{}ms", limit.as_millis()))])
 }
 
+/// Lets a session wait this long for a lock from now on.
+pub(super) async fn set_lock_limit(
+    connection: &mut PgConnection,
+    limit: Duration,
+) -> sqlx::Result<()> {
+    let set = sqlx::query("SELECT set_config('lock_timeout', $1, false)");
+    let set = set.bind(format!("{}ms", limit.as_millis()));
+    set.execute(connection).await.map(drop)
+}
+
 /// Connects, in bounded time.
 pub(super) async fn connect(options: &PgConnectOptions) -> sqlx::Result<PgConnection> {
     let connecting = timeout(CONNECT_LIMIT, PgConnection::connect_with(options));

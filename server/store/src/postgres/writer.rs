@@ -1,8 +1,8 @@
 //! The writers of a node: each commits what waits for it in one transaction, so that many rooms
 //! share a commit. A commit without an answer may have happened or not: the same work is then done
 //! again on a new connection, until its outcome is certain. So work must be *idempotent*: what it
-//! finds done by itself counts as done. Work that meets a lock of somebody else is set *aside*, where
-//! one more writer tries it again, so that it holds up nothing but itself.
+//! finds done by itself counts as done. Work that meets a lock of another session is set *aside*, where
+//! one more writer tries it again: it delays little but itself.
 
 use std::collections::VecDeque;
 use std::io;
@@ -16,8 +16,8 @@ use tokio::time::{Instant, sleep, timeout};
 use tokio_util::sync::CancellationToken;
 use tracing::{error, info, warn};
 
-use super::errors::{failure, is_locked, is_temporary};
-use super::open::{connect_writer, with_lock_limit};
+use super::errors::{LOCKED, failure, is_locked, is_temporary};
+use super::open::{connect_writer, set_lock_limit};
 use crate::StoreError;
 use chefshat_base::metrics::{StoreMetrics, Waits};
 use chefshat_base::tasks::{LongTask, named};
@@ -31,8 +31,10 @@ const ATTEMPTS_TOGETHER: u32 = 2;
 /// Pauses before a transaction is tried again.
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
-/// How long what was set aside waits for a lock each time. What else is there waits as long.
+/// How long what was set aside waits for a lock: twice as long each time that it is all that is
+/// locked, up to this number of times, since the next lock may be held as long.
 const ASIDE_LOCK_LIMIT: Duration = Duration::from_millis(50);
+const LONGER_LOCK_LIMITS: u32 = 4;
 /// How long work is tried again after the store was closed.
 const CLOSING_LIMIT: Duration = Duration::from_secs(5);
 
@@ -128,14 +130,7 @@ pub(super) fn start<W: Work>(
         let writing = writer.run(Arc::clone(&waiting));
         tasks.push(tokio::spawn(named(LongTask::PostgresWriter, writing)));
     }
-    let writer = Writer::new(
-        Shared {
-            options: with_lock_limit(shared.options.clone(), ASIDE_LOCK_LIMIT),
-            ..shared.clone()
-        },
-        None,
-    );
-    let writing = writer.run_aside(set_aside);
+    let writing = Writer::new(shared.clone(), None).run_aside(set_aside);
     tasks.push(tokio::spawn(named(LongTask::PostgresWriter, writing)));
     Queue(queue)
 }
@@ -179,22 +174,21 @@ impl<W: Work> Writer<W> {
                     break;
                 }
             }
-            let began = Instant::now();
-            let pieces = batch.len();
-            let waits = Arc::new(self.shared.metrics.waits());
-            let taken = Batch::new(std::mem::take(&mut batch), false, waits);
+            let waits = self.shared.metrics.waits();
+            let taken = Batch::new(std::mem::take(&mut batch), waits);
             let mut batches = VecDeque::from([taken]);
             self.pause = FIRST_PAUSE;
             while let Some(batch) = batches.pop_front() {
                 self.commit(batch, &mut batches).await;
             }
-            self.shared.metrics.committed(pieces, began.elapsed());
         }
     }
 
     /// Commits what was set aside, in turn, until all other writers have ended.
     async fn run_aside(mut self, mut set_aside: mpsc::UnboundedReceiver<Batch<W>>) {
-        let mut batches = VecDeque::new();
+        let mut batches: VecDeque<Batch<W>> = VecDeque::new();
+        // How many are to be tried before the next pause.
+        let mut left = 0;
         loop {
             if batches.is_empty() {
                 self.connection = None;
@@ -202,13 +196,32 @@ impl<W: Work> Writer<W> {
                     return;
                 };
                 batches.push_back(batch);
+                left = 1;
             }
+            // Most of what comes is not locked.
             while let Ok(batch) = set_aside.try_recv() {
-                batches.push_back(batch);
+                batches.push_front(batch);
+            }
+            let limit = self.retry_limit();
+            let late = StoreError::Failed(LOCKED.to_owned());
+            batches.iter_mut().for_each(|it| it.fail_late(limit, &late));
+            batches.retain(|batch| !batch.pieces.is_empty());
+            if left == 0 {
+                left = batches.len();
+                sleep(FIRST_PAUSE).await;
             }
             if let Some(batch) = batches.pop_front() {
+                left = left.saturating_sub(usize::from(batch.pieces.len() == 1));
                 self.commit(batch, &mut batches).await;
             }
+        }
+    }
+
+    /// How long work is tried again.
+    fn retry_limit(&self) -> Duration {
+        match self.shared.closing.is_cancelled() {
+            true => CLOSING_LIMIT.min(self.shared.retry_for),
+            false => self.shared.retry_for,
         }
     }
 
@@ -221,6 +234,8 @@ impl<W: Work> Writer<W> {
                 if batch.again {
                     info!("the database answers again");
                 }
+                let time = batch.began.elapsed();
+                self.shared.metrics.committed(batch.pieces.len(), time);
                 batch.answer(answers);
                 self.pause = FIRST_PAUSE;
                 return;
@@ -228,6 +243,22 @@ impl<W: Work> Writer<W> {
             Err(cause) => cause,
         };
         let failed = failure(&cause);
+        let half = batch.pieces.len().div_ceil(2);
+        if is_locked(&cause) {
+            match &self.aside {
+                Some(aside) => {
+                    warn!(error = %failed, "what meets a lock is set aside");
+                    // Its receiver outlives all other writers.
+                    let _ = aside.send(batch);
+                }
+                None if batch.pieces.len() == 1 => {
+                    batch.locked += 1;
+                    batches.push_back(batch);
+                }
+                None => batch.split(half).for_each(|it| batches.push_front(it)),
+            }
+            return;
+        }
         if !is_temporary(&cause) {
             let pieces = batch.pieces.len();
             error!(error = %failed, pieces, "a commit was refused");
@@ -243,24 +274,8 @@ impl<W: Work> Writer<W> {
             warn!(error = %failed, "a commit has no answer; it is tried again");
         }
         batch.again = true;
-        let limit = match self.shared.closing.is_cancelled() {
-            true => CLOSING_LIMIT.min(self.shared.retry_for),
-            false => self.shared.retry_for,
-        };
-        batch.fail_late(limit, &failed);
+        batch.fail_late(self.retry_limit(), &failed);
         if batch.pieces.is_empty() {
-            return;
-        }
-        let half = batch.pieces.len().div_ceil(2);
-        if is_locked(&cause) {
-            match &self.aside {
-                // It outlives all other writers.
-                Some(aside) => drop(aside.send(batch)),
-                None => {
-                    batches.extend(batch.split(half));
-                    sleep(FIRST_PAUSE).await;
-                }
-            }
             return;
         }
         match batch.unanswered {
@@ -271,7 +286,7 @@ impl<W: Work> Writer<W> {
         self.pause = LONGEST_PAUSE.min(self.pause * 2);
     }
 
-    /// Tries once. After an error the connection is gone.
+    /// Tries once. After an error other than a lock the connection is gone.
     async fn attempt(&mut self, batch: &mut Batch<W>) -> sqlx::Result<Answers<W>> {
         let work: Vec<_> = (batch.pieces.iter())
             .map(|piece| Arc::clone(&piece.work))
@@ -280,12 +295,23 @@ impl<W: Work> Writer<W> {
             Some(connection) => connection,
             None => connect_writer(&self.shared.options).await?,
         };
-        let committing = W::commit(&mut connection, &work, batch.again);
+        let limit = ASIDE_LOCK_LIMIT * 2_u32.pow(batch.locked.min(LONGER_LOCK_LIMITS));
+        let is_aside = self.aside.is_none();
+        let committing = async {
+            if is_aside {
+                set_lock_limit(&mut connection, limit).await?;
+            }
+            W::commit(&mut connection, &work, batch.again).await
+        };
         let committed = timeout(COMMIT_LIMIT, committing).await;
         match committed.unwrap_or_else(|_| Err(io::Error::from(io::ErrorKind::TimedOut).into())) {
             Ok(answers) => {
                 self.connection = Some(connection);
                 Ok(answers)
+            }
+            Err(cause) if is_locked(&cause) => {
+                self.connection = Some(connection);
+                Err(cause)
             }
             Err(cause) => {
                 batch.unanswered += 1;
@@ -302,17 +328,23 @@ struct Batch<W: Work> {
     again: bool,
     /// How often it was sent to the database and not answered.
     unanswered: u32,
-    /// Says that it waits, with all batches that it was one with.
+    /// How often it met a lock, as the only piece.
+    locked: u32,
+    /// When it was taken from the queue.
+    began: Instant,
+    /// Shared by all batches split from the same one, for the metric of waiting time.
     waits: Arc<Waits>,
 }
 
 impl<W: Work> Batch<W> {
-    fn new(pieces: Vec<Pending<W>>, again: bool, waits: Arc<Waits>) -> Self {
+    fn new(pieces: Vec<Pending<W>>, waits: Waits) -> Self {
         Self {
             pieces,
-            again,
+            again: false,
             unanswered: 0,
-            waits,
+            locked: 0,
+            began: Instant::now(),
+            waits: Arc::new(waits),
         }
     }
 
@@ -333,11 +365,19 @@ impl<W: Work> Batch<W> {
 
     /// Batches of at most this size.
     fn split(self, size: usize) -> impl Iterator<Item = Self> {
-        let (mut pieces, again, waits) = (self.pieces, self.again, self.waits);
+        let (again, began) = (self.again, self.began);
+        let (mut pieces, waits) = (self.pieces, self.waits);
         std::iter::from_fn(move || {
             let rest = pieces.split_off(size.min(pieces.len()));
             let first = std::mem::replace(&mut pieces, rest);
-            (!first.is_empty()).then(|| Self::new(first, again, Arc::clone(&waits)))
+            (!first.is_empty()).then(|| Self {
+                pieces: first,
+                again,
+                unanswered: 0,
+                locked: 0,
+                began,
+                waits: Arc::clone(&waits),
+            })
         })
     }
 }

@@ -1,9 +1,9 @@
 //! The open link: who joins by it, and where participants go on at the end.
 
 use chefshat_study::testing::settings;
-use chefshat_study::{Change, Content, End, Joined, Recruiting, Refusal, Settings, Study};
+use chefshat_study::{Change, Content, Device, End, Joined, Recruiting, Refusal, Settings, Study};
 
-use super::support::Lab;
+use super::support::{Lab, device};
 
 const ID: &str = "PROLIFIC_PID";
 
@@ -120,7 +120,7 @@ fn participants_go_on_where_the_panel_says() {
 fn the_id_at_the_panel_is_deleted_with_the_data() {
     let (_, added) = folded(&[]).join(joining(1, "secret")).unwrap();
     let mut changes = vec![added.unwrap()];
-    changes.extend(folded(&changes).open(1, None, 1000).unwrap());
+    changes.extend(folded(&changes).open(1, Some(device()), 1000).unwrap());
     changes.extend(folded(&changes).withdraw(1, true, 2000).unwrap());
     let before = folded(&changes);
     assert_eq!(before.participant(1).unwrap().panel_id(), "");
@@ -130,8 +130,41 @@ fn the_id_at_the_panel_is_deleted_with_the_data() {
     assert_eq!(reason, End::DataDeleted);
     assert_eq!(url.as_deref(), Some("https://panel.example/left"));
 
-    assert!(changes[0].forget(1));
-    assert!(!format!("{changes:?}").contains("secret"));
-    assert!(!changes[0].forget(1));
+    for change in &mut changes[..2] {
+        assert!(change.forget(1));
+        assert!(!change.forget(1), "once");
+    }
+    let left = format!("{changes:?}");
+    assert!(!left.contains("secret") && !left.contains("Europe"));
     assert_eq!(folded(&changes).participants(), before.participants());
+}
+
+#[test]
+fn a_device_is_within_its_ranges() {
+    assert!(device().is_valid());
+    let zones = ["", "Europe Rome", "x\n", "é"];
+    let mut wrong: Vec<Device> = zones.map(in_zone).into();
+    wrong.push(in_zone(&"x".repeat(65)));
+    wrong.push(Device {
+        width: 0,
+        ..device()
+    });
+    wrong.push(Device {
+        height: 0,
+        ..device()
+    });
+    wrong.push(Device {
+        pixels: 0,
+        ..device()
+    });
+    for device in wrong {
+        assert!(!device.is_valid(), "{device:?}");
+    }
+}
+
+fn in_zone(zone: &str) -> Device {
+    Device {
+        time_zone: zone.to_owned(),
+        ..device()
+    }
 }

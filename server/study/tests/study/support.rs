@@ -1,13 +1,25 @@
 //! A study that tests move on, with the changes it has folded.
 
 use chefshat_study::{
-    Answer, At, Change, Content, DueGame, ItemAnswer, ItemKind, Outcome, Refusal, Settings, Study,
+    Answer, At, Change, Content, Device, DueGame, ItemAnswer, ItemKind, Outcome, Pointer, Refusal,
+    Settings, Study,
 };
 
 pub(crate) struct Lab {
     pub(crate) study: Study,
     pub(crate) changes: Vec<Change>,
     pub(crate) now_ms: u64,
+}
+
+/// Everybody's device.
+pub(crate) fn device() -> Device {
+    Device {
+        width: 390,
+        height: 844,
+        pixels: 300,
+        pointer: Some(Pointer::Coarse),
+        time_zone: "Europe/Rome".to_owned(),
+    }
 }
 
 impl Lab {
@@ -33,7 +45,7 @@ impl Lab {
     }
 
     pub(crate) fn open(&mut self, number: u32) -> Result<(), Refusal> {
-        if let Some(opened) = self.study.open(number, None, self.now_ms)? {
+        if let Some(opened) = self.study.open(number, Some(device()), self.now_ms)? {
             self.fold(opened);
             self.study.set_connected(number, true, self.now_ms);
         }

@@ -268,6 +268,23 @@ pub fn device_from_proto(message: v1::StudyDevice) -> Option<Device> {
     device.is_valid().then_some(device)
 }
 
+/// A participant's device as a message.
+pub fn device_to_proto(device: &Device) -> v1::StudyDevice {
+    let pointer = match device.pointer {
+        None => v1::StudyPointer::Unspecified,
+        Some(Pointer::None) => v1::StudyPointer::None,
+        Some(Pointer::Coarse) => v1::StudyPointer::Coarse,
+        Some(Pointer::Fine) => v1::StudyPointer::Fine,
+    };
+    v1::StudyDevice {
+        width: device.width.into(),
+        height: device.height.into(),
+        pixels: device.pixels.into(),
+        pointer: pointer.into(),
+        time_zone: device.time_zone.clone(),
+    }
+}
+
 fn recruiting(message: v1::StudyRecruiting) -> Recruiting {
     Recruiting {
         open_link: message.open_link,

@@ -63,7 +63,7 @@ export const faults: Texts["faults"] = {
     READER_TOO_SLOW: "Deine Verbindung ist zu langsam, um diese Partie zu laden. Versuche es mit einer besseren.",
     EVENTS_GONE: "Der Anfang dieser Partie wird nicht mehr gezeigt. Ihr Replay gibt es, wenn sie zu Ende ist.",
     DISK_NEARLY_FULL:
-      "Die Festplatte des Servers ist fast voll: Es können keine neuen Partien beginnen. Bitte die Person, die ihn betreibt, Platz zu schaffen. Laufende Partien gehen weiter.",
+      "Die Festplatte des Servers ist fast voll: Es kann nichts Neues beginnen. Die Person, die ihn betreibt, muss Platz schaffen. Laufende Partien gehen weiter.",
     STORE_FAILED:
       "Der Server kann keine Partien speichern und hält an. Deine bisherigen Entscheidungen sind gespeichert; die Partien gehen weiter, wenn er wieder da ist.",
     OWNER_UNREACHABLE:

@@ -59,7 +59,7 @@ export const faults = {
     READER_TOO_SLOW: "Your connection is too slow to load this game. Try again with a better one.",
     EVENTS_GONE: "The beginning of this game is no longer shown. Its replay is available when it ends.",
     DISK_NEARLY_FULL:
-      "The server’s disk is nearly full: no new games can start. Ask its host to free some space. Running games continue.",
+      "The server’s disk is nearly full: nothing new can start. Its host has to free some space. Running games continue.",
     STORE_FAILED:
       "The server cannot store games and is stopping. Your decisions so far are stored; games resume when it is back.",
     OWNER_UNREACHABLE:
@@ -95,7 +95,7 @@ export const faults = {
     NAME_TAKEN: "Someone else already has this name. Choose another.",
     LINK_UNKNOWN:
       "This link does not belong to a study on this server. Check that you opened the complete link, or ask the person who gave it to you.",
-    PANEL_ID_TAKEN: "Somebody with this id already takes part. Go on in the browser in which you began.",
+    PANEL_ID_TAKEN: "Somebody with this id already takes part. Continue in the browser in which you began.",
     PANEL_ID_REFUSED: "The link has no valid id. Open it again from the site that invited you.",
     SESSION_UNKNOWN: "The connection to the study was interrupted. Open your link again.",
     SESSION_SUPERSEDED: "The study was opened in another window or on another device. It continues there.",

@@ -61,7 +61,7 @@ export const faults: Texts["faults"] = {
     READER_TOO_SLOW: "Tu conexión es demasiado lenta para cargar esta partida. Inténtalo con una mejor.",
     EVENTS_GONE: "El principio de esta partida ya no se muestra. Su repetición estará disponible cuando termine.",
     DISK_NEARLY_FULL:
-      "El disco del servidor está casi lleno: no pueden empezar partidas nuevas. Pide a quien lo administra que libere espacio. Las partidas en curso continúan.",
+      "El disco del servidor está casi lleno: no puede empezar nada nuevo. Quien lo administra debe liberar espacio. Las partidas en curso continúan.",
     STORE_FAILED:
       "El servidor no puede guardar partidas y se está deteniendo. Tus decisiones hasta ahora están guardadas; las partidas se reanudan cuando vuelva.",
     OWNER_UNREACHABLE:

@@ -59,7 +59,7 @@ export const faults: Texts["faults"] = {
     READER_TOO_SLOW: "La tua connessione è troppo lenta per caricare questa partita. Riprova con una migliore.",
     EVENTS_GONE: "L’inizio di questa partita non è più visibile. La registrazione sarà disponibile alla fine.",
     DISK_NEARLY_FULL:
-      "Il disco del server è quasi pieno: non possono iniziare nuove partite. Chiedi a chi gestisce il server di liberare spazio. Le partite in corso continuano.",
+      "Il disco del server è quasi pieno: non può iniziare niente di nuovo. Chi gestisce il server deve liberare spazio. Le partite in corso continuano.",
     STORE_FAILED:
       "Il server non riesce a salvare le partite e si sta fermando. Le tue decisioni finora sono salvate; le partite riprendono al suo ritorno.",
     OWNER_UNREACHABLE: "Il server che se ne occupa non è raggiungibile, o un altro sta subentrando. Riprova tra poco.",

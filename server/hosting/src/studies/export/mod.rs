@@ -139,8 +139,8 @@ impl<'s, R> TableFile<'s, R> {
 }
 
 impl StudyHandle {
-    /// The study as a message without what lets anybody take part, or count as having taken part at a
-    /// panel: data are published.
+    /// The study as a message without what lets anybody take part, or be paid by a panel: data are
+    /// passed on.
     fn publishable(&self) -> v1::Study {
         let mut study = self.describe();
         study.open_link.clear();
@@ -211,7 +211,11 @@ async fn sessions(
     sender: &mpsc::Sender<ExportedFile>,
 ) -> Result<Sheet, ExportError> {
     let mut file = TableFile::new(columns::sessions(), sender).await?;
+    let asks = study.settings().asks_for_consent();
     for (number, participant) in study.participants() {
+        if asks && participant.consent.is_none() {
+            continue;
+        }
         for (session, opened) in &participant.devices {
             let row = SessionRow {
                 number: *number,

@@ -392,37 +392,66 @@ async fn a_transaction_that_is_given_up_when_it_begins_does_not_stay_open() {
     store.close().await;
 }
 
-#[tokio::test]
-async fn what_is_locked_holds_up_nothing_else() {
+/// Six rooms in a database, of which somebody has locked the journals of the first two.
+async fn locked(options: PostgresOptions) -> (Database, PostgresStore, Journals, PgConnection) {
     let database = chefshat_postgres::database();
-    let store = node_with(&database, PostgresOptions::default()).await;
+    let store = node_with(&database, options).await;
     let mut journals = Vec::new();
     for room in 1..=6 {
         let created = store.create(durable(room), vec![entry(1)]);
         journals.push(created.await.expect("created"));
     }
-    let mut others = journals.split_off(2);
     let locked = "TRIGGER wait BEFORE INSERT ON journal FOR EACH ROW WHEN (NEW.game <= 2)";
-    let mut holder = hold(&database, locked).await;
-    let mut waiting_rooms = Vec::new();
-    for mut journal in journals {
-        waiting_rooms.push(tokio::spawn(async move { append(&mut journal, 2).await }));
+    let holder = hold(&database, locked).await;
+    (database, store, journals, holder)
+}
+
+type Journals = Vec<Box<dyn Journal>>;
+
+fn appending(mut journal: Box<dyn Journal>) -> JoinHandle<Result<(), StoreError>> {
+    tokio::spawn(async move { append(&mut journal, 2).await })
+}
+
+#[tokio::test]
+async fn what_is_locked_delays_nothing_else() {
+    let (database, store, mut journals, mut holder) = locked(PostgresOptions::default()).await;
+    let mut others = journals.split_off(2);
+    let mut delayed = Vec::new();
+    for journal in journals {
+        delayed.push(appending(journal));
         waiting(&mut holder, "advisory").await;
     }
-    let appending = async {
+    let append_to_others = async {
         for number in 2..6 {
             for journal in &mut others {
                 append(journal, number).await.expect("nobody has locked it");
             }
         }
     };
-    let appended = tokio::time::timeout(Duration::from_secs(60), appending).await;
+    let appended = tokio::time::timeout(Duration::from_secs(60), append_to_others).await;
     appended.expect("no room waits for another");
-    assert!(waiting_rooms.iter().all(|room| !room.is_finished()));
+    assert!(delayed.iter().all(|room| !room.is_finished()));
     run(&mut holder, "SELECT pg_advisory_unlock(1)").await;
-    for room in waiting_rooms {
+    for room in delayed {
         assert_eq!(room.await.expect("no panic"), Ok(()));
     }
     assert_eq!(database.run("SELECT count(*) FROM journal"), "24");
     store.close().await;
+}
+
+#[tokio::test]
+async fn what_is_locked_fails_alone_in_its_batch_when_the_store_is_closed() {
+    let (database, store, journals, _holder) = locked(PostgresOptions::default()).await;
+    // All at once, so that they share batches.
+    let mut appended: Vec<_> = journals.into_iter().map(appending).collect();
+    for room in appended.split_off(2) {
+        assert_eq!(room.await.expect("no panic"), Ok(()));
+    }
+    let closed = tokio::time::timeout(Duration::from_secs(60), store.close()).await;
+    closed.expect("it does not wait for the lock");
+    for room in appended {
+        let failed = room.await.expect("no panic");
+        assert!(matches!(failed, Err(StoreError::Failed(_))), "{failed:?}");
+    }
+    assert_eq!(database.run("SELECT count(*) FROM journal"), "10");
 }

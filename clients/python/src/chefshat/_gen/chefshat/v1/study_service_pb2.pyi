@@ -705,7 +705,7 @@ class OpenStudyRequest(_message.Message):
     """The secret of the link: `link` of StudyLink."""
     @_builtins.property
     def device(self) -> _study_pb2.StudyDevice:
-        """The device on which it is opened. One that is not of its form is left out."""
+        """The device on which it is opened. An invalid one is ignored."""
 
     def __init__(
         self,

@@ -168,10 +168,11 @@ class StudyServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def ExportStudy(self, request, context):
-        """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `sessions.csv`,
-        `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
-        read, the records of its games under `records/` and samples under `samples/`, and last what the
-        columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
+        """Streams the data of a study as files: `study.json`, the tables `participants.csv`,
+        `sessions.csv`, `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the
+        record of a game cannot be read, the records of its games under `records/` and samples under
+        `samples/`, and last what the columns of the tables mean, `codebook.csv` for people and
+        `datapackage.json` for programs.
         NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -179,8 +180,8 @@ class StudyServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def DeleteStudyParticipant(self, request, context):
-        """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface traces, and its games with
-        their records. What stays is that a participant with this number took part, when, in which
+        """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
+        traces, and its games with their records. What stays is that a participant with this number took part, when, in which
         conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
         deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
         STORE_FAILED).
@@ -641,7 +642,7 @@ class ParticipationServiceServicer(object):
         INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
         RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
         study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
-        `url`, and so has the STUDY_FULL of OpenStudy and GiveConsent.
+        `url`, also of OpenStudy and GiveConsent.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -71,15 +71,16 @@ class StudyServiceStub:
     (STUDY_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     ExportStudy: _grpc.UnaryStreamMultiCallable[_study_service_pb2.ExportStudyRequest, _study_service_pb2.ExportStudyResponse]
-    """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `sessions.csv`,
-    `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
-    read, the records of its games under `records/` and samples under `samples/`, and last what the
-    columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
+    """Streams the data of a study as files: `study.json`, the tables `participants.csv`,
+    `sessions.csv`, `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the
+    record of a game cannot be read, the records of its games under `records/` and samples under
+    `samples/`, and last what the columns of the tables mean, `codebook.csv` for people and
+    `datapackage.json` for programs.
     NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteStudyParticipant: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]
-    """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface traces, and its games with
-    their records. What stays is that a participant with this number took part, when, in which
+    """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
+    traces, and its games with their records. What stays is that a participant with this number took part, when, in which
     conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
     deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
     STORE_FAILED).
@@ -134,15 +135,16 @@ class StudyServiceAsyncStub(StudyServiceStub):
     (STUDY_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     ExportStudy: _aio.UnaryStreamMultiCallable[_study_service_pb2.ExportStudyRequest, _study_service_pb2.ExportStudyResponse]  # type: ignore[assignment]
-    """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `sessions.csv`,
-    `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
-    read, the records of its games under `records/` and samples under `samples/`, and last what the
-    columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
+    """Streams the data of a study as files: `study.json`, the tables `participants.csv`,
+    `sessions.csv`, `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the
+    record of a game cannot be read, the records of its games under `records/` and samples under
+    `samples/`, and last what the columns of the tables mean, `codebook.csv` for people and
+    `datapackage.json` for programs.
     NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteStudyParticipant: _aio.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]  # type: ignore[assignment]
-    """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface traces, and its games with
-    their records. What stays is that a participant with this number took part, when, in which
+    """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
+    traces, and its games with their records. What stays is that a participant with this number took part, when, in which
     conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
     deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
     STORE_FAILED).
@@ -248,10 +250,11 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _study_service_pb2.ExportStudyRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_study_service_pb2.ExportStudyResponse], _abc.AsyncIterator[_study_service_pb2.ExportStudyResponse]]:
-        """Streams the data of a study as files: `study.json`, the tables `participants.csv`, `sessions.csv`,
-        `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the record of a game cannot be
-        read, the records of its games under `records/` and samples under `samples/`, and last what the
-        columns of the tables mean, `codebook.csv` for people and `datapackage.json` for programs.
+        """Streams the data of a study as files: `study.json`, the tables `participants.csv`,
+        `sessions.csv`, `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the
+        record of a game cannot be read, the records of its games under `records/` and samples under
+        `samples/`, and last what the columns of the tables mean, `codebook.csv` for people and
+        `datapackage.json` for programs.
         NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         """
 
@@ -261,8 +264,8 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _study_service_pb2.DeleteStudyParticipantRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.DeleteStudyParticipantResponse, _abc.Awaitable[_study_service_pb2.DeleteStudyParticipantResponse]]:
-        """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface traces, and its games with
-        their records. What stays is that a participant with this number took part, when, in which
+        """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
+        traces, and its games with their records. What stays is that a participant with this number took part, when, in which
         conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
         deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
         STORE_FAILED).
@@ -299,7 +302,7 @@ class ParticipationServiceStub:
     INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
     RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
     study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
-    `url`, and so has the STUDY_FULL of OpenStudy and GiveConsent.
+    `url`, also of OpenStudy and GiveConsent.
     """
     OpenStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.OpenStudyRequest, _study_service_pb2.OpenStudyResponse]
     """Opens the study on this device: the participant's earlier session ends. For a participant whose
@@ -360,7 +363,7 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
     INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
     RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
     study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
-    `url`, and so has the STUDY_FULL of OpenStudy and GiveConsent.
+    `url`, also of OpenStudy and GiveConsent.
     """
     OpenStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.OpenStudyRequest, _study_service_pb2.OpenStudyResponse]  # type: ignore[assignment]
     """Opens the study on this device: the participant's earlier session ends. For a participant whose
@@ -424,7 +427,7 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
         INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
         RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
         study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
-        `url`, and so has the STUDY_FULL of OpenStudy and GiveConsent.
+        `url`, also of OpenStudy and GiveConsent.
         """
 
     @_abc_1.abstractmethod
