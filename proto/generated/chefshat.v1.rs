@@ -10385,10 +10385,10 @@ pub mod study_service_client {
             self.inner.server_streaming(req, path, codec).await
         }
         /// Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
-        /// traces, and its games with their records. What stays is that a participant with this number took part, when, in which
-        /// conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
-        /// deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
-        /// STORE_FAILED).
+        /// traces, and its games with their records. What stays is that a participant with this number took
+        /// part, when, in which conditions, and that it consented. It counts as withdrawn from then on.
+        /// Returns when the data are deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
+        /// (SHUTTING_DOWN, STORE_FAILED).
         pub async fn delete_study_participant(
             &mut self,
             request: impl tonic::IntoRequest<super::DeleteStudyParticipantRequest>,
@@ -10562,10 +10562,10 @@ pub mod study_service_server {
             tonic::Status,
         >;
         /// Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
-        /// traces, and its games with their records. What stays is that a participant with this number took part, when, in which
-        /// conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
-        /// deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
-        /// STORE_FAILED).
+        /// traces, and its games with their records. What stays is that a participant with this number took
+        /// part, when, in which conditions, and that it consented. It counts as withdrawn from then on.
+        /// Returns when the data are deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
+        /// (SHUTTING_DOWN, STORE_FAILED).
         async fn delete_study_participant(
             &self,
             request: tonic::Request<super::DeleteStudyParticipantRequest>,

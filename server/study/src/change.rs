@@ -126,8 +126,8 @@ impl Change {
     }
 
     /// Deletes the data of a participant who withdrew and had them deleted: its pseudonym, its id at
-    /// the panel, its devices and its answers. The changes fold to the same study as before. Returns whether this
-    /// one is different now and must be stored again.
+    /// the panel, its devices and its answers. The changes fold to the same study as before. Returns
+    /// whether this one is different now and must be stored again.
     pub fn forget(&mut self, forgotten: u32) -> bool {
         match self {
             Self::Added {

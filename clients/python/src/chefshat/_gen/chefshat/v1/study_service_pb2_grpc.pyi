@@ -80,10 +80,10 @@ class StudyServiceStub:
     """
     DeleteStudyParticipant: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]
     """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
-    traces, and its games with their records. What stays is that a participant with this number took part, when, in which
-    conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
-    deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
-    STORE_FAILED).
+    traces, and its games with their records. What stays is that a participant with this number took
+    part, when, in which conditions, and that it consented. It counts as withdrawn from then on.
+    Returns when the data are deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
+    (SHUTTING_DOWN, STORE_FAILED).
     """
     DeleteStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyRequest, _study_service_pb2.DeleteStudyResponse]
     """Deletes a study with all its data: settings, participants, answers, interface traces, and games
@@ -144,10 +144,10 @@ class StudyServiceAsyncStub(StudyServiceStub):
     """
     DeleteStudyParticipant: _aio.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]  # type: ignore[assignment]
     """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
-    traces, and its games with their records. What stays is that a participant with this number took part, when, in which
-    conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
-    deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
-    STORE_FAILED).
+    traces, and its games with their records. What stays is that a participant with this number took
+    part, when, in which conditions, and that it consented. It counts as withdrawn from then on.
+    Returns when the data are deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
+    (SHUTTING_DOWN, STORE_FAILED).
     """
     DeleteStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyRequest, _study_service_pb2.DeleteStudyResponse]  # type: ignore[assignment]
     """Deletes a study with all its data: settings, participants, answers, interface traces, and games
@@ -265,10 +265,10 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.DeleteStudyParticipantResponse, _abc.Awaitable[_study_service_pb2.DeleteStudyParticipantResponse]]:
         """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
-        traces, and its games with their records. What stays is that a participant with this number took part, when, in which
-        conditions, and that it consented. It counts as withdrawn from then on. Returns when the data are
-        deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN,
-        STORE_FAILED).
+        traces, and its games with their records. What stays is that a participant with this number took
+        part, when, in which conditions, and that it consented. It counts as withdrawn from then on.
+        Returns when the data are deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
+        (SHUTTING_DOWN, STORE_FAILED).
         """
 
     @_abc_1.abstractmethod
