@@ -158,21 +158,12 @@ impl Study {
         if has_id && others.any(|other| other.panel_id() == joined.panel_id) {
             return Err(Refusal::PanelIdTaken);
         }
-        let mut changes = self.add(&[String::new()])?;
+        let mut change = self.add(&[String::new()])?.pop();
         self.free_slot().ok_or(Refusal::Full)?;
-        let Some(Change::Added {
-            number, pseudonym, ..
-        }) = changes.pop()
-        else {
-            return Err(Refusal::TooManyParticipants);
-        };
-        let joined = Some(joined);
-        let change = Change::Added {
-            number,
-            pseudonym,
-            joined,
-        };
-        Ok((number, Some(change)))
+        if let Some(Change::Added { joined: how, .. }) = &mut change {
+            *how = Some(joined);
+        }
+        Ok((self.next_number(), change))
     }
 
     /// The change that opens a session of a participant, which is the newest then; `None` if its

@@ -500,7 +500,22 @@ fn not_added(problem: NotAdded) -> Status {
 
 /// The status for a refused command.
 fn refused(refusal: StudyRefusal) -> Status {
-    let (code, reason) = match &refusal {
+    let (code, reason) = code_of(&refusal);
+    match &refusal {
+        StudyRefusal::PanelId(problem) => {
+            field(reason, &FieldProblem::new("panel_id", problem.clone()))
+        }
+        StudyRefusal::Answers(problem) => {
+            let item = problem.item.to_string();
+            status(code, reason, refusal.to_string(), [("item", &item)])
+        }
+        _ => status(code, reason, refusal.to_string(), []),
+    }
+}
+
+/// The code and the reason of a refused command.
+fn code_of(refusal: &StudyRefusal) -> (Code, &'static str) {
+    match refusal {
         StudyRefusal::Unknown => (Code::NotFound, "PARTICIPANT_UNKNOWN"),
         StudyRefusal::Closed => (Code::FailedPrecondition, "STUDY_CLOSED"),
         StudyRefusal::Full => (Code::FailedPrecondition, "STUDY_FULL"),
@@ -514,18 +529,7 @@ fn refused(refusal: StudyRefusal) -> Status {
         StudyRefusal::NameTaken(_) => (Code::AlreadyExists, "NAME_TAKEN"),
         StudyRefusal::TooManyParticipants => (Code::ResourceExhausted, "TOO_MANY_PARTICIPANTS"),
         StudyRefusal::PanelIdTaken => (Code::AlreadyExists, "PANEL_ID_TAKEN"),
-        StudyRefusal::PanelId(problem) => {
-            let problem = FieldProblem::new("panel_id", problem.clone());
-            return field("PANEL_ID_REFUSED", &problem);
-        }
-        StudyRefusal::Answers(problem) => {
-            return status(
-                Code::InvalidArgument,
-                "ANSWER_REFUSED",
-                refusal.to_string(),
-                [("item", &problem.item.to_string())],
-            );
-        }
-    };
-    status(code, reason, refusal.to_string(), [])
+        StudyRefusal::PanelId(_) => (Code::InvalidArgument, "PANEL_ID_REFUSED"),
+        StudyRefusal::Answers(_) => (Code::InvalidArgument, "ANSWER_REFUSED"),
+    }
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use chefshat_study::{Answer, At, ItemAnswer, ParticipantLink, Status};
+use chefshat_study::{Answer, At, ItemAnswer, ParticipantLink, Refusal, Status};
 use tokio::sync::mpsc;
 use tokio::time::advance;
 
@@ -123,26 +123,29 @@ impl Lab {
         }
     }
 
+    async fn open(&self, number: u32) -> Result<u32, Refusal> {
+        let opened = self.study.open(Key::Local, number, None).await;
+        opened.expect("it runs")
+    }
+
+    /// The first participant opens the study, stays, and consents.
+    async fn begin(&self) -> Presence {
+        assert_eq!(self.open(1).await, Ok(1));
+        let present = self.study.present(1, 1).await;
+        assert_eq!(self.study.consent(at(1, 0)).await.expect("it runs"), Ok(0));
+        self.settled().await;
+        present
+    }
+
     /// Lets the study execute what has been sent to it.
     async fn settled(&self) {
-        let unknown = self
-            .study
-            .open(Key::Local, 99, None)
-            .await
-            .expect("it runs");
-        assert_eq!(unknown, Err(chefshat_study::Refusal::Unknown));
+        assert_eq!(self.open(99).await, Err(Refusal::Unknown));
     }
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_participant_who_is_away_for_long_gives_its_slot_to_the_next() {
     let lab = Lab::new().await;
-    let open = async |number| {
-        lab.study
-            .open(Key::Local, number, None)
-            .await
-            .expect("it runs")
-    };
     let consent = async |number, session| {
         let at = At {
             number,
@@ -151,9 +154,9 @@ async fn a_participant_who_is_away_for_long_gives_its_slot_to_the_next() {
         };
         lab.study.consent(at).await.expect("it runs")
     };
-    assert_eq!((open(1).await, open(2).await), (Ok(1), Ok(1)));
+    assert_eq!((lab.open(1).await, lab.open(2).await), (Ok(1), Ok(1)));
     assert_eq!(consent(1, 1).await, Ok(0));
-    assert_eq!(consent(2, 1).await, Err(chefshat_study::Refusal::Full));
+    assert_eq!(consent(2, 1).await, Err(Refusal::Full));
     let present = lab.study.present(1, 1).await;
     lab.settled().await;
     advance(LIMIT * 2).await;
@@ -176,24 +179,25 @@ async fn a_participant_who_is_away_for_long_gives_its_slot_to_the_next() {
     assert!(stored.contains("DroppedOut"), "{stored}");
 
     // Until somebody has its slot, it may come back.
-    assert_eq!(open(1).await, Ok(2));
+    assert_eq!(lab.open(1).await, Ok(2));
     assert_eq!(lab.status(1), Status::Active);
     lab.settled().await;
     advance(LIMIT).await;
     lab.until(1, Status::DroppedOut).await;
-    assert_eq!(open(2).await, Ok(2), "without a slot it may always return");
+    assert_eq!(
+        lab.open(2).await,
+        Ok(2),
+        "without a slot it may always return"
+    );
     assert_eq!(consent(2, 2).await, Ok(0));
-    assert_eq!(open(1).await, Ok(0), "there is only the end to show");
+    assert_eq!(lab.open(1).await, Ok(0), "there is only the end to show");
     assert_eq!(lab.status(1), Status::DroppedOut);
 }
 
 #[tokio::test(start_paused = true)]
 async fn a_study_sleeps_while_the_server_ends_although_something_is_due() {
     let lab = Lab::new().await;
-    assert_eq!(
-        lab.study.open(Key::Local, 1, None).await.expect("it runs"),
-        Ok(1)
-    );
+    assert_eq!(lab.open(1).await, Ok(1));
     drop(lab.study.present(1, 1).await);
     let mut changes = lab.study.changes();
     while lab.study.read(|study| study.is_connected(1)) {
@@ -214,13 +218,7 @@ async fn a_study_sleeps_when_the_one_who_waited_for_a_room_has_left() {
         ..ServerConfig::default()
     })
     .await;
-    assert_eq!(
-        lab.study.open(Key::Local, 1, None).await.expect("it runs"),
-        Ok(1)
-    );
-    let _present = lab.study.present(1, 1).await;
-    assert_eq!(lab.study.consent(at(1, 0)).await.expect("it runs"), Ok(0));
-    lab.settled().await;
+    let _present = lab.begin().await;
     let games = |study: &Study| study.participants()[&1].games.len();
     assert_eq!(lab.study.read(games), 1, "it waits for a room");
     let withdrawn = lab.study.withdraw(1, false).await;
@@ -302,10 +300,7 @@ async fn a_study_is_deleted_once_nobody_is_in_the_middle_of_it() {
 #[tokio::test(start_paused = true)]
 async fn all_who_delete_a_study_are_answered() {
     let lab = Lab::new().await;
-    assert_eq!(
-        lab.study.open(Key::Local, 1, None).await.expect("it runs"),
-        Ok(1)
-    );
+    assert_eq!(lab.open(1).await, Ok(1));
     let delete = || lab.studies.delete(Arc::clone(&lab.study), true);
     let (first, second) = tokio::join!(delete(), delete());
     assert_eq!(first.expect("it is deleted"), Ok((2, 0)));
@@ -365,7 +360,7 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
     studies.restore().await.expect("readable");
     let study = studies.get(id).expect("it is resumed");
     let unknown = study.open(Key::Local, 99, None).await.expect("it runs");
-    assert_eq!(unknown, Err(chefshat_study::Refusal::Unknown));
+    assert_eq!(unknown, Err(Refusal::Unknown));
     assert_eq!(rows().await, 2, "nothing is left to delete");
 
     // A server that ended right after the withdrawals.
@@ -385,7 +380,7 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
     studies.restore().await.expect("readable");
     let study = studies.get(id).expect("it is resumed");
     let unknown = study.open(Key::Local, 99, None).await.expect("it runs");
-    assert_eq!(unknown, Err(chefshat_study::Refusal::Unknown));
+    assert_eq!(unknown, Err(Refusal::Unknown));
     assert_eq!(rows().await, 1, "rewritten");
     let stored = lab.store.study(id).await.expect("readable");
     let stored = format!("{:?}", stored.expect("it exists").changes);
@@ -617,13 +612,7 @@ async fn traces_that_were_sent_again_are_exported_once() {
     let mut settings = settings();
     settings.traces = true;
     let lab = Lab::with(&ServerConfig::default(), settings, 1).await;
-    assert_eq!(
-        lab.study.open(Key::Local, 1, None).await.expect("it runs"),
-        Ok(1)
-    );
-    let _present = lab.study.present(1, 1).await;
-    assert_eq!(lab.study.consent(at(1, 0)).await.expect("it runs"), Ok(0));
-    lab.settled().await;
+    let _present = lab.begin().await;
     let game = |study: &Study| Id(study.participants()[&1].games[0].placed.game);
     let game = lab.study.read(game);
     let trace = |at_ms| v1::StudyTrace {

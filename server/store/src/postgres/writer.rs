@@ -31,8 +31,8 @@ const ATTEMPTS_TOGETHER: u32 = 2;
 /// Pauses before a transaction is tried again.
 const FIRST_PAUSE: Duration = Duration::from_millis(50);
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
-/// How long what was set aside waits for a lock: twice as long each time that it is all that is
-/// locked, up to this number of times, since the next lock may be held as long.
+/// How long what was set aside waits for a lock. What is alone in its batch waits twice as long after
+/// each lock that it meets, up to this number of times.
 const ASIDE_LOCK_LIMIT: Duration = Duration::from_millis(50);
 const LONGER_LOCK_LIMITS: u32 = 4;
 /// How long work is tried again after the store was closed.

@@ -14,7 +14,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status};
 
-use super::{Responses, StudyCalls, not_added, refused, stopped};
+use super::{Responses, StudyCalls, code_of, not_added, refused, stopped};
 use crate::grpc::follow::{changed, end};
 use crate::grpc::limits::charged;
 use crate::grpc::status::{Refusal, field, shutting_down, status, store_failed};
@@ -114,15 +114,16 @@ fn link_unknown() -> Status {
 /// The status for somebody with this id at the panel who may not begin: it names where the page sends
 /// them.
 fn not_admitted(handle: &StudyHandle, panel_id: &str, refusal: StudyRefusal) -> Status {
-    let (code, reason) = match refusal {
-        StudyRefusal::Closed => (Code::FailedPrecondition, "STUDY_CLOSED"),
-        StudyRefusal::Full => (Code::FailedPrecondition, "STUDY_FULL"),
-        StudyRefusal::TooManyParticipants => (Code::ResourceExhausted, "TOO_MANY_PARTICIPANTS"),
-        _ => return refused(refusal),
-    };
+    let is_late = matches!(
+        refusal,
+        StudyRefusal::Closed | StudyRefusal::Full | StudyRefusal::TooManyParticipants
+    );
     match handle.recruiting().full_url(panel_id) {
-        Some(url) => status(code, reason, refusal.to_string(), [("url", url.as_str())]),
-        None => refused(refusal),
+        Some(url) if is_late => {
+            let (code, reason) = code_of(&refusal);
+            status(code, reason, refusal.to_string(), [("url", url.as_str())])
+        }
+        _ => refused(refusal),
     }
 }
 

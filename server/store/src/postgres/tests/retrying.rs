@@ -392,7 +392,7 @@ async fn a_transaction_that_is_given_up_when_it_begins_does_not_stay_open() {
     store.close().await;
 }
 
-/// Six rooms in a database, of which somebody has locked the journals of the first two.
+/// Six rooms in a database. Another session has locked the journals of the first two.
 async fn locked(options: PostgresOptions) -> (Database, PostgresStore, Journals, PgConnection) {
     let database = chefshat_postgres::database();
     let store = node_with(&database, options).await;
