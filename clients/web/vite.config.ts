@@ -60,12 +60,12 @@ export default defineConfig({
     assetsInlineLimit: 0,
     modulePreload: { polyfill: false },
     // A browser without HTTP/2 makes six requests at a time: the common code comes in a few chunks,
-    // by how often it changes.
+    // by how often it changes. Libraries of single pages come with these.
     rolldownOptions: {
       output: {
         codeSplitting: {
           groups: [
-            { name: "libraries", test: /node_modules[\\/](?!uqr|smol-toml)/ },
+            { name: "libraries", test: /node_modules[\\/](@bufbuild|@connectrpc|@fontsource-variable|@?preact)[\\/]/ },
             { name: "protocol", test: /src[\\/]gen[\\/]/ },
             { name: "parts", test: /src[\\/](parts|api|lobby)[\\/]|symbols[\\/]/ },
           ],

@@ -8700,6 +8700,19 @@ pub struct StudySlider {
     #[prost(string, tag = "5")]
     pub right: ::prost::alloc::string::String,
 }
+/// An item answered by a whole number that is typed, for example an age.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct StudyNumber {
+    /// Lowest number, -1000000..=1000000.
+    #[prost(sint32, tag = "1")]
+    pub min: i32,
+    /// Highest number, from `min` to 1000000.
+    #[prost(sint32, tag = "2")]
+    pub max: i32,
+    /// What it counts or measures, shown beside it, at most 100 characters, for example "years".
+    #[prost(string, tag = "3")]
+    pub unit: ::prost::alloc::string::String,
+}
 /// An item answered by choosing from options.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StudyChoice {
@@ -8717,8 +8730,40 @@ pub struct StudyFreeText {
     #[prost(uint32, tag = "1")]
     pub max_characters: u32,
 }
-/// An item of a questionnaire.
+/// Some of the answers to an item.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct StudyAnswerSet {
+    /// For an item answered by a number: the lowest of them; unset: there is none.
+    #[prost(sint32, optional, tag = "1")]
+    pub min: ::core::option::Option<i32>,
+    /// For an item answered by a number: the highest of them; unset: there is none.
+    #[prost(sint32, optional, tag = "2")]
+    pub max: ::core::option::Option<i32>,
+    /// For a choice: indices of options, from 0.
+    #[prost(uint32, repeated, tag = "3")]
+    pub options: ::prost::alloc::vec::Vec<u32>,
+}
+/// What an earlier answer must be for something to be shown.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct StudyShownIf {
+    /// Id of a questionnaire that participants meet earlier. Empty: the item's own, which is not
+    /// `shuffled` then.
+    #[prost(string, tag = "1")]
+    pub questionnaire: ::prost::alloc::string::String,
+    /// Id of its item, which is answered by a number or a choice; in the item's own questionnaire, one
+    /// that comes before.
+    #[prost(string, tag = "2")]
+    pub item: ::prost::alloc::string::String,
+    /// Its answer is one of these, or has one of these options. If it was answered several times, the
+    /// last answer counts.
+    #[prost(message, optional, tag = "3")]
+    pub answers: ::core::option::Option<StudyAnswerSet>,
+    /// The answer is none of these, or there is none.
+    #[prost(bool, tag = "4")]
+    pub not: bool,
+}
+/// An item of a questionnaire.
+#[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StudyItem {
     /// Identifies it in the questionnaire and in exported data: 1..=64 letters, digits, `_`, `-` or
     /// `.`.
@@ -8727,14 +8772,22 @@ pub struct StudyItem {
     /// The scale it belongs to, at most 64 characters, or empty.
     #[prost(string, tag = "2")]
     pub scale: ::prost::alloc::string::String,
-    /// The question or statement, 1..=500 characters; may be empty for a semantic differential.
+    /// The question or statement, 1..=500 characters of Markdown (StudyText); may be empty for a semantic
+    /// differential.
     #[prost(string, tag = "3")]
     pub text: ::prost::alloc::string::String,
     /// Whether it may be left unanswered. By default an item must be answered.
     #[prost(bool, tag = "4")]
     pub optional: bool,
+    /// It is shown only if all of these hold, at most 4.
+    #[prost(message, repeated, tag = "11")]
+    pub shown_if: ::prost::alloc::vec::Vec<StudyShownIf>,
+    /// Set for an attention check: the answers that pass it, for a choice the options that are chosen
+    /// and no others. Participants do not learn it; exported data say who passed.
+    #[prost(message, optional, tag = "12")]
+    pub attention_check: ::core::option::Option<StudyAnswerSet>,
     /// How it is answered.
-    #[prost(oneof = "study_item::Kind", tags = "5, 6, 7, 8, 9")]
+    #[prost(oneof = "study_item::Kind", tags = "5, 6, 7, 8, 9, 10")]
     pub kind: ::core::option::Option<study_item::Kind>,
 }
 /// Nested message and enum types in `StudyItem`.
@@ -8757,6 +8810,9 @@ pub mod study_item {
         /// In words.
         #[prost(message, tag = "9")]
         FreeText(super::StudyFreeText),
+        /// By a number.
+        #[prost(message, tag = "10")]
+        Number(super::StudyNumber),
     }
 }
 /// A stage in which a participant answers questions.
@@ -8775,7 +8831,8 @@ pub struct StudyQuestionnaire {
     /// Title, at most 128 characters; by default that of the template.
     #[prost(string, tag = "3")]
     pub title: ::prost::alloc::string::String,
-    /// Text above the items, at most 2000 characters; by default that of the template.
+    /// Text above the items, at most 2000 characters of Markdown (StudyText); by default that of the
+    /// template.
     #[prost(string, tag = "4")]
     pub instructions: ::prost::alloc::string::String,
     /// The items, 1..=100.
@@ -8788,7 +8845,7 @@ pub struct StudyQuestionnaire {
 /// A text to agree to. Reaches participants.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StudyConsent {
-    /// The text, 1..=20000 characters. Blank lines separate paragraphs.
+    /// The text, 1..=20000 characters of Markdown (StudyText).
     #[prost(string, tag = "1")]
     pub text: ::prost::alloc::string::String,
     /// Its version, 1..=64 characters, which is recorded with the SHA-256 of the text and the time.
@@ -8798,7 +8855,7 @@ pub struct StudyConsent {
 /// A questionnaire on another site. Reaches participants.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StudyExternalQuestionnaire {
-    /// What the participant reads first, at most 2000 characters.
+    /// What the participant reads first, at most 2000 characters of Markdown (StudyText).
     #[prost(string, tag = "1")]
     pub text: ::prost::alloc::string::String,
     /// Its address, which begins with <https://.> "{participant}" stands for the pseudonym.
@@ -8811,7 +8868,8 @@ pub struct StudyText {
     /// Its title, at most 128 characters.
     #[prost(string, tag = "1")]
     pub title: ::prost::alloc::string::String,
-    /// The text, 1..=20000 characters. Blank lines separate paragraphs.
+    /// The text, 1..=20000 characters of Markdown (CommonMark): paragraphs, headings, lists, quotations,
+    /// emphasis, code and links. A page shows HTML and pictures in it as they are written.
     #[prost(string, tag = "2")]
     pub text: ::prost::alloc::string::String,
 }
@@ -8840,6 +8898,10 @@ pub struct StudyBlock {
 /// A stage of a study.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StudyStage {
+    /// Participants pass over it unless all of these hold, at most 4. Not for consent, games and
+    /// `per_condition`.
+    #[prost(message, repeated, tag = "8")]
+    pub shown_if: ::prost::alloc::vec::Vec<StudyShownIf>,
     /// What the participant does.
     #[prost(oneof = "study_stage::Stage", tags = "1, 2, 3, 4, 5, 6, 7")]
     pub stage: ::core::option::Option<study_stage::Stage>,
@@ -9205,7 +9267,7 @@ pub struct StudyShownQuestionnaire {
     pub items: ::prost::alloc::vec::Vec<StudyShownItem>,
 }
 /// An item, as a participant sees it.
-#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+#[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StudyShownItem {
     /// Identifies it in StudyItemAnswer.
     #[prost(uint32, tag = "1")]
@@ -9216,8 +9278,11 @@ pub struct StudyShownItem {
     /// Whether it may be left unanswered.
     #[prost(bool, tag = "3")]
     pub optional: bool,
+    /// It is shown, and answered, only while all of these hold.
+    #[prost(message, repeated, tag = "10")]
+    pub shown_if: ::prost::alloc::vec::Vec<StudyShownItemIf>,
     /// How it is answered.
-    #[prost(oneof = "study_shown_item::Kind", tags = "4, 5, 6, 7, 8")]
+    #[prost(oneof = "study_shown_item::Kind", tags = "4, 5, 6, 7, 8, 9")]
     pub kind: ::core::option::Option<study_shown_item::Kind>,
 }
 /// Nested message and enum types in `StudyShownItem`.
@@ -9240,7 +9305,23 @@ pub mod study_shown_item {
         /// In words.
         #[prost(message, tag = "8")]
         FreeText(super::StudyFreeText),
+        /// By a number.
+        #[prost(message, tag = "9")]
+        Number(super::StudyNumber),
     }
+}
+/// What the answer to another item of the questionnaire must be for an item to be shown.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct StudyShownItemIf {
+    /// `item` of that StudyShownItem, which comes before.
+    #[prost(uint32, tag = "1")]
+    pub item: u32,
+    /// Its answer is one of these, or has one of these options. An item that is not shown has no answer.
+    #[prost(message, optional, tag = "2")]
+    pub answers: ::core::option::Option<StudyAnswerSet>,
+    /// The answer is none of these, or there is none.
+    #[prost(bool, tag = "3")]
+    pub not: bool,
 }
 /// A game, as its participant sees it.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]

@@ -35849,6 +35849,138 @@ impl<'de> serde::Deserialize<'de> for Study {
         deserializer.deserialize_struct("chefshat.v1.Study", FIELDS, GeneratedVisitor)
     }
 }
+impl serde::Serialize for StudyAnswerSet {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if self.min.is_some() {
+            len += 1;
+        }
+        if self.max.is_some() {
+            len += 1;
+        }
+        if !self.options.is_empty() {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyAnswerSet", len)?;
+        if let Some(v) = self.min.as_ref() {
+            struct_ser.serialize_field("min", v)?;
+        }
+        if let Some(v) = self.max.as_ref() {
+            struct_ser.serialize_field("max", v)?;
+        }
+        if !self.options.is_empty() {
+            struct_ser.serialize_field("options", &self.options)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyAnswerSet {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "min",
+            "max",
+            "options",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Min,
+            Max,
+            Options,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "min" => Ok(GeneratedField::Min),
+                            "max" => Ok(GeneratedField::Max),
+                            "options" => Ok(GeneratedField::Options),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = StudyAnswerSet;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.StudyAnswerSet")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<StudyAnswerSet, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut min__ = None;
+                let mut max__ = None;
+                let mut options__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Min => {
+                            if min__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("min"));
+                            }
+                            min__ = 
+                                map_.next_value::<::std::option::Option<::pbjson::private::NumberDeserialize<_>>>()?.map(|x| x.0)
+                            ;
+                        }
+                        GeneratedField::Max => {
+                            if max__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("max"));
+                            }
+                            max__ = 
+                                map_.next_value::<::std::option::Option<::pbjson::private::NumberDeserialize<_>>>()?.map(|x| x.0)
+                            ;
+                        }
+                        GeneratedField::Options => {
+                            if options__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("options"));
+                            }
+                            options__ = 
+                                Some(map_.next_value::<Vec<::pbjson::private::NumberDeserialize<_>>>()?
+                                    .into_iter().map(|x| x.0).collect())
+                            ;
+                        }
+                    }
+                }
+                Ok(StudyAnswerSet {
+                    min: min__,
+                    max: max__,
+                    options: options__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.StudyAnswerSet", FIELDS, GeneratedVisitor)
+    }
+}
 impl serde::Serialize for StudyBlock {
     #[allow(deprecated)]
     fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
@@ -37826,6 +37958,12 @@ impl serde::Serialize for StudyItem {
         if self.optional {
             len += 1;
         }
+        if !self.shown_if.is_empty() {
+            len += 1;
+        }
+        if self.attention_check.is_some() {
+            len += 1;
+        }
         if self.kind.is_some() {
             len += 1;
         }
@@ -37841,6 +37979,12 @@ impl serde::Serialize for StudyItem {
         }
         if self.optional {
             struct_ser.serialize_field("optional", &self.optional)?;
+        }
+        if !self.shown_if.is_empty() {
+            struct_ser.serialize_field("shownIf", &self.shown_if)?;
+        }
+        if let Some(v) = self.attention_check.as_ref() {
+            struct_ser.serialize_field("attentionCheck", v)?;
         }
         if let Some(v) = self.kind.as_ref() {
             match v {
@@ -37859,6 +38003,9 @@ impl serde::Serialize for StudyItem {
                 study_item::Kind::FreeText(v) => {
                     struct_ser.serialize_field("freeText", v)?;
                 }
+                study_item::Kind::Number(v) => {
+                    struct_ser.serialize_field("number", v)?;
+                }
             }
         }
         struct_ser.end()
@@ -37875,6 +38022,10 @@ impl<'de> serde::Deserialize<'de> for StudyItem {
             "scale",
             "text",
             "optional",
+            "shown_if",
+            "shownIf",
+            "attention_check",
+            "attentionCheck",
             "likert",
             "semantic_differential",
             "semanticDifferential",
@@ -37882,6 +38033,7 @@ impl<'de> serde::Deserialize<'de> for StudyItem {
             "choice",
             "free_text",
             "freeText",
+            "number",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -37890,11 +38042,14 @@ impl<'de> serde::Deserialize<'de> for StudyItem {
             Scale,
             Text,
             Optional,
+            ShownIf,
+            AttentionCheck,
             Likert,
             SemanticDifferential,
             Slider,
             Choice,
             FreeText,
+            Number,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -37920,11 +38075,14 @@ impl<'de> serde::Deserialize<'de> for StudyItem {
                             "scale" => Ok(GeneratedField::Scale),
                             "text" => Ok(GeneratedField::Text),
                             "optional" => Ok(GeneratedField::Optional),
+                            "shownIf" | "shown_if" => Ok(GeneratedField::ShownIf),
+                            "attentionCheck" | "attention_check" => Ok(GeneratedField::AttentionCheck),
                             "likert" => Ok(GeneratedField::Likert),
                             "semanticDifferential" | "semantic_differential" => Ok(GeneratedField::SemanticDifferential),
                             "slider" => Ok(GeneratedField::Slider),
                             "choice" => Ok(GeneratedField::Choice),
                             "freeText" | "free_text" => Ok(GeneratedField::FreeText),
+                            "number" => Ok(GeneratedField::Number),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -37948,6 +38106,8 @@ impl<'de> serde::Deserialize<'de> for StudyItem {
                 let mut scale__ = None;
                 let mut text__ = None;
                 let mut optional__ = None;
+                let mut shown_if__ = None;
+                let mut attention_check__ = None;
                 let mut kind__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
@@ -37974,6 +38134,18 @@ impl<'de> serde::Deserialize<'de> for StudyItem {
                                 return Err(serde::de::Error::duplicate_field("optional"));
                             }
                             optional__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::ShownIf => {
+                            if shown_if__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("shownIf"));
+                            }
+                            shown_if__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::AttentionCheck => {
+                            if attention_check__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("attentionCheck"));
+                            }
+                            attention_check__ = map_.next_value()?;
                         }
                         GeneratedField::Likert => {
                             if kind__.is_some() {
@@ -38010,6 +38182,13 @@ impl<'de> serde::Deserialize<'de> for StudyItem {
                             kind__ = map_.next_value::<::std::option::Option<_>>()?.map(study_item::Kind::FreeText)
 ;
                         }
+                        GeneratedField::Number => {
+                            if kind__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("number"));
+                            }
+                            kind__ = map_.next_value::<::std::option::Option<_>>()?.map(study_item::Kind::Number)
+;
+                        }
                     }
                 }
                 Ok(StudyItem {
@@ -38017,6 +38196,8 @@ impl<'de> serde::Deserialize<'de> for StudyItem {
                     scale: scale__.unwrap_or_default(),
                     text: text__.unwrap_or_default(),
                     optional: optional__.unwrap_or_default(),
+                    shown_if: shown_if__.unwrap_or_default(),
+                    attention_check: attention_check__,
                     kind: kind__,
                 })
             }
@@ -38620,6 +38801,135 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
             }
         }
         deserializer.deserialize_struct("chefshat.v1.StudyLink", FIELDS, GeneratedVisitor)
+    }
+}
+impl serde::Serialize for StudyNumber {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if self.min != 0 {
+            len += 1;
+        }
+        if self.max != 0 {
+            len += 1;
+        }
+        if !self.unit.is_empty() {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyNumber", len)?;
+        if self.min != 0 {
+            struct_ser.serialize_field("min", &self.min)?;
+        }
+        if self.max != 0 {
+            struct_ser.serialize_field("max", &self.max)?;
+        }
+        if !self.unit.is_empty() {
+            struct_ser.serialize_field("unit", &self.unit)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyNumber {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "min",
+            "max",
+            "unit",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Min,
+            Max,
+            Unit,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "min" => Ok(GeneratedField::Min),
+                            "max" => Ok(GeneratedField::Max),
+                            "unit" => Ok(GeneratedField::Unit),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = StudyNumber;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.StudyNumber")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<StudyNumber, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut min__ = None;
+                let mut max__ = None;
+                let mut unit__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Min => {
+                            if min__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("min"));
+                            }
+                            min__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::Max => {
+                            if max__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("max"));
+                            }
+                            max__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::Unit => {
+                            if unit__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("unit"));
+                            }
+                            unit__ = Some(map_.next_value()?);
+                        }
+                    }
+                }
+                Ok(StudyNumber {
+                    min: min__.unwrap_or_default(),
+                    max: max__.unwrap_or_default(),
+                    unit: unit__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.StudyNumber", FIELDS, GeneratedVisitor)
     }
 }
 impl serde::Serialize for StudyOrder {
@@ -40635,6 +40945,148 @@ impl<'de> serde::Deserialize<'de> for StudyShownGame {
         deserializer.deserialize_struct("chefshat.v1.StudyShownGame", FIELDS, GeneratedVisitor)
     }
 }
+impl serde::Serialize for StudyShownIf {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if !self.questionnaire.is_empty() {
+            len += 1;
+        }
+        if !self.item.is_empty() {
+            len += 1;
+        }
+        if self.answers.is_some() {
+            len += 1;
+        }
+        if self.not {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyShownIf", len)?;
+        if !self.questionnaire.is_empty() {
+            struct_ser.serialize_field("questionnaire", &self.questionnaire)?;
+        }
+        if !self.item.is_empty() {
+            struct_ser.serialize_field("item", &self.item)?;
+        }
+        if let Some(v) = self.answers.as_ref() {
+            struct_ser.serialize_field("answers", v)?;
+        }
+        if self.not {
+            struct_ser.serialize_field("not", &self.not)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyShownIf {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "questionnaire",
+            "item",
+            "answers",
+            "not",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Questionnaire,
+            Item,
+            Answers,
+            Not,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "questionnaire" => Ok(GeneratedField::Questionnaire),
+                            "item" => Ok(GeneratedField::Item),
+                            "answers" => Ok(GeneratedField::Answers),
+                            "not" => Ok(GeneratedField::Not),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = StudyShownIf;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.StudyShownIf")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<StudyShownIf, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut questionnaire__ = None;
+                let mut item__ = None;
+                let mut answers__ = None;
+                let mut not__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Questionnaire => {
+                            if questionnaire__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("questionnaire"));
+                            }
+                            questionnaire__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::Item => {
+                            if item__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("item"));
+                            }
+                            item__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::Answers => {
+                            if answers__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("answers"));
+                            }
+                            answers__ = map_.next_value()?;
+                        }
+                        GeneratedField::Not => {
+                            if not__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("not"));
+                            }
+                            not__ = Some(map_.next_value()?);
+                        }
+                    }
+                }
+                Ok(StudyShownIf {
+                    questionnaire: questionnaire__.unwrap_or_default(),
+                    item: item__.unwrap_or_default(),
+                    answers: answers__,
+                    not: not__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.StudyShownIf", FIELDS, GeneratedVisitor)
+    }
+}
 impl serde::Serialize for StudyShownItem {
     #[allow(deprecated)]
     fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
@@ -40652,6 +41104,9 @@ impl serde::Serialize for StudyShownItem {
         if self.optional {
             len += 1;
         }
+        if !self.shown_if.is_empty() {
+            len += 1;
+        }
         if self.kind.is_some() {
             len += 1;
         }
@@ -40664,6 +41119,9 @@ impl serde::Serialize for StudyShownItem {
         }
         if self.optional {
             struct_ser.serialize_field("optional", &self.optional)?;
+        }
+        if !self.shown_if.is_empty() {
+            struct_ser.serialize_field("shownIf", &self.shown_if)?;
         }
         if let Some(v) = self.kind.as_ref() {
             match v {
@@ -40682,6 +41140,9 @@ impl serde::Serialize for StudyShownItem {
                 study_shown_item::Kind::FreeText(v) => {
                     struct_ser.serialize_field("freeText", v)?;
                 }
+                study_shown_item::Kind::Number(v) => {
+                    struct_ser.serialize_field("number", v)?;
+                }
             }
         }
         struct_ser.end()
@@ -40697,6 +41158,8 @@ impl<'de> serde::Deserialize<'de> for StudyShownItem {
             "item",
             "text",
             "optional",
+            "shown_if",
+            "shownIf",
             "likert",
             "semantic_differential",
             "semanticDifferential",
@@ -40704,6 +41167,7 @@ impl<'de> serde::Deserialize<'de> for StudyShownItem {
             "choice",
             "free_text",
             "freeText",
+            "number",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -40711,11 +41175,13 @@ impl<'de> serde::Deserialize<'de> for StudyShownItem {
             Item,
             Text,
             Optional,
+            ShownIf,
             Likert,
             SemanticDifferential,
             Slider,
             Choice,
             FreeText,
+            Number,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -40740,11 +41206,13 @@ impl<'de> serde::Deserialize<'de> for StudyShownItem {
                             "item" => Ok(GeneratedField::Item),
                             "text" => Ok(GeneratedField::Text),
                             "optional" => Ok(GeneratedField::Optional),
+                            "shownIf" | "shown_if" => Ok(GeneratedField::ShownIf),
                             "likert" => Ok(GeneratedField::Likert),
                             "semanticDifferential" | "semantic_differential" => Ok(GeneratedField::SemanticDifferential),
                             "slider" => Ok(GeneratedField::Slider),
                             "choice" => Ok(GeneratedField::Choice),
                             "freeText" | "free_text" => Ok(GeneratedField::FreeText),
+                            "number" => Ok(GeneratedField::Number),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -40767,6 +41235,7 @@ impl<'de> serde::Deserialize<'de> for StudyShownItem {
                 let mut item__ = None;
                 let mut text__ = None;
                 let mut optional__ = None;
+                let mut shown_if__ = None;
                 let mut kind__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
@@ -40789,6 +41258,12 @@ impl<'de> serde::Deserialize<'de> for StudyShownItem {
                                 return Err(serde::de::Error::duplicate_field("optional"));
                             }
                             optional__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::ShownIf => {
+                            if shown_if__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("shownIf"));
+                            }
+                            shown_if__ = Some(map_.next_value()?);
                         }
                         GeneratedField::Likert => {
                             if kind__.is_some() {
@@ -40825,17 +41300,152 @@ impl<'de> serde::Deserialize<'de> for StudyShownItem {
                             kind__ = map_.next_value::<::std::option::Option<_>>()?.map(study_shown_item::Kind::FreeText)
 ;
                         }
+                        GeneratedField::Number => {
+                            if kind__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("number"));
+                            }
+                            kind__ = map_.next_value::<::std::option::Option<_>>()?.map(study_shown_item::Kind::Number)
+;
+                        }
                     }
                 }
                 Ok(StudyShownItem {
                     item: item__.unwrap_or_default(),
                     text: text__.unwrap_or_default(),
                     optional: optional__.unwrap_or_default(),
+                    shown_if: shown_if__.unwrap_or_default(),
                     kind: kind__,
                 })
             }
         }
         deserializer.deserialize_struct("chefshat.v1.StudyShownItem", FIELDS, GeneratedVisitor)
+    }
+}
+impl serde::Serialize for StudyShownItemIf {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if self.item != 0 {
+            len += 1;
+        }
+        if self.answers.is_some() {
+            len += 1;
+        }
+        if self.not {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyShownItemIf", len)?;
+        if self.item != 0 {
+            struct_ser.serialize_field("item", &self.item)?;
+        }
+        if let Some(v) = self.answers.as_ref() {
+            struct_ser.serialize_field("answers", v)?;
+        }
+        if self.not {
+            struct_ser.serialize_field("not", &self.not)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyShownItemIf {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "item",
+            "answers",
+            "not",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Item,
+            Answers,
+            Not,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "item" => Ok(GeneratedField::Item),
+                            "answers" => Ok(GeneratedField::Answers),
+                            "not" => Ok(GeneratedField::Not),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = StudyShownItemIf;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.StudyShownItemIf")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<StudyShownItemIf, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut item__ = None;
+                let mut answers__ = None;
+                let mut not__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Item => {
+                            if item__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("item"));
+                            }
+                            item__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::Answers => {
+                            if answers__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("answers"));
+                            }
+                            answers__ = map_.next_value()?;
+                        }
+                        GeneratedField::Not => {
+                            if not__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("not"));
+                            }
+                            not__ = Some(map_.next_value()?);
+                        }
+                    }
+                }
+                Ok(StudyShownItemIf {
+                    item: item__.unwrap_or_default(),
+                    answers: answers__,
+                    not: not__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.StudyShownItemIf", FIELDS, GeneratedVisitor)
     }
 }
 impl serde::Serialize for StudyShownQuestionnaire {
@@ -41136,10 +41746,16 @@ impl serde::Serialize for StudyStage {
     {
         use serde::ser::SerializeStruct;
         let mut len = 0;
+        if !self.shown_if.is_empty() {
+            len += 1;
+        }
         if self.stage.is_some() {
             len += 1;
         }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyStage", len)?;
+        if !self.shown_if.is_empty() {
+            struct_ser.serialize_field("shownIf", &self.shown_if)?;
+        }
         if let Some(v) = self.stage.as_ref() {
             match v {
                 study_stage::Stage::Consent(v) => {
@@ -41175,6 +41791,8 @@ impl<'de> serde::Deserialize<'de> for StudyStage {
         D: serde::Deserializer<'de>,
     {
         const FIELDS: &[&str] = &[
+            "shown_if",
+            "shownIf",
             "consent",
             "questionnaire",
             "external_questionnaire",
@@ -41188,6 +41806,7 @@ impl<'de> serde::Deserialize<'de> for StudyStage {
 
         #[allow(clippy::enum_variant_names)]
         enum GeneratedField {
+            ShownIf,
             Consent,
             Questionnaire,
             ExternalQuestionnaire,
@@ -41216,6 +41835,7 @@ impl<'de> serde::Deserialize<'de> for StudyStage {
                         E: serde::de::Error,
                     {
                         match value {
+                            "shownIf" | "shown_if" => Ok(GeneratedField::ShownIf),
                             "consent" => Ok(GeneratedField::Consent),
                             "questionnaire" => Ok(GeneratedField::Questionnaire),
                             "externalQuestionnaire" | "external_questionnaire" => Ok(GeneratedField::ExternalQuestionnaire),
@@ -41242,9 +41862,16 @@ impl<'de> serde::Deserialize<'de> for StudyStage {
                 where
                     V: serde::de::MapAccess<'de>,
             {
+                let mut shown_if__ = None;
                 let mut stage__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
+                        GeneratedField::ShownIf => {
+                            if shown_if__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("shownIf"));
+                            }
+                            shown_if__ = Some(map_.next_value()?);
+                        }
                         GeneratedField::Consent => {
                             if stage__.is_some() {
                                 return Err(serde::de::Error::duplicate_field("consent"));
@@ -41297,6 +41924,7 @@ impl<'de> serde::Deserialize<'de> for StudyStage {
                     }
                 }
                 Ok(StudyStage {
+                    shown_if: shown_if__.unwrap_or_default(),
                     stage: stage__,
                 })
             }

@@ -298,6 +298,7 @@ async fn with_a_study(channel: &Channel) -> [JoinHandle<()>; 2] {
             }],
             stages: vec![v1::StudyStage {
                 stage: Some(Stage::Games(v1::StudyGames { count: 1 })),
+                ..v1::StudyStage::default()
             }],
             drop_out_after_ms: DROPS_OUT_MS,
             ..v1::StudySettings::default()

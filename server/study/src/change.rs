@@ -44,6 +44,8 @@ pub enum Change {
         number: u32,
         /// The answers.
         answers: Arc<[ItemAnswer]>,
+        /// Number of steps that it passes over then.
+        passed_over: u32,
         /// When, in milliseconds since the Unix epoch.
         at_ms: u64,
     },
@@ -76,6 +78,8 @@ pub enum Change {
         number: u32,
         /// Whether it is at its next step; otherwise at the next game of its step.
         step_over: bool,
+        /// Number of steps that it passes over then.
+        passed_over: u32,
         /// When, in milliseconds since the Unix epoch.
         at_ms: u64,
     },

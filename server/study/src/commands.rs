@@ -232,9 +232,10 @@ impl Study {
     /// If the participant is not at this step in this session, it is not a questionnaire, or the
     /// answers are invalid.
     pub fn answer(&self, at: At, answers: Vec<ItemAnswer>, now_ms: u64) -> Result<Change, Refusal> {
-        self.check_answers(at, &answers, false)?;
+        let participant = self.check_answers(at, &answers, false)?;
         Ok(Change::Answered {
             number: at.number,
+            passed_over: self.passed_over_next(participant, &answers),
             answers: answers.into(),
             at_ms: now_ms,
         })
@@ -265,7 +266,8 @@ impl Study {
         let Task::Questionnaire(questionnaire) = step.task else {
             return Err(Refusal::StepMismatch);
         };
-        questionnaire.check_answers(answers, only_saved)?;
+        let items = self.items_after(participant, at.step, questionnaire);
+        questionnaire.check_answers(&items, answers, only_saved)?;
         Ok(participant)
     }
 
@@ -285,9 +287,14 @@ impl Study {
         if count > 0 && !matches!(Phase::of(participant), Phase::Over(_)) {
             return Err(Refusal::GameNotOver);
         }
+        let step_over = participant.games_done() + 1 >= count;
         Ok(Change::Continued {
             number: at.number,
-            step_over: participant.games_done() + 1 >= count,
+            step_over,
+            passed_over: match step_over {
+                true => self.passed_over_next(participant, &[]),
+                false => 0,
+            },
             at_ms: now_ms,
         })
     }

@@ -42,6 +42,7 @@ mod presence;
 mod questionnaire;
 mod recruiting;
 mod settings;
+mod shown;
 mod stage;
 mod state;
 mod templates;
@@ -67,8 +68,10 @@ pub use settings::{
     Condition, Factor, Hide, Labels, MAX_FACTORS, MAX_GAMES, MAX_LEVELS, MAX_PARTICIPANTS,
     MAX_SEEDS, MAX_STEPS, Settings,
 };
+pub use shown::{AnswerSet, MAX_SHOWN_IF, ShownIf, ShownItemIf};
 pub use stage::{
-    Consent, ExternalQuestionnaire, MAX_BLOCK, MAX_STAGE_GAMES, MAX_STAGES, Stage, Step, Task, Text,
+    Consent, ExternalQuestionnaire, MAX_BLOCK, MAX_STAGE_GAMES, MAX_STAGES, Part, Stage, Step,
+    Task, Text,
 };
 pub use state::{Participant, PlayedGame, Status};
 pub use templates::{Language, Template};
@@ -159,6 +162,71 @@ impl Study {
         }
     }
 
+    /// Indices of the items that a participant was shown at a step in the order in which it met them,
+    /// or is shown after what it has entered so far; `None` if the step is not a questionnaire. It was
+    /// shown none of a step that it passed over.
+    pub fn shown_items(&self, number: u32, step: usize) -> Option<Vec<usize>> {
+        let participant = self.participant(number)?;
+        let steps = self.steps_of(participant)?;
+        let Task::Questionnaire(questionnaire) = steps.get(step)?.task else {
+            return None;
+        };
+        if participant.passed_over.contains(&step) {
+            return Some(Vec::new());
+        }
+        let entered = (participant.answers.get(&step)).unwrap_or(&participant.saved_answers);
+        let items = self.items_after(participant, step, questionnaire);
+        let shown = questionnaire.shown_by(&items, entered);
+        let mut order = self.item_order(number, step)?;
+        order.retain(|index| shown.contains(index));
+        Some(order)
+    }
+
+    /// Number of attention checks that a participant has answered, and of those that it passed.
+    pub fn attention_checks(&self, participant: &Participant) -> (usize, usize) {
+        let steps = self.steps_of(participant).unwrap_or_default();
+        let (mut answered, mut passed) = (0, 0);
+        for (step, answers) in &participant.answers {
+            let Some(Task::Questionnaire(questionnaire)) = steps.get(*step).map(|it| it.task)
+            else {
+                continue;
+            };
+            for answer in answers.iter() {
+                let item = questionnaire.items.get(answer.item);
+                if let Some(passing) = item.and_then(|it| it.attention_check.as_ref()) {
+                    answered += 1;
+                    passed += usize::from(passing.is_passed_by(&answer.value));
+                }
+            }
+        }
+        (answered, passed)
+    }
+
+    /// Indices of the items of a step that a participant may be shown, whatever it enters there.
+    fn items_after(
+        &self,
+        participant: &Participant,
+        step: usize,
+        questionnaire: &Questionnaire,
+    ) -> Vec<usize> {
+        let steps = self.steps_of(participant).unwrap_or_default();
+        let earlier = |id: &str, item: &str| last_answer(&steps[..step], participant, id, item);
+        questionnaire.items_after(earlier)
+    }
+
+    /// Number of steps that a participant passes over after its step, where it gives these answers.
+    fn passed_over_next(&self, participant: &Participant, answers: &[ItemAnswer]) -> u32 {
+        let steps = self.steps_of(participant).unwrap_or_default();
+        let step = participant.step();
+        let earlier = |id: &str, item: &str| match steps[step].task {
+            Task::Questionnaire(it) if it.id == id => it.answer_to(item, answers),
+            _ => last_answer(&steps[..step], participant, id, item),
+        };
+        let next = steps.iter().skip(step + 1);
+        let passed_over = next.take_while(|step| !ShownIf::all_hold(step.shown_if, earlier));
+        passed_over.count() as u32
+    }
+
     /// The sequence of conditions of a participant who has a slot.
     pub fn sequence_of(&self, participant: &Participant) -> Option<&[usize]> {
         participant.slot.map(|slot| self.sequence(slot))
@@ -230,4 +298,18 @@ impl Study {
         let kept: BTreeSet<u32> = kept.filter_map(|it| it.slot).collect();
         (0..self.settings.participants).find(|slot| !kept.contains(slot))
     }
+}
+
+/// The last answer of a participant at these steps to an item of a questionnaire.
+fn last_answer<'p>(
+    steps: &[Step<'_>],
+    participant: &'p Participant,
+    questionnaire: &str,
+    item: &str,
+) -> Option<&'p Answer> {
+    let mut answered = participant.answers.range(..steps.len()).rev();
+    answered.find_map(|(step, answers)| match steps[*step].task {
+        Task::Questionnaire(it) if it.id == questionnaire => Some(it.answer_to(item, answers)),
+        _ => None,
+    })?
 }

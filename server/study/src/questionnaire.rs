@@ -9,6 +9,7 @@ use crate::chance::Chance;
 use crate::checks::{
     Checked, characters, has_control_characters, identifier, refuse, unique, within,
 };
+use crate::shown::{AnswerSet, ShownIf};
 
 /// Maximum number of items of a questionnaire.
 pub const MAX_ITEMS: usize = 100;
@@ -16,8 +17,8 @@ pub const MAX_ITEMS: usize = 100;
 pub const MAX_OPTIONS: usize = 50;
 /// Numbers of points of an item.
 const POINTS: RangeInclusive<u32> = 2..=11;
-/// Values of a slider.
-const SLIDER: RangeInclusive<i32> = -1_000_000..=1_000_000;
+/// Values of a slider, and numbers.
+const NUMBERS: RangeInclusive<i32> = -1_000_000..=1_000_000;
 /// Maximum length of a free text, in characters.
 const MAX_TEXT: usize = 10_000;
 const MAX_TITLE: usize = 128;
@@ -55,6 +56,10 @@ pub struct Item {
     pub required: bool,
     /// How it is answered.
     pub kind: ItemKind,
+    /// It is shown only if all of these hold, at most 4.
+    pub shown_if: Vec<ShownIf>,
+    /// For an attention check, the answers that pass it.
+    pub attention_check: Option<AnswerSet>,
 }
 
 /// How an item is answered.
@@ -88,6 +93,15 @@ pub enum ItemKind {
         left: String,
         /// Label of the highest value.
         right: String,
+    },
+    /// By a whole number that is typed.
+    Number {
+        /// Lowest number.
+        min: i32,
+        /// Highest number.
+        max: i32,
+        /// What it counts or measures, or empty.
+        unit: String,
     },
     /// From a list of 2..=50 options.
     Choice {
@@ -130,7 +144,7 @@ impl ItemAnswer {
 /// The value of an answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Answer {
-    /// A point, from 1, or the value of a slider.
+    /// A point, from 1, the value of a slider, or a number.
     Number(i32),
     /// Indices of the chosen options, ascending.
     Options(Vec<usize>),
@@ -171,10 +185,11 @@ impl Questionnaire {
         order
     }
 
-    /// Checks answers: at most one for each item, each valid, and, unless they are only saved, one for
-    /// each required item.
+    /// Checks answers to those of its items that may be shown: at most one for each item, each valid
+    /// and of an item that is shown, and, unless they are only saved, one for each required item.
     pub(crate) fn check_answers(
         &self,
+        items: &[usize],
         answers: &[ItemAnswer],
         only_saved: bool,
     ) -> Result<(), AnswerProblem> {
@@ -192,8 +207,12 @@ impl Questionnaire {
                 return problem(answer.item, wrong);
             }
         }
-        for (index, item) in self.items.iter().enumerate() {
-            if is_required(item) && !answered.contains(&index) {
+        let shown = self.shown_by(items, answers);
+        if let Some(&hidden) = answered.difference(&shown).next() {
+            return problem(hidden, "it is not shown after these answers".to_owned());
+        }
+        for index in shown {
+            if is_required(&self.items[index]) && !answered.contains(&index) {
                 return problem(index, "it must be answered".to_owned());
             }
         }
@@ -202,13 +221,30 @@ impl Questionnaire {
 }
 
 impl Item {
+    /// An item that everybody must answer, of no scale.
+    pub fn new(id: impl Into<String>, text: impl Into<String>, kind: ItemKind) -> Self {
+        Self {
+            id: id.into(),
+            scale: String::new(),
+            text: text.into(),
+            required: true,
+            kind,
+            shown_if: Vec::new(),
+            attention_check: None,
+        }
+    }
+
     fn check(&self, field: &str) -> Checked {
         identifier(&format!("{field}.id"), &self.id)?;
         characters(&format!("{field}.scale"), &self.scale, 0..=64)?;
         let needs_text = !matches!(self.kind, ItemKind::SemanticDifferential { .. });
         let least = usize::from(needs_text);
         characters(&format!("{field}.text"), &self.text, least..=MAX_QUESTION)?;
-        self.kind.check(field)
+        self.kind.check(field)?;
+        match &self.attention_check {
+            Some(passing) => passing.check(&format!("{field}.attention_check"), &self.kind),
+            None => Ok(()),
+        }
     }
 }
 
@@ -242,8 +278,8 @@ impl ItemKind {
                 left,
                 right,
             } => {
-                within(&field("min"), *min, SLIDER)?;
-                within(&field("max"), *max, SLIDER)?;
+                within(&field("min"), *min, NUMBERS)?;
+                within(&field("max"), *max, NUMBERS)?;
                 if min >= max {
                     return refuse(field("max"), format!("{max} is not above `min`, {min}"));
                 }
@@ -253,6 +289,11 @@ impl ItemKind {
                 }
                 characters(&field("left"), left, 0..=MAX_LABEL)?;
                 characters(&field("right"), right, 0..=MAX_LABEL)
+            }
+            Self::Number { min, max, unit } => {
+                within(&field("min"), *min, NUMBERS)?;
+                within(&field("max"), *max, *min..=*NUMBERS.end())?;
+                characters(&field("unit"), unit, 0..=MAX_LABEL)
             }
             Self::Choice { options, .. } => {
                 within(&field("options"), options.len(), 2..=MAX_OPTIONS)?;
@@ -281,6 +322,10 @@ impl ItemKind {
                 let is_valid = (min..=max).contains(&number) && number.abs_diff(*min) % step == 0;
                 let problem = || format!("{number} is not within {min}..={max} in steps of {step}");
                 (!is_valid).then(problem)
+            }
+            (Self::Number { min, max, .. }, Answer::Number(number)) => {
+                let is_valid = (min..=max).contains(&number);
+                (!is_valid).then(|| format!("{number} is not within {min}..={max}"))
             }
             (Self::Choice { options, multiple }, Answer::Options(chosen)) => {
                 let distinct: BTreeSet<_> = chosen.iter().collect();

@@ -135,20 +135,18 @@ impl Settings {
 
     /// Whether participants are asked for their consent, which is what they do first.
     pub fn asks_for_consent(&self) -> bool {
-        matches!(self.stages.first(), Some(Stage::Once(Task::Consent(_))))
+        self.stages.first().is_some_and(Stage::is_consent)
     }
 
     /// Whether participants get their slots by their consent, so that nobody who declines takes one:
     /// they are asked for it before they play or meet a condition.
     pub fn assigns_by_consent(&self) -> bool {
-        let plays = |stage: &&Stage| {
-            matches!(
-                stage,
-                Stage::Once(Task::Practice { .. } | Task::Games { .. }) | Stage::PerCondition(_)
-            )
+        let plays = |stage: &&Stage| match stage {
+            Stage::Once(part) => matches!(part.task, Task::Practice { .. } | Task::Games { .. }),
+            Stage::PerCondition(_) => true,
         };
         let mut before = self.stages.iter().take_while(|stage| !plays(stage));
-        before.any(|stage| matches!(stage, Stage::Once(Task::Consent(_))))
+        before.any(Stage::is_consent)
     }
 
     /// SHA-256 of the seeds one after the other, for a preregistration.
@@ -219,17 +217,18 @@ impl Settings {
 
     fn check_stages(&self) -> Checked {
         within("stages", self.stages.len(), 1..=MAX_STAGES)?;
-        let mut questionnaires = Vec::new();
+        let (mut questionnaires, mut fields) = (Vec::new(), Vec::new());
         for (index, stage) in self.stages.iter().enumerate() {
             let field = format!("stages[{index}]");
-            if let Stage::PerCondition(tasks) = stage {
+            if let Stage::PerCondition(parts) = stage {
                 let field = format!("{field}.per_condition.stages");
-                within(&field, tasks.len(), 1..=MAX_BLOCK)?;
+                within(&field, parts.len(), 1..=MAX_BLOCK)?;
             }
-            for (field, task) in stage.tasks(&field) {
-                task.check(&field)?;
+            for (part_index, part) in stage.parts().iter().enumerate() {
+                let field = stage.path(&field, part_index);
+                part.check(&field, &questionnaires)?;
                 let is_once = matches!(stage, Stage::Once(_));
-                match task {
+                match &part.task {
                     Task::Consent(_) if index > 0 || !is_once => {
                         return refuse(field, "consent must be the first stage, outside blocks");
                     }
@@ -239,15 +238,16 @@ impl Settings {
                             "games of a study within participants must be in `per_condition`",
                         );
                     }
-                    Task::Questionnaire(it) => questionnaires.push((field, it.id.as_str())),
+                    Task::Questionnaire(it) => {
+                        questionnaires.push(it);
+                        fields.push(field);
+                    }
                     _ => {}
                 }
             }
         }
-        let ids = questionnaires.iter().map(|(_, id)| *id);
-        unique(ids, |index| {
-            format!("{}.questionnaire.id", questionnaires[index].0)
-        })?;
+        let ids = questionnaires.iter().map(|it| it.id.as_str());
+        unique(ids, |index| format!("{}.questionnaire.id", fields[index]))?;
         let steps = self.steps(&self.sequences()[0]).len();
         within("stages", steps, 1..=MAX_STEPS)?;
         let (counted, practice) = self.games();

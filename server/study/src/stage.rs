@@ -2,8 +2,9 @@
 //! each of its conditions.
 
 use crate::address;
-use crate::checks::{Checked, characters, within};
+use crate::checks::{Checked, characters, refuse, within};
 use crate::questionnaire::Questionnaire;
+use crate::shown::ShownIf;
 
 /// Maximum number of stages.
 pub const MAX_STAGES: usize = 50;
@@ -22,9 +23,18 @@ const PLACEHOLDER: &str = "{participant}";
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Stage {
     /// Done once.
-    Once(Task),
+    Once(Part),
     /// Done for each condition of the participant, in the order of its sequence.
-    PerCondition(Vec<Task>),
+    PerCondition(Vec<Part>),
+}
+
+/// A task, and for whom it is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Part {
+    /// What to do.
+    pub task: Task,
+    /// Participants pass over it unless all of these hold, at most 4.
+    pub shown_if: Vec<ShownIf>,
 }
 
 /// What a participant does at a step.
@@ -82,6 +92,8 @@ pub struct Text {
 pub struct Step<'s> {
     /// What to do.
     pub task: &'s Task,
+    /// Participants pass over it unless all of these hold.
+    pub shown_if: &'s [ShownIf],
     /// The condition whose block it belongs to, if any.
     pub block: Option<usize>,
 }
@@ -92,11 +104,10 @@ pub(crate) fn steps<'s>(stages: &'s [Stage], sequence: &[usize]) -> Vec<Step<'s>
     let mut steps = Vec::new();
     for stage in stages {
         match stage {
-            Stage::Once(task) => steps.push(Step { task, block: None }),
-            Stage::PerCondition(tasks) => {
+            Stage::Once(part) => steps.push(part.step(None)),
+            Stage::PerCondition(parts) => {
                 for &condition in sequence {
-                    let block = Some(condition);
-                    steps.extend(tasks.iter().map(|task| Step { task, block }));
+                    steps.extend(parts.iter().map(|part| part.step(Some(condition))));
                 }
             }
         }
@@ -105,22 +116,82 @@ pub(crate) fn steps<'s>(stages: &'s [Stage], sequence: &[usize]) -> Vec<Step<'s>
 }
 
 impl Stage {
-    /// The tasks of the stage, each once, with their paths.
-    pub(crate) fn tasks<'s>(&'s self, field: &str) -> Vec<(String, &'s Task)> {
+    /// A task that all participants do once.
+    pub fn once(task: Task) -> Self {
+        Self::Once(task.into())
+    }
+
+    /// Tasks that all participants do for each of their conditions.
+    pub fn per_condition(tasks: impl IntoIterator<Item = Task>) -> Self {
+        Self::PerCondition(tasks.into_iter().map(Part::from).collect())
+    }
+
+    /// Whether it is the consent.
+    pub(crate) fn is_consent(&self) -> bool {
+        matches!(self, Self::Once(part) if matches!(part.task, Task::Consent(_)))
+    }
+
+    /// The parts of the stage, each once.
+    pub fn parts(&self) -> &[Part] {
         match self {
-            Self::Once(task) => vec![(field.to_owned(), task)],
-            Self::PerCondition(tasks) => {
-                let path = |index| format!("{field}.per_condition.stages[{index}]");
-                let tasks = tasks.iter().enumerate();
-                tasks.map(|(index, task)| (path(index), task)).collect()
-            }
+            Self::Once(part) => std::slice::from_ref(part),
+            Self::PerCondition(parts) => parts,
         }
+    }
+
+    /// The path of the part with this index.
+    pub(crate) fn path(&self, field: &str, index: usize) -> String {
+        match self {
+            Self::Once(_) => field.to_owned(),
+            Self::PerCondition(_) => format!("{field}.per_condition.stages[{index}]"),
+        }
+    }
+}
+
+impl From<Task> for Part {
+    fn from(task: Task) -> Self {
+        let shown_if = Vec::new();
+        Self { task, shown_if }
+    }
+}
+
+impl Part {
+    fn step(&self, block: Option<usize>) -> Step<'_> {
+        Step {
+            task: &self.task,
+            shown_if: &self.shown_if,
+            block,
+        }
+    }
+
+    /// Returns the first invalid setting of a part after these questionnaires.
+    pub(crate) fn check(&self, field: &str, earlier: &[&Questionnaire]) -> Checked {
+        self.task.check(field)?;
+        let shown_if = format!("{field}.shown_if");
+        let is_for_all = matches!(self.task, Task::Consent(_) | Task::Games { .. });
+        if is_for_all && !self.shown_if.is_empty() {
+            return refuse(shown_if, "consent and games are for all participants");
+        }
+        ShownIf::check_all(&self.shown_if, &shown_if, earlier, None)?;
+        let Task::Questionnaire(questionnaire) = &self.task else {
+            return Ok(());
+        };
+        for (index, item) in questionnaire.items.iter().enumerate() {
+            let field = format!("{field}.questionnaire.items[{index}].shown_if");
+            ShownIf::check_all(
+                &item.shown_if,
+                &field,
+                earlier,
+                Some((questionnaire, index)),
+            )?;
+        }
+        Ok(())
     }
 }
 
 impl Task {
     /// Returns the first invalid setting.
-    pub(crate) fn check(&self, field: &str) -> Checked {
+    fn check(&self, field: &str) -> Checked {
         match self {
             Self::Consent(consent) => {
                 let (text, version) = (&consent.text, &consent.version);

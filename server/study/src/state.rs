@@ -2,7 +2,7 @@
 //! next. A change that does not fit (for an unknown participant, say) has no effect, so the same
 //! changes always lead to the same state.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use crate::change::{Change, ConsentGiven, Joined, Outcome, PlacedGame};
@@ -45,6 +45,8 @@ pub struct Participant {
     /// When it reached each step, in milliseconds since the Unix epoch, and last when it completed
     /// the study. Empty until it begins.
     pub reached_at_ms: Vec<u64>,
+    /// Steps that it passed over.
+    pub passed_over: BTreeSet<usize>,
     /// When it completed the study or left it, in milliseconds since the Unix epoch.
     pub ended_at_ms: Option<u64>,
     /// Its consent.
@@ -104,7 +106,11 @@ impl Participant {
         (last.placed.step == self.step()).then_some(last)
     }
 
-    fn advance(&mut self, steps: usize, at_ms: u64) {
+    fn advance(&mut self, steps: usize, passed_over: u32, at_ms: u64) {
+        for _ in 0..passed_over {
+            self.reached_at_ms.push(at_ms);
+            self.passed_over.insert(self.step());
+        }
         self.reached_at_ms.push(at_ms);
         self.saved_answers = Arc::default();
         if self.step() >= steps {
@@ -158,6 +164,7 @@ impl StudyState {
                     session: 0,
                     devices: BTreeMap::new(),
                     reached_at_ms: Vec::new(),
+                    passed_over: BTreeSet::new(),
                     ended_at_ms: None,
                     consent: None,
                     answers: BTreeMap::new(),
@@ -182,18 +189,19 @@ impl StudyState {
                 if let Some(participant) = self.active(*number) {
                     participant.slot = participant.slot.or(*slot);
                     participant.consent = Some(consent.clone());
-                    participant.advance(steps, consent.at_ms);
+                    participant.advance(steps, 0, consent.at_ms);
                 }
             }
             Change::Answered {
                 number,
                 answers,
+                passed_over,
                 at_ms,
             } => {
                 if let Some(participant) = self.active(*number) {
                     let step = participant.step();
                     participant.answers.insert(step, Arc::clone(answers));
-                    participant.advance(steps, *at_ms);
+                    participant.advance(steps, *passed_over, *at_ms);
                 }
             }
             Change::Saved { number, answers } => {
@@ -225,6 +233,7 @@ impl StudyState {
             Change::Continued {
                 number,
                 step_over,
+                passed_over,
                 at_ms,
             } => {
                 if let Some(participant) = self.active(*number) {
@@ -232,7 +241,7 @@ impl StudyState {
                         game.continued = true;
                     }
                     if *step_over {
-                        participant.advance(steps, *at_ms);
+                        participant.advance(steps, *passed_over, *at_ms);
                     }
                 }
             }

@@ -178,16 +178,14 @@ fn godspeed(texts: Texts) -> Vec<Item> {
             ),
             _ => "",
         };
+        let kind = ItemKind::SemanticDifferential {
+            points: 5,
+            left: texts.choose(left_en, left_it).to_owned(),
+            right: texts.choose(right_en, right_it).to_owned(),
+        };
         Item {
-            id: id.to_owned(),
             scale: scale.to_owned(),
-            text: text.to_owned(),
-            required: true,
-            kind: ItemKind::SemanticDifferential {
-                points: 5,
-                left: texts.choose(left_en, left_it).to_owned(),
-                right: texts.choose(right_en, right_it).to_owned(),
-            },
+            ..Item::new(id, text, kind)
         }
     };
     rows(GODSPEED).map(item).collect()
@@ -204,18 +202,15 @@ effort|How hard did you have to work to accomplish your level of performance?|Qu
 frustration|How insecure, discouraged, irritated, stressed, and annoyed were you?|Quanta insicurezza, scoraggiamento, irritazione, stress e fastidio hai provato?|Very Low|Very High|Molto basso|Molto alto";
 
 fn nasa_tlx(texts: Texts) -> Vec<Item> {
-    let item = |[id, text_en, text_it, left_en, right_en, left_it, right_it]: [&str; 7]| Item {
-        id: id.to_owned(),
-        scale: String::new(),
-        text: texts.choose(text_en, text_it).to_owned(),
-        required: true,
-        kind: ItemKind::Slider {
+    let item = |[id, text_en, text_it, left_en, right_en, left_it, right_it]: [&str; 7]| {
+        let kind = ItemKind::Slider {
             min: 0,
             max: 100,
             step: 5,
             left: texts.choose(left_en, left_it).to_owned(),
             right: texts.choose(right_en, right_it).to_owned(),
-        },
+        };
+        Item::new(id, texts.choose(text_en, text_it), kind)
     };
     rows(NASA_TLX).map(item).collect()
 }

@@ -27,9 +27,9 @@ pub fn settings() -> Settings {
         assignment_seed: [7; 32],
         seeds: (0..3).map(|seed| [seed; 32]).collect(),
         stages: vec![
-            Stage::Once(consent()),
-            Stage::Once(Task::Games { count: 1 }),
-            Stage::Once(text()),
+            Stage::once(consent()),
+            Stage::once(Task::Games { count: 1 }),
+            Stage::once(text()),
         ],
         traces: false,
         drop_out_after_ms: 60_000,
@@ -56,13 +56,13 @@ pub fn within(conditions: usize) -> Settings {
         order: Order::Within,
         participants: 24,
         stages: vec![
-            Stage::Once(consent()),
-            Stage::Once(Task::Practice { in_data: false }),
-            Stage::PerCondition(vec![
+            Stage::once(consent()),
+            Stage::once(Task::Practice { in_data: false }),
+            Stage::per_condition(vec![
                 Task::Games { count: 2 },
                 Task::Questionnaire(questionnaire),
             ]),
-            Stage::Once(text()),
+            Stage::once(text()),
         ],
         ..settings()
     }

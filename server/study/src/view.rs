@@ -9,6 +9,7 @@ use crate::games::Phase;
 use crate::questionnaire::{ItemKind, Questionnaire};
 use crate::recruiting::Recruiting;
 use crate::settings::{Hide, Labels};
+use crate::shown::ShownItemIf;
 use crate::stage::{Consent, ExternalQuestionnaire, Task, Text};
 use crate::state::{Participant, Status};
 use crate::templates::Language;
@@ -76,6 +77,8 @@ pub struct ShownItem {
     pub required: bool,
     /// How it is answered.
     pub kind: ItemKind,
+    /// It is shown, and answered, only while all of these hold.
+    pub shown_if: Vec<ShownItemIf>,
 }
 
 /// A game, as its participant sees it.
@@ -152,8 +155,9 @@ impl Study {
         Some(match self.step_of(participant)?.task {
             Task::Consent(consent) => Content::Consent(consent.clone()),
             Task::Questionnaire(questionnaire) => {
-                let seed = self.settings().assignment_seed;
-                let order = questionnaire.order(seed, number, participant.step());
+                let items = self.items_after(participant, participant.step(), questionnaire);
+                let mut order = self.item_order(number, participant.step())?;
+                order.retain(|index| items.contains(index));
                 Content::Questionnaire(ShownQuestionnaire::of(questionnaire, &order))
             }
             Task::External(it) => Content::External(it.filled_in(&participant.pseudonym)),
@@ -191,6 +195,7 @@ impl ShownQuestionnaire {
                 text: item.text.clone(),
                 required: item.required,
                 kind: item.kind.clone(),
+                shown_if: questionnaire.shown_if(item),
             }
         };
         Self {

@@ -114,7 +114,10 @@ pub(crate) fn study() -> v1::CreateStudyRequest {
         filled_by: Some(v1::seat_config::FilledBy::BuiltInAgent("random".into())),
         ..v1::SeatConfig::default()
     };
-    let stage = |stage| v1::StudyStage { stage: Some(stage) };
+    let stage = |stage| v1::StudyStage {
+        stage: Some(stage),
+        ..v1::StudyStage::default()
+    };
     v1::CreateStudyRequest {
         settings: Some(v1::StudySettings {
             name: "hostile".into(),

@@ -64,6 +64,7 @@ fn study(items: u32) -> v1::CreateStudyRequest {
             items: (0..items).map(item).collect(),
             ..v1::StudyQuestionnaire::default()
         })),
+        ..v1::StudyStage::default()
     });
     let mut request = acts::study();
     if let Some(settings) = &mut request.settings {

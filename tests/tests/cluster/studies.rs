@@ -20,7 +20,10 @@ const PARTICIPANTS: u32 = 4;
 const TRY_AGAIN: Duration = Duration::from_millis(50);
 
 fn settings() -> v1::StudySettings {
-    let stage = |stage| v1::StudyStage { stage: Some(stage) };
+    let stage = |stage| v1::StudyStage {
+        stage: Some(stage),
+        ..v1::StudyStage::default()
+    };
     let seat = v1::SeatConfig {
         filled_by: Some(FilledBy::BuiltInAgent("random".into())),
         ..v1::SeatConfig::default()

@@ -182,12 +182,12 @@ async fn a_repeated_request_is_answered_to_its_own_token_alone() {
 }
 
 #[tokio::test]
-async fn a_study_of_empty_stages_is_refused_before_it_is_decoded() {
+async fn a_study_of_empty_factors_is_refused_before_it_is_decoded() {
     let server = Guarded::start().await;
     let (_, host) = server.caller(Role::Host, None).await;
-    let stages = vec![v1::StudyStage::default(); 500_000];
+    let factors = vec![v1::StudyFactor::default(); 500_000];
     let settings = v1::StudySettings {
-        stages,
+        factors,
         ..v1::StudySettings::default()
     };
     let mut studies = StudyServiceClient::new(host.channel());

@@ -137,7 +137,10 @@ pub(crate) fn address(host: &Host) -> SocketAddr {
 }
 
 fn stage(stage: Stage) -> v1::StudyStage {
-    v1::StudyStage { stage: Some(stage) }
+    v1::StudyStage {
+        stage: Some(stage),
+        ..v1::StudyStage::default()
+    }
 }
 
 fn condition(temperament: &str, robot: &str, agent: &str, behaviour: &str) -> v1::StudyCondition {

@@ -54,7 +54,8 @@ def of_answers(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
     """The scales of questionnaires, or the items that belong to none, as rows of participant, condition, measure and value."""
     answers = tables["answers"]
     items = tables["items"]
-    numbers = items.loc[items["kind"].isin(["likert", "semantic_differential", "slider"]), ["questionnaire", "item"]]
+    measures = items["kind"].isin(["likert", "semantic_differential", "slider", "number"]) & items["attention_check"].isna()
+    numbers = items.loc[measures, ["questionnaire", "item"]]
     answers = answers[answers["status"] == "answered"].merge(numbers, on=["questionnaire", "item"])
     return pd.DataFrame(
         {

@@ -1,18 +1,27 @@
 // A questionnaire of a study. Every item is a native group of radio buttons, a slider, check boxes
 // or a text field, so that keyboard and screen reader work as everywhere. No item has a value
-// before the participant gives it one.
+// before the participant gives it one. Statements with the same points are a table where there is
+// space, and groups one above the other where there is none.
 
+import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
-import type { StudyShownItem, StudyShownQuestionnaire, StudySlider } from "../gen/chefshat/v1/study_pb";
+import type {
+  StudyLikert,
+  StudyNumber,
+  StudyShownItem,
+  StudyShownQuestionnaire,
+  StudySlider,
+} from "../gen/chefshat/v1/study_pb";
 import { t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import { answersOf, type Draft, draftOf, missingItems, type Value } from "./answers";
+import { answersOf, type Draft, draftOf, missingItems, shownItems, type Value } from "./answers";
+import { Formatted, FormattedQuestion, plainText } from "./Formatted";
 import type { ItemAnswer, Participating } from "./participating";
 import css from "./Questionnaire.module.css";
-import { Paragraphs, StageTitle } from "./Stage";
+import { StageTitle } from "./Stage";
 
 interface QuestionnaireProps {
   questionnaire: StudyShownQuestionnaire;
@@ -32,39 +41,44 @@ export function Questionnaire({ questionnaire, part }: QuestionnaireProps) {
   const { busy, fault, run } = useAttempt();
   const save = useSaving(part.save);
   const form = useRef<HTMLFormElement>(null);
-  const missing = tried ? missingItems(items, draft) : [];
+  const shown = shownItems(items, draft);
+  const missing = tried ? missingItems(shown, draft) : [];
 
   const enter = (item: number, value: Value) => {
     const next = { ...draft, [item]: { value, afterMs: performance.now() - reachedAtMs } };
     setDraft(next);
-    save(answersOf(items, next));
+    save(answersOf(shownItems(items, next), next));
   };
   const submit = (event: Event) => {
     event.preventDefault();
     setTried(true);
-    const left = missingItems(items, draft);
+    const left = missingItems(shown, draft);
     if (left.length > 0) {
       announce(words.missing(left.length));
       form.current?.querySelector<HTMLElement>(`[data-item="${left[0]}"] :is(input, textarea)`)?.focus();
       return;
     }
     run(async () => {
-      await part.answer(answersOf(items, draft));
+      await part.answer(answersOf(shown, draft));
       return false;
     });
   };
   return (
     <form class={css.form} ref={form} onSubmit={submit} noValidate data-part="questionnaire">
       <StageTitle>{title || words.title}</StageTitle>
-      {instructions && <Paragraphs text={instructions} />}
-      {items.map((item) => (
-        <Item
-          key={item.item}
-          item={item}
-          value={draft[item.item]?.value}
-          missing={missing.includes(item.item)}
-          onEnter={(value) => enter(item.item, value)}
-        />
+      {instructions && <Formatted text={instructions} />}
+      {tablesOf(shown).map((table) => (
+        <Table key={table[0]?.item} items={table}>
+          {table.map((item) => (
+            <Item
+              key={item.item}
+              item={item}
+              value={draft[item.item]?.value}
+              missing={missing.includes(item.item)}
+              onEnter={(value) => enter(item.item, value)}
+            />
+          ))}
+        </Table>
       ))}
       {missing.length > 0 && <Notice kind="fault">{words.missing(missing.length)}</Notice>}
       {fault && <Notice kind="fault">{fault}</Notice>}
@@ -109,6 +123,51 @@ function useSaving(send: (answers: ItemAnswer[]) => Promise<void>): (answers: It
   };
 }
 
+/** The fewest statements with the same points that are a table. */
+const TABLE_ROWS = 3;
+
+/** The items, those together that are a table. */
+function tablesOf(items: readonly StudyShownItem[]): StudyShownItem[][] {
+  const runs: StudyShownItem[][] = [];
+  for (const item of items) {
+    const last = runs.at(-1);
+    if (last?.[0] && haveSamePoints(last[0], item)) last.push(item);
+    else runs.push([item]);
+  }
+  return runs.flatMap((run) => (run.length < TABLE_ROWS ? run.map((item) => [item]) : [run]));
+}
+
+function haveSamePoints({ kind: one }: StudyShownItem, { kind: other }: StudyShownItem): boolean {
+  if (one.case !== "likert" || other.case !== "likert") return false;
+  return one.value.points === other.value.points && one.value.labels.join("\n") === other.value.labels.join("\n");
+}
+
+/** Statements with the same points below their labels; a single item stands for itself. */
+function Table({ items, children }: { items: readonly StudyShownItem[]; children: ComponentChildren }) {
+  const kind = items[0]?.kind;
+  if (items.length < TABLE_ROWS || kind?.case !== "likert") return <>{children}</>;
+  return (
+    <div class={css.table} data-part="item-table">
+      <TableHead likert={kind.value} />
+      {children}
+    </div>
+  );
+}
+
+/** The labels once; every item has them for a screen reader. */
+function TableHead({ likert: { points, labels } }: { likert: StudyLikert }) {
+  const all = labels.length === points && points > 2;
+  return (
+    <div class={css.head} aria-hidden="true">
+      <div class={all ? css.points : css.labels} style={{ "--points": points }}>
+        {labels.map((label, index) => (
+          <span key={index}>{label}</span>
+        ))}
+      </div>
+    </div>
+  );
+}
+
 interface ItemProps {
   item: StudyShownItem;
   value: Value | undefined;
@@ -120,8 +179,11 @@ function Item({ item, value, missing, onEnter }: ItemProps) {
   const words = t().studies.questionnaire;
   const { kind } = item;
   const id = `item-${item.item}`;
-  const question =
-    item.text || (kind.case === "semanticDifferential" ? `${kind.value.left} – ${kind.value.right}` : "");
+  const question = item.text
+    ? plainText(item.text)
+    : kind.case === "semanticDifferential"
+      ? `${kind.value.left} – ${kind.value.right}`
+      : "";
   return (
     <fieldset
       class={css.item}
@@ -131,7 +193,7 @@ function Item({ item, value, missing, onEnter }: ItemProps) {
       aria-describedby={missing ? `${id}-fault` : undefined}
     >
       <legend class={item.text ? css.question : "visually-hidden"}>
-        {question}
+        {item.text ? <FormattedQuestion text={item.text} /> : question}
         {item.optional && <span class="soft small"> {words.optional}</span>}
       </legend>
       {kind.case === "likert" && (
@@ -165,9 +227,18 @@ function Item({ item, value, missing, onEnter }: ItemProps) {
           onEnter={onEnter}
         />
       )}
+      {kind.case === "number" && (
+        <NumberField
+          id={id}
+          label={question}
+          number={kind.value}
+          value={typeof value === "number" ? value : undefined}
+          onEnter={onEnter}
+        />
+      )}
       {missing && (
         <p id={`${id}-fault`} class={css.fault}>
-          {words.answerThis}
+          {kind.case === "number" ? words.numberWithin(kind.value.min, kind.value.max) : words.answerThis}
         </p>
       )}
     </fieldset>
@@ -291,6 +362,44 @@ function Choice({ id, options, multiple, value, onEnter }: ChoiceProps) {
           <span>{option}</span>
         </label>
       ))}
+    </div>
+  );
+}
+
+interface NumberFieldProps {
+  id: string;
+  label: string;
+  number: StudyNumber;
+  value: number | undefined;
+  onEnter: (value: number | string) => void;
+}
+
+/** A number that is typed. What is not one of the numbers stands until it is corrected. */
+function NumberField({ id, label, number: { min, max, unit }, value, onEnter }: NumberFieldProps) {
+  const words = t().studies.questionnaire;
+  const [typed, setTyped] = useState(value === undefined || Number.isNaN(value) ? "" : String(value));
+  const type = (text: string) => {
+    setTyped(text);
+    const number = /^[-−]?\d+$/.test(text.trim()) ? Number(text.trim().replace("−", "-")) : Number.NaN;
+    if (text.trim() === "") onEnter("");
+    else onEnter(min <= number && number <= max ? number : Number.NaN);
+  };
+  return (
+    <div class={css.number}>
+      <input
+        class={css.text}
+        // A keyboard of digits has no minus on some phones.
+        inputMode={min < 0 ? "text" : "numeric"}
+        autoComplete="off"
+        aria-label={label}
+        aria-describedby={`${id}-range`}
+        value={typed}
+        onInput={(event) => type(event.currentTarget.value)}
+      />
+      {unit && <span>{unit}</span>}
+      <span id={`${id}-range`} class="soft small">
+        {words.numberWithin(min, max)}
+      </span>
     </div>
   );
 }

@@ -1,5 +1,4 @@
-// What the stages of a study have in common: a title that gets the focus when the stage begins, and
-// texts in paragraphs.
+// What the stages of a study have in common: a title that gets the focus when the stage begins.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef } from "preact/hooks";
@@ -21,19 +20,5 @@ export function StageTitle({ children }: { children: ComponentChildren }) {
     <h1 ref={title} tabIndex={-1}>
       {children}
     </h1>
-  );
-}
-
-/** A text whose paragraphs are separated by blank lines. */
-export function Paragraphs({ text }: { text: string }) {
-  return (
-    <>
-      {text.split(/\n\s*\n/).map((paragraph, index) => (
-        // The text of a stage does not change.
-        <p key={index} style={{ whiteSpace: "pre-line", overflowWrap: "anywhere" }}>
-          {paragraph.trim()}
-        </p>
-      ))}
-    </>
   );
 }

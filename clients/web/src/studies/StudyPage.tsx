@@ -23,11 +23,13 @@ import { download } from "../parts/download";
 import { CheckField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import type { PageProps } from "../router";
+import { Formatted } from "./Formatted";
 import { type Participating, startParticipating } from "./participating";
 import { Questionnaire } from "./Questionnaire";
-import { Paragraphs, StageTitle } from "./Stage";
+import { StageTitle } from "./Stage";
 import css from "./Study.module.css";
 import { StudyGame } from "./StudyGame";
+import { safeAddress } from "./safe-address";
 
 /** The page. */
 export function StudyPage({ route }: PageProps<"study">) {
@@ -160,7 +162,7 @@ function Consent({ consent, title, part }: { consent: StudyConsent; title: strin
     <form class={`sheet ${css.stage}`} onSubmit={submit} noValidate data-part="consent">
       <StageTitle>{words.title}</StageTitle>
       <section class={css.consent} aria-label={words.textLabel}>
-        <Paragraphs text={consent.text} />
+        <Formatted text={consent.text} />
       </section>
       <p class="soft small">{words.version(consent.version)}</p>
       <div>
@@ -199,15 +201,10 @@ function Text({ text, part }: { text: StudyText; part: Participating }) {
   return (
     <section class={`sheet ${css.stage}`} data-part="study-text">
       <StageTitle>{text.title || t().studies.title}</StageTitle>
-      <Paragraphs text={text.text} />
+      <Formatted text={text.text} />
       <Next part={part}>{t().studies.next}</Next>
     </section>
   );
-}
-
-/** A valid address of a questionnaire, or empty: a link must not run a script. */
-function safeAddress(address: string): string {
-  return ["https:", "http:"].includes(URL.parse(address)?.protocol ?? "") ? address : "";
 }
 
 function External({ external, part }: { external: StudyExternalQuestionnaire; part: Participating }) {
@@ -217,7 +214,7 @@ function External({ external, part }: { external: StudyExternalQuestionnaire; pa
   return (
     <section class={`sheet ${css.stage}`} data-part="study-external">
       <StageTitle>{words.title}</StageTitle>
-      {external.text && <Paragraphs text={external.text} />}
+      {external.text && <Formatted text={external.text} />}
       {address && (
         <>
           <p>{words.text(new URL(address).host)}</p>

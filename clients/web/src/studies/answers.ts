@@ -1,10 +1,13 @@
 // The answers of a participant to a questionnaire while they are entered: what is missing, and what
 // is sent. The server keeps them until they are given: a reload or another device shows them again.
 
-import type { StudyItemAnswer, StudyShownItem } from "../gen/chefshat/v1/study_pb";
+import type { StudyAnswerSet, StudyItemAnswer, StudyShownItem } from "../gen/chefshat/v1/study_pb";
 import type { ItemAnswer } from "./participating";
 
-/** An entered value: a point or the value of a slider, chosen options, or a text. */
+/**
+ * An entered value: a point, the value of a slider or a number, of which one that is not valid is
+ * NaN; chosen options; or a text.
+ */
 export type Value = number | readonly number[] | string;
 
 /** What was entered for an item, and when it last changed, milliseconds from reaching the step. */
@@ -16,23 +19,47 @@ export interface Entered {
 /** What was entered so far, by item. */
 export type Draft = Readonly<Record<number, Entered>>;
 
-/** The items that must be answered and are not. */
-export function missingItems(items: readonly StudyShownItem[], draft: Draft): number[] {
-  return items.flatMap(({ item, optional }) => (optional || isAnswered(draft[item]) ? [] : [item]));
+/** Those of the items that are shown for what was entered so far. */
+export function shownItems(items: readonly StudyShownItem[], draft: Draft): StudyShownItem[] {
+  const shown = new Set<number>();
+  return items.filter(({ item, shownIf }) => {
+    const holds = shownIf.every((condition) => {
+      const entered = shown.has(condition.item) ? draft[condition.item] : undefined;
+      const isOne = isAnswered(entered) && isAmong(entered.value, condition.answers);
+      return isOne !== condition.not;
+    });
+    if (holds) shown.add(item);
+    return holds;
+  });
 }
 
-function isAnswered(entered: Entered | undefined): boolean {
+function isAmong(value: Value, answers: StudyAnswerSet | undefined): boolean {
+  const { min = -Infinity, max = Infinity, options = [] } = answers ?? {};
+  if (typeof value === "number") return min <= value && value <= max;
+  return typeof value !== "string" && value.some((option) => options.includes(option));
+}
+
+/** The shown items that must be answered and are not, and those whose answer is not valid. */
+export function missingItems(shown: readonly StudyShownItem[], draft: Draft): number[] {
+  const isMissing = ({ item, optional }: StudyShownItem) => {
+    const entered = draft[item];
+    return Number.isNaN(entered?.value) || (!optional && !isAnswered(entered));
+  };
+  return shown.filter(isMissing).map(({ item }) => item);
+}
+
+function isAnswered(entered: Entered | undefined): entered is Entered {
   if (!entered) return false;
   const { value } = entered;
-  if (typeof value === "number") return true;
+  if (typeof value === "number") return !Number.isNaN(value);
   return typeof value === "string" ? value.trim() !== "" : value.length > 0;
 }
 
-/** The answers to send, in the order of the items. */
-export function answersOf(items: readonly StudyShownItem[], draft: Draft): ItemAnswer[] {
-  return items.flatMap(({ item }): ItemAnswer[] => {
+/** The answers to send, in the order of the shown items. */
+export function answersOf(shown: readonly StudyShownItem[], draft: Draft): ItemAnswer[] {
+  return shown.flatMap(({ item }): ItemAnswer[] => {
     const entered = draft[item];
-    if (!entered || !isAnswered(entered)) return [];
+    if (!isAnswered(entered)) return [];
     return [{ item, value: sentOf(entered.value), answeredAfterMs: Math.round(entered.afterMs) }];
   });
 }

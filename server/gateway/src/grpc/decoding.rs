@@ -684,13 +684,13 @@ mod tests {
         let study = "/chefshat.v1.StudyService/CreateStudy";
         // Its first 5 bytes are enough.
         check(study, vec![0, 0, 0x20, 0, 0], "MESSAGE_TOO_LARGE").await;
-        // A million bytes of empty stages.
-        let stages = v1::StudySettings {
-            stages: vec![v1::StudyStage::default(); 500_000],
+        // A million bytes of empty factors.
+        let factors = v1::StudySettings {
+            factors: vec![v1::StudyFactor::default(); 500_000],
             ..v1::StudySettings::default()
         };
         let create = v1::CreateStudyRequest {
-            settings: Some(stages),
+            settings: Some(factors),
             ..v1::CreateStudyRequest::default()
         };
         check(study, framed(&create.encode_to_vec()), "TOO_MANY_ELEMENTS").await;

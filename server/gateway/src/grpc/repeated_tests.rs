@@ -71,6 +71,7 @@ async fn another_token_does_not_get_the_secret_of_a_study() {
             }],
             stages: vec![v1::StudyStage {
                 stage: Some(v1::study_stage::Stage::Games(v1::StudyGames { count: 1 })),
+                ..v1::StudyStage::default()
             }],
             ..v1::StudySettings::default()
         }),

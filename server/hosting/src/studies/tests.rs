@@ -35,7 +35,10 @@ fn settings() -> v1::StudySettings {
         filled_by: Some(v1::seat_config::FilledBy::BuiltInAgent("random".into())),
         ..v1::SeatConfig::default()
     };
-    let stage = |stage| v1::StudyStage { stage: Some(stage) };
+    let stage = |stage| v1::StudyStage {
+        stage: Some(stage),
+        ..v1::StudyStage::default()
+    };
     v1::StudySettings {
         name: "away".into(),
         title: "A game of cards".into(),
@@ -444,18 +447,21 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         kind: Some(kind),
         ..v1::StudyItem::default()
     };
+    let points = v1::StudyLikert {
+        points: 5,
+        labels: vec!["not at all".into(), "very".into()],
+    };
+    let from = |min| {
+        Some(v1::StudyAnswerSet {
+            min: Some(min),
+            ..v1::StudyAnswerSet::default()
+        })
+    };
     let questionnaire = v1::StudyQuestionnaire {
         id: "after".into(),
         title: "After all".into(),
         items: vec![
-            item(
-                "liked",
-                false,
-                Kind::Likert(v1::StudyLikert {
-                    points: 5,
-                    labels: vec!["not at all".into(), "very".into()],
-                }),
-            ),
+            item("liked", false, Kind::Likert(points.clone())),
             item(
                 "seen",
                 true,
@@ -469,6 +475,26 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
                 true,
                 Kind::FreeText(v1::StudyFreeText { max_characters: 50 }),
             ),
+            v1::StudyItem {
+                shown_if: vec![v1::StudyShownIf {
+                    item: "liked".into(),
+                    answers: from(4),
+                    ..v1::StudyShownIf::default()
+                }],
+                ..item(
+                    "played",
+                    false,
+                    Kind::Number(v1::StudyNumber {
+                        min: 0,
+                        max: 99,
+                        unit: "years".into(),
+                    }),
+                )
+            },
+            v1::StudyItem {
+                attention_check: from(3),
+                ..item("check", false, Kind::Likert(points))
+            },
         ],
         ..v1::StudyQuestionnaire::default()
     };
@@ -483,6 +509,7 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         1,
         v1::StudyStage {
             stage: Some(Stage::Questionnaire(questionnaire)),
+            ..v1::StudyStage::default()
         },
     );
     let lab = Lab::with(&ServerConfig::default(), settings, 4).await;
@@ -506,8 +533,10 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         answer(0, Answer::Number(5)),
         answer(1, Answer::Options(vec![0, 2])),
         answer(2, Answer::Text("=1+2, or \"three\"".into())),
+        answer(3, Answer::Number(12)),
+        answer(4, Answer::Number(3)),
     ];
-    let few = vec![answer(0, Answer::Number(3))];
+    let few = vec![answer(0, Answer::Number(3)), answer(4, Answer::Number(2))];
     for (number, answers) in [(1, all), (2, few)] {
         let answered = lab.study.answer(Key::Local, at(number, 1), answers).await;
         answered.expect("it runs").expect("they are valid");
@@ -527,46 +556,71 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         "status",
         "answer",
         "label",
+        "passed",
     ];
     let answers = tables["answers.csv"].iter();
     let answers: Vec<String> = answers.map(|row| cells(row, &columns)).collect();
     assert_eq!(
         answers,
         [
-            "1|'-low|liked|1|answered|5|very",
-            "1|'-low|seen|2|answered|0 2|'=cards; nothing",
-            "1|'-low|said|3|answered|'=1+2, or \"three\"|",
+            "1|'-low|liked|1|answered|5|very|",
+            "1|'-low|seen|2|answered|0 2|'=cards; nothing|",
+            "1|'-low|said|3|answered|'=1+2, or \"three\"||",
+            "1|'-low|played|4|answered|12||",
+            "1|'-low|check|5|answered|3||true",
             // Points between the ends have no label.
-            "2|'-low|liked|1|answered|3|",
-            "2|'-low|seen|2|left_out||",
-            "2|'-low|said|3|left_out||",
-            "3|'-low|liked|1|not_sent||",
-            "3|'-low|seen|2|not_sent||",
-            "3|'-low|said|3|not_sent||",
+            "2|'-low|liked|1|answered|3||",
+            "2|'-low|seen|2|left_out|||",
+            "2|'-low|said|3|left_out|||",
+            "2|'-low|played||not_shown|||",
+            "2|'-low|check|4|answered|2||false",
+            "3|'-low|liked|1|not_sent|||",
+            "3|'-low|seen|2|not_sent|||",
+            "3|'-low|said|3|not_sent|||",
+            "3|'-low|played||not_shown|||",
+            "3|'-low|check|4|not_sent|||",
         ]
     );
     let items = tables["items.csv"].iter();
-    let columns = ["item", "kind", "required", "lowest", "highest", "labels"];
+    let columns = [
+        "item",
+        "kind",
+        "required",
+        "lowest",
+        "highest",
+        "labels",
+        "unit",
+        "shown_if",
+        "attention_check",
+    ];
     let items: Vec<String> = items.map(|row| cells(row, &columns)).collect();
     assert_eq!(
         items,
         [
-            "liked|likert|true|1|5|1 = not at all; 5 = very",
-            "seen|choices|false|0|2|0 = =cards; 1 = faces; 2 = nothing",
-            "said|free_text|false|||",
+            "liked|likert|true|1|5|1 = not at all; 5 = very|||",
+            "seen|choices|false|0|2|0 = =cards; 1 = faces; 2 = nothing|||",
+            "said|free_text|false||||||",
+            "played|number|true|0|99||years|liked 4..|",
+            "check|likert|true|1|5|1 = not at all; 5 = very|||3..",
         ]
     );
     let people = tables["participants.csv"].iter();
-    let people: Vec<String> = people
-        .map(|row| cells(row, &["number", "state", "conditions", "factor_mood"]))
-        .collect();
+    let columns = [
+        "number",
+        "state",
+        "conditions",
+        "factor_mood",
+        "attention_checks",
+        "attention_checks_passed",
+    ];
+    let people: Vec<String> = people.map(|row| cells(row, &columns)).collect();
     assert_eq!(
         people,
         [
-            "1|active|only|'-low",
-            "2|active|only|'-low",
-            "3|active|only|'-low",
-            "4|invited||"
+            "1|active|only|'-low|1|1",
+            "2|active|only|'-low|1|0",
+            "3|active|only|'-low|0|0",
+            "4|invited|||0|0"
         ]
     );
 
@@ -653,6 +707,7 @@ async fn the_settings_of_all_studies_of_a_caller_take_its_share_of_memory() {
     };
     let text = v1::StudyStage {
         stage: Some(Stage::Text(text)),
+        ..v1::StudyStage::default()
     };
     long.stages.splice(1..1, vec![text; 45]);
     let create = async || studies.create(long.clone(), None, remote).await;
@@ -702,6 +757,7 @@ fn long_answers(questionnaires: usize) -> v1::StudySettings {
             items: (0..100).map(item).collect(),
             ..v1::StudyQuestionnaire::default()
         })),
+        ..v1::StudyStage::default()
     };
     let mut settings = settings();
     settings

@@ -161,6 +161,8 @@ struct AnsweredForm {
     answers: Vec<AnswerForm>,
     #[prost(uint64, tag = "3")]
     at_ms: u64,
+    #[prost(uint32, tag = "4")]
+    passed_over: u32,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -221,6 +223,9 @@ struct MarkForm {
     at_ms: u64,
     #[prost(bool, tag = "3")]
     flag: bool,
+    /// Of a participant who continues: the number of steps that it passes over.
+    #[prost(uint32, tag = "4")]
+    passed_over: u32,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -359,6 +364,7 @@ fn kind_of(change: &Change) -> KindForm {
         number: *number,
         at_ms: *at_ms,
         flag,
+        passed_over: 0,
     };
     match change {
         Change::Added {
@@ -399,16 +405,18 @@ fn kind_of(change: &Change) -> KindForm {
         Change::Answered {
             number,
             answers,
+            passed_over,
             at_ms,
         } => KindForm::Answered(AnsweredForm {
             number: *number,
             answers: answers.iter().map(answer_to_form).collect(),
             at_ms: *at_ms,
+            passed_over: *passed_over,
         }),
         Change::Saved { number, answers } => KindForm::Saved(AnsweredForm {
             number: *number,
             answers: answers.iter().map(answer_to_form).collect(),
-            at_ms: 0,
+            ..AnsweredForm::default()
         }),
         Change::Placed { number, game } => KindForm::Placed(PlacedForm {
             number: *number,
@@ -429,8 +437,12 @@ fn kind_of(change: &Change) -> KindForm {
         Change::Continued {
             number,
             step_over,
+            passed_over,
             at_ms,
-        } => KindForm::Continued(mark(number, at_ms, *step_over)),
+        } => KindForm::Continued(MarkForm {
+            passed_over: *passed_over,
+            ..mark(number, at_ms, *step_over)
+        }),
         Change::DroppedOut { number, at_ms } => KindForm::DroppedOut(mark(number, at_ms, false)),
         Change::Withdrew {
             number,
@@ -474,6 +486,7 @@ fn change_of(kind: KindForm) -> Result<Change, Unreadable> {
         KindForm::Answered(form) => Change::Answered {
             number: form.number,
             answers: answers_from_form(form.answers)?,
+            passed_over: form.passed_over,
             at_ms: form.at_ms,
         },
         KindForm::Saved(form) => Change::Saved {
@@ -504,6 +517,7 @@ fn change_of(kind: KindForm) -> Result<Change, Unreadable> {
         KindForm::Continued(form) => Change::Continued {
             number: form.number,
             step_over: form.flag,
+            passed_over: form.passed_over,
             at_ms: form.at_ms,
         },
         KindForm::DroppedOut(form) => Change::DroppedOut {

@@ -90,6 +90,7 @@ fn every_change() -> Vec<Change> {
                 answer(1, Answer::Options(vec![0, 4]), None),
                 answer(2, Answer::Text("words".to_owned()), Some(9)),
             ]),
+            passed_over: 2,
             at_ms,
         },
         Change::Saved {
@@ -117,11 +118,13 @@ fn every_change() -> Vec<Change> {
         Change::Continued {
             number,
             step_over: true,
+            passed_over: 0,
             at_ms,
         },
         Change::Continued {
             number,
             step_over: false,
+            passed_over: 1,
             at_ms,
         },
         Change::DroppedOut { number, at_ms },

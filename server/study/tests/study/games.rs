@@ -52,8 +52,8 @@ fn a_condition_counts_its_own_seeds_for_itself() {
 fn practice_reveals_no_condition_outside_blocks() {
     let mut settings = settings();
     settings.stages = vec![
-        Stage::Once(Task::Practice { in_data: true }),
-        Stage::PerCondition(vec![
+        Stage::once(Task::Practice { in_data: true }),
+        Stage::per_condition(vec![
             Task::Practice { in_data: false },
             Task::Games { count: 1 },
         ]),

@@ -4,20 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chefshat_study::testing::{settings, within};
 use chefshat_study::{
-    Answer, Change, Content, Item, ItemAnswer, ItemKind, Language, MAX_SAVES, Questionnaire,
-    Refusal, Stage, Study, Task, Template,
+    Answer, AnswerSet, Change, Content, Item, ItemAnswer, ItemKind, Language, MAX_SAVES, Part,
+    Questionnaire, Refusal, Settings, ShownIf, Stage, Status, Study, Task, Template, Text,
 };
 
 use super::support::{Lab, answer, valid};
 
 fn item(id: &str, kind: ItemKind) -> Item {
-    Item {
-        id: id.to_owned(),
-        scale: String::new(),
-        text: "How was it?".to_owned(),
-        required: true,
-        kind,
-    }
+    Item::new(id, "How was it?", kind)
 }
 
 /// One required item of each kind, and an optional choice.
@@ -67,7 +61,7 @@ fn questionnaire() -> Questionnaire {
 #[test]
 fn answers_are_checked_item_by_item() {
     let mut settings = settings();
-    settings.stages[0] = Stage::Once(Task::Questionnaire(questionnaire()));
+    settings.stages[0] = Stage::once(Task::Questionnaire(questionnaire()));
     let mut lab = Lab::new(settings, 1);
     lab.open(1).unwrap();
     let items = questionnaire().items;
@@ -163,12 +157,198 @@ fn answers_are_checked_item_by_item() {
     assert!(lab.study.answer(lab.at(1), reversed, 0).is_ok());
 }
 
+/// A first questionnaire with a number and a choice, a second with items for some, and a text and
+/// practice for some.
+fn branching() -> Settings {
+    let options = ["cards", "chess", "none"].map(str::to_owned).to_vec();
+    let number = |id: &str| {
+        let (min, max, unit) = (18, 99, "years".to_owned());
+        item(id, ItemKind::Number { min, max, unit })
+    };
+    let choice = |id: &str, multiple| {
+        let options = options.clone();
+        item(id, ItemKind::Choice { options, multiple })
+    };
+    let likert = |id: &str, shown_if: Vec<ShownIf>| {
+        let labels = ["no", "yes"].map(str::to_owned).to_vec();
+        Item {
+            shown_if,
+            ..item(id, ItemKind::Likert { points: 5, labels })
+        }
+    };
+    let numbers = |min, max| AnswerSet {
+        min,
+        max,
+        options: Vec::new(),
+    };
+    let options_of = |options: &[usize]| AnswerSet {
+        options: options.to_vec(),
+        ..AnswerSet::default()
+    };
+    let before = |item: &str, answers, not| ShownIf {
+        questionnaire: Some("before".to_owned()),
+        item: item.to_owned(),
+        answers,
+        not,
+    };
+    let here = |item: &str, answers| ShownIf {
+        questionnaire: None,
+        item: item.to_owned(),
+        answers,
+        not: false,
+    };
+    let first = Questionnaire {
+        id: "before".to_owned(),
+        items: vec![
+            number("age"),
+            Item {
+                required: false,
+                ..choice("plays", true)
+            },
+            // "cards" and no other option.
+            Item {
+                attention_check: Some(options_of(&[0])),
+                ..choice("check", true)
+            },
+        ],
+        ..questionnaire()
+    };
+    let over_30 = before("age", numbers(Some(31), None), false);
+    let second = Questionnaire {
+        id: "after".to_owned(),
+        items: vec![
+            likert("all", Vec::new()),
+            likert("players", vec![before("plays", options_of(&[0, 1]), false)]),
+            likert("agreed", vec![here("all", numbers(Some(4), None))]),
+            likert("asked_on", vec![here("agreed", numbers(None, Some(2)))]),
+        ],
+        ..questionnaire()
+    };
+    let text = Task::Text(Text {
+        title: String::new(),
+        text: "You play cards.".to_owned(),
+    });
+    let part = |task, shown_if| Stage::Once(Part { task, shown_if });
+    let mut settings = settings();
+    settings.stages = vec![
+        Stage::once(Task::Questionnaire(first)),
+        part(
+            Task::Practice { in_data: false },
+            vec![before("plays", options_of(&[0]), true)],
+        ),
+        part(
+            text,
+            vec![before("plays", options_of(&[0]), false), over_30.clone()],
+        ),
+        Stage::once(Task::Questionnaire(second)),
+        Stage::once(Task::Games { count: 1 }),
+        part(Task::Practice { in_data: false }, vec![over_30]),
+    ];
+    settings
+}
+
+#[test]
+fn earlier_answers_decide_what_is_shown() {
+    // Age, what is played, the steps that are reached, and the items of the second questionnaire.
+    for (age, plays, steps, items) in [
+        (18, vec![2], vec![0, 1, 3, 4, 6], vec![0, 2, 3]),
+        (30, vec![0], vec![0, 3, 4, 6], vec![0, 1, 2, 3]),
+        (31, vec![1, 2], vec![0, 1, 3, 4, 5, 6], vec![0, 1, 2, 3]),
+        (99, vec![0, 1], vec![0, 2, 3, 4, 5, 6], vec![0, 1, 2, 3]),
+        (40, vec![], vec![0, 1, 3, 4, 5, 6], vec![0, 2, 3]),
+    ] {
+        let mut lab = Lab::new(branching(), 1);
+        lab.open(1).unwrap();
+        let given = vec![
+            answer(0, Answer::Number(age)),
+            answer(1, Answer::Options(plays.clone())),
+            answer(2, Answer::Options(vec![0])),
+        ];
+        let mut given = Some(given);
+        let mut reached = vec![0];
+        while lab.study.participant(1).unwrap().ended_at_ms.is_none() {
+            match lab.study.view(1).unwrap().content {
+                Content::Questionnaire(shown) if lab.at(1).step == 3 => {
+                    let shown: Vec<usize> = shown.items.iter().map(|it| it.item).collect();
+                    assert_eq!(shown, items);
+                    // `all` has 5, so `agreed` is shown and has 5, so `asked_on` is not.
+                    let mut answers: Vec<ItemAnswer> = (shown.iter())
+                        .map(|item| answer(*item, Answer::Number(5)))
+                        .collect();
+                    let hidden = lab.study.answer(lab.at(1), answers.clone(), 0).unwrap_err();
+                    let text = "item 3: it is not shown after these answers";
+                    assert_eq!(hidden.to_string(), text);
+                    answers.pop();
+                    let answered = lab.study.answer(lab.at(1), answers, 0).unwrap();
+                    lab.fold(answered);
+                    let mut met = items.clone();
+                    met.pop();
+                    assert_eq!(lab.study.shown_items(1, 3), Some(met));
+                }
+                Content::Questionnaire(_) => {
+                    let given = given.take().unwrap();
+                    let answered = lab.study.answer(lab.at(1), given, 0).unwrap();
+                    lab.fold(answered);
+                }
+                _ => drop(lab.act(1)),
+            }
+            let step = lab.at(1).step;
+            if reached.last() != Some(&step) {
+                reached.push(step);
+            }
+        }
+        assert_eq!(reached, steps, "{age} {plays:?}");
+        let participant = lab.study.participant(1).unwrap();
+        assert_eq!(participant.status, Status::Completed);
+        assert_eq!(participant.reached_at_ms.len(), 7);
+        assert_eq!(lab.folded_again(), lab.study);
+        // The journal without the answers leads to the same steps.
+        let deleted = lab.study.withdraw(1, true, 0).unwrap().unwrap();
+        lab.fold(deleted);
+        for change in &mut lab.changes {
+            change.forget(1);
+        }
+        assert_eq!(lab.folded_again(), lab.study);
+    }
+}
+
+#[test]
+fn an_attention_check_is_passed_by_its_answers_and_no_others() {
+    for (chosen, passed) in [(vec![0], 1), (vec![1], 0), (vec![0, 1], 0), (vec![], 0)] {
+        let mut settings = branching();
+        let Stage::Once(first) = &mut settings.stages[0] else {
+            panic!("a questionnaire");
+        };
+        let Task::Questionnaire(it) = &mut first.task else {
+            panic!("a questionnaire");
+        };
+        it.items[2].required = false;
+        it.items[0].attention_check = Some(AnswerSet {
+            min: Some(20),
+            max: Some(20),
+            options: Vec::new(),
+        });
+        let mut lab = Lab::new(settings, 1);
+        lab.open(1).unwrap();
+        let given = vec![
+            answer(0, Answer::Number(20 + passed)),
+            answer(1, Answer::Options(vec![2])),
+            answer(2, Answer::Options(chosen)),
+        ];
+        let answered = lab.study.answer(lab.at(1), given, 0).unwrap();
+        lab.fold(answered);
+        // One of both checks is passed where none or all options are right.
+        let participant = lab.study.participant(1).unwrap();
+        assert_eq!(lab.study.attention_checks(participant), (2, 1));
+    }
+}
+
 #[test]
 fn what_is_entered_is_kept_until_it_is_answered_or_deleted() {
     let mut settings = settings();
     let stage = |id: &str| {
         let id = id.to_owned();
-        Stage::Once(Task::Questionnaire(Questionnaire {
+        Stage::once(Task::Questionnaire(Questionnaire {
             id,
             ..questionnaire()
         }))
@@ -279,7 +459,7 @@ fn templates_are_complete_in_both_languages() {
             assert_eq!(distinct.len(), scales);
             // As a stage it passes the checks of every questionnaire.
             let mut settings = settings();
-            settings.stages[2] = Stage::Once(Task::Questionnaire(questionnaire));
+            settings.stages[2] = Stage::once(Task::Questionnaire(questionnaire));
             Study::new(settings).unwrap();
             items.into_iter().map(|item| item.id).collect::<Vec<_>>()
         });

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use chefshat_study::testing::{condition, consent, settings, text, within};
 use chefshat_study::{
-    ExternalQuestionnaire, Factor, Item, ItemKind, Language, Questionnaire, Settings, Stage, Study,
-    Task, Template,
+    AnswerSet, ExternalQuestionnaire, Factor, Item, ItemKind, Language, Part, Questionnaire,
+    Settings, ShownIf, Stage, Study, Task, Template, Text,
 };
 
 fn check(field: &str, start: Settings, change: impl FnOnce(&mut Settings)) {
@@ -16,16 +16,13 @@ fn check(field: &str, start: Settings, change: impl FnOnce(&mut Settings)) {
 }
 
 fn item(kind: ItemKind) -> Stage {
-    Stage::Once(Task::Questionnaire(Questionnaire {
+    Stage::once(Task::Questionnaire(Questionnaire {
         id: "q".to_owned(),
         title: String::new(),
         instructions: String::new(),
         items: vec![Item {
-            id: "i".to_owned(),
-            scale: String::new(),
-            text: "?".to_owned(),
             required: false,
-            kind,
+            ..Item::new("i", "?", kind)
         }],
         shuffled: false,
     }))
@@ -44,7 +41,7 @@ fn slider(min: i32, max: i32, step: u32) -> Stage {
 
 fn external(url: &str) -> Stage {
     let (text, url) = (String::new(), url.to_owned());
-    Stage::Once(Task::External(ExternalQuestionnaire { text, url }))
+    Stage::once(Task::External(ExternalQuestionnaire { text, url }))
 }
 
 #[test]
@@ -142,20 +139,20 @@ fn a_problem_of_the_design_names_its_field() {
 
 #[test]
 fn a_problem_of_a_stage_names_its_field() {
-    let games = |count| Stage::Once(Task::Games { count });
+    let games = |count| Stage::once(Task::Games { count });
     check("stages", settings(), |it| it.stages.clear());
     check("stages", settings(), |it| it.stages = vec![games(100); 11]);
     check("stages", within(12), |it| {
-        it.stages = vec![Stage::PerCondition(vec![text(); 17])]
+        it.stages = vec![Stage::per_condition(vec![text(); 17])]
     });
     check("stages[1]", settings(), |it| {
-        it.stages[1] = Stage::Once(consent())
+        it.stages[1] = Stage::once(consent())
     });
     check("stages[0].per_condition.stages[0]", settings(), |it| {
-        it.stages[0] = Stage::PerCondition(vec![consent()]);
+        it.stages[0] = Stage::per_condition(vec![consent()]);
     });
     check("stages[0].per_condition.stages", settings(), |it| {
-        it.stages[0] = Stage::PerCondition(Vec::new());
+        it.stages[0] = Stage::per_condition(Vec::new());
     });
     check("stages[3]", within(2), |it| it.stages[3] = games(1));
     check("stages[1].games.count", settings(), |it| {
@@ -164,8 +161,8 @@ fn a_problem_of_a_stage_names_its_field() {
     check("stages[2].questionnaire.id", settings(), |it| {
         let twice =
             Task::Questionnaire(Template::NasaTlx.questionnaire(Language::English).unwrap());
-        it.stages[1] = Stage::Once(twice.clone());
-        it.stages[2] = Stage::Once(twice);
+        it.stages[1] = Stage::once(twice.clone());
+        it.stages[2] = Stage::once(twice);
     });
     for url in [
         "http://example.org",
@@ -200,6 +197,10 @@ fn a_problem_of_an_item_names_its_field() {
             multiple: true,
         })
     };
+    let number = |min, max| {
+        let unit = "years".to_owned();
+        item(ItemKind::Number { min, max, unit })
+    };
     for (field, stage) in [
         ("points", likert(1, 2)),
         ("points", likert(12, 2)),
@@ -214,6 +215,8 @@ fn a_problem_of_an_item_names_its_field() {
             "max_characters",
             item(ItemKind::FreeText { max_characters: 0 }),
         ),
+        ("min", number(-1_000_001, 0)),
+        ("max", number(1, 0)),
     ] {
         let field = format!("stages[1].questionnaire.items[0].{field}");
         check(&field, settings(), |it| it.stages[1] = stage);
@@ -223,9 +226,159 @@ fn a_problem_of_an_item_names_its_field() {
         likert(5, 5),
         slider(-10, 10, 5),
         choice(&["a", "b"]),
+        number(7, 7),
     ] {
         let mut valid = settings();
         valid.stages[1] = stage;
         Study::new(valid).unwrap();
+    }
+}
+
+#[test]
+fn a_problem_of_a_condition_names_its_field() {
+    let questionnaire = |id: &str, items: Vec<Item>, shuffled| {
+        Task::Questionnaire(Questionnaire {
+            id: id.to_owned(),
+            title: String::new(),
+            instructions: String::new(),
+            items,
+            shuffled,
+        })
+    };
+    let number = |min, max| ItemKind::Number {
+        min,
+        max,
+        unit: String::new(),
+    };
+    let options = ["a", "b"].map(str::to_owned).to_vec();
+    let multiple = false;
+    let earlier = questionnaire(
+        "earlier",
+        vec![
+            Item::new("number", "?", number(0, 9)),
+            Item::new("choice", "?", ItemKind::Choice { options, multiple }),
+            Item::new("text", "?", ItemKind::FreeText { max_characters: 9 }),
+        ],
+        false,
+    );
+    let from = |min| AnswerSet {
+        min: Some(min),
+        ..AnswerSet::default()
+    };
+    let chosen = |options: &[usize]| AnswerSet {
+        options: options.to_vec(),
+        ..AnswerSet::default()
+    };
+    let shown_if = |questionnaire: Option<&str>, item: &str, answers: AnswerSet| ShownIf {
+        questionnaire: questionnaire.map(str::to_owned),
+        item: item.to_owned(),
+        answers,
+        not: false,
+    };
+    let part = |task, shown_if| Stage::Once(Part { task, shown_if });
+    let text = || {
+        Task::Text(Text {
+            title: String::new(),
+            text: "x".to_owned(),
+        })
+    };
+    let check_part = |field: &str, stage: Stage| {
+        check(&format!("stages[2].{field}"), settings(), |it| {
+            it.stages[1] = Stage::once(earlier.clone());
+            it.stages.insert(2, stage);
+        });
+    };
+    let in_earlier = |item: &str, answers| vec![shown_if(Some("earlier"), item, answers)];
+    for (field, conditions) in [
+        (
+            "shown_if",
+            vec![shown_if(Some("earlier"), "number", from(1)); 5],
+        ),
+        (
+            "shown_if[0].questionnaire",
+            vec![shown_if(None, "number", from(1))],
+        ),
+        (
+            "shown_if[0].questionnaire",
+            vec![shown_if(Some("later"), "number", from(1))],
+        ),
+        ("shown_if[0].item", in_earlier("nothing", from(1))),
+        (
+            "shown_if[0].answers",
+            in_earlier("number", AnswerSet::default()),
+        ),
+        ("shown_if[0].answers", in_earlier("number", chosen(&[1]))),
+        ("shown_if[0].answers", in_earlier("text", from(1))),
+        ("shown_if[0].answers", in_earlier("choice", from(1))),
+        (
+            "shown_if[0].answers.options",
+            in_earlier("choice", chosen(&[])),
+        ),
+        (
+            "shown_if[0].answers.options",
+            in_earlier("choice", chosen(&[2])),
+        ),
+        (
+            "shown_if[0].answers.options",
+            in_earlier("choice", chosen(&[1, 0])),
+        ),
+    ] {
+        check_part(field, part(text(), conditions));
+    }
+    let games = Task::Games { count: 1 };
+    check_part("shown_if", part(games, in_earlier("number", from(1))));
+    // Items of their own questionnaire: not themselves, not later ones, and not where it is shuffled.
+    let own = |of_first: &str, of_second: &str, shuffled| {
+        let item = |id: &str, other: &str| Item {
+            shown_if: vec![shown_if(None, other, from(1))],
+            ..Item::new(id, "?", number(0, 9))
+        };
+        let first = match of_first {
+            "" => Item::new("one", "?", number(0, 9)),
+            other => item("one", other),
+        };
+        Stage::once(questionnaire(
+            "own",
+            vec![first, item("two", of_second)],
+            shuffled,
+        ))
+    };
+    let items = "questionnaire.items";
+    check_part(
+        &format!("{items}[0].shown_if[0].item"),
+        own("two", "one", false),
+    );
+    check_part(
+        &format!("{items}[1].shown_if[0].item"),
+        own("", "two", false),
+    );
+    check_part(
+        &format!("{items}[1].shown_if[0].questionnaire"),
+        own("", "one", true),
+    );
+    for stage in [
+        own("", "one", false),
+        part(text(), in_earlier("number", from(1))),
+        part(text(), in_earlier("choice", chosen(&[0, 1]))),
+    ] {
+        let mut valid = settings();
+        valid.stages[1] = Stage::once(earlier.clone());
+        valid.stages.insert(2, stage);
+        Study::new(valid).unwrap();
+    }
+    for (field, kind, passing) in [
+        ("attention_check.options", "choice", chosen(&[2])),
+        ("attention_check", "number", AnswerSet::default()),
+    ] {
+        let mut items = match &earlier {
+            Task::Questionnaire(it) => it.items.clone(),
+            _ => Vec::new(),
+        };
+        let index = items.iter().position(|item| item.id == kind).unwrap();
+        items[index].attention_check = Some(passing);
+        let field = format!("stages[1].questionnaire.items[{index}].{field}");
+        check(&field, settings(), |it| {
+            it.stages[1] = Stage::once(questionnaire("earlier", items, false));
+        });
     }
 }

@@ -156,6 +156,7 @@ pub(crate) fn valid(kind: &ItemKind) -> Answer {
             Answer::Number(*points as i32)
         }
         ItemKind::Slider { min, step, .. } => Answer::Number(min + *step as i32),
+        ItemKind::Number { min, .. } => Answer::Number(*min),
         ItemKind::Choice { .. } => Answer::Options(vec![1]),
         ItemKind::FreeText { .. } => Answer::Text("It was\nfun.".to_owned()),
     }

@@ -30,7 +30,7 @@ fn participants_of_different_conditions_get_the_same() {
     let mut settings = settings();
     settings.stages.insert(
         2,
-        Stage::PerCondition(vec![
+        Stage::per_condition(vec![
             Task::Practice { in_data: false },
             Task::Questionnaire(Template::NasaTlx.questionnaire(Language::English).unwrap()),
         ]),
@@ -70,7 +70,7 @@ fn a_game_hides_what_its_condition_hides() {
 #[test]
 fn a_pseudonym_cannot_add_to_the_address_of_an_external_questionnaire() {
     let mut settings = settings();
-    settings.stages[0] = Stage::Once(Task::External(ExternalQuestionnaire {
+    settings.stages[0] = Stage::once(Task::External(ExternalQuestionnaire {
         text: "Please answer these questions.".to_owned(),
         url: "https://example.org/?p={participant}&x=1".to_owned(),
     }));

@@ -11,9 +11,9 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::{Fill, ParticipantKind, SeatLabels};
 use chefshat_room::policy::{Durability, Policy, Visibility};
 use chefshat_study::{
-    Condition, Consent, Device, ExternalQuestionnaire, Factor, Hide, Item, ItemKind, Labels,
-    Language, Order, Outcome, Participant, PlayedGame, Pointer, Questionnaire, Recruiting,
-    Settings, SettingsProblem, Stage, Status, Study, Task, Template, Text,
+    AnswerSet, Condition, Consent, Device, ExternalQuestionnaire, Factor, Hide, Item, ItemKind,
+    Labels, Language, Order, Outcome, Part, Participant, PlayedGame, Pointer, Questionnaire,
+    Recruiting, Settings, SettingsProblem, ShownIf, Stage, Status, Study, Task, Template, Text,
 };
 
 use super::agent::check_budget;
@@ -390,14 +390,58 @@ fn hidden(field: &str, messages: &[i32]) -> Result<BTreeSet<Hide>, SettingsProbl
 
 fn stage_of(field: &str, message: &v1::StudyStage) -> Result<Stage, SettingsProblem> {
     if let Some(study_stage::Stage::PerCondition(block)) = &message.stage {
-        let mut tasks = Vec::new();
+        if !message.shown_if.is_empty() {
+            return Err(problem(
+                format!("{field}.shown_if"),
+                "set it for the stages of the block",
+            ));
+        }
+        let mut parts = Vec::new();
         for (index, stage) in block.stages.iter().enumerate() {
             let field = format!("{field}.per_condition.stages[{index}]");
-            tasks.push(task_of(&field, stage)?);
+            parts.push(part_of(&field, stage)?);
         }
-        return Ok(Stage::PerCondition(tasks));
+        return Ok(Stage::PerCondition(parts));
     }
-    task_of(field, message).map(Stage::Once)
+    part_of(field, message).map(Stage::Once)
+}
+
+fn part_of(field: &str, message: &v1::StudyStage) -> Result<Part, SettingsProblem> {
+    Ok(Part {
+        task: task_of(field, message)?,
+        shown_if: shown_if(&message.shown_if),
+    })
+}
+
+/// Conditions. Those without answers are refused as empty ones.
+fn shown_if(messages: &[v1::StudyShownIf]) -> Vec<ShownIf> {
+    let condition = |message: &v1::StudyShownIf| ShownIf {
+        questionnaire: (!message.questionnaire.is_empty()).then(|| message.questionnaire.clone()),
+        item: message.item.clone(),
+        answers: message.answers.as_ref().map(answer_set).unwrap_or_default(),
+        not: message.not,
+    };
+    messages.iter().map(condition).collect()
+}
+
+fn answer_set(message: &v1::StudyAnswerSet) -> AnswerSet {
+    let options = message.options.iter();
+    AnswerSet {
+        min: message.min,
+        max: message.max,
+        options: options
+            .map(|option| usize::try_from(*option).unwrap_or(usize::MAX))
+            .collect(),
+    }
+}
+
+/// Some of the answers to an item, as a message.
+pub(super) fn answer_set_to_proto(answers: &AnswerSet) -> v1::StudyAnswerSet {
+    v1::StudyAnswerSet {
+        min: answers.min,
+        max: answers.max,
+        options: answers.options.iter().copied().map(number).collect(),
+    }
 }
 
 fn task_of(field: &str, message: &v1::StudyStage) -> Result<Task, SettingsProblem> {
@@ -469,6 +513,11 @@ fn item_of(field: &str, message: &v1::StudyItem) -> Result<Item, SettingsProblem
         Some(Kind::FreeText(it)) => ItemKind::FreeText {
             max_characters: usize::try_from(it.max_characters).unwrap_or(usize::MAX),
         },
+        Some(Kind::Number(it)) => ItemKind::Number {
+            min: it.min,
+            max: it.max,
+            unit: it.unit,
+        },
     };
     Ok(Item {
         id: message.id.clone(),
@@ -476,6 +525,8 @@ fn item_of(field: &str, message: &v1::StudyItem) -> Result<Item, SettingsProblem
         text: message.text.clone(),
         required: !message.optional,
         kind,
+        shown_if: shown_if(&message.shown_if),
+        attention_check: message.attention_check.as_ref().map(answer_set),
     })
 }
 
@@ -486,6 +537,8 @@ fn item_to_proto(item: &Item) -> v1::StudyItem {
         text: item.text.clone(),
         optional: !item.required,
         kind: Some(item_kind(item.kind.clone())),
+        // Templates, whose items these are, have neither.
+        ..v1::StudyItem::default()
     }
 }
 
@@ -522,6 +575,7 @@ pub(super) fn item_kind(kind: ItemKind) -> study_item::Kind {
         ItemKind::FreeText { max_characters } => Kind::FreeText(v1::StudyFreeText {
             max_characters: number(max_characters),
         }),
+        ItemKind::Number { min, max, unit } => Kind::Number(v1::StudyNumber { min, max, unit }),
     }
 }
 

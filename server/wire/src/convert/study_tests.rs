@@ -20,7 +20,10 @@ fn completed(
         name: "pilot".to_owned(),
         language: language.to_owned(),
         block_size: 1,
-        stages: vec![v1::StudyStage { stage: Some(stage) }],
+        stages: vec![v1::StudyStage {
+            stage: Some(stage),
+            ..v1::StudyStage::default()
+        }],
         ..Default::default()
     };
     let complete = complete_settings(settings, || [1; 32], true)?;

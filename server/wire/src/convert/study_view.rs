@@ -4,11 +4,12 @@
 use chefshat_proto::v1::{self, study_item, study_item_answer, study_shown_item, study_view};
 use chefshat_room::ids::Id;
 use chefshat_study::{
-    Answer, Content, End, Hide, ItemAnswer, ShownGame, ShownItem, ShownQuestionnaire, View,
+    Answer, Content, End, Hide, ItemAnswer, ShownGame, ShownItem, ShownItemIf, ShownQuestionnaire,
+    View,
 };
 
 use super::number;
-use super::study::item_kind;
+use super::study::{answer_set_to_proto, item_kind};
 
 /// A view as a message. `ticket_of` has the ticket of the participant's seat in a room.
 pub fn study_view(view: View, ticket_of: impl FnOnce(Id) -> String) -> v1::StudyView {
@@ -66,7 +67,17 @@ fn item(shown: ShownItem) -> v1::StudyShownItem {
             Kind::Slider(it) => Shown::Slider(it),
             Kind::Choice(it) => Shown::Choice(it),
             Kind::FreeText(it) => Shown::FreeText(it),
+            Kind::Number(it) => Shown::Number(it),
         }),
+        shown_if: shown.shown_if.iter().map(shown_item_if).collect(),
+    }
+}
+
+fn shown_item_if(condition: &ShownItemIf) -> v1::StudyShownItemIf {
+    v1::StudyShownItemIf {
+        item: number(condition.item),
+        answers: Some(answer_set_to_proto(&condition.answers)),
+        not: condition.not,
     }
 }
 

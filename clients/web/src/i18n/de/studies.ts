@@ -38,6 +38,7 @@ export const studies: Texts["studies"] = {
     point: (point, points, label) => `${point} von ${points}${label && `: ${label}`}`,
     unset: "noch keine Antwort",
     onScale: (value, min, max) => `${value}, von ${min} bis ${max}`,
+    numberWithin: (min: number, max: number) => `Eine ganze Zahl von ${min} bis ${max}`,
     left: (count) => plural(count, { one: "noch # Zeichen", other: "noch # Zeichen" }),
   },
   external: {

@@ -36,6 +36,7 @@ export const studies = {
     point: (point: number, points: number, label: string) => `${point} of ${points}${label && `: ${label}`}`,
     unset: "no answer yet",
     onScale: (value: number, min: number, max: number) => `${value}, from ${min} to ${max}`,
+    numberWithin: (min: number, max: number) => `A whole number from ${min} to ${max}`,
     left: (count: number) => plural(count, { one: "# character left", other: "# characters left" }),
   },
   external: {

@@ -37,6 +37,7 @@ export const studies: Texts["studies"] = {
     point: (point, points, label) => `${point} de ${points}${label && `: ${label}`}`,
     unset: "sin respuesta todavía",
     onScale: (value, min, max) => `${value}, de ${min} a ${max}`,
+    numberWithin: (min: number, max: number) => `Un número entero de ${min} a ${max}`,
     left: (count) => plural(count, { one: "queda # carácter", other: "quedan # caracteres" }),
   },
   external: {

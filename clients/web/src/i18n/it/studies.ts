@@ -38,6 +38,7 @@ export const studies: Texts["studies"] = {
     point: (point, points, label) => `${point} di ${points}${label && `: ${label}`}`,
     unset: "ancora nessuna risposta",
     onScale: (value, min, max) => `${value}, da ${min} a ${max}`,
+    numberWithin: (min: number, max: number) => `Un numero intero da ${min} a ${max}`,
     left: (count) => plural(count, { one: "ancora # carattere", other: "ancora # caratteri" }),
   },
   external: {

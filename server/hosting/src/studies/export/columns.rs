@@ -4,8 +4,8 @@ use chefshat_engine::SeatStatistics;
 use chefshat_proto::v1::{self, StudyTraceKind, game_event::Kind as EventKind, record_line::Line};
 use chefshat_record::outcome;
 use chefshat_study::{
-    Answer, Condition, DeviceSession, Item, ItemAnswer, ItemKind, Outcome, Participant, PlayedGame,
-    Pointer, Questionnaire, Settings, Status, Study,
+    Answer, AnswerSet, Condition, DeviceSession, Item, ItemAnswer, ItemKind, Outcome, Participant,
+    PlayedGame, Pointer, Questionnaire, Settings, ShownIf, Status, Study,
 };
 
 use super::table::{Code, Column, Kind, Sheet, Table};
@@ -183,6 +183,18 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
         |row| optional(row.participant.consent.as_ref().map(|it| &it.language)),
     )
     .empty(NO_CONSENT)
+    .with(
+        "attention_checks",
+        COUNT,
+        "number of attention checks that it has answered",
+        |row| text(row.study.attention_checks(row.participant).0),
+    )
+    .with(
+        "attention_checks_passed",
+        COUNT,
+        "number of these that it passed",
+        |row| text(row.study.attention_checks(row.participant).1),
+    )
     .with(
         "data_deleted",
         Kind::Boolean,
@@ -443,6 +455,7 @@ pub(super) fn items<'s>() -> Table<ItemRow<'s>> {
         Code::new("choice", "by an option of a list"),
         Code::new("choices", "by any number of options of a list"),
         Code::new("free_text", "in words"),
+        Code::new("number", "by a number that is typed"),
     ];
     Table::new(
         "items.csv",
@@ -478,6 +491,7 @@ pub(super) fn items<'s>() -> Table<ItemRow<'s>> {
             } => "choice",
             ItemKind::Choice { multiple: true, .. } => "choices",
             ItemKind::FreeText { .. } => "free_text",
+            ItemKind::Number { .. } => "number",
         };
         kind.to_owned()
     })
@@ -513,6 +527,47 @@ pub(super) fn items<'s>() -> Table<ItemRow<'s>> {
         },
     )
     .empty("it has no labels")
+    .with(
+        "unit",
+        Kind::Text,
+        "what the number counts or measures",
+        |row| match &row.item.kind {
+            ItemKind::Number { unit, .. } => unit.clone(),
+            _ => String::new(),
+        },
+    )
+    .empty("it is not answered by a number that is typed, or its text says it")
+    .with("shown_if", Kind::Text, SHOWN_IF, |row| {
+        let conditions = row.item.shown_if.iter().map(condition_text);
+        conditions.collect::<Vec<_>>().join("; ")
+    })
+    .empty("everybody who was shown the questionnaire was shown the item")
+    .with("attention_check", Kind::Text, ATTENTION_CHECK, |row| {
+        optional(row.item.attention_check.as_ref().map(answers_text))
+    })
+    .empty(NO_ATTENTION_CHECK)
+}
+
+/// What an earlier answer must be, for example "before.plays not 0..2".
+fn condition_text(condition: &ShownIf) -> String {
+    let questionnaire = condition.questionnaire.as_ref();
+    let of = questionnaire.map_or_else(String::new, |id| format!("{id}."));
+    let not = if condition.not { "not " } else { "" };
+    format!(
+        "{of}{} {not}{}",
+        condition.item,
+        answers_text(&condition.answers)
+    )
+}
+
+/// Some of the answers to an item: options separated by spaces, or the lowest and highest number.
+fn answers_text(answers: &AnswerSet) -> String {
+    if answers.options.is_empty() {
+        let (min, max) = (optional(answers.min), optional(answers.max));
+        return format!("{min}..{max}");
+    }
+    let options = answers.options.iter().map(text);
+    options.collect::<Vec<_>>().join(" ")
 }
 
 /// The lowest and highest number that answers an item, and the step between neighbouring ones;
@@ -523,6 +578,7 @@ fn numbers_of(kind: &ItemKind) -> Option<(i64, i64, u32)> {
             Some((1, i64::from(*points), 1))
         }
         ItemKind::Slider { min, max, step, .. } => Some((i64::from(*min), i64::from(*max), *step)),
+        ItemKind::Number { min, max, .. } => Some((i64::from(*min), i64::from(*max), 1)),
         ItemKind::Choice { options, .. } => {
             let last = i64::try_from(options.len()).unwrap_or(i64::MAX) - 1;
             Some((0, last, 1))
@@ -547,18 +603,24 @@ fn labels_of(kind: &ItemKind) -> Vec<(i64, &str)> {
         ItemKind::Choice { options, .. } => {
             (lowest..).zip(options.iter().map(String::as_str)).collect()
         }
-        ItemKind::FreeText { .. } => Vec::new(),
+        ItemKind::Number { .. } | ItemKind::FreeText { .. } => Vec::new(),
     };
     labels.retain(|(_, label)| !label.is_empty());
     labels
 }
+
+const SHOWN_IF: &str = "the earlier answers for which the item was shown: item, after its \
+    questionnaire and a point if that is another, and its options or lowest and highest number";
+const ATTENTION_CHECK: &str =
+    "the answers that pass this attention check: its options, or the lowest and highest number";
+const NO_ATTENTION_CHECK: &str = "the item is no attention check";
 
 const QUESTIONNAIRE: &str = "id of the questionnaire";
 const ITEM: &str = "id of the item in the questionnaire";
 const SCALE: &str = "scale that the item belongs to";
 const NO_SCALE: &str = "it belongs to none";
 
-/// An item that a participant was shown.
+/// An item of a questionnaire that a participant has reached.
 pub(super) struct AnswerRow<'s> {
     pub(super) number: u32,
     pub(super) participant: &'s Participant,
@@ -566,8 +628,9 @@ pub(super) struct AnswerRow<'s> {
     pub(super) condition: Option<&'s Condition>,
     pub(super) questionnaire: &'s Questionnaire,
     pub(super) item: &'s Item,
-    /// Place of the item in the order in which the participant met them, from 1.
-    pub(super) position: usize,
+    /// Place of the item in the order in which the participant met them, from 1; `None` if it was not
+    /// shown the item.
+    pub(super) position: Option<usize>,
     pub(super) answer: Option<&'s ItemAnswer>,
 }
 
@@ -598,16 +661,21 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
     const NO_LABEL: &str = "it was not answered, or in words, or the number has no label";
     const AFTER: &str = "time from showing the questionnaire to the last change of the answer, \
         measured by the participant's device";
+    const PASSED: &str = "whether the attention check was passed";
     const NOT_MEASURED: &str = "it was not answered, or the device did not measure it";
     let statuses = [
         Code::new("answered", "the item was answered"),
         Code::new("left_out", "the questionnaire was sent without it"),
         Code::new("not_sent", "the questionnaire was shown and not sent"),
+        Code::new(
+            "not_shown",
+            "earlier answers left the item, or the questionnaire, out",
+        ),
     ];
     let condition = Kind::one_of(conditions(settings));
     let table = Table::new(
         "answers.csv",
-        "an item that a participant was shown",
+        "an item of a questionnaire that a participant has reached",
         &["number", "step", "item"],
     )
     .with("number", COUNT, NUMBER, |row: &Row<'s>| text(row.number))
@@ -629,17 +697,19 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
     .with("item", Kind::Text, ITEM, |row| row.item.id.clone())
     .with("scale", Kind::Text, SCALE, |row| row.item.scale.clone())
     .empty(NO_SCALE)
-    .with("position", COUNT, POSITION, |row| text(row.position))
+    .with("position", COUNT, POSITION, |row| optional(row.position))
+    .empty("the item was not shown")
     .with(
         "status",
         Kind::one_of(statuses),
         "whether it was answered",
         |row| {
             let was_sent = row.participant.answers.contains_key(&row.step);
-            let status = match (row.answer, was_sent) {
-                (Some(_), _) => "answered",
-                (None, true) => "left_out",
-                (None, false) => "not_sent",
+            let status = match row.answer {
+                Some(_) => "answered",
+                None if row.position.is_none() => "not_shown",
+                None if was_sent => "left_out",
+                None => "not_sent",
             };
             status.to_owned()
         },
@@ -662,6 +732,12 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
             .join("; ")
     })
     .empty(NO_LABEL)
+    .with("passed", Kind::Boolean, PASSED, |row| {
+        let passing = row.item.attention_check.as_ref();
+        let passing = passing.zip(row.answer);
+        optional(passing.map(|(passing, answer)| passing.is_passed_by(&answer.value)))
+    })
+    .empty("the item is no attention check, or was not answered")
     .with("answered_after_ms", MILLISECONDS, AFTER, |row| {
         optional(row.answer.and_then(|it| it.answered_after_ms))
     })

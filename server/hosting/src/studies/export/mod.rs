@@ -356,14 +356,9 @@ pub(super) async fn record_of(
 
 /// Sends the items of all questionnaires.
 async fn items(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<Sheet, ExportError> {
-    let stages = study.settings().stages.iter();
-    let tasks = stages.flat_map(|stage| match stage {
-        Stage::Once(task) => std::slice::from_ref(task),
-        Stage::PerCondition(tasks) => tasks,
-    });
     let mut file = TableFile::new(columns::items(), sender).await?;
-    for task in tasks {
-        let Task::Questionnaire(questionnaire) = task else {
+    for part in study.settings().stages.iter().flat_map(Stage::parts) {
+        let Task::Questionnaire(questionnaire) = &part.task else {
             continue;
         };
         for (index, item) in questionnaire.items.iter().enumerate() {
@@ -378,7 +373,7 @@ async fn items(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<She
     file.end().await
 }
 
-/// Sends the items that participants were shown, with their answers.
+/// Sends the items of the questionnaires that participants have reached, with their answers.
 async fn answers(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<Sheet, ExportError> {
     let settings = study.settings();
     let mut file = TableFile::new(columns::answers(settings), sender).await?;
@@ -397,9 +392,9 @@ async fn answers(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<S
                 .or_else(|| (sequence.len() == 1).then(|| sequence[0]));
             let answers = participant.answers.get(&step);
             let answers = answers.map_or(&[][..], |answers| answers);
-            let order = study.item_order(*number, step).unwrap_or_default();
+            let shown = study.shown_items(*number, step).unwrap_or_default();
             for (index, item) in questionnaire.items.iter().enumerate() {
-                let position = order.iter().position(|it| *it == index);
+                let position = shown.iter().position(|it| *it == index);
                 let row = AnswerRow {
                     number: *number,
                     participant,
@@ -407,7 +402,7 @@ async fn answers(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<S
                     condition: condition.map(|index| &settings.conditions[index]),
                     questionnaire,
                     item,
-                    position: position.unwrap_or(index) + 1,
+                    position: position.map(|position| position + 1),
                     answer: answers.iter().find(|answer| answer.item == index),
                 };
                 file.row(&row).await?;

@@ -496,6 +496,36 @@ class StudySlider(_message.Message):
 Global___StudySlider: _TypeAlias = StudySlider  # noqa: Y015
 
 @_typing.final
+class StudyNumber(_message.Message):
+    """An item answered by a whole number that is typed, for example an age."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    MIN_FIELD_NUMBER: _builtins.int
+    MAX_FIELD_NUMBER: _builtins.int
+    UNIT_FIELD_NUMBER: _builtins.int
+    min: _builtins.int
+    """Lowest number, -1000000..=1000000."""
+    max: _builtins.int
+    """Highest number, from `min` to 1000000."""
+    unit: _builtins.str
+    """What it counts or measures, shown beside it, at most 100 characters, for example "years"."""
+    def __init__(
+        self,
+        *,
+        min: _builtins.int = ...,
+        max: _builtins.int = ...,
+        unit: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["max", b"max", "min", b"min", "unit", b"unit"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___StudyNumber: _TypeAlias = StudyNumber  # noqa: Y015
+
+@_typing.final
 class StudyChoice(_message.Message):
     """An item answered by choosing from options."""
 
@@ -546,6 +576,84 @@ class StudyFreeText(_message.Message):
 Global___StudyFreeText: _TypeAlias = StudyFreeText  # noqa: Y015
 
 @_typing.final
+class StudyAnswerSet(_message.Message):
+    """Some of the answers to an item."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    MIN_FIELD_NUMBER: _builtins.int
+    MAX_FIELD_NUMBER: _builtins.int
+    OPTIONS_FIELD_NUMBER: _builtins.int
+    min: _builtins.int
+    """For an item answered by a number: the lowest of them; unset: there is none."""
+    max: _builtins.int
+    """For an item answered by a number: the highest of them; unset: there is none."""
+    @_builtins.property
+    def options(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
+        """For a choice: indices of options, from 0."""
+
+    def __init__(
+        self,
+        *,
+        min: _builtins.int | None = ...,
+        max: _builtins.int | None = ...,
+        options: _abc.Iterable[_builtins.int] | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["_max", b"_max", "_min", b"_min", "max", b"max", "min", b"min"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_max", b"_max", "_min", b"_min", "max", b"max", "min", b"min", "options", b"options"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    _WhichOneofReturnType__max: _TypeAlias = _typing.Literal["max"]  # noqa: Y015
+    _WhichOneofArgType__max: _TypeAlias = _typing.Literal["_max", b"_max"]  # noqa: Y015
+    _WhichOneofReturnType__min: _TypeAlias = _typing.Literal["min"]  # noqa: Y015
+    _WhichOneofArgType__min: _TypeAlias = _typing.Literal["_min", b"_min"]  # noqa: Y015
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__max) -> _WhichOneofReturnType__max | None: ...
+    @_typing.overload
+    def WhichOneof(self, oneof_group: _WhichOneofArgType__min) -> _WhichOneofReturnType__min | None: ...
+
+Global___StudyAnswerSet: _TypeAlias = StudyAnswerSet  # noqa: Y015
+
+@_typing.final
+class StudyShownIf(_message.Message):
+    """What an earlier answer must be for something to be shown."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    QUESTIONNAIRE_FIELD_NUMBER: _builtins.int
+    ITEM_FIELD_NUMBER: _builtins.int
+    ANSWERS_FIELD_NUMBER: _builtins.int
+    NOT_FIELD_NUMBER: _builtins.int
+    questionnaire: _builtins.str
+    """Id of a questionnaire that participants meet earlier. Empty: the item's own, which is not
+    `shuffled` then.
+    """
+    item: _builtins.str
+    """Id of its item, which is answered by a number or a choice; in the item's own questionnaire, one
+    that comes before.
+    """
+    @_builtins.property
+    def answers(self) -> Global___StudyAnswerSet:
+        """Its answer is one of these, or has one of these options. If it was answered several times, the
+        last answer counts.
+        """
+
+    def __init__(
+        self,
+        *,
+        questionnaire: _builtins.str = ...,
+        item: _builtins.str = ...,
+        answers: Global___StudyAnswerSet | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["answers", b"answers"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["answers", b"answers", "item", b"item", "not", b"not", "questionnaire", b"questionnaire"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___StudyShownIf: _TypeAlias = StudyShownIf  # noqa: Y015
+
+@_typing.final
 class StudyItem(_message.Message):
     """An item of a questionnaire."""
 
@@ -560,6 +668,9 @@ class StudyItem(_message.Message):
     SLIDER_FIELD_NUMBER: _builtins.int
     CHOICE_FIELD_NUMBER: _builtins.int
     FREE_TEXT_FIELD_NUMBER: _builtins.int
+    NUMBER_FIELD_NUMBER: _builtins.int
+    SHOWN_IF_FIELD_NUMBER: _builtins.int
+    ATTENTION_CHECK_FIELD_NUMBER: _builtins.int
     id: _builtins.str
     """Identifies it in the questionnaire and in exported data: 1..=64 letters, digits, `_`, `-` or
     `.`.
@@ -567,7 +678,9 @@ class StudyItem(_message.Message):
     scale: _builtins.str
     """The scale it belongs to, at most 64 characters, or empty."""
     text: _builtins.str
-    """The question or statement, 1..=500 characters; may be empty for a semantic differential."""
+    """The question or statement, 1..=500 characters of Markdown (StudyText); may be empty for a semantic
+    differential.
+    """
     optional: _builtins.bool
     """Whether it may be left unanswered. By default an item must be answered."""
     @_builtins.property
@@ -590,6 +703,20 @@ class StudyItem(_message.Message):
     def free_text(self) -> Global___StudyFreeText:
         """In words."""
 
+    @_builtins.property
+    def number(self) -> Global___StudyNumber:
+        """By a number."""
+
+    @_builtins.property
+    def shown_if(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyShownIf]:
+        """It is shown only if all of these hold, at most 4."""
+
+    @_builtins.property
+    def attention_check(self) -> Global___StudyAnswerSet:
+        """Set for an attention check: the answers that pass it, for a choice the options that are chosen
+        and no others. Participants do not learn it; exported data say who passed.
+        """
+
     def __init__(
         self,
         *,
@@ -602,12 +729,15 @@ class StudyItem(_message.Message):
         slider: Global___StudySlider | None = ...,
         choice: Global___StudyChoice | None = ...,
         free_text: Global___StudyFreeText | None = ...,
+        number: Global___StudyNumber | None = ...,
+        shown_if: _abc.Iterable[Global___StudyShownIf] | None = ...,
+        attention_check: Global___StudyAnswerSet | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["choice", b"choice", "free_text", b"free_text", "kind", b"kind", "likert", b"likert", "semantic_differential", b"semantic_differential", "slider", b"slider"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["attention_check", b"attention_check", "choice", b"choice", "free_text", b"free_text", "kind", b"kind", "likert", b"likert", "number", b"number", "semantic_differential", b"semantic_differential", "slider", b"slider"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["choice", b"choice", "free_text", b"free_text", "id", b"id", "kind", b"kind", "likert", b"likert", "optional", b"optional", "scale", b"scale", "semantic_differential", b"semantic_differential", "slider", b"slider", "text", b"text"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["attention_check", b"attention_check", "choice", b"choice", "free_text", b"free_text", "id", b"id", "kind", b"kind", "likert", b"likert", "number", b"number", "optional", b"optional", "scale", b"scale", "semantic_differential", b"semantic_differential", "shown_if", b"shown_if", "slider", b"slider", "text", b"text"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_kind: _TypeAlias = _typing.Literal["likert", "semantic_differential", "slider", "choice", "free_text"]  # noqa: Y015
+    _WhichOneofReturnType_kind: _TypeAlias = _typing.Literal["likert", "semantic_differential", "slider", "choice", "free_text", "number"]  # noqa: Y015
     _WhichOneofArgType_kind: _TypeAlias = _typing.Literal["kind", b"kind"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_kind) -> _WhichOneofReturnType_kind | None: ...
 
@@ -638,7 +768,9 @@ class StudyQuestionnaire(_message.Message):
     title: _builtins.str
     """Title, at most 128 characters; by default that of the template."""
     instructions: _builtins.str
-    """Text above the items, at most 2000 characters; by default that of the template."""
+    """Text above the items, at most 2000 characters of Markdown (StudyText); by default that of the
+    template.
+    """
     shuffled: _builtins.bool
     """Whether each participant meets the items in a random order of its own, which exported data have."""
     @_builtins.property
@@ -672,7 +804,7 @@ class StudyConsent(_message.Message):
     TEXT_FIELD_NUMBER: _builtins.int
     VERSION_FIELD_NUMBER: _builtins.int
     text: _builtins.str
-    """The text, 1..=20000 characters. Blank lines separate paragraphs."""
+    """The text, 1..=20000 characters of Markdown (StudyText)."""
     version: _builtins.str
     """Its version, 1..=64 characters, which is recorded with the SHA-256 of the text and the time."""
     def __init__(
@@ -698,7 +830,7 @@ class StudyExternalQuestionnaire(_message.Message):
     TEXT_FIELD_NUMBER: _builtins.int
     URL_FIELD_NUMBER: _builtins.int
     text: _builtins.str
-    """What the participant reads first, at most 2000 characters."""
+    """What the participant reads first, at most 2000 characters of Markdown (StudyText)."""
     url: _builtins.str
     """Its address, which begins with https://. "{participant}" stands for the pseudonym."""
     def __init__(
@@ -726,7 +858,9 @@ class StudyText(_message.Message):
     title: _builtins.str
     """Its title, at most 128 characters."""
     text: _builtins.str
-    """The text, 1..=20000 characters. Blank lines separate paragraphs."""
+    """The text, 1..=20000 characters of Markdown (CommonMark): paragraphs, headings, lists, quotations,
+    emphasis, code and links. A page shows HTML and pictures in it as they are written.
+    """
     def __init__(
         self,
         *,
@@ -824,6 +958,7 @@ class StudyStage(_message.Message):
     GAMES_FIELD_NUMBER: _builtins.int
     TEXT_FIELD_NUMBER: _builtins.int
     PER_CONDITION_FIELD_NUMBER: _builtins.int
+    SHOWN_IF_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def consent(self) -> Global___StudyConsent:
         """Agrees to a text; only as the first stage."""
@@ -852,6 +987,12 @@ class StudyStage(_message.Message):
     def per_condition(self) -> Global___StudyBlock:
         """Does these stages for each of its conditions."""
 
+    @_builtins.property
+    def shown_if(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyShownIf]:
+        """Participants pass over it unless all of these hold, at most 4. Not for consent, games and
+        `per_condition`.
+        """
+
     def __init__(
         self,
         *,
@@ -862,10 +1003,11 @@ class StudyStage(_message.Message):
         games: Global___StudyGames | None = ...,
         text: Global___StudyText | None = ...,
         per_condition: Global___StudyBlock | None = ...,
+        shown_if: _abc.Iterable[Global___StudyShownIf] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "external_questionnaire", b"external_questionnaire", "games", b"games", "per_condition", b"per_condition", "practice", b"practice", "questionnaire", b"questionnaire", "stage", b"stage", "text", b"text"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "external_questionnaire", b"external_questionnaire", "games", b"games", "per_condition", b"per_condition", "practice", b"practice", "questionnaire", b"questionnaire", "stage", b"stage", "text", b"text"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "external_questionnaire", b"external_questionnaire", "games", b"games", "per_condition", b"per_condition", "practice", b"practice", "questionnaire", b"questionnaire", "shown_if", b"shown_if", "stage", b"stage", "text", b"text"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType_stage: _TypeAlias = _typing.Literal["consent", "questionnaire", "external_questionnaire", "practice", "games", "text", "per_condition"]  # noqa: Y015
     _WhichOneofArgType_stage: _TypeAlias = _typing.Literal["stage", b"stage"]  # noqa: Y015
@@ -1488,6 +1630,8 @@ class StudyShownItem(_message.Message):
     SLIDER_FIELD_NUMBER: _builtins.int
     CHOICE_FIELD_NUMBER: _builtins.int
     FREE_TEXT_FIELD_NUMBER: _builtins.int
+    NUMBER_FIELD_NUMBER: _builtins.int
+    SHOWN_IF_FIELD_NUMBER: _builtins.int
     item: _builtins.int
     """Identifies it in StudyItemAnswer."""
     text: _builtins.str
@@ -1514,6 +1658,14 @@ class StudyShownItem(_message.Message):
     def free_text(self) -> Global___StudyFreeText:
         """In words."""
 
+    @_builtins.property
+    def number(self) -> Global___StudyNumber:
+        """By a number."""
+
+    @_builtins.property
+    def shown_if(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyShownItemIf]:
+        """It is shown, and answered, only while all of these hold."""
+
     def __init__(
         self,
         *,
@@ -1525,16 +1677,47 @@ class StudyShownItem(_message.Message):
         slider: Global___StudySlider | None = ...,
         choice: Global___StudyChoice | None = ...,
         free_text: Global___StudyFreeText | None = ...,
+        number: Global___StudyNumber | None = ...,
+        shown_if: _abc.Iterable[Global___StudyShownItemIf] | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["choice", b"choice", "free_text", b"free_text", "kind", b"kind", "likert", b"likert", "semantic_differential", b"semantic_differential", "slider", b"slider"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["choice", b"choice", "free_text", b"free_text", "kind", b"kind", "likert", b"likert", "number", b"number", "semantic_differential", b"semantic_differential", "slider", b"slider"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["choice", b"choice", "free_text", b"free_text", "item", b"item", "kind", b"kind", "likert", b"likert", "optional", b"optional", "semantic_differential", b"semantic_differential", "slider", b"slider", "text", b"text"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["choice", b"choice", "free_text", b"free_text", "item", b"item", "kind", b"kind", "likert", b"likert", "number", b"number", "optional", b"optional", "semantic_differential", b"semantic_differential", "shown_if", b"shown_if", "slider", b"slider", "text", b"text"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_kind: _TypeAlias = _typing.Literal["likert", "semantic_differential", "slider", "choice", "free_text"]  # noqa: Y015
+    _WhichOneofReturnType_kind: _TypeAlias = _typing.Literal["likert", "semantic_differential", "slider", "choice", "free_text", "number"]  # noqa: Y015
     _WhichOneofArgType_kind: _TypeAlias = _typing.Literal["kind", b"kind"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_kind) -> _WhichOneofReturnType_kind | None: ...
 
 Global___StudyShownItem: _TypeAlias = StudyShownItem  # noqa: Y015
+
+@_typing.final
+class StudyShownItemIf(_message.Message):
+    """What the answer to another item of the questionnaire must be for an item to be shown."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    ITEM_FIELD_NUMBER: _builtins.int
+    ANSWERS_FIELD_NUMBER: _builtins.int
+    NOT_FIELD_NUMBER: _builtins.int
+    item: _builtins.int
+    """`item` of that StudyShownItem, which comes before."""
+    @_builtins.property
+    def answers(self) -> Global___StudyAnswerSet:
+        """Its answer is one of these, or has one of these options. An item that is not shown has no answer."""
+
+    def __init__(
+        self,
+        *,
+        item: _builtins.int = ...,
+        answers: Global___StudyAnswerSet | None = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _typing.Literal["answers", b"answers"]  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["answers", b"answers", "item", b"item", "not", b"not"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___StudyShownItemIf: _TypeAlias = StudyShownItemIf  # noqa: Y015
 
 @_typing.final
 class StudyShownGame(_message.Message):

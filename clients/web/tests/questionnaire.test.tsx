@@ -1,0 +1,136 @@
+// A questionnaire: items that depend on answers, numbers, statements as a table, and texts in Markdown.
+
+import { create } from "@bufbuild/protobuf";
+import { type ComponentChild, render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, expect, test } from "vitest";
+import { StudyShownQuestionnaireSchema } from "../src/gen/chefshat/v1/study_pb";
+import { Formatted, FormattedQuestion, plainText } from "../src/studies/Formatted";
+import type { ItemAnswer } from "../src/studies/participating";
+import { Questionnaire } from "../src/studies/Questionnaire";
+import { root } from "./mounted";
+
+const LIKERT = { case: "likert" as const, value: { points: 5, labels: ["no", "yes"] } };
+const AGE = { case: "number" as const, value: { min: 18, max: 99, unit: "years" } };
+const GAMES = { case: "choice" as const, value: { options: ["cards", "chess"], multiple: true } };
+
+afterEach(() => act(() => render(null, root)));
+
+const show = (what: ComponentChild) => act(() => render(what, root));
+const shownItems = () => [...root.querySelectorAll<HTMLElement>("[data-item]")].map(({ dataset }) => dataset.item);
+const field = (item: number, which = "input") => {
+  const found = root.querySelector<HTMLInputElement>(`[data-item="${item}"] ${which}`);
+  if (!found) throw new Error(`${item} has no ${which}`);
+  return found;
+};
+const type = (item: number, text: string) =>
+  act(() => {
+    field(item).value = text;
+    field(item).dispatchEvent(new Event("input", { bubbles: true }));
+  });
+const faults = () => [...root.querySelectorAll('[id$="-fault"]')].map((fault) => fault.textContent);
+
+/** The form of a questionnaire, and what it sends. */
+async function shown(items: NonNullable<Parameters<typeof create<typeof StudyShownQuestionnaireSchema>>[1]>["items"]) {
+  const sent: ItemAnswer[][] = [];
+  const part = {
+    progress: () => ({ step: 0, reachedAtMs: 0, saved: [] }),
+    save: async () => {},
+    answer: async (answers: ItemAnswer[]) => {
+      sent.push(answers);
+    },
+  };
+  const questionnaire = create(StudyShownQuestionnaireSchema, { title: "Before", items: items ?? [] });
+  await show(<Questionnaire questionnaire={questionnaire} part={part} />);
+  const send = () => act(() => root.querySelector<HTMLButtonElement>('button[type="submit"]')?.click());
+  const values = () => sent.at(-1)?.map(({ item, value }) => [item, value?.value]);
+  return { send, sent, values };
+}
+
+test("an item is shown only for the answers that it depends on, and only then asked for and sent", async () => {
+  const answers = { options: [0] };
+  const { send, values } = await shown([
+    { item: 0, text: "What do you play?", optional: true, kind: GAMES },
+    { item: 1, text: "How long?", kind: AGE, shownIf: [{ item: 0, answers }] },
+    { item: 2, text: "Would you like to?", kind: LIKERT, shownIf: [{ item: 0, answers, not: true }] },
+    { item: 3, text: "Since when?", kind: AGE, shownIf: [{ item: 1, answers: { min: 50 } }] },
+  ]);
+  expect(shownItems()).toEqual(["0", "2"]);
+  await act(() => field(0).click());
+  expect(shownItems()).toEqual(["0", "1"]);
+  await type(1, "50");
+  expect(shownItems()).toEqual(["0", "1", "3"]);
+  await send();
+  expect(faults()).toEqual(["A whole number from 18 to 99"]);
+  // What it depends on is not shown any more, and so has no answer.
+  await act(() => field(0).click());
+  expect(shownItems()).toEqual(["0", "2"]);
+  await act(() => field(2, 'input[value="4"]').click());
+  await send();
+  expect(values()).toEqual([[2, 4]]);
+});
+
+test("a number that is none, or too small or large, is corrected before it is sent", async () => {
+  const { send, sent, values } = await shown([{ item: 0, text: "Your age?", optional: true, kind: AGE }]);
+  for (const wrong of ["17", "100", "old", "20.5", "2e1", "-20"]) {
+    await type(0, wrong);
+    await send();
+    expect(faults(), wrong).toEqual(["A whole number from 18 to 99"]);
+  }
+  expect(sent).toEqual([]);
+  // Without an answer it is left out.
+  await type(0, "");
+  expect(faults()).toEqual([]);
+  await type(0, " 20 ");
+  await send();
+  expect(values()).toEqual([[0, 20]]);
+});
+
+test("statements with the same points are a table with one head, and groups of their own for a screen reader", async () => {
+  const other = { case: "likert" as const, value: { points: 5, labels: ["never", "often"] } };
+  await shown([
+    ...[0, 1, 2].map((item) => ({ item, text: `Statement ${item}`, kind: LIKERT })),
+    ...[3, 4].map((item) => ({ item, text: `Statement ${item}`, kind: other })),
+  ]);
+  const tables = root.querySelectorAll('[data-part="item-table"]');
+  expect(tables).toHaveLength(1);
+  expect(tables[0]?.querySelectorAll("fieldset")).toHaveLength(3);
+  expect(tables[0]?.querySelector('[aria-hidden="true"]')?.textContent).toBe("noyes");
+  expect(field(2, 'input[value="5"]').getAttribute("aria-label")).toBe("5 of 5: yes");
+  expect(root.querySelectorAll("fieldset")).toHaveLength(5);
+});
+
+test("a text is Markdown, in which nothing runs", async () => {
+  const text = [
+    "# Welcome",
+    "You *may* **stop**,\nat any `time`.",
+    "1. one\n2. two\n\n- [site](https://example.org/a?b=c), [script](javascript:alert(1)), [named][n]",
+    "[n]: https://example.com/",
+    '<img src="x" onerror="alert(1)"> <script>alert(1)</script>',
+    "![a card](https://example.org/card.png)",
+    "> said\n\n---",
+  ].join("\n\n");
+  await show(<Formatted text={text} />);
+  expect(root.querySelector("h2")?.textContent).toBe("Welcome");
+  expect(root.querySelector("em")?.textContent).toBe("may");
+  expect(root.querySelector("p")?.textContent).toBe("You may stop,\nat any time.");
+  expect(root.querySelectorAll("ol li")).toHaveLength(2);
+  const links = [...root.querySelectorAll("a")];
+  expect(links.map(({ href, textContent }) => [href, textContent])).toEqual([
+    ["https://example.org/a?b=c", "site"],
+    ["https://example.com/", "named"],
+  ]);
+  expect(links.every(({ target, rel }) => target === "_blank" && rel.includes("noopener"))).toBe(true);
+  expect(root.textContent).toContain("script");
+  expect(root.querySelectorAll("img, script")).toHaveLength(0);
+  expect(root.textContent).toContain('<img src="x" onerror="alert(1)">');
+  expect(root.textContent).toContain("a card");
+  expect(root.querySelector("blockquote")?.textContent).toBe("said");
+});
+
+test("a question has markup, and its field a name without", async () => {
+  await show(<FormattedQuestion text={"How *sure*\n\nare you?"} />);
+  expect(root.querySelectorAll("p")).toHaveLength(0);
+  expect(root.querySelector("em")?.textContent).toBe("sure");
+  expect(plainText("How *sure* are [you](https://example.org)?")).toBe("How sure are you?");
+});
