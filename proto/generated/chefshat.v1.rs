@@ -8739,7 +8739,7 @@ pub struct StudyAnswerSet {
     /// For an item answered by a number: the highest of them; unset: there is none.
     #[prost(sint32, optional, tag = "2")]
     pub max: ::core::option::Option<i32>,
-    /// For a choice: indices of options, from 0.
+    /// For a choice: indices of options, from 0, ascending.
     #[prost(uint32, repeated, tag = "3")]
     pub options: ::prost::alloc::vec::Vec<u32>,
 }
@@ -8754,8 +8754,8 @@ pub struct StudyShownIf {
     /// that comes before.
     #[prost(string, tag = "2")]
     pub item: ::prost::alloc::string::String,
-    /// Its answer is one of these, or has one of these options. If it was answered several times, the
-    /// last answer counts.
+    /// Its answer is one of these, or has one of these options. Of a questionnaire that was answered
+    /// several times, the last time counts; within `per_condition`, that of the same condition.
     #[prost(message, optional, tag = "3")]
     pub answers: ::core::option::Option<StudyAnswerSet>,
     /// The answer is none of these, or there is none.
@@ -8869,7 +8869,8 @@ pub struct StudyText {
     #[prost(string, tag = "1")]
     pub title: ::prost::alloc::string::String,
     /// The text, 1..=20000 characters of Markdown (CommonMark): paragraphs, headings, lists, quotations,
-    /// emphasis, code and links. A page shows HTML and pictures in it as they are written.
+    /// emphasis, code and links. A page shows HTML in it as it is written, and the words of pictures. Of
+    /// questions, only the markup within paragraphs counts.
     #[prost(string, tag = "2")]
     pub text: ::prost::alloc::string::String,
 }
@@ -9138,6 +9139,9 @@ pub struct StudyParticipant {
     /// Its id at the panel (StudyRecruiting); empty if there is none, and after its data were deleted.
     #[prost(string, tag = "14")]
     pub panel_id: ::prost::alloc::string::String,
+    /// Whether it is a test participant (AddStudyParticipantsRequest).
+    #[prost(bool, tag = "15")]
+    pub test: bool,
 }
 /// The link of a participant.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -9180,7 +9184,7 @@ pub struct Study {
     /// Number of games of every participant, without practice.
     #[prost(uint32, tag = "7")]
     pub games: u32,
-    /// Number of practice games of every participant.
+    /// Most practice games of a participant: some may pass over them.
     #[prost(uint32, tag = "8")]
     pub practice_games: u32,
     /// Number of participants, with those who have left.
@@ -9202,6 +9206,9 @@ pub struct Study {
     /// for it is the path "/study/" and this text.
     #[prost(string, tag = "14")]
     pub open_link: ::prost::alloc::string::String,
+    /// Number of test participants, which no other number here counts.
+    #[prost(uint32, tag = "15")]
+    pub test_participants: u32,
 }
 /// What a participant is shown now. This and all that follows reaches participants.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -9224,6 +9231,9 @@ pub struct StudyView {
     /// Whether the page should send interface traces (RecordTraces).
     #[prost(bool, tag = "6")]
     pub traces: bool,
+    /// Whether this is a test participant, who may continue without answering and playing (ContinueStudy).
+    #[prost(bool, tag = "13")]
+    pub test: bool,
     /// What is shown.
     #[prost(oneof = "study_view::Content", tags = "7, 8, 9, 10, 11, 12")]
     pub content: ::core::option::Option<study_view::Content>,
@@ -9259,7 +9269,7 @@ pub struct StudyShownQuestionnaire {
     /// Title, or empty.
     #[prost(string, tag = "1")]
     pub title: ::prost::alloc::string::String,
-    /// Text above the items, or empty.
+    /// Text above the items in Markdown (StudyText), or empty.
     #[prost(string, tag = "2")]
     pub instructions: ::prost::alloc::string::String,
     /// The items, in the order in which to show them.
@@ -9272,7 +9282,7 @@ pub struct StudyShownItem {
     /// Identifies it in StudyItemAnswer.
     #[prost(uint32, tag = "1")]
     pub item: u32,
-    /// The question or statement; may be empty for a semantic differential.
+    /// The question or statement in Markdown (StudyText); may be empty for a semantic differential.
     #[prost(string, tag = "2")]
     pub text: ::prost::alloc::string::String,
     /// Whether it may be left unanswered.
@@ -9384,7 +9394,7 @@ pub mod study_item_answer {
     /// The answer.
     #[derive(Clone, PartialEq, Eq, Hash, ::prost::Oneof)]
     pub enum Value {
-        /// A point, from 1, or the value of a slider.
+        /// A point, from 1, the value of a slider, or a number.
         #[prost(sint32, tag = "2")]
         Number(i32),
         /// The chosen options.
@@ -9802,6 +9812,11 @@ pub struct AddStudyParticipantsRequest {
     /// Number of participants to add besides those, named by number such as "P01", at most 1000.
     #[prost(uint32, tag = "4")]
     pub count: u32,
+    /// Whether they are test participants: they go through the study as others do, with conditions in the
+    /// same order of slots, but take no slot from those; no count and no exported data of others include
+    /// them. Those named by number are called "T01" and so on.
+    #[prost(bool, tag = "5")]
+    pub test: bool,
 }
 /// The added participants.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -9900,6 +9915,9 @@ pub struct ExportStudyRequest {
     /// `owner_token` of CreateStudyResponse.
     #[prost(string, tag = "2")]
     pub owner_token: ::prost::alloc::string::String,
+    /// Whether to export the data of its test participants, instead of those of all others.
+    #[prost(bool, tag = "3")]
+    pub test: bool,
 }
 /// A part of the data.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -10047,7 +10065,8 @@ pub struct AnswerQuestionnaireRequest {
     /// `step` of the view that was shown.
     #[prost(uint32, tag = "2")]
     pub step: u32,
-    /// The answers, at most one for each item and one for each that is not optional.
+    /// The answers, at most one for each item that is shown after them (`shown_if` of StudyShownItem), and
+    /// one for each of these that is not optional.
     #[prost(message, repeated, tag = "3")]
     pub answers: ::prost::alloc::vec::Vec<StudyItemAnswer>,
 }
@@ -10067,7 +10086,7 @@ pub struct SaveAnswersRequest {
     /// `step` of the view that was shown.
     #[prost(uint32, tag = "2")]
     pub step: u32,
-    /// All that was entered so far, at most one answer for each item.
+    /// All that was entered so far, at most one answer for each item that is shown after it.
     #[prost(message, repeated, tag = "3")]
     pub answers: ::prost::alloc::vec::Vec<StudyItemAnswer>,
 }
@@ -11572,7 +11591,9 @@ pub mod participation_service_client {
                 );
             self.inner.unary(req, path, codec).await
         }
-        /// Continues from a text, a questionnaire on another site, or a game that has ended.
+        /// Continues from a text, a questionnaire on another site, or a game that has ended. A test participant
+        /// continues from a questionnaire, too, without answers; a game of its that runs is closed first, and
+        /// the view says when it has ended.
         /// FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
         pub async fn continue_study(
             &mut self,
@@ -11753,7 +11774,9 @@ pub mod participation_service_server {
             tonic::Response<super::SaveAnswersResponse>,
             tonic::Status,
         >;
-        /// Continues from a text, a questionnaire on another site, or a game that has ended.
+        /// Continues from a text, a questionnaire on another site, or a game that has ended. A test participant
+        /// continues from a questionnaire, too, without answers; a game of its that runs is closed first, and
+        /// the view says when it has ended.
         /// FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
         async fn continue_study(
             &self,

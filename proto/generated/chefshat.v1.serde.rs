@@ -1387,6 +1387,9 @@ impl serde::Serialize for AddStudyParticipantsRequest {
         if self.count != 0 {
             len += 1;
         }
+        if self.test {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.AddStudyParticipantsRequest", len)?;
         if !self.study_id.is_empty() {
             struct_ser.serialize_field("studyId", &self.study_id)?;
@@ -1399,6 +1402,9 @@ impl serde::Serialize for AddStudyParticipantsRequest {
         }
         if self.count != 0 {
             struct_ser.serialize_field("count", &self.count)?;
+        }
+        if self.test {
+            struct_ser.serialize_field("test", &self.test)?;
         }
         struct_ser.end()
     }
@@ -1416,6 +1422,7 @@ impl<'de> serde::Deserialize<'de> for AddStudyParticipantsRequest {
             "ownerToken",
             "pseudonyms",
             "count",
+            "test",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -1424,6 +1431,7 @@ impl<'de> serde::Deserialize<'de> for AddStudyParticipantsRequest {
             OwnerToken,
             Pseudonyms,
             Count,
+            Test,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -1449,6 +1457,7 @@ impl<'de> serde::Deserialize<'de> for AddStudyParticipantsRequest {
                             "ownerToken" | "owner_token" => Ok(GeneratedField::OwnerToken),
                             "pseudonyms" => Ok(GeneratedField::Pseudonyms),
                             "count" => Ok(GeneratedField::Count),
+                            "test" => Ok(GeneratedField::Test),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -1472,6 +1481,7 @@ impl<'de> serde::Deserialize<'de> for AddStudyParticipantsRequest {
                 let mut owner_token__ = None;
                 let mut pseudonyms__ = None;
                 let mut count__ = None;
+                let mut test__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::StudyId => {
@@ -1500,6 +1510,12 @@ impl<'de> serde::Deserialize<'de> for AddStudyParticipantsRequest {
                                 Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
                             ;
                         }
+                        GeneratedField::Test => {
+                            if test__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("test"));
+                            }
+                            test__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(AddStudyParticipantsRequest {
@@ -1507,6 +1523,7 @@ impl<'de> serde::Deserialize<'de> for AddStudyParticipantsRequest {
                     owner_token: owner_token__.unwrap_or_default(),
                     pseudonyms: pseudonyms__.unwrap_or_default(),
                     count: count__.unwrap_or_default(),
+                    test: test__.unwrap_or_default(),
                 })
             }
         }
@@ -10365,12 +10382,18 @@ impl serde::Serialize for ExportStudyRequest {
         if !self.owner_token.is_empty() {
             len += 1;
         }
+        if self.test {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.ExportStudyRequest", len)?;
         if !self.study_id.is_empty() {
             struct_ser.serialize_field("studyId", &self.study_id)?;
         }
         if !self.owner_token.is_empty() {
             struct_ser.serialize_field("ownerToken", &self.owner_token)?;
+        }
+        if self.test {
+            struct_ser.serialize_field("test", &self.test)?;
         }
         struct_ser.end()
     }
@@ -10386,12 +10409,14 @@ impl<'de> serde::Deserialize<'de> for ExportStudyRequest {
             "studyId",
             "owner_token",
             "ownerToken",
+            "test",
         ];
 
         #[allow(clippy::enum_variant_names)]
         enum GeneratedField {
             StudyId,
             OwnerToken,
+            Test,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -10415,6 +10440,7 @@ impl<'de> serde::Deserialize<'de> for ExportStudyRequest {
                         match value {
                             "studyId" | "study_id" => Ok(GeneratedField::StudyId),
                             "ownerToken" | "owner_token" => Ok(GeneratedField::OwnerToken),
+                            "test" => Ok(GeneratedField::Test),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -10436,6 +10462,7 @@ impl<'de> serde::Deserialize<'de> for ExportStudyRequest {
             {
                 let mut study_id__ = None;
                 let mut owner_token__ = None;
+                let mut test__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::StudyId => {
@@ -10450,11 +10477,18 @@ impl<'de> serde::Deserialize<'de> for ExportStudyRequest {
                             }
                             owner_token__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::Test => {
+                            if test__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("test"));
+                            }
+                            test__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(ExportStudyRequest {
                     study_id: study_id__.unwrap_or_default(),
                     owner_token: owner_token__.unwrap_or_default(),
+                    test: test__.unwrap_or_default(),
                 })
             }
         }
@@ -35558,6 +35592,9 @@ impl serde::Serialize for Study {
         if !self.open_link.is_empty() {
             len += 1;
         }
+        if self.test_participants != 0 {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.Study", len)?;
         if !self.study_id.is_empty() {
             struct_ser.serialize_field("studyId", &self.study_id)?;
@@ -35605,6 +35642,9 @@ impl serde::Serialize for Study {
         if !self.open_link.is_empty() {
             struct_ser.serialize_field("openLink", &self.open_link)?;
         }
+        if self.test_participants != 0 {
+            struct_ser.serialize_field("testParticipants", &self.test_participants)?;
+        }
         struct_ser.end()
     }
 }
@@ -35634,6 +35674,8 @@ impl<'de> serde::Deserialize<'de> for Study {
             "left",
             "open_link",
             "openLink",
+            "test_participants",
+            "testParticipants",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -35652,6 +35694,7 @@ impl<'de> serde::Deserialize<'de> for Study {
             Completed,
             Left,
             OpenLink,
+            TestParticipants,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -35687,6 +35730,7 @@ impl<'de> serde::Deserialize<'de> for Study {
                             "completed" => Ok(GeneratedField::Completed),
                             "left" => Ok(GeneratedField::Left),
                             "openLink" | "open_link" => Ok(GeneratedField::OpenLink),
+                            "testParticipants" | "test_participants" => Ok(GeneratedField::TestParticipants),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -35720,6 +35764,7 @@ impl<'de> serde::Deserialize<'de> for Study {
                 let mut completed__ = None;
                 let mut left__ = None;
                 let mut open_link__ = None;
+                let mut test_participants__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::StudyId => {
@@ -35826,6 +35871,14 @@ impl<'de> serde::Deserialize<'de> for Study {
                             }
                             open_link__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::TestParticipants => {
+                            if test_participants__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("testParticipants"));
+                            }
+                            test_participants__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
                     }
                 }
                 Ok(Study {
@@ -35843,6 +35896,7 @@ impl<'de> serde::Deserialize<'de> for Study {
                     completed: completed__.unwrap_or_default(),
                     left: left__.unwrap_or_default(),
                     open_link: open_link__.unwrap_or_default(),
+                    test_participants: test_participants__.unwrap_or_default(),
                 })
             }
         }
@@ -39056,6 +39110,9 @@ impl serde::Serialize for StudyParticipant {
         if !self.panel_id.is_empty() {
             len += 1;
         }
+        if self.test {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyParticipant", len)?;
         if self.number != 0 {
             struct_ser.serialize_field("number", &self.number)?;
@@ -39105,6 +39162,9 @@ impl serde::Serialize for StudyParticipant {
         if !self.panel_id.is_empty() {
             struct_ser.serialize_field("panelId", &self.panel_id)?;
         }
+        if self.test {
+            struct_ser.serialize_field("test", &self.test)?;
+        }
         struct_ser.end()
     }
 }
@@ -39133,6 +39193,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
             "dataDeleted",
             "panel_id",
             "panelId",
+            "test",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -39151,6 +39212,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
             Games,
             DataDeleted,
             PanelId,
+            Test,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -39186,6 +39248,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                             "games" => Ok(GeneratedField::Games),
                             "dataDeleted" | "data_deleted" => Ok(GeneratedField::DataDeleted),
                             "panelId" | "panel_id" => Ok(GeneratedField::PanelId),
+                            "test" => Ok(GeneratedField::Test),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -39219,6 +39282,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                 let mut games__ = None;
                 let mut data_deleted__ = None;
                 let mut panel_id__ = None;
+                let mut test__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Number => {
@@ -39317,6 +39381,12 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                             }
                             panel_id__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::Test => {
+                            if test__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("test"));
+                            }
+                            test__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(StudyParticipant {
@@ -39334,6 +39404,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                     games: games__.unwrap_or_default(),
                     data_deleted: data_deleted__.unwrap_or_default(),
                     panel_id: panel_id__.unwrap_or_default(),
+                    test: test__.unwrap_or_default(),
                 })
             }
         }
@@ -42332,6 +42403,9 @@ impl serde::Serialize for StudyView {
         if self.traces {
             len += 1;
         }
+        if self.test {
+            len += 1;
+        }
         if self.content.is_some() {
             len += 1;
         }
@@ -42353,6 +42427,9 @@ impl serde::Serialize for StudyView {
         }
         if self.traces {
             struct_ser.serialize_field("traces", &self.traces)?;
+        }
+        if self.test {
+            struct_ser.serialize_field("test", &self.test)?;
         }
         if let Some(v) = self.content.as_ref() {
             match v {
@@ -42392,6 +42469,7 @@ impl<'de> serde::Deserialize<'de> for StudyView {
             "step",
             "steps",
             "traces",
+            "test",
             "consent",
             "questionnaire",
             "external_questionnaire",
@@ -42409,6 +42487,7 @@ impl<'de> serde::Deserialize<'de> for StudyView {
             Step,
             Steps,
             Traces,
+            Test,
             Consent,
             Questionnaire,
             ExternalQuestionnaire,
@@ -42442,6 +42521,7 @@ impl<'de> serde::Deserialize<'de> for StudyView {
                             "step" => Ok(GeneratedField::Step),
                             "steps" => Ok(GeneratedField::Steps),
                             "traces" => Ok(GeneratedField::Traces),
+                            "test" => Ok(GeneratedField::Test),
                             "consent" => Ok(GeneratedField::Consent),
                             "questionnaire" => Ok(GeneratedField::Questionnaire),
                             "externalQuestionnaire" | "external_questionnaire" => Ok(GeneratedField::ExternalQuestionnaire),
@@ -42473,6 +42553,7 @@ impl<'de> serde::Deserialize<'de> for StudyView {
                 let mut step__ = None;
                 let mut steps__ = None;
                 let mut traces__ = None;
+                let mut test__ = None;
                 let mut content__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
@@ -42515,6 +42596,12 @@ impl<'de> serde::Deserialize<'de> for StudyView {
                                 return Err(serde::de::Error::duplicate_field("traces"));
                             }
                             traces__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::Test => {
+                            if test__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("test"));
+                            }
+                            test__ = Some(map_.next_value()?);
                         }
                         GeneratedField::Consent => {
                             if content__.is_some() {
@@ -42567,6 +42654,7 @@ impl<'de> serde::Deserialize<'de> for StudyView {
                     step: step__.unwrap_or_default(),
                     steps: steps__.unwrap_or_default(),
                     traces: traces__.unwrap_or_default(),
+                    test: test__.unwrap_or_default(),
                     content: content__,
                 })
             }

@@ -295,7 +295,7 @@ test("the data are one ZIP with the files of the server", async () => {
     yield part("records/ä.jsonl", "{}");
   });
   const counted: number[] = [];
-  const files = await exportStudy(ID, (count) => counted.push(count));
+  const files = await exportStudy(ID, false, (count) => counted.push(count));
   expect(counted).toEqual([1, 2]);
   const bytes = new Uint8Array(await zipped(files).arrayBuffer());
   const view = new DataView(bytes.buffer);

@@ -61,7 +61,7 @@ test("an item is shown only for the answers that it depends on, and only then as
   await type(1, "50");
   expect(shownItems()).toEqual(["0", "1", "3"]);
   await send();
-  expect(faults()).toEqual(["A whole number from 18 to 99"]);
+  expect(faults()).toEqual(["Please answer this question."]);
   // What it depends on is not shown any more, and so has no answer.
   await act(() => field(0).click());
   expect(shownItems()).toEqual(["0", "2"]);
@@ -75,7 +75,8 @@ test("a number that is none, or too small or large, is corrected before it is se
   for (const wrong of ["17", "100", "old", "20.5", "2e1", "-20"]) {
     await type(0, wrong);
     await send();
-    expect(faults(), wrong).toEqual(["A whole number from 18 to 99"]);
+    expect(faults(), wrong).toEqual(["This is none of the numbers that can be answered."]);
+    expect(field(0).getAttribute("aria-invalid"), wrong).toBe("true");
   }
   expect(sent).toEqual([]);
   // Without an answer it is left out.
@@ -84,6 +85,33 @@ test("a number that is none, or too small or large, is corrected before it is se
   await type(0, " 20 ");
   await send();
   expect(values()).toEqual([[0, 20]]);
+});
+
+test("a wrong number is forgotten when its item is not shown any more", async () => {
+  const { send, values } = await shown([
+    { item: 0, text: "What do you play?", optional: true, kind: GAMES },
+    { item: 1, text: "How long?", optional: true, kind: AGE, shownIf: [{ item: 0, answers: { options: [0] } }] },
+  ]);
+  await act(() => field(0).click());
+  await type(1, "old");
+  await act(() => field(0).click());
+  await act(() => field(0).click());
+  expect(field(1).value).toBe("");
+  await send();
+  expect(values()).toEqual([[0, { options: [0] }]]);
+});
+
+test("the field that lets another item appear keeps the focus", async () => {
+  await shown([
+    ...[0, 1].map((item) => ({ item, text: `Statement ${item}`, kind: LIKERT })),
+    { item: 2, text: "Statement 2", kind: LIKERT, shownIf: [{ item: 1, answers: { min: 4 } }] },
+  ]);
+  expect(shownItems()).toEqual(["0", "1"]);
+  const point = field(1, 'input[value="4"]');
+  point.focus();
+  await act(() => point.click());
+  expect(shownItems()).toEqual(["0", "1", "2"]);
+  expect(document.activeElement).toBe(point);
 });
 
 test("statements with the same points are a table with one head, and groups of their own for a screen reader", async () => {
@@ -129,8 +157,11 @@ test("a text is Markdown, in which nothing runs", async () => {
 });
 
 test("a question has markup, and its field a name without", async () => {
-  await show(<FormattedQuestion text={"How *sure*\n\nare you?"} />);
-  expect(root.querySelectorAll("p")).toHaveLength(0);
-  expect(root.querySelector("em")?.textContent).toBe("sure");
-  expect(plainText("How *sure* are [you](https://example.org)?")).toBe("How sure are you?");
+  const text = "1. How *sure*\n\nare [you](https://example.org),  \n*really*?";
+  await show(<FormattedQuestion text={text} />);
+  expect(root.querySelectorAll("p, ol")).toHaveLength(0);
+  expect(root.querySelector("em")?.textContent).toBe("really");
+  // What is no paragraph stands as it is written.
+  expect(root.textContent).toContain("1. How *sure*");
+  expect(plainText(text)).toBe("1. How *sure* are you, really?");
 });

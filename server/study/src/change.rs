@@ -17,6 +17,8 @@ pub enum Change {
         pseudonym: String,
         /// How it joined, if not by being added by a researcher.
         joined: Option<Joined>,
+        /// Whether it is a test participant.
+        test: bool,
     },
     /// A participant opened a session, which supersedes its earlier ones.
     Opened {
@@ -138,6 +140,7 @@ impl Change {
                 number,
                 pseudonym,
                 joined,
+                ..
             } if *number == forgotten => {
                 let panel_id = joined.as_mut().map(|it| std::mem::take(&mut it.panel_id));
                 let had_panel_id = panel_id.is_some_and(|it| !it.is_empty());

@@ -82,12 +82,12 @@ pub struct At {
 }
 
 impl Study {
-    /// The changes that add participants with these pseudonyms; an empty one stands for a name by
-    /// number, such as "P01".
+    /// The changes that add participants, or test participants, with these pseudonyms; an empty one
+    /// stands for a name by number, such as "P01", or "T01" in a test.
     ///
     /// # Errors
     /// If the study is closed or has too many participants, or if a pseudonym is taken.
-    pub fn add(&self, pseudonyms: &[String]) -> Result<Vec<Change>, Refusal> {
+    pub fn add(&self, pseudonyms: &[String], test: bool) -> Result<Vec<Change>, Refusal> {
         if self.is_closed() {
             return Err(Refusal::Closed);
         }
@@ -108,8 +108,9 @@ impl Study {
             let mut pseudonym = pseudonym.clone();
             if pseudonym.is_empty() {
                 // A name by number that was given to somebody else is skipped.
+                let letter = if test { 'T' } else { 'P' };
                 pseudonym = (number..)
-                    .map(|number| format!("P{number:02}"))
+                    .map(|number| format!("{letter}{number:02}"))
                     .find(|name| taken.insert(name.to_lowercase()))
                     .expect("there are more numbers than participants");
             }
@@ -117,6 +118,7 @@ impl Study {
                 number,
                 pseudonym,
                 joined: None,
+                test,
             });
         }
         Ok(changes)
@@ -158,8 +160,8 @@ impl Study {
         if has_id && others.any(|other| other.panel_id() == joined.panel_id) {
             return Err(Refusal::PanelIdTaken);
         }
-        let mut change = self.add(&[String::new()])?.pop();
-        self.free_slot().ok_or(Refusal::Full)?;
+        let mut change = self.add(&[String::new()], false)?.pop();
+        self.free_slot(false).ok_or(Refusal::Full)?;
         if let Some(Change::Added { joined: how, .. }) = &mut change {
             *how = Some(joined);
         }
@@ -182,11 +184,11 @@ impl Study {
         let slot = match participant.status {
             Status::Invited if self.is_closed() => return Err(Refusal::Closed),
             Status::Invited => {
-                let slot = self.free_slot().ok_or(Refusal::Full)?;
+                let slot = self.free_slot(participant.test).ok_or(Refusal::Full)?;
                 (!self.settings().assigns_by_consent()).then_some(slot)
             }
             Status::Active => None,
-            Status::DroppedOut if self.holder_of(participant.slot).is_none() => None,
+            Status::DroppedOut if !self.is_replaced(participant) => None,
             _ => return Ok(None),
         };
         if participant.session >= MAX_SESSIONS {
@@ -212,7 +214,7 @@ impl Study {
         };
         let slot = match participant.slot {
             Some(_) => None,
-            None => Some(self.free_slot().ok_or(Refusal::Full)?),
+            None => Some(self.free_slot(participant.test).ok_or(Refusal::Full)?),
         };
         Ok(Change::Consented {
             number: at.number,
@@ -272,7 +274,7 @@ impl Study {
     }
 
     /// The change by which a participant continues from a text, an external questionnaire or a game
-    /// that has ended.
+    /// that has ended; in a test also from a questionnaire, without answers.
     ///
     /// # Errors
     /// If the participant is not at this step in this session, or the step is not over.
@@ -280,6 +282,7 @@ impl Study {
         let (participant, step) = self.at(at)?;
         let count = match step.task {
             Task::Text(_) | Task::External(_) => 0,
+            Task::Questionnaire(_) if participant.test => 0,
             Task::Practice { .. } => 1,
             Task::Games { count } => *count,
             Task::Consent(_) | Task::Questionnaire(_) => return Err(Refusal::StepMismatch),

@@ -48,9 +48,12 @@ impl Phase<'_> {
         let attempt = game.placed.attempt;
         match game.ended {
             None => Phase::Playing(game),
-            Some((Outcome::Aborted, _)) if attempt < MAX_ATTEMPTS => Phase::Due {
-                attempt: attempt + 1,
-            },
+            // A test participant may have left it.
+            Some((Outcome::Aborted, _)) if attempt < MAX_ATTEMPTS && !participant.test => {
+                Phase::Due {
+                    attempt: attempt + 1,
+                }
+            }
             Some(_) => Phase::Over(game),
         }
     }
@@ -116,6 +119,15 @@ impl Study {
             seat: condition.participant_seat.unwrap_or(rotated),
             attempt,
         })
+    }
+
+    /// The room of the game that a test participant is playing.
+    pub fn room_of_test(&self, number: u32) -> Option<[u8; 16]> {
+        let participant = self.participant(number).filter(|it| it.test)?;
+        match Phase::of(participant) {
+            Phase::Playing(game) => Some(game.placed.room),
+            Phase::Due { .. } | Phase::Over(_) => None,
+        }
     }
 
     /// The change by which a participant's due game gets a room; `None` if no game is due.

@@ -8,7 +8,7 @@
 //!
 //! // Two conditions between participants; consent, a game, a debriefing.
 //! let mut study = Study::new(testing::settings())?;
-//! for change in study.add(&["Ada".to_owned()])? {
+//! for change in study.add(&["Ada".to_owned()], false)? {
 //!     study.fold(&change);
 //! }
 //! let opened = study.open(1, None, 1000)?.expect("Ada has not begun");
@@ -79,6 +79,7 @@ pub use view::{Content, End, ShownGame, ShownItem, ShownQuestionnaire, View};
 
 use assignment::Assignment;
 use presence::Presence;
+use shown::EarlierAnswers;
 use state::StudyState;
 
 /// A study. Two are equal if their changes have led to the same state; who is connected does not
@@ -174,7 +175,11 @@ impl Study {
         if participant.passed_over.contains(&step) {
             return Some(Vec::new());
         }
-        let entered = (participant.answers.get(&step)).unwrap_or(&participant.saved_answers);
+        let entered = match participant.answers.get(&step) {
+            Some(answers) => answers,
+            None if step == participant.step() => &participant.saved_answers,
+            None => &[][..],
+        };
         let items = self.items_after(participant, step, questionnaire);
         let shown = questionnaire.shown_by(&items, entered);
         let mut order = self.item_order(number, step)?;
@@ -210,21 +215,25 @@ impl Study {
         questionnaire: &Questionnaire,
     ) -> Vec<usize> {
         let steps = self.steps_of(participant).unwrap_or_default();
-        let earlier = |id: &str, item: &str| last_answer(&steps[..step], participant, id, item);
-        questionnaire.items_after(earlier)
+        let given = given_answers(participant, &[]);
+        questionnaire.items_after(&EarlierAnswers::before(&steps, step, given))
     }
 
-    /// Number of steps that a participant passes over after its step, where it gives these answers.
+    /// Number of steps that a participant passes over after its step, where it gives these answers:
+    /// those that are for others, and questionnaires of which no item is for it.
     fn passed_over_next(&self, participant: &Participant, answers: &[ItemAnswer]) -> u32 {
         let steps = self.steps_of(participant).unwrap_or_default();
-        let step = participant.step();
-        let earlier = |id: &str, item: &str| match steps[step].task {
-            Task::Questionnaire(it) if it.id == id => it.answer_to(item, answers),
-            _ => last_answer(&steps[..step], participant, id, item),
+        let is_for_others = |step: &usize| {
+            let given = given_answers(participant, answers);
+            let earlier = EarlierAnswers::before(&steps, *step, given);
+            let is_empty = match steps[*step].task {
+                Task::Questionnaire(it) => it.items_after(&earlier).is_empty(),
+                _ => false,
+            };
+            is_empty || !ShownIf::all_hold(steps[*step].shown_if, &earlier)
         };
-        let next = steps.iter().skip(step + 1);
-        let passed_over = next.take_while(|step| !ShownIf::all_hold(step.shown_if, earlier));
-        passed_over.count() as u32
+        let next = participant.step() + 1..steps.len();
+        next.take_while(is_for_others).count() as u32
     }
 
     /// The sequence of conditions of a participant who has a slot.
@@ -282,34 +291,37 @@ impl Study {
         drop_out.into_iter().chain(close).min()
     }
 
-    /// The participant who keeps a slot.
-    fn holder_of(&self, slot: Option<u32>) -> Option<u32> {
-        let slot = slot?;
-        let mut participants = self.state.participants.iter();
-        let holder = participants.find(|(_, it)| it.holds_slot() && it.slot == Some(slot));
-        holder.map(|(number, _)| *number)
+    /// Whether somebody keeps the slot that a participant had.
+    fn is_replaced(&self, participant: &Participant) -> bool {
+        let slots = self.kept_slots(participant.test);
+        participant.slot.is_some_and(|slot| slots.contains(&slot))
     }
 
     /// The first slot that nobody keeps. A slot that is given again comes before new ones, so that
     /// blocks fill up in order.
-    fn free_slot(&self) -> Option<u32> {
+    fn free_slot(&self, test: bool) -> Option<u32> {
+        let kept = self.kept_slots(test);
+        let slots = match test {
+            true => MAX_PARTICIPANTS,
+            false => self.settings.participants,
+        };
+        (0..slots).find(|slot| !kept.contains(slot))
+    }
+
+    /// The slots that participants keep. Test participants have slots of their own.
+    fn kept_slots(&self, test: bool) -> BTreeSet<u32> {
         let participants = self.state.participants.values();
-        let kept = participants.filter(|it| it.holds_slot());
-        let kept: BTreeSet<u32> = kept.filter_map(|it| it.slot).collect();
-        (0..self.settings.participants).find(|slot| !kept.contains(slot))
+        let kept = participants.filter(|it| it.test == test && it.holds_slot());
+        kept.filter_map(|it| it.slot).collect()
     }
 }
 
-/// The last answer of a participant at these steps to an item of a questionnaire.
-fn last_answer<'p>(
-    steps: &[Step<'_>],
+/// The answers of a participant by step, with those that it gives at its own.
+fn given_answers<'p>(
     participant: &'p Participant,
-    questionnaire: &str,
-    item: &str,
-) -> Option<&'p Answer> {
-    let mut answered = participant.answers.range(..steps.len()).rev();
-    answered.find_map(|(step, answers)| match steps[*step].task {
-        Task::Questionnaire(it) if it.id == questionnaire => Some(it.answer_to(item, answers)),
-        _ => None,
-    })?
+    now: &'p [ItemAnswer],
+) -> impl Iterator<Item = (usize, &'p [ItemAnswer])> {
+    let given = participant.answers.iter();
+    let given = given.map(|(step, answers)| (*step, &answers[..]));
+    given.chain([(participant.step(), now)])
 }

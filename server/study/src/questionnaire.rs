@@ -242,7 +242,7 @@ impl Item {
         characters(&format!("{field}.text"), &self.text, least..=MAX_QUESTION)?;
         self.kind.check(field)?;
         match &self.attention_check {
-            Some(passing) => passing.check(&format!("{field}.attention_check"), &self.kind),
+            Some(passing) => passing.check_passing(&format!("{field}.attention_check"), &self.kind),
             None => Ok(()),
         }
     }
@@ -305,6 +305,19 @@ impl ItemKind {
             Self::FreeText { max_characters } => {
                 within(&field("max_characters"), *max_characters, 1..=MAX_TEXT)
             }
+        }
+    }
+
+    /// The lowest and highest number that answers it, and the step between neighbouring ones; `None` if
+    /// it is answered by options or in words.
+    pub fn numbers(&self) -> Option<(i32, i32, u32)> {
+        match self {
+            Self::Likert { points, .. } | Self::SemanticDifferential { points, .. } => {
+                Some((1, i32::try_from(*points).unwrap_or(i32::MAX), 1))
+            }
+            Self::Slider { min, max, step, .. } => Some((*min, *max, *step)),
+            Self::Number { min, max, .. } => Some((*min, *max, 1)),
+            Self::Choice { .. } | Self::FreeText { .. } => None,
         }
     }
 

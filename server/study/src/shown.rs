@@ -1,9 +1,10 @@
 //! What is shown only after certain answers: items of a questionnaire, and stages.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::checks::{Checked, refuse, within};
 use crate::questionnaire::{Answer, Item, ItemAnswer, ItemKind, Questionnaire};
+use crate::stage::{Step, Task};
 
 /// Maximum number of conditions of an item or a stage.
 pub const MAX_SHOWN_IF: usize = 4;
@@ -47,37 +48,50 @@ pub struct ShownItemIf {
 impl AnswerSet {
     /// Returns the first invalid field, for answers to an item of this kind.
     pub(crate) fn check(&self, field: &str, kind: &ItemKind) -> Checked {
-        match kind {
-            ItemKind::FreeText { .. } => {
-                return refuse(field, "it must be answered by a number or a choice");
+        if let ItemKind::Choice { options, .. } = kind {
+            if self.min.is_some() || self.max.is_some() {
+                return refuse(field, "a choice is answered by `options`");
             }
-            ItemKind::Choice { options, .. } => {
-                if self.min.is_some() || self.max.is_some() {
-                    return refuse(field, "a choice is answered by `options`");
-                }
-                let field = format!("{field}.options");
-                within(&field, self.options.len(), 1..=options.len())?;
-                let is_valid = self.options.is_sorted_by(|one, next| one < next)
-                    && self.options.iter().all(|option| *option < options.len());
-                if !is_valid {
-                    let most = options.len() - 1;
-                    return refuse(field, format!("options must ascend within 0..={most}"));
-                }
+            let field = format!("{field}.options");
+            within(&field, self.options.len(), 1..=options.len())?;
+            let is_valid = self.options.is_sorted_by(|one, next| one < next)
+                && self.options.iter().all(|option| *option < options.len());
+            if !is_valid {
+                let most = options.len() - 1;
+                return refuse(field, format!("options must ascend within 0..={most}"));
             }
-            _ => {
-                if !self.options.is_empty() {
-                    return refuse(field, "it is answered by a number: set `min` and `max`");
-                }
-                let (min, max) = (self.min.unwrap_or(i32::MIN), self.max.unwrap_or(i32::MAX));
-                if min > max || (self.min.is_none() && self.max.is_none()) {
-                    return refuse(
-                        field,
-                        "set `min`, or `max`, or a `max` that is at least `min`",
-                    );
-                }
-            }
+            return Ok(());
+        }
+        let Some((lowest, highest, step)) = kind.numbers() else {
+            return refuse(field, "it must be answered by a number or a choice");
+        };
+        if !self.options.is_empty() {
+            return refuse(field, "it is answered by a number: set `min` and `max`");
+        }
+        if self.min.is_none() && self.max.is_none() {
+            return refuse(field, "set `min`, `max` or both");
+        }
+        // The first number from `min` on.
+        let (lowest, step) = (i64::from(lowest), i64::from(step).max(1));
+        let above = (self.min.map_or(0, |min| i64::from(min) - lowest)).max(0);
+        let first = lowest + (above + step - 1) / step * step;
+        if first > i64::from(self.max.unwrap_or(highest).min(highest)) {
+            return refuse(field, "no answer to the item is within `min` and `max`");
         }
         Ok(())
+    }
+
+    /// Returns the first invalid field of the answers that pass an attention check.
+    pub(crate) fn check_passing(&self, field: &str, kind: &ItemKind) -> Checked {
+        self.check(field, kind)?;
+        match kind {
+            ItemKind::Choice {
+                multiple: false, ..
+            } if self.options.len() > 1 => {
+                refuse(format!("{field}.options"), "nobody can choose several")
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Whether an answer is one of these, or has one of these options.
@@ -154,29 +168,55 @@ impl ShownIf {
         }
     }
 
-    /// Whether all these conditions hold for a participant, whose last answer to an item of an earlier
-    /// questionnaire is found by their ids.
-    pub(crate) fn all_hold<'a>(
-        conditions: &[Self],
-        answer_of: impl Fn(&str, &str) -> Option<&'a Answer>,
-    ) -> bool {
+    /// Whether all of these conditions hold that are about earlier questionnaires.
+    pub(crate) fn all_hold(conditions: &[Self], earlier: &EarlierAnswers<'_>) -> bool {
         conditions.iter().all(|condition| {
             let id = condition.questionnaire.as_deref();
-            id.is_none_or(|id| condition.holds(answer_of(id, &condition.item)))
+            id.is_none_or(|id| condition.holds(earlier.to(id, &condition.item)))
         })
+    }
+}
+
+/// The last answers of a participant to each questionnaire before a step, by the questionnaire's id.
+#[derive(Debug)]
+pub(crate) struct EarlierAnswers<'a>(BTreeMap<&'a str, (&'a Questionnaire, &'a [ItemAnswer])>);
+
+impl<'a> EarlierAnswers<'a> {
+    /// Those before a step, of the answers that were given at these steps, in their order. In the
+    /// block of a condition, the blocks of others do not count.
+    pub(crate) fn before(
+        steps: &[Step<'a>],
+        step: usize,
+        given: impl Iterator<Item = (usize, &'a [ItemAnswer])>,
+    ) -> Self {
+        let block = steps.get(step).and_then(|it| it.block);
+        let earlier = given.take_while(|(at, _)| *at < step);
+        let earlier = earlier.filter_map(|(at, answers)| {
+            let of = steps.get(at)?;
+            let counts = block.is_none() || of.block.is_none() || of.block == block;
+            match of.task {
+                Task::Questionnaire(it) if counts => Some((it.id.as_str(), (it, answers))),
+                _ => None,
+            }
+        });
+        Self(earlier.collect())
+    }
+
+    fn to(&self, questionnaire: &str, item: &str) -> Option<&'a Answer> {
+        let (questionnaire, answers) = self.0.get(questionnaire)?;
+        let index = questionnaire.items.iter().position(|it| it.id == item)?;
+        let answer = answers.iter().find(|answer| answer.item == index)?;
+        Some(&answer.value)
     }
 }
 
 impl Questionnaire {
     /// Indices of the items that a participant may be shown who gave these answers to earlier
     /// questionnaires, in the order of the definition.
-    pub(crate) fn items_after<'a>(
-        &self,
-        answer_of: impl Fn(&str, &str) -> Option<&'a Answer>,
-    ) -> Vec<usize> {
+    pub(crate) fn items_after(&self, earlier: &EarlierAnswers<'_>) -> Vec<usize> {
         let items = self.items.iter().enumerate();
         items
-            .filter(|(_, item)| ShownIf::all_hold(&item.shown_if, &answer_of))
+            .filter(|(_, item)| ShownIf::all_hold(&item.shown_if, earlier))
             .map(|(index, _)| index)
             .collect()
     }
@@ -197,13 +237,6 @@ impl Questionnaire {
             }
         }
         shown
-    }
-
-    /// The answer to the item with this id.
-    pub(crate) fn answer_to<'a>(&self, id: &str, answers: &'a [ItemAnswer]) -> Option<&'a Answer> {
-        let index = self.items.iter().position(|item| item.id == id)?;
-        let answer = answers.iter().find(|answer| answer.item == index)?;
-        Some(&answer.value)
     }
 
     /// The conditions of an item on the answers of its own questionnaire, as participants see them.

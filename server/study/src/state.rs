@@ -34,6 +34,8 @@ pub struct Participant {
     /// How it joined by the open link, if it did. Its id at the panel is empty after its data were
     /// deleted.
     pub joined: Option<Joined>,
+    /// Whether it is a test participant, who takes no slot from others.
+    pub test: bool,
     /// Its state.
     pub status: Status,
     /// Its slot, or after it has left the one it had; `None` until it begins, or until its consent.
@@ -155,10 +157,12 @@ impl StudyState {
                 number,
                 pseudonym,
                 joined,
+                test,
             } => {
                 let added = || Participant {
                     pseudonym: pseudonym.clone(),
                     joined: joined.clone(),
+                    test: *test,
                     status: Status::Invited,
                     slot: None,
                     session: 0,

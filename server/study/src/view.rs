@@ -29,6 +29,8 @@ pub struct View {
     pub steps: usize,
     /// Whether interface traces are recorded.
     pub traces: bool,
+    /// Whether this is a test participant.
+    pub test: bool,
     /// The content.
     pub content: Content,
 }
@@ -136,6 +138,7 @@ impl Study {
             step: participant.step(),
             steps: self.step_count(),
             traces: settings.traces,
+            test: participant.test,
             content,
         })
     }

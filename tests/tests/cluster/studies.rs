@@ -241,6 +241,7 @@ async fn a_study_whose_owner_is_killed_goes_on_at_another_node() {
         owner_token: owner_token.clone(),
         pseudonyms: Vec::new(),
         count: PARTICIPANTS - 1,
+        test: false,
     };
     let added = service.add_study_participants(request).await;
     let links = added.expect("its owner").into_inner().links;
@@ -307,6 +308,7 @@ async fn a_study_whose_owner_is_killed_goes_on_at_another_node() {
         let request = v1::ExportStudyRequest {
             study_id: study_id.clone(),
             owner_token: owner_token.clone(),
+            test: false,
         };
         let exported = settled(|| {
             let (mut service, request) = (service.clone(), request.clone());

@@ -445,6 +445,7 @@ impl Lab {
             owner_token: self.owner_token.clone(),
             pseudonyms,
             count: 0,
+            test: false,
         };
         let added = self.service.add_study_participants(request).await;
         let links = added.expect("the study is open").into_inner().links;
@@ -464,6 +465,7 @@ impl Lab {
         let request = v1::ExportStudyRequest {
             study_id: self.study_id.clone(),
             owner_token: self.owner_token.clone(),
+            test: false,
         };
         let exported = self.service.export_study(request).await;
         let mut parts = exported.expect("the study exists").into_inner();

@@ -258,6 +258,7 @@ async fn what_cannot_be_read_ends_no_list_of_others() {
     let request = v1::ExportStudyRequest {
         study_id: study,
         owner_token: token,
+        test: false,
     };
     let files = service
         .export_study(request)

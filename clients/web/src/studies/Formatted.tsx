@@ -13,19 +13,38 @@ export function Formatted({ text }: { text: string }) {
   return <div class={css.text}>{inside(tree, definitionsOf(tree))}</div>;
 }
 
-/** A question: its paragraphs stand where only words may, in the legend of a group. */
+/**
+ * A question, in the legend of a group, where only words may stand: what is no paragraph is shown as it
+ * is written.
+ */
 export function FormattedQuestion({ text }: { text: string }) {
   const tree = useMemo(() => fromMarkdown(text), [text]);
-  return <span class={css.question}>{inside(tree, definitionsOf(tree), "span")}</span>;
+  const definitions = definitionsOf(tree);
+  return (
+    <span class={css.question}>
+      {tree.children.map((node, index) => (
+        // A text does not change.
+        <span key={index}>{node.type === "paragraph" ? inside(node, definitions) : written(node, text)}</span>
+      ))}
+    </span>
+  );
 }
 
-/** The words of a text without its markup, for names of fields. */
+/** The words of a question without its markup, for names of fields. */
 export function plainText(text: string): string {
   const words = (node: Nodes): string => {
     if ("children" in node) return node.children.map(words).join("");
+    if (node.type === "break") return " ";
+    if ("alt" in node) return node.alt ?? "";
     return "value" in node ? node.value : "";
   };
-  return words(fromMarkdown(text));
+  const blocks = fromMarkdown(text).children;
+  return blocks.map((node) => (node.type === "paragraph" ? words(node) : written(node, text))).join(" ");
+}
+
+/** A part of a text with its markup. */
+function written({ position }: Nodes, text: string): string {
+  return position ? text.slice(position.start.offset, position.end.offset) : "";
 }
 
 /** Addresses that a text defines apart from its links. */
@@ -33,35 +52,31 @@ type Definitions = ReadonlyMap<string, string>;
 
 function definitionsOf(tree: Root): Definitions {
   const defined = tree.children.filter((node): node is Definition => node.type === "definition");
-  return new Map(defined.map(({ identifier, url }) => [identifier, url]));
+  // The first one of a name counts.
+  return new Map(defined.reverse().map(({ identifier, url }) => [identifier, url]));
 }
 
-/** What a paragraph is. */
-type Paragraph = "p" | "span";
-
-function inside(node: Nodes, definitions: Definitions, paragraph: Paragraph = "p"): ComponentChildren {
+function inside(node: Nodes, definitions: Definitions): ComponentChildren {
   if (!("children" in node)) return null;
   return node.children.map((child, index) => (
     // A text does not change.
-    <Node key={index} node={child} {...{ definitions, paragraph }} />
+    <Node key={index} node={child} definitions={definitions} />
   ));
 }
 
 interface NodeProps {
   node: Nodes;
   definitions: Definitions;
-  paragraph: Paragraph;
 }
 
-function Node({ node, definitions, paragraph }: NodeProps): JSX.Element | string | null {
-  const within = inside(node, definitions, paragraph);
-  const Paragraph = paragraph;
+function Node({ node, definitions }: NodeProps): JSX.Element | string | null {
+  const within = inside(node, definitions);
   switch (node.type) {
     case "text":
     case "html":
       return node.value;
     case "paragraph":
-      return <Paragraph>{within}</Paragraph>;
+      return <p>{within}</p>;
     case "heading": {
       // The title of the stage is above all headings.
       const Heading = node.depth === 1 ? "h2" : node.depth === 2 ? "h3" : "h4";

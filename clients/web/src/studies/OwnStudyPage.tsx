@@ -25,6 +25,7 @@ import css from "./Own.module.css";
 import {
   addParticipants,
   addressOf,
+  addTestParticipants,
   closeStudy,
   deleteDataOf,
   deleteStudy,
@@ -125,12 +126,13 @@ export function OwnStudy({ study, participants }: FollowedStudy) {
             {closed ? words.closed : words.open} · {words.counts(study.completed, settings?.participants ?? 0)}
           </p>
         </div>
-        <Export study={study} />
+        <Export study={study} test={false} />
       </header>
       {closed && <Notice kind="hint">{words.isClosed}</Notice>}
       <Counts study={study} participants={participants} />
       {!closed && study.openLink && <OpenLink study={study} />}
       {!closed && <Add studyId={studyId} />}
+      <Tests study={study} />
       <Links key={participants.length} studyId={studyId} />
       <Participants study={study} participants={participants} />
       <details class={`sheet ${css.part}`}>
@@ -280,6 +282,47 @@ function Add({ studyId }: { studyId: string }) {
   );
 }
 
+/** Test participants: to look at the study, or to try an analysis with their data. */
+function Tests({ study }: { study: Study }) {
+  const words = t().studies.own.tests;
+  const { studyId, closed, testParticipants } = study;
+  const [count, setCount] = useState("1");
+  const { busy, fault, run } = useAttempt();
+  const number = Number(count);
+  const valid = Number.isInteger(number) && number >= 1 && number <= MAX_ADDED;
+  const add = (event: Event) => {
+    event.preventDefault();
+    if (valid) run(() => addTestParticipants(studyId, number).then(() => false));
+  };
+  if (closed && testParticipants === 0) return null;
+  return (
+    <section class={`sheet ${css.part}`} data-part="test-participants">
+      <h2>{words.title}</h2>
+      {!closed && (
+        <form class={css.part} onSubmit={add} noValidate>
+          <p class="soft">{words.text}</p>
+          <TextField
+            label={words.count}
+            value={count}
+            onText={setCount}
+            type="number"
+            min={1}
+            max={MAX_ADDED}
+            fault={valid ? undefined : t().studies.make.problems.number(1, MAX_ADDED)}
+          />
+          {fault && <Notice kind="fault">{fault}</Notice>}
+          <div>
+            <Button type="submit" busy={busy}>
+              {words.submit}
+            </Button>
+          </div>
+        </form>
+      )}
+      {testParticipants > 0 && <Export study={study} test />}
+    </section>
+  );
+}
+
 /** The links, requested when asked for: they let anybody take part. */
 function Links({ studyId }: { studyId: string }) {
   const words = t().studies.own.links;
@@ -375,6 +418,7 @@ function Row({ study, participant }: { study: Study; participant: StudyParticipa
       <td class="number">{number}</td>
       <th scope="row">
         {dataDeleted ? <span class="soft">{words.board.deleted}</span> : pseudonym}
+        {participant.test && <span class="soft small"> {words.tests.mark}</span>}
         {panelId && <span class="soft small"> {panelId}</span>}
       </th>
       <td>{conditions.join(", ")}</td>
@@ -440,21 +484,22 @@ function seenWords({ beganAtMs, endedAtMs, sessions }: StudyParticipant): string
   return "";
 }
 
-function Export({ study }: { study: Study }) {
+function Export({ study, test }: { study: Study; test: boolean }) {
   const words = t().studies.own;
   const [files, setFiles] = useState(0);
   const { busy, fault, run } = useAttempt();
   const save = () =>
     run(async () => {
       setFiles(0);
-      const archive = zipped(await exportStudy(study.studyId, setFiles));
-      download(archive, `${fileName(study.settings?.name ?? "study")}.zip`, "application/zip");
+      const archive = zipped(await exportStudy(study.studyId, test, setFiles));
+      const name = fileName(study.settings?.name ?? "study");
+      download(archive, `${name}${test ? "-test" : ""}.zip`, "application/zip");
       return false;
     });
   return (
     <div class={css.export}>
       <Button busy={busy} onClick={save}>
-        {words.export}
+        {test ? words.tests.export : words.export}
       </Button>
       {busy && <span class="soft small">{words.exporting(files)}</span>}
       {fault && <Notice kind="fault">{fault}</Notice>}

@@ -4,7 +4,7 @@
 // space, and groups one above the other where there is none.
 
 import type { ComponentChildren } from "preact";
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import type {
   StudyLikert,
   StudyNumber,
@@ -17,7 +17,7 @@ import { announce } from "../parts/Announcer";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import { answersOf, type Draft, draftOf, missingItems, shownItems, type Value } from "./answers";
+import { answersOf, type Draft, draftOf, missingItems, shownItems, type Value, withoutHiddenFaults } from "./answers";
 import { Formatted, FormattedQuestion, plainText } from "./Formatted";
 import type { ItemAnswer, Participating } from "./participating";
 import css from "./Questionnaire.module.css";
@@ -41,11 +41,13 @@ export function Questionnaire({ questionnaire, part }: QuestionnaireProps) {
   const { busy, fault, run } = useAttempt();
   const save = useSaving(part.save);
   const form = useRef<HTMLFormElement>(null);
+  const tables = useMemo(() => tablesOf(items), [items]);
   const shown = shownItems(items, draft);
   const missing = tried ? missingItems(shown, draft) : [];
 
   const enter = (item: number, value: Value) => {
-    const next = { ...draft, [item]: { value, afterMs: performance.now() - reachedAtMs } };
+    const entered = { ...draft, [item]: { value, afterMs: performance.now() - reachedAtMs } };
+    const next = withoutHiddenFaults(items, entered);
     setDraft(next);
     save(answersOf(shownItems(items, next), next));
   };
@@ -67,9 +69,9 @@ export function Questionnaire({ questionnaire, part }: QuestionnaireProps) {
     <form class={css.form} ref={form} onSubmit={submit} noValidate data-part="questionnaire">
       <StageTitle>{title || words.title}</StageTitle>
       {instructions && <Formatted text={instructions} />}
-      {tablesOf(shown).map((table) => (
-        <Table key={table[0]?.item} items={table}>
-          {table.map((item) => (
+      {tables.map((table) => (
+        <Table key={table[0]?.item} items={table} shown={shown}>
+          {(item) => (
             <Item
               key={item.item}
               item={item}
@@ -77,7 +79,7 @@ export function Questionnaire({ questionnaire, part }: QuestionnaireProps) {
               missing={missing.includes(item.item)}
               onEnter={(value) => enter(item.item, value)}
             />
-          ))}
+          )}
         </Table>
       ))}
       {missing.length > 0 && <Notice kind="fault">{words.missing(missing.length)}</Notice>}
@@ -142,14 +144,26 @@ function haveSamePoints({ kind: one }: StudyShownItem, { kind: other }: StudySho
   return one.value.points === other.value.points && one.value.labels.join("\n") === other.value.labels.join("\n");
 }
 
-/** Statements with the same points below their labels; a single item stands for itself. */
-function Table({ items, children }: { items: readonly StudyShownItem[]; children: ComponentChildren }) {
+interface TableProps {
+  items: readonly StudyShownItem[];
+  /** Those of the questionnaire that are shown now. */
+  shown: readonly StudyShownItem[];
+  children: (item: StudyShownItem) => ComponentChildren;
+}
+
+/**
+ * Statements with the same points below their labels; a single item stands for itself. What is a table
+ * stays one when items appear or disappear, so that the field that did it keeps the focus.
+ */
+function Table({ items, shown, children }: TableProps) {
+  const rows = items.filter((item) => shown.includes(item));
   const kind = items[0]?.kind;
-  if (items.length < TABLE_ROWS || kind?.case !== "likert") return <>{children}</>;
+  if (rows.length === 0) return null;
+  if (items.length < TABLE_ROWS || kind?.case !== "likert") return <>{rows.map(children)}</>;
   return (
     <div class={css.table} data-part="item-table">
       <TableHead likert={kind.value} />
-      {children}
+      {rows.map(children)}
     </div>
   );
 }
@@ -179,8 +193,9 @@ function Item({ item, value, missing, onEnter }: ItemProps) {
   const words = t().studies.questionnaire;
   const { kind } = item;
   const id = `item-${item.item}`;
+  const plain = useMemo(() => plainText(item.text), [item.text]);
   const question = item.text
-    ? plainText(item.text)
+    ? plain
     : kind.case === "semanticDifferential"
       ? `${kind.value.left} – ${kind.value.right}`
       : "";
@@ -233,12 +248,12 @@ function Item({ item, value, missing, onEnter }: ItemProps) {
           label={question}
           number={kind.value}
           value={typeof value === "number" ? value : undefined}
-          onEnter={onEnter}
+          {...{ missing, onEnter }}
         />
       )}
       {missing && (
         <p id={`${id}-fault`} class={css.fault}>
-          {kind.case === "number" ? words.numberWithin(kind.value.min, kind.value.max) : words.answerThis}
+          {Number.isNaN(value) ? words.notThisNumber : words.answerThis}
         </p>
       )}
     </fieldset>
@@ -366,16 +381,15 @@ function Choice({ id, options, multiple, value, onEnter }: ChoiceProps) {
   );
 }
 
-interface NumberFieldProps {
+interface NumberFieldProps extends Pick<ItemProps, "missing" | "onEnter"> {
   id: string;
   label: string;
   number: StudyNumber;
   value: number | undefined;
-  onEnter: (value: number | string) => void;
 }
 
 /** A number that is typed. What is not one of the numbers stands until it is corrected. */
-function NumberField({ id, label, number: { min, max, unit }, value, onEnter }: NumberFieldProps) {
+function NumberField({ id, label, number: { min, max, unit }, value, missing, onEnter }: NumberFieldProps) {
   const words = t().studies.questionnaire;
   const [typed, setTyped] = useState(value === undefined || Number.isNaN(value) ? "" : String(value));
   const type = (text: string) => {
@@ -392,11 +406,12 @@ function NumberField({ id, label, number: { min, max, unit }, value, onEnter }: 
         inputMode={min < 0 ? "text" : "numeric"}
         autoComplete="off"
         aria-label={label}
-        aria-describedby={`${id}-range`}
+        aria-describedby={`${id}-unit ${id}-range${missing ? ` ${id}-fault` : ""}`}
+        aria-invalid={missing || undefined}
         value={typed}
         onInput={(event) => type(event.currentTarget.value)}
       />
-      {unit && <span>{unit}</span>}
+      {unit && <span id={`${id}-unit`}>{unit}</span>}
       <span id={`${id}-range`} class="soft small">
         {words.numberWithin(min, max)}
       </span>

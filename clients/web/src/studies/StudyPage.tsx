@@ -86,6 +86,7 @@ export function Taking({ part }: { part: Participating }) {
     <div class={css.study} data-part="study">
       {part.link.value === "lost" && <Notice kind="fault">{words.lost}</Notice>}
       <Progress view={view} />
+      {view.test && <TestNotice view={view} part={part} />}
       <Stage key={stageKey(view)} {...{ view, part }} />
       <Withdraw view={view} part={part} />
     </div>
@@ -116,6 +117,32 @@ function Progress({ view: { title, step, steps, content } }: { view: StudyView }
         </>
       )}
     </header>
+  );
+}
+
+/** Says that this is a test, and lets go on from questions and games without answering and playing. */
+function TestNotice({ view: { content }, part }: StageProps) {
+  const words = t().studies.test;
+  const { busy, fault, run } = useAttempt();
+  const game = content.case === "game" && !content.value.ended ? content.value : undefined;
+  const goOn = () => run(() => part.proceed().then(() => false));
+  return (
+    <Notice kind="hint">
+      <p>
+        <b>{words.title}</b> {words.text}
+      </p>
+      {content.case === "questionnaire" && (
+        <Button busy={busy} onClick={goOn}>
+          {words.skip}
+        </Button>
+      )}
+      {game?.ticket && (
+        <Button busy={busy} onClick={goOn}>
+          {words.end}
+        </Button>
+      )}
+      {fault && <p>{fault}</p>}
+    </Notice>
   );
 }
 

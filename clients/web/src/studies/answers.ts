@@ -39,6 +39,15 @@ function isAmong(value: Value, answers: StudyAnswerSet | undefined): boolean {
   return typeof value !== "string" && value.some((option) => options.includes(option));
 }
 
+/** What was entered, without numbers that are not valid in items that are not shown any more. */
+export function withoutHiddenFaults(items: readonly StudyShownItem[], draft: Draft): Draft {
+  const shown = shownItems(items, draft).map(({ item }) => item);
+  const kept = Object.entries(draft).filter(
+    ([item, { value }]) => !Number.isNaN(value) || shown.includes(Number(item)),
+  );
+  return Object.fromEntries(kept);
+}
+
 /** The shown items that must be answered and are not, and those whose answer is not valid. */
 export function missingItems(shown: readonly StudyShownItem[], draft: Draft): number[] {
   const isMissing = ({ item, optional }: StudyShownItem) => {

@@ -30,11 +30,15 @@ export function stateName(state: StudyParticipantState) {
   }
 }
 
-/** The participants in each state: of each condition, and last of all (`condition` undefined). */
+/**
+ * The participants in each state, without test participants: of each condition, and last of all
+ * (`condition` undefined).
+ */
 export function byCondition(
   study: Study,
-  participants: readonly StudyParticipant[],
+  all: readonly StudyParticipant[],
 ): { condition: string | undefined; counts: number[] }[] {
+  const participants = all.filter(({ test }) => !test);
   const count = (some: readonly StudyParticipant[]) =>
     STATES.map((state) => some.filter((participant) => participant.state === state).length);
   const rows: { condition: string | undefined; counts: number[] }[] = (study.settings?.conditions ?? []).map(

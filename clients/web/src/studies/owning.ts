@@ -46,6 +46,10 @@ export async function addParticipants(studyId: string, count: number, pseudonyms
   return (await studyApi.addStudyParticipants({ ...ownership(studyId), count, pseudonyms }, call)).links;
 }
 
+export async function addTestParticipants(studyId: string, count: number): Promise<StudyLink[]> {
+  return (await studyApi.addStudyParticipants({ ...ownership(studyId), count, test: true }, call)).links;
+}
+
 export async function linksOf(studyId: string): Promise<StudyLink[]> {
   return (await studyApi.listStudyLinks(ownership(studyId), call)).links;
 }
@@ -73,13 +77,17 @@ export async function deleteStudy(studyId: string, force: boolean): Promise<void
   remember(STORED + studyId, null);
 }
 
-/** The data of a study as files, in the order of the server; `onFiles` is called with their number. */
+/**
+ * The data of a study, or those of its test participants, as files in the order of the server; `onFiles`
+ * is called with their number.
+ */
 export async function exportStudy(
   studyId: string,
+  test: boolean,
   onFiles: (count: number) => void,
 ): Promise<Map<string, Uint8Array[]>> {
   const files = new Map<string, Uint8Array[]>();
-  for await (const { file, data } of studyApi.exportStudy(ownership(studyId))) {
+  for await (const { file, data } of studyApi.exportStudy({ ...ownership(studyId), test })) {
     const parts = files.get(file);
     if (parts) parts.push(data);
     else {

@@ -40,7 +40,7 @@ test("a participant goes through all stages, on two devices, without meeting a c
 
   await second.page.getByRole("heading", { name: "About the game" }).waitFor();
   await second.page.getByRole("button", { name: "Send the answers" }).click();
-  await second.page.getByText("3 questions have no answer yet.").first().waitFor();
+  await second.page.getByText("Please check 3 questions.").first().waitFor();
   expect(await inaccessible(second.page)).toEqual([]);
   expect(await tooWide(second.page)).toEqual([]);
   const kept = second.page.waitForResponse((response) => response.url().endsWith("/SaveAnswers"));
@@ -127,6 +127,88 @@ test.each([
   while ((await playGame(page, 1)) === 1);
   expect([...seen]).toEqual(expected);
   expect(faults).toEqual([]);
+});
+
+test("a researcher tests a study: every page, without answering and playing, apart from all counts", async () => {
+  const statements = ["They played well.", "I trusted them.", "I was bored."].map((text, index) => ({
+    id: `s${index}`,
+    text,
+    kind: { case: "likert" as const, value: { points: 5, labels: ["not at all", "very much"] } },
+    shownIf: index === 2 ? [{ item: "age", answers: { min: 30 } }] : [],
+  }));
+  const age = {
+    id: "age",
+    text: "How *old* are you?",
+    kind: { case: "number" as const, value: { min: 18, max: 99, unit: "years" } },
+  };
+  const before = {
+    id: "before",
+    title: "Before the game",
+    instructions: "Choose **one**:\n\n- a\n- b",
+    items: [age, ...statements],
+  };
+  const only = { shownIf: [{ questionnaire: "before", item: "age", answers: { min: 30 } }] };
+  const { studyId, ownerToken } = await newStudy(server, {
+    participants: 2,
+    stages: [
+      { stage: { case: "consent", value: { text: "# Study\n\nSee [our page](https://example.org).", version: "1" } } },
+      { stage: { case: "questionnaire", value: before } },
+      { stage: { case: "text", value: { title: "For some", text: "You are over 30." } }, ...only },
+      { stage: { case: "games", value: { count: 1 } } },
+      { stage: { case: "text", value: { title: "About this study", text: "Thank you." } } },
+    ],
+  });
+  const researcher = await person(browser, { viewport: PHONE });
+  await researcher.page.goto(`${server.url}/studies/${studyId}`);
+  await researcher.page.getByLabel("Owner token").fill(ownerToken);
+  await researcher.page.getByRole("button", { name: "Use this key" }).click();
+  await researcher.page.getByLabel("Number of test participants").fill("2");
+  await researcher.page.getByRole("button", { name: "Add test participants" }).click();
+  await researcher.page.getByRole("button", { name: "Download the data of test participants (ZIP)" }).waitFor();
+  expect(await inaccessible(researcher.page)).toEqual([]);
+  expect(await tooWide(researcher.page)).toEqual([]);
+
+  const { links } = await clientsOf(server).studies.listStudyLinks({ studyId, ownerToken });
+  const { page, faults } = await person(browser);
+  await page.goto(`${server.url}/study/${links[0]?.link}`);
+  await page.getByText("Test participation").waitFor();
+  await page.getByRole("link", { name: "our page" }).waitFor();
+  expect(await inaccessible(page)).toEqual([]);
+  await page.getByLabel("I have read this text").press("Space");
+  await page.getByRole("button", { name: "Agree and continue" }).press("Enter");
+  await page.getByRole("textbox", { name: "How old are you?" }).fill("3");
+  await page.getByRole("button", { name: "Send the answers" }).click();
+  await page.getByText("This is none of the numbers that can be answered.").waitFor();
+  expect(await page.getByRole("group", { name: "I was bored." }).count()).toBe(0);
+  await page.getByRole("textbox", { name: "How old are you?" }).fill("30");
+  await page.getByRole("group", { name: "I was bored." }).waitFor();
+  expect(await inaccessible(page)).toEqual([]);
+  await page.setViewportSize(PHONE);
+  expect(await tooWide(page)).toEqual([]);
+  for (const point of await page.getByRole("radio", { name: "4 of 5" }).all()) await point.check();
+  await page.getByRole("button", { name: "Send the answers" }).click();
+  await page.getByRole("heading", { name: "For some" }).waitFor();
+  await page.getByRole("button", { name: "Continue" }).click();
+  await page.locator("[data-decision]").waitFor();
+  await page.getByRole("button", { name: "End the game" }).click();
+  await page.locator('[data-part~="study-game"]').getByRole("button", { name: "Continue" }).click();
+  await page.getByRole("heading", { name: "About this study" }).waitFor();
+
+  // The other one skips the questions, and so is not over 30.
+  const other = await person(browser);
+  await other.page.goto(`${server.url}/study/${links[1]?.link}`);
+  await other.page.getByLabel("I have read this text").press("Space");
+  await other.page.getByRole("button", { name: "Agree and continue" }).press("Enter");
+  await other.page.getByRole("button", { name: "Skip the questions" }).click();
+  await other.page.locator("[data-decision]").waitFor();
+
+  const { study, participants } = await clientsOf(server).studies.getStudy({ studyId, ownerToken });
+  expect([study?.added, study?.active, study?.testParticipants]).toEqual([0, 0, 2]);
+  expect(participants.map(({ pseudonym, test }) => [pseudonym, test])).toEqual([
+    ["T01", true],
+    ["T02", true],
+  ]);
+  expect([...faults, ...other.faults, ...researcher.faults]).toEqual([]);
 });
 
 test("a researcher deletes a study with a participant in the middle of it, and its link and key are gone", async () => {

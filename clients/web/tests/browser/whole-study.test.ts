@@ -28,7 +28,7 @@ const FEW = 2;
 
 const COLUMNS = {
   "participants.csv":
-    "number,participant,panel_id,state,slot,conditions,factor_warmth,step,sessions,began_at_ms,ended_at_ms,consent_at_ms,consent_version,consent_text_sha256,consent_language,attention_checks,attention_checks_passed,data_deleted",
+    "number,participant,panel_id,test,state,slot,conditions,factor_warmth,step,sessions,began_at_ms,ended_at_ms,consent_at_ms,consent_version,consent_text_sha256,consent_language,attention_checks,attention_checks_passed,data_deleted",
   "sessions.csv": "number,participant,session,opened_at_ms,width,height,pixels,pointer,time_zone",
   "games.csv":
     "study,number,participant,condition,factor_warmth,step,practice,attempt,seed_index,seed,seat,game_id,outcome,started_at_ms,ended_at_ms,place,points,shifts,decisions,invalid_answers,timeouts,hints,timed_decisions,decision_time_us",
@@ -175,8 +175,9 @@ function expectComplete(
   expect(inState("completed")).toHaveLength(COUNT);
   expect(inState("dropped_out")).toHaveLength(DROPPING_OUT);
   expect(inState("withdrawn").map((row) => [row.participant, row.data_deleted])).toEqual([["", "true"]]);
-  // None came from a panel.
-  expect(people.flatMap(emptyCells).filter((name) => name !== "panel_id")).toEqual(["participant"]);
+  // None came from a panel. Nothing is known of the one whose data were deleted.
+  const deleted = ["participant", "attention_checks", "attention_checks_passed"];
+  expect(people.flatMap(emptyCells).filter((name) => name !== "panel_id")).toEqual(deleted);
   const sessions = rows("sessions.csv");
   for (const { number, sessions: opened, data_deleted: deleted } of people)
     expect(sessions.filter((row) => row.number === number)).toHaveLength(deleted === "true" ? 0 : Number(opened));
@@ -212,7 +213,7 @@ function expectComplete(
     for (const kind of ["decision_shown", "answer_sent"]) expect(kinds, participant).toContain(kind);
   }
   expect(answers).toHaveLength(4 * COUNT);
-  expect([...new Set(answers.flatMap(emptyCells))]).toEqual(["scale", "label"]);
+  expect([...new Set(answers.flatMap(emptyCells))]).toEqual(["scale", "label", "passed"]);
 }
 
 /** The rows of a table whose cells are not quoted. */

@@ -5,6 +5,7 @@
 mod connection;
 mod file;
 mod owner;
+mod trial;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -23,6 +24,7 @@ use super::{CommandError, say};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
                   chefshat study create docs/studies/example.toml --owner-file ./owner\n  \
+                  chefshat study test STUDY-ID --owner-file ./owner\n  \
                   chefshat study links STUDY-ID --add 16 --owner-file ./owner\n  \
                   chefshat study follow STUDY-ID --owner-file ./owner\n  \
                   chefshat study export STUDY-ID --out data --owner-file ./owner\n\n\
@@ -42,6 +44,8 @@ enum StudyAction {
     Show(owner::Show),
     /// Print the links of the participants, after adding some if wanted.
     Links(owner::Links),
+    /// Let test participants go through a study, with answers by chance.
+    Test(trial::Test),
     /// Follow the progress of a study until it is closed and nobody is active.
     Follow(owner::Follow),
     /// Write the data of a study into a folder.
@@ -63,6 +67,7 @@ impl StudyCommand {
             StudyAction::List(command) => command.run().await?,
             StudyAction::Show(command) => command.run().await?,
             StudyAction::Links(command) => command.run().await?,
+            StudyAction::Test(command) => return command.run().await,
             StudyAction::Follow(command) => command.run().await?,
             StudyAction::Export(command) => command.run().await?,
             StudyAction::Close(command) => command.close().await?,
@@ -124,7 +129,7 @@ impl Create {
             hex::encode(&study.seeds_sha256)
         ))?;
         say(format_args!(
-            "each of {} participants has {} steps with {} games and {} for practice",
+            "each of {} participants has {} steps with {} games and at most {} for practice",
             study.settings.map_or(0, |it| it.participants),
             study.steps,
             study.games,

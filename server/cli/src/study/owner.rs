@@ -19,14 +19,14 @@ use crate::{CommandError, say};
 pub(super) struct Owned {
     /// ID of the study.
     #[arg(value_name = "STUDY-ID")]
-    study_id: String,
+    pub(super) study_id: String,
     #[command(flatten)]
-    owner: OwnerArgs,
+    pub(super) owner: OwnerArgs,
     #[command(flatten)]
-    server: ServerArg,
+    pub(super) server: ServerArg,
     /// Print JSON lines.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// List the studies of an owner token, or all for the operator.
@@ -59,6 +59,9 @@ pub(super) struct Links {
     /// Add a participant with this pseudonym. Do not use names of people. Repeatable.
     #[arg(long = "pseudonym", value_name = "NAME")]
     pseudonyms: Vec<String>,
+    /// Add test participants, who take no place: to look at the study as participants see it.
+    #[arg(long)]
+    test: bool,
 }
 
 /// Follow the progress of a study until it is closed and nobody is active.
@@ -76,6 +79,9 @@ pub(super) struct Export {
     /// The folder, which must not exist yet.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
+    /// The data of test participants, instead of those of all others.
+    #[arg(long)]
+    test: bool,
 }
 
 /// Remove a participant, whose slot is free again. Its data are kept.
@@ -185,6 +191,9 @@ impl Links {
         let owned = self.owned;
         let mut service = service(&owned.server).await?;
         let (study_id, owner_token) = (owned.study_id.clone(), owned.owner.token()?);
+        if self.test && self.add == 0 && self.pseudonyms.is_empty() {
+            return Err("say with --add or --pseudonym which test participants to add".into());
+        }
         let links = if self.add == 0 && self.pseudonyms.is_empty() {
             let request = v1::ListStudyLinksRequest {
                 study_id,
@@ -198,6 +207,7 @@ impl Links {
                 owner_token,
                 pseudonyms: self.pseudonyms,
                 count: self.add,
+                test: self.test,
             };
             let added = service.add_study_participants(request).await;
             added.map_err(refused)?.into_inner().links
@@ -249,6 +259,7 @@ impl Export {
         let request = v1::ExportStudyRequest {
             study_id: owned.study_id.clone(),
             owner_token: owned.owner.token()?,
+            test: self.test,
         };
         let exported = service.export_study(request).await.map_err(refused)?;
         let mut parts = exported.into_inner();
@@ -402,7 +413,7 @@ fn summary(study: &v1::Study) -> String {
 }
 
 /// A participant in a line.
-fn line(participant: &v1::StudyParticipant) -> String {
+pub(super) fn line(participant: &v1::StudyParticipant) -> String {
     let state = participant.state().as_str_name();
     let state = state
         .trim_start_matches("STUDY_PARTICIPANT_STATE_")
@@ -412,12 +423,13 @@ fn line(participant: &v1::StudyParticipant) -> String {
     } else {
         ""
     };
+    let test = if participant.test { " (test)" } else { "" };
     let id = match participant.panel_id.as_str() {
         "" => String::new(),
         id => format!(" ({id})"),
     };
     format!(
-        "{}\t{}{id}\t{state}{present}\tstep {}\t{}",
+        "{}\t{}{test}{id}\t{state}{present}\tstep {}\t{}",
         participant.number,
         participant.pseudonym,
         participant.step,

@@ -222,7 +222,10 @@ impl StudyService for StudyCalls {
             return Err(field("COUNT_REFUSED", &FieldProblem::new("count", words)));
         }
         pseudonyms.resize(count, String::new());
-        let added = handle.add(key, pseudonyms).await.map_err(stopped)?;
+        let added = handle
+            .add(key, pseudonyms, request.test)
+            .await
+            .map_err(stopped)?;
         let first = added.map_err(not_added)?;
         Ok(Response::new(v1::AddStudyParticipantsResponse {
             links: self.links(&handle, first, count),
@@ -342,7 +345,7 @@ impl StudyService for StudyCalls {
                 }
             };
             let gathering = async move {
-                let gathered = handle.export(studies.rooms(), &files).await;
+                let gathered = handle.export(studies.rooms(), request.test, &files).await;
                 drop(files);
                 gathered
             };

@@ -102,6 +102,7 @@ impl ParticipantData {
                 "devices": devices,
                 "consent": consent,
                 "reachedAtMs": participant.reached_at_ms,
+                "passedOver": participant.passed_over,
                 "endedAtMs": participant.ended_at_ms,
                 "gameIds": games,
             } })];

@@ -199,8 +199,8 @@ impl StudyHandle {
         Token::of_request(room, &SecretHash::from_bytes(self.header.key), &[0; 32])
     }
 
-    /// Adds participants with these pseudonyms, empty ones by number, and charges a caller for their
-    /// memory. Returns the number of the first.
+    /// Adds participants, or test participants, with these pseudonyms, empty ones by number, and charges
+    /// a caller for their memory. Returns the number of the first.
     ///
     /// # Errors
     /// The server ends, or (inner result) the request is refused.
@@ -208,6 +208,7 @@ impl StudyHandle {
         &self,
         key: Key,
         pseudonyms: Vec<String>,
+        test: bool,
     ) -> Result<Result<u32, NotAdded>, Stopped> {
         let memory = match self.shared.data.for_participants(key, &pseudonyms) {
             Ok(memory) => memory,
@@ -216,7 +217,7 @@ impl StudyHandle {
         let data = Arc::clone(&self.shared.data);
         let added = self.command(move |study, _| {
             let first = study.next_number();
-            let changes = study.add(&pseudonyms)?;
+            let changes = study.add(&pseudonyms, test)?;
             // Here, because the caller may go before it gets its answer.
             data.keep_participants(memory);
             Ok((changes, first))
@@ -364,13 +365,22 @@ impl StudyHandle {
         )
     }
 
-    /// Continues with the next step of a participant.
+    /// Continues with the next step of a participant. The running game of a test participant is closed
+    /// before it can continue.
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
-    pub async fn proceed(&self, at: At) -> Result<Result<u32, Refusal>, Stopped> {
-        self.command(move |study, now_ms| Ok((vec![study.proceed(at, now_ms)?], 0)))
-            .await
+    pub async fn proceed(&self, at: At, rooms: &Rooms) -> Result<Result<u32, Refusal>, Stopped> {
+        let command = self.command(move |study, now_ms| Ok((vec![study.proceed(at, now_ms)?], 0)));
+        let proceeded = command.await?;
+        if proceeded == Err(Refusal::GameNotOver)
+            && let Some(room) = self.read(|study| study.room_of_test(at.number))
+            && let Some(room) = rooms.get(Id(room))
+        {
+            room.close_without_token().await;
+            return Ok(Ok(0));
+        }
+        Ok(proceeded)
     }
 
     /// Withdraws a participant. If its data are to be deleted, returns when they are.
@@ -422,7 +432,8 @@ impl StudyHandle {
                 return Ok((changes, 0));
             };
             let next = study.next_number();
-            changes.extend(study.add(&[String::new()])?);
+            let test = study.participant(number).is_some_and(|it| it.test);
+            changes.extend(study.add(&[String::new()], test)?);
             data.keep_participants(memory);
             Ok((changes, next))
         });

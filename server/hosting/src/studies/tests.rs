@@ -103,7 +103,7 @@ impl Lab {
         let created = studies.create(settings, None, Key::Local).await;
         let (study, _) = created.expect("valid settings");
         let added = study
-            .add(Key::Local, vec![String::new(); participants])
+            .add(Key::Local, vec![String::new(); participants], false)
             .await;
         assert_eq!(added.expect("it runs"), Ok(1));
         Self {
@@ -354,7 +354,7 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
         assert_eq!(withdrawn.expect("it runs"), Ok(()));
     }
     assert_eq!(rows().await, 1, "rewritten");
-    let added = lab.study.add(Key::Local, vec!["Ada".into()]).await;
+    let added = lab.study.add(Key::Local, vec!["Ada".into()], false).await;
     assert_eq!(added.expect("it runs"), Ok(3));
     assert_eq!(rows().await, 2);
     lab.studies.end();
@@ -367,7 +367,7 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
     assert_eq!(rows().await, 2, "nothing is left to delete");
 
     // A server that ended right after the withdrawals.
-    let added = study.add(Key::Local, vec!["Bo".into()]).await;
+    let added = study.add(Key::Local, vec!["Bo".into()], false).await;
     assert_eq!(added.expect("it runs"), Ok(4));
     studies.end();
     let withdrew = |number| chefshat_study::Change::Withdrew {
@@ -408,8 +408,8 @@ async fn a_record_from_elsewhere_is_no_data_of_a_study() {
 /// The rows of exported tables, without those of records, each by the names of its columns.
 type Tables = BTreeMap<String, Vec<BTreeMap<String, String>>>;
 
-/// The files that a study exports, by name.
-async fn exported(lab: &Lab) -> BTreeMap<String, Vec<u8>> {
+/// The files that a study exports, or those of its test participants, by name.
+async fn exported(lab: &Lab, test: bool) -> BTreeMap<String, Vec<u8>> {
     let (sender, mut receiver) = mpsc::channel::<ExportedFile>(1);
     let mut files: BTreeMap<String, Vec<u8>> = BTreeMap::new();
     let receiving = async {
@@ -419,7 +419,10 @@ async fn exported(lab: &Lab) -> BTreeMap<String, Vec<u8>> {
     };
     let exporting = async {
         let rooms = lab.studies.rooms();
-        lab.study.export(rooms, &sender).await.expect("an export");
+        lab.study
+            .export(rooms, test, &sender)
+            .await
+            .expect("an export");
         drop(sender);
     };
     tokio::join!(receiving, exporting);
@@ -542,7 +545,9 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         answered.expect("it runs").expect("they are valid");
     }
 
-    let files = exported(&lab).await;
+    let tested = lab.study.add(Key::Local, vec![String::new()], true).await;
+    assert_eq!(tested.expect("it runs"), Ok(5));
+    let files = exported(&lab, false).await;
     let tables = tables(&files);
     let cells = |row: &BTreeMap<String, String>, columns: &[&str]| {
         let cells = columns.iter().map(|column| row[*column].clone());
@@ -659,6 +664,12 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         .iter()
         .find(|row| row["column"] == "factor_mood");
     assert_eq!(mood.expect("a row")["codes"], "'-low; high");
+    let tests = self::tables(&exported(&lab, true).await);
+    let tests = tests["participants.csv"].iter();
+    let tests: Vec<String> = tests
+        .map(|row| cells(row, &["participant", "test"]))
+        .collect();
+    assert_eq!(tests, ["T05|true"]);
 }
 
 #[tokio::test]
@@ -687,7 +698,7 @@ async fn traces_that_were_sent_again_are_exported_once() {
         let recorded = lab.study.record_traces((1, 1), game, traces, rooms).await;
         assert!(matches!(recorded, Ok(Ok(()))), "{recorded:?}");
     }
-    let tables = tables(&exported(&lab).await);
+    let tables = tables(&exported(&lab, false).await);
     let times = tables["traces.csv"].iter().map(|row| row["at_ms"].as_str());
     assert_eq!(
         times.collect::<Vec<_>>(),
@@ -772,7 +783,7 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
     let (studies, store) = (&lab.studies, &lab.store);
     let created = studies.create(long_answers(49), None, Key::Local).await;
     let (study, _) = created.expect("valid settings");
-    let added = study.add(Key::Local, vec![String::new(); 2]).await;
+    let added = study.add(Key::Local, vec![String::new(); 2], false).await;
     assert_eq!(added.expect("it runs"), Ok(1));
     assert_eq!(
         study.open(Key::Local, 1, None).await.expect("it runs"),
@@ -847,14 +858,14 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
     assert!(resumed.common.data.taken() <= MAX_STUDY_DATA);
     let free = MAX_STUDY_DATA - resumed.common.data.taken();
     let others = resumed.common.data.take_many_anyway(Key::Local, free);
-    let one_more = study.add(address(200), vec![String::new()]).await;
+    let one_more = study.add(address(200), vec![String::new()], false).await;
     assert!(
         matches!(&one_more, Ok(Err(NotAdded::Memory(it))) if it.reason == "TOO_MANY_PARTICIPANTS"),
         "{one_more:?}"
     );
 
     drop(others);
-    let added = study.add(address(200), vec![String::new()]).await;
+    let added = study.add(address(200), vec![String::new()], false).await;
     assert_eq!(added.expect("it runs"), Ok(3));
 
     // What is deleted is free again.

@@ -1,6 +1,7 @@
 //! `chefshat study` against a server: a study is created from the example, managed, exported and
 //! deleted.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use chefshat_client::Client;
@@ -136,4 +137,133 @@ fn a_study_is_listed_shown_exported_and_closed_and_participants_leave_it() {
     let counts = "0 active, 1 invited, 2 left";
     assert_eq!(closed, summary("closed", counts));
     owned("links", "--add 1").assert_failed("STUDY_CLOSED");
+}
+
+/// A study without consent and games, with an item of each kind, and items and stages for some.
+const QUESTIONS: &str = r#"
+name = "questions"
+title = "Questions"
+participants = 2
+
+[[conditions]]
+id = "one"
+rules = { preset = "paper", faces = 8, target_shifts = 1 }
+policy = { pace_ms = 0 }
+seats = [{ built_in_agent = "random" }, { built_in_agent = "random" }, { built_in_agent = "random" }]
+[[conditions]]
+id = "two"
+rules = { preset = "paper", faces = 8, target_shifts = 1 }
+policy = { pace_ms = 0 }
+seats = [{ built_in_agent = "random" }, { built_in_agent = "random" }, { built_in_agent = "random" }]
+
+[[stages]]
+[stages.questionnaire]
+id = "before"
+items = [
+    { id = "age", text = "Age", number = { min = 18, max = 99 } },
+    { id = "plays", text = "What?", optional = true, choice = { options = ["a", "b", "c"], multiple = true } },
+    { id = "one", text = "Which?", choice = { options = ["a", "b"] } },
+    { id = "liked", text = "Liked", likert = { points = 2, labels = ["no", "yes"] } },
+    { id = "why", text = "Why not?", free_text = { max_characters = 9 }, shown_if = [{ item = "liked", answers = { max = 1 } }] },
+    { id = "real", semantic_differential = { points = 5, left = "fake", right = "real" } },
+    { id = "check", text = "Low?", slider = { min = 0, max = 10, step = 5 }, attention_check = { max = 0 } },
+]
+[[stages]]
+shown_if = [{ questionnaire = "before", item = "one", answers = { options = [0] }, not = true }]
+[stages.questionnaire]
+id = "some"
+items = [
+    { id = "a", text = "A", number = { min = 1, max = 3 } },
+    { id = "b", text = "B", number = { min = 1, max = 3 }, shown_if = [{ questionnaire = "before", item = "plays", answers = { options = [2] }, not = true }] },
+]
+[[stages]]
+games = { count = 1 }
+"#;
+
+#[test]
+fn test_participants_go_through_a_study_by_what_they_are_shown() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(&folder.path().join("data"));
+    let owner = folder.path().join("owner");
+    let file = folder.path().join("questions.toml");
+    std::fs::write(&file, QUESTIONS).unwrap();
+    let create = ["study", "create", file.to_str().unwrap(), "--json"];
+    let owner_file = ["--server", &url, "--owner-file", owner.to_str().unwrap()];
+    let created = chefshat(&[&create[..], &owner_file].concat()).well().json();
+    let id = created["study"]["studyId"].as_str().unwrap().to_owned();
+    let owned = |command: &str, more: &str| -> Ended {
+        let owner = owner.to_str().unwrap();
+        run(
+            &url,
+            &format!("study {command} {id} {more} --owner-file {owner}"),
+        )
+    };
+    let tested = owned("test", "--participants 24 --seed 7").well().stdout;
+    let lines: Vec<&str> = tested.lines().collect();
+    assert!(lines[0].starts_with("1\tT01 (test)\tcompleted"), "{tested}");
+    assert_eq!(lines[24], "24 of 24 test participants completed the study");
+    let shown = owned("show", "").well().stdout;
+    assert!(
+        shown.contains("0 completed, 0 active, 0 invited, 0 left"),
+        "{shown}"
+    );
+    // A participant still gets the first place.
+    owned("links", "--test").assert_failed("--add");
+    let links = owned("links", "--add 1 --json").well().json();
+    open(&url, links["link"].as_str().unwrap());
+    let first = owned("show", "--json").well().json()["participants"][24].clone();
+    assert_eq!(first["slot"], 0, "{first}");
+
+    let table = |more: &str, file: &str| -> Vec<BTreeMap<String, String>> {
+        let out = folder.path().join(format!("exported{more}"));
+        if !out.exists() {
+            owned("export", &format!("{more} --out {}", out.display())).well();
+        }
+        let rows = csv::Reader::from_path(out.join(file)).unwrap();
+        rows.into_deserialize().map(Result::unwrap).collect()
+    };
+    assert_eq!(table("", "participants.csv").len(), 1);
+    assert_eq!(table("", "games.csv").len(), 0);
+    let participants = table("--test", "participants.csv");
+    assert_eq!(participants.len(), 24);
+    assert!(participants.iter().all(|it| it["test"] == "true"));
+    for condition in ["one", "two"] {
+        let of = participants
+            .iter()
+            .filter(|it| it["conditions"] == condition);
+        assert_eq!(of.count(), 12, "{condition}");
+    }
+    assert_eq!(table("--test", "games.csv").len(), 24);
+
+    // What each was shown follows from its answers, which were by chance: all of it occurs.
+    let answers = table("--test", "answers.csv");
+    let mut seen = BTreeSet::new();
+    for participant in &participants {
+        let of = |item: &str| {
+            let mut rows = answers.iter();
+            let row = rows.find(|it| it["number"] == participant["number"] && it["item"] == item);
+            row.unwrap().clone()
+        };
+        let is_shown = |item: &str| of(item)["status"] != "not_shown";
+        assert_eq!(is_shown("why"), of("liked")["answer"] == "1");
+        assert_eq!(is_shown("a"), of("one")["answer"] != "0");
+        let plays_c = of("plays")["answer"].contains('2');
+        assert_eq!(is_shown("b"), is_shown("a") && !plays_c);
+        assert_eq!(
+            of("a")["questionnaire_shown_at_ms"].is_empty(),
+            !is_shown("a")
+        );
+        assert_eq!(
+            of("check")["passed"] == "true",
+            of("check")["answer"] == "0"
+        );
+        let passed = if of("check")["answer"] == "0" {
+            "1"
+        } else {
+            "0"
+        };
+        assert_eq!(participant["attention_checks_passed"], passed);
+        seen.insert((is_shown("why"), is_shown("a"), plays_c, passed));
+    }
+    assert!(seen.len() > 6, "{seen:?}");
 }

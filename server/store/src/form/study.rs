@@ -71,6 +71,8 @@ struct AddedForm {
     pseudonym: String,
     #[prost(message, optional, tag = "3")]
     joined: Option<JoinedForm>,
+    #[prost(bool, tag = "4")]
+    test: bool,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -371,6 +373,7 @@ fn kind_of(change: &Change) -> KindForm {
             number,
             pseudonym,
             joined,
+            test,
         } => KindForm::Added(AddedForm {
             number: *number,
             pseudonym: pseudonym.clone(),
@@ -378,6 +381,7 @@ fn kind_of(change: &Change) -> KindForm {
                 request_sha256: joined.request_sha256.to_vec(),
                 panel_id: joined.panel_id.clone(),
             }),
+            test: *test,
         }),
         Change::Opened {
             number,
@@ -466,6 +470,7 @@ fn change_of(kind: KindForm) -> Result<Change, Unreadable> {
                     panel_id: joined.panel_id,
                 }),
             },
+            test: form.test,
         },
         KindForm::Opened(form) => Change::Opened {
             number: form.number,

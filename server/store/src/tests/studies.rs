@@ -25,6 +25,7 @@ fn added(number: u32) -> Change {
         number,
         pseudonym: format!("Pseudonym {number}"),
         joined: None,
+        test: false,
     }
 }
 
@@ -54,6 +55,7 @@ fn every_change() -> Vec<Change> {
                 request_sha256: [6; 32],
                 panel_id: "5f2".to_owned(),
             }),
+            test: true,
         },
         Change::Opened {
             number,

@@ -246,7 +246,7 @@ fn a_full_or_closed_study_accepts_nobody() {
     lab.wait(1_000_000);
     assert!(lab.study.is_closed() && lab.study.close().is_none());
     assert_eq!(lab.open(2), Err(Refusal::Closed));
-    assert_eq!(lab.study.add(&[String::new()]), Err(Refusal::Closed));
+    assert_eq!(lab.study.add(&[String::new()], false), Err(Refusal::Closed));
     // Who has begun continues, also in a new session.
     lab.complete(1);
     assert_eq!(status(&lab, 1), Status::Completed);
@@ -256,16 +256,80 @@ fn a_full_or_closed_study_accepts_nobody() {
 fn pseudonyms_are_unique_and_follow_from_numbers() {
     let mut lab = Lab::new(settings(), 1);
     let names = ["p04", "", "", "Ada"].map(str::to_owned);
-    for change in lab.study.add(&names).unwrap() {
+    for change in lab.study.add(&names, false).unwrap() {
         lab.fold(change);
     }
     let participants = lab.study.participants().values();
     let pseudonyms: Vec<_> = participants.map(|it| it.pseudonym.as_str()).collect();
     assert_eq!(pseudonyms, ["P01", "p04", "P03", "P05", "Ada"]);
     for taken in [&["ada".to_owned()][..], &["Bo".to_owned(), "BO".to_owned()]] {
-        assert!(matches!(lab.study.add(taken), Err(Refusal::NameTaken(_))));
+        assert!(matches!(
+            lab.study.add(taken, false),
+            Err(Refusal::NameTaken(_))
+        ));
     }
     let most = chefshat_study::MAX_PARTICIPANTS as usize;
-    let too_many = lab.study.add(&vec![String::new(); most]);
+    let too_many = lab.study.add(&vec![String::new(); most], false);
     assert_eq!(too_many, Err(Refusal::TooManyParticipants));
+}
+
+#[test]
+fn test_participants_take_no_slot_from_others_and_may_go_on_without_answers() {
+    let mut settings = within(2);
+    settings.participants = 2;
+    let mut lab = Lab::new(settings, 1);
+    for change in lab.study.add(&vec![String::new(); 3], true).unwrap() {
+        lab.fold(change);
+    }
+    lab.add(2);
+    let of = |lab: &Lab, number| {
+        let participant = lab.study.participant(number).unwrap();
+        (
+            participant.pseudonym.clone(),
+            participant.slot,
+            participant.test,
+        )
+    };
+    // More of them than the study has slots, before anybody else.
+    for (number, slot) in [(2, 0), (3, 1), (4, 2)] {
+        lab.complete(number);
+        let name = format!("T{number:02}");
+        assert_eq!(of(&lab, number), (name, Some(slot), true));
+        assert!(lab.study.view(number).unwrap().test);
+    }
+    for (number, slot) in [(1, 0), (5, 1)] {
+        lab.begin(number);
+        assert_eq!(
+            of(&lab, number),
+            (format!("P{number:02}"), Some(slot), false)
+        );
+        assert!(!lab.study.view(number).unwrap().test);
+    }
+    assert_eq!(lab.open(6), Err(Refusal::Full));
+    // The conditions of a slot are the same in a test.
+    let conditions = |number| {
+        let participant = lab.study.participant(number).unwrap();
+        lab.study.sequence_of(participant)
+    };
+    assert_eq!(conditions(2), conditions(1));
+    assert_eq!(lab.folded_again(), lab.study);
+
+    // A questionnaire is passed over in a test alone.
+    for change in lab.study.add(&[String::new()], true).unwrap() {
+        lab.fold(change);
+    }
+    let mut skipped = Vec::new();
+    for number in [1, 7] {
+        if number == 7 {
+            lab.begin(number);
+        }
+        while !matches!(
+            lab.study.view(number).unwrap().content,
+            Content::Questionnaire(_)
+        ) {
+            lab.act(number);
+        }
+        skipped.push(lab.study.proceed(lab.at(number), 0).is_ok());
+    }
+    assert_eq!(skipped, [false, true]);
 }

@@ -313,6 +313,89 @@ fn earlier_answers_decide_what_is_shown() {
 }
 
 #[test]
+fn in_a_block_the_answers_of_other_conditions_do_not_count() {
+    let number = |id: &str, shown_if: Vec<ShownIf>| {
+        let (min, max, unit) = (0, 9, String::new());
+        let kind = ItemKind::Number { min, max, unit };
+        Item {
+            required: false,
+            shown_if,
+            ..item(id, kind)
+        }
+    };
+    let above_5 = || {
+        vec![ShownIf {
+            questionnaire: Some("asked".to_owned()),
+            item: "n".to_owned(),
+            answers: AnswerSet {
+                min: Some(6),
+                ..AnswerSet::default()
+            },
+            not: false,
+        }]
+    };
+    let stage = |id: &str, items| {
+        Task::Questionnaire(Questionnaire {
+            id: id.to_owned(),
+            items,
+            ..questionnaire()
+        })
+    };
+    let mut settings = within(2);
+    settings.stages = vec![
+        Stage::per_condition([
+            stage("asked", vec![number("n", Vec::new())]),
+            // Nobody is shown a questionnaire without items.
+            stage("more", vec![number("m", above_5())]),
+            Task::Games { count: 1 },
+        ]),
+        Stage::Once(Part {
+            task: stage("last", vec![number("l", Vec::new())]),
+            shown_if: above_5(),
+        }),
+    ];
+    // The answers in both conditions, and the steps that are passed over.
+    for (answers, passed_over) in [
+        ([Some(6), Some(6)], vec![]),
+        ([Some(6), Some(5)], vec![4, 6]),
+        ([Some(6), None], vec![4, 6]),
+        ([None, Some(9)], vec![1]),
+    ] {
+        let mut lab = Lab::new(settings.clone(), 1);
+        lab.open(1).unwrap();
+        while lab.study.participant(1).unwrap().ended_at_ms.is_none() {
+            let at = lab.at(1);
+            let given = match at.step {
+                0 => answers[0],
+                3 => answers[1],
+                1 | 4 | 6 => Some(1),
+                _ => {
+                    lab.act(1);
+                    continue;
+                }
+            };
+            let given = given.map(|number| answer(0, Answer::Number(number)));
+            let given = Vec::from_iter(given);
+            let answered = lab.study.answer(at, given, 0).unwrap();
+            lab.fold(answered);
+        }
+        let participant = lab.study.participant(1).unwrap();
+        assert_eq!(
+            participant.passed_over,
+            passed_over.iter().copied().collect()
+        );
+        for step in [1, 4, 6] {
+            let shown = if passed_over.contains(&step) {
+                vec![]
+            } else {
+                vec![0]
+            };
+            assert_eq!(lab.study.shown_items(1, step), Some(shown));
+        }
+    }
+}
+
+#[test]
 fn an_attention_check_is_passed_by_its_answers_and_no_others() {
     for (chosen, passed) in [(vec![0], 1), (vec![1], 0), (vec![0, 1], 0), (vec![], 0)] {
         let mut settings = branching();

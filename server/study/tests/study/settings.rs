@@ -308,6 +308,7 @@ fn a_problem_of_a_condition_names_its_field() {
             in_earlier("number", AnswerSet::default()),
         ),
         ("shown_if[0].answers", in_earlier("number", chosen(&[1]))),
+        ("shown_if[0].answers", in_earlier("number", from(10))),
         ("shown_if[0].answers", in_earlier("text", from(1))),
         ("shown_if[0].answers", in_earlier("choice", from(1))),
         (
@@ -368,6 +369,7 @@ fn a_problem_of_a_condition_names_its_field() {
     }
     for (field, kind, passing) in [
         ("attention_check.options", "choice", chosen(&[2])),
+        ("attention_check.options", "choice", chosen(&[0, 1])),
         ("attention_check", "number", AnswerSet::default()),
     ] {
         let mut items = match &earlier {

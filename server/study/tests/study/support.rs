@@ -40,7 +40,7 @@ impl Lab {
     }
 
     pub(crate) fn add(&mut self, count: usize) {
-        let added = self.study.add(&vec![String::new(); count]).unwrap();
+        let added = self.study.add(&vec![String::new(); count], false).unwrap();
         added.into_iter().for_each(|change| self.fold(change));
     }
 

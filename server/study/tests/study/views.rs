@@ -75,7 +75,11 @@ fn a_pseudonym_cannot_add_to_the_address_of_an_external_questionnaire() {
         url: "https://example.org/?p={participant}&x=1".to_owned(),
     }));
     let mut lab = Lab::new(settings, 0);
-    for change in lab.study.add(&["a&x=2 è{participant}".to_owned()]).unwrap() {
+    for change in lab
+        .study
+        .add(&["a&x=2 è{participant}".to_owned()], false)
+        .unwrap()
+    {
         lab.fold(change);
     }
     lab.open(1).unwrap();

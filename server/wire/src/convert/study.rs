@@ -621,8 +621,10 @@ pub fn study_to_proto(
     study: &Study,
 ) -> v1::Study {
     let (games, practice_games) = study.settings().games();
+    let participants = study.participants().values();
+    let (tests, participants): (Vec<_>, Vec<_>) = participants.partition(|it| it.test);
     let mut counts = [0; 4];
-    for participant in study.participants().values() {
+    for participant in &participants {
         counts[match participant.status {
             Status::Invited => 0,
             Status::Active => 1,
@@ -640,12 +642,13 @@ pub fn study_to_proto(
         steps: number(study.step_count()),
         games,
         practice_games,
-        added: number(study.participants().len()),
+        added: number(participants.len()),
         invited,
         active,
         completed,
         left,
         open_link,
+        test_participants: number(tests.len()),
     }
 }
 
@@ -686,6 +689,7 @@ pub fn study_participant(
             .collect(),
         data_deleted: participant.data_deleted,
         panel_id: participant.panel_id().to_owned(),
+        test: participant.test,
     })
 }
 

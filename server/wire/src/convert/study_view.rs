@@ -21,6 +21,7 @@ pub fn study_view(view: View, ticket_of: impl FnOnce(Id) -> String) -> v1::Study
         step: number(view.step),
         steps: number(view.steps),
         traces: view.traces,
+        test: view.test,
         content: Some(match view.content {
             Content::Consent(consent) => Message::Consent(v1::StudyConsent {
                 text: consent.text,

@@ -32,13 +32,13 @@ export const studies: Texts["studies"] = {
     title: "Fragen",
     optional: "(freiwillig)",
     submit: "Antworten senden",
-    missing: (count) =>
-      plural(count, { one: "# Frage hat noch keine Antwort.", other: "# Fragen haben noch keine Antwort." }),
+    missing: (count) => plural(count, { one: "Bitte prüfen Sie # Frage.", other: "Bitte prüfen Sie # Fragen." }),
     answerThis: "Bitte beantworten Sie diese Frage.",
     point: (point, points, label) => `${point} von ${points}${label && `: ${label}`}`,
     unset: "noch keine Antwort",
     onScale: (value, min, max) => `${value}, von ${min} bis ${max}`,
-    numberWithin: (min: number, max: number) => `Eine ganze Zahl von ${min} bis ${max}`,
+    notThisNumber: "Mit dieser Zahl kann nicht geantwortet werden.",
+    numberWithin: (min, max) => `Eine ganze Zahl von ${min} bis ${max}`,
     left: (count) => plural(count, { one: "noch # Zeichen", other: "noch # Zeichen" }),
   },
   external: {
@@ -77,6 +77,12 @@ export const studies: Texts["studies"] = {
       `Ihr Code in der Studie ist ${pseudonym}. Nennen Sie ihn, wenn Sie Fragen zu Ihren Daten haben.`,
     close: "Sie können diese Seite schließen.",
     goOn: (host) => `Weiter zu ${host}`,
+  },
+  test: {
+    title: "Testteilnahme",
+    text: "Sie nehmen zum Testen teil: Was Sie hier tun, zählt nicht, und Sie können Fragen überspringen.",
+    skip: "Fragen überspringen",
+    end: "Das Spiel beenden",
   },
   withdraw: {
     button: "Teilnahme zurückziehen…",
@@ -137,6 +143,14 @@ export const studies: Texts["studies"] = {
       namesHint: "Pseudonyme, keine Namen von Personen. Alle sehen ihr eigenes.",
       submit: "Hinzufügen",
       problem: "Gib eine Zahl von 1 bis 1000 ein oder Codes mit höchstens 64 Zeichen.",
+    },
+    tests: {
+      title: "Die Studie testen",
+      text: "Testteilnehmer sehen die Studie wie andere, nehmen keinen Platz ein und werden nirgends mitgezählt. Öffne einen ihrer Links, um jede Seite anzusehen; „chefshat study test“ lässt Programme hindurchgehen.",
+      count: "Anzahl der Testteilnehmer",
+      submit: "Testteilnehmer hinzufügen",
+      mark: "Test",
+      export: "Daten der Testteilnehmer herunterladen (ZIP)",
     },
     openLink: {
       title: "Link für alle",

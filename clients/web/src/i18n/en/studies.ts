@@ -30,12 +30,12 @@ export const studies = {
     title: "Questions",
     optional: "(optional)",
     submit: "Send the answers",
-    missing: (count: number) =>
-      plural(count, { one: "# question has no answer yet.", other: "# questions have no answer yet." }),
+    missing: (count: number) => plural(count, { one: "Please check # question.", other: "Please check # questions." }),
     answerThis: "Please answer this question.",
     point: (point: number, points: number, label: string) => `${point} of ${points}${label && `: ${label}`}`,
     unset: "no answer yet",
     onScale: (value: number, min: number, max: number) => `${value}, from ${min} to ${max}`,
+    notThisNumber: "This is none of the numbers that can be answered.",
     numberWithin: (min: number, max: number) => `A whole number from ${min} to ${max}`,
     left: (count: number) => plural(count, { one: "# character left", other: "# characters left" }),
   },
@@ -74,6 +74,12 @@ export const studies = {
       `Your code in the study is ${pseudonym}. Give it if you have questions about your data.`,
     close: "You can close this page.",
     goOn: (host: string) => `Go on to ${host}`,
+  },
+  test: {
+    title: "Test participation",
+    text: "You take part as a test: nothing that you do here counts, and you may skip questions.",
+    skip: "Skip the questions",
+    end: "End the game",
   },
   withdraw: {
     button: "Withdraw from the study…",
@@ -133,6 +139,14 @@ export const studies = {
       namesHint: "Pseudonyms, not names of people. They see their own.",
       submit: "Add",
       problem: "Enter a number from 1 to 1000, or codes of at most 64 characters.",
+    },
+    tests: {
+      title: "Test the study",
+      text: "Test participants see the study as others do, take no place, and are in no count. Open one of their links to look at every page; “chefshat study test” lets programs go through it.",
+      count: "Number of test participants",
+      submit: "Add test participants",
+      mark: "test",
+      export: "Download the data of test participants (ZIP)",
     },
     openLink: {
       title: "Link for everyone",

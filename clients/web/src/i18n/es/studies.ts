@@ -32,12 +32,13 @@ export const studies: Texts["studies"] = {
     optional: "(opcional)",
     submit: "Enviar las respuestas",
     missing: (count) =>
-      plural(count, { one: "# pregunta sigue sin respuesta.", other: "# preguntas siguen sin respuesta." }),
+      plural(count, { one: "Revise # pregunta, por favor.", other: "Revise # preguntas, por favor." }),
     answerThis: "Responda a esta pregunta.",
     point: (point, points, label) => `${point} de ${points}${label && `: ${label}`}`,
     unset: "sin respuesta todavía",
     onScale: (value, min, max) => `${value}, de ${min} a ${max}`,
-    numberWithin: (min: number, max: number) => `Un número entero de ${min} a ${max}`,
+    notThisNumber: "No se puede responder con este número.",
+    numberWithin: (min, max) => `Un número entero de ${min} a ${max}`,
     left: (count) => plural(count, { one: "queda # carácter", other: "quedan # caracteres" }),
   },
   external: {
@@ -74,6 +75,12 @@ export const studies: Texts["studies"] = {
     pseudonym: (pseudonym) => `Su código en el estudio es ${pseudonym}. Indíquelo si tiene preguntas sobre sus datos.`,
     close: "Puede cerrar esta página.",
     goOn: (host) => `Seguir en ${host}`,
+  },
+  test: {
+    title: "Participación de prueba",
+    text: "Usted participa como prueba: nada de lo que haga aquí cuenta, y puede omitir preguntas.",
+    skip: "Omitir las preguntas",
+    end: "Terminar la partida",
   },
   withdraw: {
     button: "Retirarse del estudio…",
@@ -134,6 +141,14 @@ export const studies: Texts["studies"] = {
       namesHint: "Seudónimos, no nombres de personas. Cada cual ve el suyo.",
       submit: "Añadir",
       problem: "Escribe un número del 1 al 1000, o códigos de 64 caracteres como máximo.",
+    },
+    tests: {
+      title: "Probar el estudio",
+      text: "Los participantes de prueba ven el estudio como los demás, no ocupan plaza y no cuentan en ninguna parte. Abre uno de sus enlaces para ver cada página; «chefshat study test» hace que lo recorran programas.",
+      count: "Número de participantes de prueba",
+      submit: "Añadir participantes de prueba",
+      mark: "prueba",
+      export: "Descargar los datos de los participantes de prueba (ZIP)",
     },
     openLink: {
       title: "Enlace para todos",

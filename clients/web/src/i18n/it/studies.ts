@@ -32,13 +32,13 @@ export const studies: Texts["studies"] = {
     title: "Domande",
     optional: "(facoltativa)",
     submit: "Inviare le risposte",
-    missing: (count) =>
-      plural(count, { one: "# domanda è ancora senza risposta.", other: "# domande sono ancora senza risposta." }),
+    missing: (count) => plural(count, { one: "Controlli # domanda.", other: "Controlli # domande." }),
     answerThis: "Risponda a questa domanda.",
     point: (point, points, label) => `${point} di ${points}${label && `: ${label}`}`,
     unset: "ancora nessuna risposta",
     onScale: (value, min, max) => `${value}, da ${min} a ${max}`,
-    numberWithin: (min: number, max: number) => `Un numero intero da ${min} a ${max}`,
+    notThisNumber: "Non si può rispondere con questo numero.",
+    numberWithin: (min, max) => `Un numero intero da ${min} a ${max}`,
     left: (count) => plural(count, { one: "ancora # carattere", other: "ancora # caratteri" }),
   },
   external: {
@@ -75,6 +75,12 @@ export const studies: Texts["studies"] = {
     pseudonym: (pseudonym) => `Il Suo codice nello studio è ${pseudonym}. Lo indichi se ha domande sui Suoi dati.`,
     close: "Può chiudere questa pagina.",
     goOn: (host) => `Continuare su ${host}`,
+  },
+  test: {
+    title: "Partecipazione di prova",
+    text: "Lei partecipa come prova: nulla di ciò che fa qui conta, e può saltare le domande.",
+    skip: "Salta le domande",
+    end: "Termina la partita",
   },
   withdraw: {
     button: "Ritirarsi dallo studio…",
@@ -135,6 +141,14 @@ export const studies: Texts["studies"] = {
       namesHint: "Pseudonimi, non nomi di persone. Ognuno vede il proprio.",
       submit: "Aggiungi",
       problem: "Inserisci un numero da 1 a 1000, o codici di al massimo 64 caratteri.",
+    },
+    tests: {
+      title: "Provare lo studio",
+      text: "I partecipanti di prova vedono lo studio come gli altri, non occupano posti e non sono contati. Apri uno dei loro link per vedere ogni pagina; «chefshat study test» lo fa percorrere da programmi.",
+      count: "Numero di partecipanti di prova",
+      submit: "Aggiungi partecipanti di prova",
+      mark: "prova",
+      export: "Scarica i dati dei partecipanti di prova (ZIP)",
     },
     openLink: {
       title: "Link per tutti",

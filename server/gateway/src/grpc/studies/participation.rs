@@ -294,7 +294,8 @@ impl ParticipationService for StudyCalls {
         let key = charged(request.extensions());
         let request = request.into_inner();
         let (handle, number, session) = self.of_session(&request.session, key).await?;
-        let continued = handle.proceed(at(number, session, request.step)).await;
+        let at = at(number, session, request.step);
+        let continued = handle.proceed(at, self.studies.rooms()).await;
         continued.map_err(stopped)?.map_err(refused)?;
         let view = Some(view_of(&handle, number, self.studies.rooms())?);
         Ok(Response::new(v1::ContinueStudyResponse { view }))
@@ -399,7 +400,8 @@ mod tests {
     use prost_types::{DescriptorProto, FileDescriptorSet};
 
     /// Fields that would tell participants what they must not know.
-    const FORBIDDEN: [&str; 16] = [
+    const FORBIDDEN: [&str; 18] = [
+        "attention_check",
         "block",
         "condition",
         "conditions",
@@ -411,6 +413,7 @@ mod tests {
         "order",
         "owner_token",
         "robot_behaviour",
+        "scale",
         "seats",
         "seed",
         "seeds",

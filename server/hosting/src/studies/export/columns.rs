@@ -85,6 +85,12 @@ pub(super) struct ParticipantRow<'s> {
 }
 
 impl ParticipantRow<'_> {
+    /// Number of attention checks that it has answered, and of those that it passed.
+    fn attention_checks(&self) -> Option<(usize, usize)> {
+        let is_kept = !self.participant.data_deleted;
+        is_kept.then(|| self.study.attention_checks(self.participant))
+    }
+
     /// `what` of each of its conditions, in order, separated by spaces.
     fn of_each(&self, what: impl Fn(&Condition) -> String) -> String {
         let sequence = self.study.sequence_of(self.participant).unwrap_or_default();
@@ -118,6 +124,12 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
             row.participant.panel_id().to_owned()
         })
         .empty("it did not join from a panel, or its data were deleted")
+        .with(
+            "test",
+            Kind::Boolean,
+            "whether it is a test participant",
+            |row| text(row.participant.test),
+        )
         .with(
             "state",
             Kind::one_of(states),
@@ -187,14 +199,16 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
         "attention_checks",
         COUNT,
         "number of attention checks that it has answered",
-        |row| text(row.study.attention_checks(row.participant).0),
+        |row| optional(row.attention_checks().map(|(answered, _)| answered)),
     )
+    .empty(DELETED)
     .with(
         "attention_checks_passed",
         COUNT,
         "number of these that it passed",
-        |row| text(row.study.attention_checks(row.participant).1),
+        |row| optional(row.attention_checks().map(|(_, passed)| passed)),
     )
+    .empty(DELETED)
     .with(
         "data_deleted",
         Kind::Boolean,
@@ -548,10 +562,10 @@ pub(super) fn items<'s>() -> Table<ItemRow<'s>> {
     .empty(NO_ATTENTION_CHECK)
 }
 
-/// What an earlier answer must be, for example "before.plays not 0..2".
+/// What an earlier answer must be, for example "before/plays not 0..2".
 fn condition_text(condition: &ShownIf) -> String {
     let questionnaire = condition.questionnaire.as_ref();
-    let of = questionnaire.map_or_else(String::new, |id| format!("{id}."));
+    let of = questionnaire.map_or_else(String::new, |id| format!("{id}/"));
     let not = if condition.not { "not " } else { "" };
     format!(
         "{of}{} {not}{}",
@@ -573,18 +587,12 @@ fn answers_text(answers: &AnswerSet) -> String {
 /// The lowest and highest number that answers an item, and the step between neighbouring ones;
 /// `None` if it is answered in words.
 fn numbers_of(kind: &ItemKind) -> Option<(i64, i64, u32)> {
-    match kind {
-        ItemKind::Likert { points, .. } | ItemKind::SemanticDifferential { points, .. } => {
-            Some((1, i64::from(*points), 1))
-        }
-        ItemKind::Slider { min, max, step, .. } => Some((i64::from(*min), i64::from(*max), *step)),
-        ItemKind::Number { min, max, .. } => Some((i64::from(*min), i64::from(*max), 1)),
-        ItemKind::Choice { options, .. } => {
-            let last = i64::try_from(options.len()).unwrap_or(i64::MAX) - 1;
-            Some((0, last, 1))
-        }
-        ItemKind::FreeText { .. } => None,
+    if let ItemKind::Choice { options, .. } = kind {
+        let last = i64::try_from(options.len()).unwrap_or(i64::MAX) - 1;
+        return Some((0, last, 1));
     }
+    let (lowest, highest, step) = kind.numbers()?;
+    Some((i64::from(lowest), i64::from(highest), step))
 }
 
 /// The numbers that answer an item and have a label, each with it.
@@ -610,7 +618,8 @@ fn labels_of(kind: &ItemKind) -> Vec<(i64, &str)> {
 }
 
 const SHOWN_IF: &str = "the earlier answers for which the item was shown: item, after its \
-    questionnaire and a point if that is another, and its options or lowest and highest number";
+    questionnaire and a slash if that is another, and its options or lowest and highest number, after \
+    `not` where other answers count, or none";
 const ATTENTION_CHECK: &str =
     "the answers that pass this attention check: its options, or the lowest and highest number";
 const NO_ATTENTION_CHECK: &str = "the item is no attention check";
@@ -635,6 +644,13 @@ pub(super) struct AnswerRow<'s> {
 }
 
 impl AnswerRow<'_> {
+    /// When the participant reached a step, unless it passed over the questionnaire.
+    fn reached_at_ms(&self, step: usize) -> Option<u64> {
+        let was_shown = !self.participant.passed_over.contains(&self.step);
+        let reached = self.participant.reached_at_ms.get(step).copied();
+        reached.filter(|_| was_shown)
+    }
+
     /// The numbers that answer the item.
     fn chosen(&self) -> Vec<i64> {
         match self.answer.map(|it| &it.value) {
@@ -661,6 +677,7 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
     const NO_LABEL: &str = "it was not answered, or in words, or the number has no label";
     const AFTER: &str = "time from showing the questionnaire to the last change of the answer, \
         measured by the participant's device";
+    const PASSED_OVER: &str = "the participant passed over the questionnaire";
     const PASSED: &str = "whether the attention check was passed";
     const NOT_MEASURED: &str = "it was not answered, or the device did not measure it";
     let statuses = [
@@ -746,15 +763,16 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
         "questionnaire_shown_at_ms",
         SINCE_EPOCH,
         "when the participant reached the step",
-        |row| optional(row.participant.reached_at_ms.get(row.step)),
+        |row| optional(row.reached_at_ms(row.step)),
     )
+    .empty(PASSED_OVER)
     .with(
         "questionnaire_answered_at_ms",
         SINCE_EPOCH,
         "when the questionnaire was sent",
-        |row| optional(row.participant.reached_at_ms.get(row.step + 1)),
+        |row| optional(row.reached_at_ms(row.step + 1)),
     )
-    .empty("it was not sent")
+    .empty("it was not sent, or not shown")
 }
 
 /// A session of a participant on a device that is known.

@@ -152,23 +152,27 @@ impl StudyHandle {
         study
     }
 
-    /// Sends the data of the study, file by file.
+    /// Sends the data of the study, or those of its test participants, file by file.
     ///
     /// # Errors
     /// The store failed, or nobody receives.
     pub async fn export(
         &self,
         rooms: &Rooms,
+        test: bool,
         sender: &mpsc::Sender<ExportedFile>,
     ) -> Result<(), ExportError> {
-        let study = self.committed().clone();
+        let study = &self.committed().clone();
+        let people = study.participants().iter();
+        let people = people.filter(|(_, it)| it.test == test);
+        let people: Vec<_> = people.map(|(number, it)| (*number, it)).collect();
         json_file("study.json", &self.publishable(), sender).await?;
-        let mut sheets = vec![participants(&study, sender).await?];
-        sheets.push(sessions(&study, sender).await?);
-        sheets.extend(games(self, &study, rooms, sender).await?);
-        sheets.push(items(&study, sender).await?);
-        sheets.push(answers(&study, sender).await?);
-        sheets.push(traces(self, &study, rooms, sender).await?);
+        let mut sheets = vec![participants(study, &people, sender).await?];
+        sheets.push(sessions(study, &people, sender).await?);
+        sheets.extend(games(self, study, &people, rooms, sender).await?);
+        sheets.push(items(study, sender).await?);
+        sheets.push(answers(study, &people, sender).await?);
+        sheets.push(traces(self, study, &people, rooms, sender).await?);
         sheets.push(codebook(&sheets, sender).await?);
         let name = format!("study-{}", self.id());
         let descriptor = table::descriptor(&name, &self.plan.name, &sheets);
@@ -189,13 +193,16 @@ async fn json_file(
     file.end().await
 }
 
+/// The participants whose data are exported, by number.
+type People<'s> = [(u32, &'s Participant)];
+
 async fn participants(
     study: &Study,
+    people: &People<'_>,
     sender: &mpsc::Sender<ExportedFile>,
 ) -> Result<Sheet, ExportError> {
     let mut file = TableFile::new(columns::participants(study.settings()), sender).await?;
-    for (number, participant) in study.participants() {
-        let number = *number;
+    for &(number, participant) in people {
         let row = ParticipantRow {
             study,
             number,
@@ -208,17 +215,18 @@ async fn participants(
 
 async fn sessions(
     study: &Study,
+    people: &People<'_>,
     sender: &mpsc::Sender<ExportedFile>,
 ) -> Result<Sheet, ExportError> {
     let mut file = TableFile::new(columns::sessions(), sender).await?;
     let asks = study.settings().asks_for_consent();
-    for (number, participant) in study.participants() {
+    for &(number, participant) in people {
         if asks && participant.consent.is_none() {
             continue;
         }
         for (session, opened) in &participant.devices {
             let row = SessionRow {
-                number: *number,
+                number,
                 participant,
                 session: *session,
                 opened,
@@ -246,13 +254,14 @@ fn is_in_data(study: &Study, participant: &Participant, game: &PlayedGame) -> bo
 async fn games(
     handle: &StudyHandle,
     study: &Study,
+    people: &People<'_>,
     rooms: &Rooms,
     sender: &mpsc::Sender<ExportedFile>,
 ) -> Result<Vec<Sheet>, ExportError> {
     let settings = study.settings();
     let mut file = TableFile::new(columns::games(settings), sender).await?;
     let (mut records, mut unreadable) = (Vec::new(), Vec::new());
-    for (number, participant) in study.participants() {
+    for &(number, participant) in people {
         for game in &participant.games {
             if !is_in_data(study, participant, game) {
                 continue;
@@ -271,7 +280,7 @@ async fn games(
             let row = GameRow {
                 settings,
                 study: &handle.plan.name,
-                number: *number,
+                number,
                 participant,
                 game,
                 result: result.map(|lines| GameResult::of(lines, game.placed.seat)),
@@ -374,10 +383,14 @@ async fn items(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<She
 }
 
 /// Sends the items of the questionnaires that participants have reached, with their answers.
-async fn answers(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<Sheet, ExportError> {
+async fn answers(
+    study: &Study,
+    people: &People<'_>,
+    sender: &mpsc::Sender<ExportedFile>,
+) -> Result<Sheet, ExportError> {
     let settings = study.settings();
     let mut file = TableFile::new(columns::answers(settings), sender).await?;
-    for (number, participant) in study.participants() {
+    for &(number, participant) in people {
         if participant.data_deleted {
             continue;
         }
@@ -392,11 +405,11 @@ async fn answers(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<S
                 .or_else(|| (sequence.len() == 1).then(|| sequence[0]));
             let answers = participant.answers.get(&step);
             let answers = answers.map_or(&[][..], |answers| answers);
-            let shown = study.shown_items(*number, step).unwrap_or_default();
+            let shown = study.shown_items(number, step).unwrap_or_default();
             for (index, item) in questionnaire.items.iter().enumerate() {
                 let position = shown.iter().position(|it| *it == index);
                 let row = AnswerRow {
-                    number: *number,
+                    number,
                     participant,
                     step,
                     condition: condition.map(|index| &settings.conditions[index]),
@@ -415,15 +428,16 @@ async fn answers(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<S
 async fn traces(
     handle: &StudyHandle,
     study: &Study,
+    people: &People<'_>,
     rooms: &Rooms,
     sender: &mpsc::Sender<ExportedFile>,
 ) -> Result<Sheet, ExportError> {
     let settings = study.settings();
     let mut conditions = BTreeMap::new();
-    for (number, participant) in study.participants() {
+    for &(number, participant) in people {
         for game in &participant.games {
             if is_in_data(study, participant, game) {
-                conditions.insert((*number, Id(game.placed.game)), game.placed.condition);
+                conditions.insert((number, Id(game.placed.game)), game.placed.condition);
             }
         }
     }

@@ -590,7 +590,7 @@ class StudyAnswerSet(_message.Message):
     """For an item answered by a number: the highest of them; unset: there is none."""
     @_builtins.property
     def options(self) -> _containers.RepeatedScalarFieldContainer[_builtins.int]:
-        """For a choice: indices of options, from 0."""
+        """For a choice: indices of options, from 0, ascending."""
 
     def __init__(
         self,
@@ -634,8 +634,8 @@ class StudyShownIf(_message.Message):
     """
     @_builtins.property
     def answers(self) -> Global___StudyAnswerSet:
-        """Its answer is one of these, or has one of these options. If it was answered several times, the
-        last answer counts.
+        """Its answer is one of these, or has one of these options. Of a questionnaire that was answered
+        several times, the last time counts; within `per_condition`, that of the same condition.
         """
 
     def __init__(
@@ -859,7 +859,8 @@ class StudyText(_message.Message):
     """Its title, at most 128 characters."""
     text: _builtins.str
     """The text, 1..=20000 characters of Markdown (CommonMark): paragraphs, headings, lists, quotations,
-    emphasis, code and links. A page shows HTML and pictures in it as they are written.
+    emphasis, code and links. A page shows HTML in it as it is written, and the words of pictures. Of
+    questions, only the markup within paragraphs counts.
     """
     def __init__(
         self,
@@ -1326,6 +1327,7 @@ class StudyParticipant(_message.Message):
     GAMES_FIELD_NUMBER: _builtins.int
     DATA_DELETED_FIELD_NUMBER: _builtins.int
     PANEL_ID_FIELD_NUMBER: _builtins.int
+    TEST_FIELD_NUMBER: _builtins.int
     number: _builtins.int
     """Number, from 1."""
     pseudonym: _builtins.str
@@ -1350,6 +1352,8 @@ class StudyParticipant(_message.Message):
     """Whether its data were deleted."""
     panel_id: _builtins.str
     """Its id at the panel (StudyRecruiting); empty if there is none, and after its data were deleted."""
+    test: _builtins.bool
+    """Whether it is a test participant (AddStudyParticipantsRequest)."""
     @_builtins.property
     def conditions(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
         """Ids of its conditions in their order; empty until it begins."""
@@ -1379,10 +1383,11 @@ class StudyParticipant(_message.Message):
         games: _abc.Iterable[Global___StudyGame] | None = ...,
         data_deleted: _builtins.bool = ...,
         panel_id: _builtins.str = ...,
+        test: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_slot", b"_slot", "consent", b"consent", "slot", b"slot"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_slot", b"_slot", "began_at_ms", b"began_at_ms", "conditions", b"conditions", "connected", b"connected", "consent", b"consent", "data_deleted", b"data_deleted", "ended_at_ms", b"ended_at_ms", "games", b"games", "number", b"number", "panel_id", b"panel_id", "pseudonym", b"pseudonym", "sessions", b"sessions", "slot", b"slot", "state", b"state", "step", b"step"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_slot", b"_slot", "began_at_ms", b"began_at_ms", "conditions", b"conditions", "connected", b"connected", "consent", b"consent", "data_deleted", b"data_deleted", "ended_at_ms", b"ended_at_ms", "games", b"games", "number", b"number", "panel_id", b"panel_id", "pseudonym", b"pseudonym", "sessions", b"sessions", "slot", b"slot", "state", b"state", "step", b"step", "test", b"test"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__slot: _TypeAlias = _typing.Literal["slot"]  # noqa: Y015
     _WhichOneofArgType__slot: _TypeAlias = _typing.Literal["_slot", b"_slot"]  # noqa: Y015
@@ -1446,6 +1451,7 @@ class Study(_message.Message):
     COMPLETED_FIELD_NUMBER: _builtins.int
     LEFT_FIELD_NUMBER: _builtins.int
     OPEN_LINK_FIELD_NUMBER: _builtins.int
+    TEST_PARTICIPANTS_FIELD_NUMBER: _builtins.int
     study_id: _builtins.str
     """Identifies it: 32 hexadecimal digits."""
     seeds_sha256: _builtins.bytes
@@ -1459,7 +1465,7 @@ class Study(_message.Message):
     games: _builtins.int
     """Number of games of every participant, without practice."""
     practice_games: _builtins.int
-    """Number of practice games of every participant."""
+    """Most practice games of a participant: some may pass over them."""
     added: _builtins.int
     """Number of participants, with those who have left."""
     invited: _builtins.int
@@ -1474,6 +1480,8 @@ class Study(_message.Message):
     """The open link, if the settings have one: 30 characters that need no escaping. The page's address
     for it is the path "/study/" and this text.
     """
+    test_participants: _builtins.int
+    """Number of test participants, which no other number here counts."""
     @_builtins.property
     def settings(self) -> Global___StudySettings:
         """Its settings, every field set."""
@@ -1495,10 +1503,11 @@ class Study(_message.Message):
         completed: _builtins.int = ...,
         left: _builtins.int = ...,
         open_link: _builtins.str = ...,
+        test_participants: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["settings", b"settings"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["active", b"active", "added", b"added", "closed", b"closed", "completed", b"completed", "created_at_ms", b"created_at_ms", "games", b"games", "invited", b"invited", "left", b"left", "open_link", b"open_link", "practice_games", b"practice_games", "seeds_sha256", b"seeds_sha256", "settings", b"settings", "steps", b"steps", "study_id", b"study_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["active", b"active", "added", b"added", "closed", b"closed", "completed", b"completed", "created_at_ms", b"created_at_ms", "games", b"games", "invited", b"invited", "left", b"left", "open_link", b"open_link", "practice_games", b"practice_games", "seeds_sha256", b"seeds_sha256", "settings", b"settings", "steps", b"steps", "study_id", b"study_id", "test_participants", b"test_participants"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -1522,6 +1531,7 @@ class StudyView(_message.Message):
     TEXT_FIELD_NUMBER: _builtins.int
     GAME_FIELD_NUMBER: _builtins.int
     END_FIELD_NUMBER: _builtins.int
+    TEST_FIELD_NUMBER: _builtins.int
     title: _builtins.str
     """Title of the study."""
     language: _builtins.str
@@ -1534,6 +1544,8 @@ class StudyView(_message.Message):
     """Number of steps, the same for all participants."""
     traces: _builtins.bool
     """Whether the page should send interface traces (RecordTraces)."""
+    test: _builtins.bool
+    """Whether this is a test participant, who may continue without answering and playing (ContinueStudy)."""
     @_builtins.property
     def consent(self) -> Global___StudyConsent:
         """A text to agree to: GiveConsent or WithdrawFromStudy."""
@@ -1573,10 +1585,11 @@ class StudyView(_message.Message):
         text: Global___StudyText | None = ...,
         game: Global___StudyShownGame | None = ...,
         end: Global___StudyEnd | None = ...,
+        test: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "content", b"content", "end", b"end", "external_questionnaire", b"external_questionnaire", "game", b"game", "questionnaire", b"questionnaire", "text", b"text"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "content", b"content", "end", b"end", "external_questionnaire", b"external_questionnaire", "game", b"game", "language", b"language", "pseudonym", b"pseudonym", "questionnaire", b"questionnaire", "step", b"step", "steps", b"steps", "text", b"text", "title", b"title", "traces", b"traces"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "content", b"content", "end", b"end", "external_questionnaire", b"external_questionnaire", "game", b"game", "language", b"language", "pseudonym", b"pseudonym", "questionnaire", b"questionnaire", "step", b"step", "steps", b"steps", "test", b"test", "text", b"text", "title", b"title", "traces", b"traces"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType_content: _TypeAlias = _typing.Literal["consent", "questionnaire", "external_questionnaire", "text", "game", "end"]  # noqa: Y015
     _WhichOneofArgType_content: _TypeAlias = _typing.Literal["content", b"content"]  # noqa: Y015
@@ -1596,7 +1609,7 @@ class StudyShownQuestionnaire(_message.Message):
     title: _builtins.str
     """Title, or empty."""
     instructions: _builtins.str
-    """Text above the items, or empty."""
+    """Text above the items in Markdown (StudyText), or empty."""
     @_builtins.property
     def items(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyShownItem]:
         """The items, in the order in which to show them."""
@@ -1635,7 +1648,7 @@ class StudyShownItem(_message.Message):
     item: _builtins.int
     """Identifies it in StudyItemAnswer."""
     text: _builtins.str
-    """The question or statement; may be empty for a semantic differential."""
+    """The question or statement in Markdown (StudyText); may be empty for a semantic differential."""
     optional: _builtins.bool
     """Whether it may be left unanswered."""
     @_builtins.property
@@ -1817,7 +1830,7 @@ class StudyItemAnswer(_message.Message):
     item: _builtins.int
     """`item` of StudyShownItem."""
     number: _builtins.int
-    """A point, from 1, or the value of a slider."""
+    """A point, from 1, the value of a slider, or a number."""
     text: _builtins.str
     """A free text."""
     answered_after_ms: _builtins.int

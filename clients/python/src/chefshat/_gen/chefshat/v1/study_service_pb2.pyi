@@ -195,12 +195,18 @@ class AddStudyParticipantsRequest(_message.Message):
     OWNER_TOKEN_FIELD_NUMBER: _builtins.int
     PSEUDONYMS_FIELD_NUMBER: _builtins.int
     COUNT_FIELD_NUMBER: _builtins.int
+    TEST_FIELD_NUMBER: _builtins.int
     study_id: _builtins.str
     """Identifies the study."""
     owner_token: _builtins.str
     """`owner_token` of CreateStudyResponse."""
     count: _builtins.int
     """Number of participants to add besides those, named by number such as "P01", at most 1000."""
+    test: _builtins.bool
+    """Whether they are test participants: they go through the study as others do, with conditions in the
+    same order of slots, but take no slot from those; no count and no exported data of others include
+    them. Those named by number are called "T01" and so on.
+    """
     @_builtins.property
     def pseudonyms(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
         """Their pseudonyms, 1..=64 characters each, at most 1000. Participants see their own. Do not use
@@ -214,10 +220,11 @@ class AddStudyParticipantsRequest(_message.Message):
         owner_token: _builtins.str = ...,
         pseudonyms: _abc.Iterable[_builtins.str] | None = ...,
         count: _builtins.int = ...,
+        test: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["count", b"count", "owner_token", b"owner_token", "pseudonyms", b"pseudonyms", "study_id", b"study_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["count", b"count", "owner_token", b"owner_token", "pseudonyms", b"pseudonyms", "study_id", b"study_id", "test", b"test"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -477,19 +484,23 @@ class ExportStudyRequest(_message.Message):
 
     STUDY_ID_FIELD_NUMBER: _builtins.int
     OWNER_TOKEN_FIELD_NUMBER: _builtins.int
+    TEST_FIELD_NUMBER: _builtins.int
     study_id: _builtins.str
     """Identifies it."""
     owner_token: _builtins.str
     """`owner_token` of CreateStudyResponse."""
+    test: _builtins.bool
+    """Whether to export the data of its test participants, instead of those of all others."""
     def __init__(
         self,
         *,
         study_id: _builtins.str = ...,
         owner_token: _builtins.str = ...,
+        test: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["owner_token", b"owner_token", "study_id", b"study_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["owner_token", b"owner_token", "study_id", b"study_id", "test", b"test"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -872,7 +883,9 @@ class AnswerQuestionnaireRequest(_message.Message):
     """`step` of the view that was shown."""
     @_builtins.property
     def answers(self) -> _containers.RepeatedCompositeFieldContainer[_study_pb2.StudyItemAnswer]:
-        """The answers, at most one for each item and one for each that is not optional."""
+        """The answers, at most one for each item that is shown after them (`shown_if` of StudyShownItem), and
+        one for each of these that is not optional.
+        """
 
     def __init__(
         self,
@@ -928,7 +941,7 @@ class SaveAnswersRequest(_message.Message):
     """`step` of the view that was shown."""
     @_builtins.property
     def answers(self) -> _containers.RepeatedCompositeFieldContainer[_study_pb2.StudyItemAnswer]:
-        """All that was entered so far, at most one answer for each item."""
+        """All that was entered so far, at most one answer for each item that is shown after it."""
 
     def __init__(
         self,

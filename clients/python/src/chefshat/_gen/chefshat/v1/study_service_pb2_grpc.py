@@ -697,7 +697,9 @@ class ParticipationServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def ContinueStudy(self, request, context):
-        """Continues from a text, a questionnaire on another site, or a game that has ended.
+        """Continues from a text, a questionnaire on another site, or a game that has ended. A test participant
+        continues from a questionnaire, too, without answers; a game of its that runs is closed first, and
+        the view says when it has ended.
         FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)

@@ -333,7 +333,9 @@ class ParticipationServiceStub:
     needs an answer. RESOURCE_EXHAUSTED (TOO_MANY_SAVES after 1000); else as AnswerQuestionnaire.
     """
     ContinueStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.ContinueStudyRequest, _study_service_pb2.ContinueStudyResponse]
-    """Continues from a text, a questionnaire on another site, or a game that has ended.
+    """Continues from a text, a questionnaire on another site, or a game that has ended. A test participant
+    continues from a questionnaire, too, without answers; a game of its that runs is closed first, and
+    the view says when it has ended.
     FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
     """
     RecordTraces: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.RecordTracesRequest, _study_service_pb2.RecordTracesResponse]
@@ -394,7 +396,9 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
     needs an answer. RESOURCE_EXHAUSTED (TOO_MANY_SAVES after 1000); else as AnswerQuestionnaire.
     """
     ContinueStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.ContinueStudyRequest, _study_service_pb2.ContinueStudyResponse]  # type: ignore[assignment]
-    """Continues from a text, a questionnaire on another site, or a game that has ended.
+    """Continues from a text, a questionnaire on another site, or a game that has ended. A test participant
+    continues from a questionnaire, too, without answers; a game of its that runs is closed first, and
+    the view says when it has ended.
     FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
     """
     RecordTraces: _aio.UnaryUnaryMultiCallable[_study_service_pb2.RecordTracesRequest, _study_service_pb2.RecordTracesResponse]  # type: ignore[assignment]
@@ -494,7 +498,9 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _study_service_pb2.ContinueStudyRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.ContinueStudyResponse, _abc.Awaitable[_study_service_pb2.ContinueStudyResponse]]:
-        """Continues from a text, a questionnaire on another site, or a game that has ended.
+        """Continues from a text, a questionnaire on another site, or a game that has ended. A test participant
+        continues from a questionnaire, too, without answers; a game of its that runs is closed first, and
+        the view says when it has ended.
         FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
         """
 
