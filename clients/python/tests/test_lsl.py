@@ -223,8 +223,9 @@ def test_the_command_sends_all_games_of_a_participant_of_a_study(
         channel = grpc.insecure_channel(real_address.removeprefix("http://"))
         studies = StudyServiceStub(channel)
         made = studies.CreateStudy(pb.CreateStudyRequest(settings=settings))
-        owned = {"study_id": made.study.study_id, "owner_token": made.owner_token}
-        added = studies.AddStudyParticipants(pb.AddStudyParticipantsRequest(count=1, **owned))
+        study_id, owner_token = made.study.study_id, made.owner_token
+        request = pb.AddStudyParticipantsRequest(study_id=study_id, owner_token=owner_token, count=1)
+        added = studies.AddStudyParticipants(request)
         command = [sys.executable, "-m", "chefshat.lsl", "--address", real_address, "--study", made.study.study_id]
         command += ["--participant", "1", "--secret", made.owner_token, "--wait"]
         processes.append(Popen(command, text=True, stdout=PIPE, stderr=PIPE, cwd=tmp_path))
@@ -243,7 +244,7 @@ def test_the_command_sends_all_games_of_a_participant_of_a_study(
                 room = pb.Room(room_id=game.room_id, game_id=game.game_id)
                 clock = owner.clock(game.room_id, local=pylsl.local_clock)
                 check_times(owner, room, sent, max(clock.error, WANTED_ERROR_S))
-        studies.CloseStudy(pb.CloseStudyRequest(**owned))
+        studies.CloseStudy(pb.CloseStudyRequest(study_id=study_id, owner_token=owner_token))
         _, said = processes[-1].communicate(timeout=WAIT_S)
         assert processes[-1].returncode == 0, said
         assert "participant 1 has finished" in said

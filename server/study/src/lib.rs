@@ -36,13 +36,14 @@ mod change;
 mod checks;
 mod commands;
 mod device;
+mod earlier;
 mod games;
+mod item_kind;
 mod link;
 mod presence;
 mod questionnaire;
 mod recruiting;
 mod settings;
-mod shown;
 mod stage;
 mod state;
 mod templates;
@@ -59,16 +60,16 @@ pub use checks::SettingsProblem;
 pub use commands::{At, MAX_SAVES, MAX_SESSIONS, Refusal};
 pub use device::{Device, DeviceSession, Pointer};
 pub use games::{DueGame, MAX_ATTEMPTS};
+pub use item_kind::{Answer, AnswerSet, ItemKind, MAX_OPTIONS};
 pub use link::{ParticipantLink, SessionSecret};
 pub use questionnaire::{
-    Answer, AnswerProblem, Item, ItemAnswer, ItemKind, MAX_ITEMS, MAX_OPTIONS, Questionnaire,
+    AnswerProblem, Item, ItemAnswer, MAX_ITEMS, MAX_SHOWN_IF, Questionnaire, ShownIf, ShownItemIf,
 };
 pub use recruiting::Recruiting;
 pub use settings::{
     Condition, Factor, Hide, Labels, MAX_FACTORS, MAX_GAMES, MAX_LEVELS, MAX_PARTICIPANTS,
     MAX_SEEDS, MAX_STEPS, Settings,
 };
-pub use shown::{AnswerSet, MAX_SHOWN_IF, ShownIf, ShownItemIf};
 pub use stage::{
     Consent, ExternalQuestionnaire, MAX_BLOCK, MAX_STAGE_GAMES, MAX_STAGES, Part, Stage, Step,
     Task, Text,
@@ -78,8 +79,8 @@ pub use templates::{Language, Template};
 pub use view::{Content, End, ShownGame, ShownItem, ShownQuestionnaire, View};
 
 use assignment::Assignment;
+use earlier::EarlierAnswers;
 use presence::Presence;
-use shown::EarlierAnswers;
 use state::StudyState;
 
 /// A study. Two are equal if their changes have led to the same state; who is connected does not
@@ -216,7 +217,7 @@ impl Study {
     ) -> Vec<usize> {
         let steps = self.steps_of(participant).unwrap_or_default();
         let given = given_answers(participant, &[]);
-        questionnaire.items_after(&EarlierAnswers::before(&steps, step, given))
+        EarlierAnswers::before(&steps, step, given).items_of(questionnaire)
     }
 
     /// Number of steps that a participant passes over after its step, where it gives these answers:
@@ -227,10 +228,10 @@ impl Study {
             let given = given_answers(participant, answers);
             let earlier = EarlierAnswers::before(&steps, *step, given);
             let is_empty = match steps[*step].task {
-                Task::Questionnaire(it) => it.items_after(&earlier).is_empty(),
+                Task::Questionnaire(it) => earlier.items_of(it).is_empty(),
                 _ => false,
             };
-            is_empty || !ShownIf::all_hold(steps[*step].shown_if, &earlier)
+            is_empty || !earlier.satisfy(steps[*step].shown_if)
         };
         let next = participant.step() + 1..steps.len();
         next.take_while(is_for_others).count() as u32

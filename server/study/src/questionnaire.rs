@@ -1,31 +1,21 @@
-//! Questionnaires: items, the order in which a participant meets them, and which answers are valid.
+//! Questionnaires: items, the order in which a participant meets them, which of them it is shown, and
+//! what it must answer.
 
 use std::collections::BTreeSet;
-use std::ops::RangeInclusive;
 
 use thiserror::Error;
 
 use crate::chance::Chance;
-use crate::checks::{
-    Checked, characters, has_control_characters, identifier, refuse, unique, within,
-};
-use crate::shown::{AnswerSet, ShownIf};
+use crate::checks::{Checked, characters, identifier, refuse, unique, within};
+use crate::item_kind::{Answer, AnswerSet, ItemKind};
 
+/// Maximum number of conditions of an item or a stage.
+pub const MAX_SHOWN_IF: usize = 4;
 /// Maximum number of items of a questionnaire.
 pub const MAX_ITEMS: usize = 100;
-/// Maximum number of options of a choice.
-pub const MAX_OPTIONS: usize = 50;
-/// Numbers of points of an item.
-const POINTS: RangeInclusive<u32> = 2..=11;
-/// Values of a slider, and numbers.
-const NUMBERS: RangeInclusive<i32> = -1_000_000..=1_000_000;
-/// Maximum length of a free text, in characters.
-const MAX_TEXT: usize = 10_000;
 const MAX_TITLE: usize = 128;
 const MAX_INSTRUCTIONS: usize = 2000;
 const MAX_QUESTION: usize = 500;
-const MAX_OPTION: usize = 200;
-const MAX_LABEL: usize = 100;
 
 /// A questionnaire.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -62,59 +52,29 @@ pub struct Item {
     pub attention_check: Option<AnswerSet>,
 }
 
-/// How an item is answered.
+/// What an earlier answer must be for something to be shown.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum ItemKind {
-    /// By one of 2..=11 points, by how much one agrees.
-    Likert {
-        /// Number of points.
-        points: u32,
-        /// Labels of the first and last point, or of all.
-        labels: Vec<String>,
-    },
-    /// By one of 2..=11 points between two words.
-    SemanticDifferential {
-        /// Number of points.
-        points: u32,
-        /// The word at the first point.
-        left: String,
-        /// The word at the last point.
-        right: String,
-    },
-    /// By a value on a slider.
-    Slider {
-        /// Lowest value.
-        min: i32,
-        /// Highest value.
-        max: i32,
-        /// Distance of two values, a divisor of `max - min`.
-        step: u32,
-        /// Label of the lowest value.
-        left: String,
-        /// Label of the highest value.
-        right: String,
-    },
-    /// By a whole number that is typed.
-    Number {
-        /// Lowest number.
-        min: i32,
-        /// Highest number.
-        max: i32,
-        /// What it counts or measures, or empty.
-        unit: String,
-    },
-    /// From a list of 2..=50 options.
-    Choice {
-        /// The options.
-        options: Vec<String>,
-        /// Whether several may be chosen.
-        multiple: bool,
-    },
-    /// In words.
-    FreeText {
-        /// Maximum number of characters, 1..=10000.
-        max_characters: usize,
-    },
+pub struct ShownIf {
+    /// Id of an earlier questionnaire; `None`: the item's own.
+    pub questionnaire: Option<String>,
+    /// Id of its item.
+    pub item: String,
+    /// Its answer is one of these, or has one of these options.
+    pub answers: AnswerSet,
+    /// The answer is none of these, or there is none.
+    pub not: bool,
+}
+
+/// What the answer to another item of the questionnaire must be for an item to be shown, as
+/// participants see it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ShownItemIf {
+    /// Index of that item in the questionnaire's definition.
+    pub item: usize,
+    /// Its answer is one of these, or has one of these options.
+    pub answers: AnswerSet,
+    /// The answer is none of these, or there is none.
+    pub not: bool,
 }
 
 /// An answer to an item.
@@ -139,17 +99,6 @@ impl ItemAnswer {
         };
         size_of::<Self>() + content
     }
-}
-
-/// The value of an answer.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Answer {
-    /// A point, from 1, the value of a slider, or a number.
-    Number(i32),
-    /// Indices of the chosen options, ascending.
-    Options(Vec<usize>),
-    /// A free text.
-    Text(String),
 }
 
 /// An invalid answer, or a missing one.
@@ -248,126 +197,95 @@ impl Item {
     }
 }
 
-impl ItemKind {
-    fn check(&self, field: &str) -> Checked {
-        let field = |name: &str| format!("{field}.{name}");
-        let label = |name: &str, text: &str| characters(&field(name), text, 1..=MAX_LABEL);
-        match self {
-            Self::Likert { points, labels } => {
-                within(&field("points"), *points, POINTS)?;
-                if labels.len() != 2 && labels.len() != *points as usize {
-                    let (given, points) = (labels.len(), *points);
-                    let problem = format!("{given} labels for {points} points: give 2 or {points}");
-                    return refuse(field("labels"), problem);
-                }
-                labels.iter().try_for_each(|text| label("labels", text))
+impl ShownIf {
+    /// Whether it holds after an answer, or without one.
+    pub(crate) fn holds(&self, answer: Option<&Answer>) -> bool {
+        answer.is_some_and(|answer| self.answers.has(answer)) != self.not
+    }
+
+    /// Returns the first invalid field of conditions on the answers to `earlier` questionnaires. Those
+    /// on the answers of `own`, where there is one, are about items before the one with this index.
+    pub(crate) fn check_all(
+        conditions: &[Self],
+        field: &str,
+        earlier: &[&Questionnaire],
+        own: Option<(&Questionnaire, usize)>,
+    ) -> Checked {
+        within(field, conditions.len(), 0..=MAX_SHOWN_IF)?;
+        for (index, condition) in conditions.iter().enumerate() {
+            condition.check(&format!("{field}[{index}]"), earlier, own)?;
+        }
+        Ok(())
+    }
+
+    fn check(
+        &self,
+        field: &str,
+        earlier: &[&Questionnaire],
+        own: Option<(&Questionnaire, usize)>,
+    ) -> Checked {
+        let of_field = format!("{field}.questionnaire");
+        let items = match (&self.questionnaire, own) {
+            (Some(id), _) => match earlier.iter().find(|it| it.id == *id) {
+                Some(questionnaire) => &questionnaire.items[..],
+                None => return refuse(of_field, format!("no earlier questionnaire is {id:?}")),
+            },
+            (None, None) => return refuse(of_field, "name an earlier questionnaire"),
+            (None, Some((questionnaire, _))) if questionnaire.shuffled => {
+                let problem = "name an earlier questionnaire: this one is shuffled, so that the \
+                    item may come first";
+                return refuse(of_field, problem);
             }
-            Self::SemanticDifferential {
-                points,
-                left,
-                right,
-            } => {
-                within(&field("points"), *points, POINTS)?;
-                label("left", left)?;
-                label("right", right)
-            }
-            Self::Slider {
-                min,
-                max,
-                step,
-                left,
-                right,
-            } => {
-                within(&field("min"), *min, NUMBERS)?;
-                within(&field("max"), *max, NUMBERS)?;
-                if min >= max {
-                    return refuse(field("max"), format!("{max} is not above `min`, {min}"));
-                }
-                if *step == 0 || max.abs_diff(*min) % step != 0 {
-                    let problem = format!("{step} does not divide {}", max.abs_diff(*min));
-                    return refuse(field("step"), problem);
-                }
-                characters(&field("left"), left, 0..=MAX_LABEL)?;
-                characters(&field("right"), right, 0..=MAX_LABEL)
-            }
-            Self::Number { min, max, unit } => {
-                within(&field("min"), *min, NUMBERS)?;
-                within(&field("max"), *max, *min..=*NUMBERS.end())?;
-                characters(&field("unit"), unit, 0..=MAX_LABEL)
-            }
-            Self::Choice { options, .. } => {
-                within(&field("options"), options.len(), 2..=MAX_OPTIONS)?;
-                let names = options.iter().map(String::as_str);
-                unique(names, |index| field(&format!("options[{index}]")))?;
-                let mut options = options.iter();
-                options.try_for_each(|text| characters(&field("options"), text, 1..=MAX_OPTION))
-            }
-            Self::FreeText { max_characters } => {
-                within(&field("max_characters"), *max_characters, 1..=MAX_TEXT)
+            (None, Some((questionnaire, index))) => &questionnaire.items[..index],
+        };
+        match items.iter().find(|item| item.id == self.item) {
+            Some(item) => self.answers.check(&format!("{field}.answers"), &item.kind),
+            None => {
+                let problem = format!("no item before it is {:?}", self.item);
+                refuse(format!("{field}.item"), problem)
             }
         }
     }
+}
 
-    /// The lowest and highest number that answers it, and the step between neighbouring ones; `None` if
-    /// it is answered by options or in words.
-    pub fn numbers(&self) -> Option<(i32, i32, u32)> {
-        match self {
-            Self::Likert { points, .. } | Self::SemanticDifferential { points, .. } => {
-                Some((1, i32::try_from(*points).unwrap_or(i32::MAX), 1))
+impl Questionnaire {
+    /// Those of these items, in the order of the definition, that are shown once these answers to
+    /// this questionnaire are given.
+    pub(crate) fn shown_by(&self, items: &[usize], answers: &[ItemAnswer]) -> BTreeSet<usize> {
+        let mut shown = BTreeSet::new();
+        for &index in items {
+            let mut conditions = self.own_conditions(&self.items[index]);
+            let is_shown = conditions.all(|(other, condition)| {
+                let answer = answers.iter().find(|answer| answer.item == other);
+                let answer = answer.filter(|_| shown.contains(&other));
+                condition.holds(answer.map(|answer| &answer.value))
+            });
+            if is_shown {
+                shown.insert(index);
             }
-            Self::Slider { min, max, step, .. } => Some((*min, *max, *step)),
-            Self::Number { min, max, .. } => Some((*min, *max, 1)),
-            Self::Choice { .. } | Self::FreeText { .. } => None,
         }
+        shown
     }
 
-    /// What is wrong with an answer.
-    fn problem_of(&self, answer: &Answer, required: bool) -> Option<String> {
-        match (self, answer) {
-            (
-                Self::Likert { points, .. } | Self::SemanticDifferential { points, .. },
-                Answer::Number(number),
-            ) => {
-                let is_valid = u32::try_from(*number).is_ok_and(|it| (1..=*points).contains(&it));
-                (!is_valid).then(|| format!("{number} is not a point within 1..={points}"))
-            }
-            (Self::Slider { min, max, step, .. }, Answer::Number(number)) => {
-                let is_valid = (min..=max).contains(&number) && number.abs_diff(*min) % step == 0;
-                let problem = || format!("{number} is not within {min}..={max} in steps of {step}");
-                (!is_valid).then(problem)
-            }
-            (Self::Number { min, max, .. }, Answer::Number(number)) => {
-                let is_valid = (min..=max).contains(&number);
-                (!is_valid).then(|| format!("{number} is not within {min}..={max}"))
-            }
-            (Self::Choice { options, multiple }, Answer::Options(chosen)) => {
-                let distinct: BTreeSet<_> = chosen.iter().collect();
-                let (least, most) = match multiple {
-                    true => (usize::from(required), options.len()),
-                    false => (1, 1),
-                };
-                if !(least..=most).contains(&chosen.len()) {
-                    let count = chosen.len();
-                    return Some(format!("{count} options are not within {least}..={most}"));
-                }
-                let is_valid = distinct.len() == chosen.len()
-                    && chosen.is_sorted()
-                    && chosen.iter().all(|option| *option < options.len());
-                let most = options.len() - 1;
-                (!is_valid).then(|| format!("options must ascend within 0..={most}"))
-            }
-            (Self::FreeText { max_characters }, Answer::Text(text)) => {
-                let count = text.chars().count();
-                if !(1..=*max_characters).contains(&count) {
-                    let problem = format!("{count} characters are not within 1..={max_characters}");
-                    return Some(problem);
-                }
-                has_control_characters(text)
-                    .then(|| "control characters are not allowed".to_owned())
-            }
-            (Self::Choice { .. }, _) => Some("it is answered by options".to_owned()),
-            (Self::FreeText { .. }, _) => Some("it is answered by a text".to_owned()),
-            _ => Some("it is answered by a number".to_owned()),
-        }
+    /// The conditions of an item on the answers of its own questionnaire, as participants see them.
+    pub(crate) fn shown_if(&self, item: &Item) -> Vec<ShownItemIf> {
+        let conditions = self.own_conditions(item);
+        conditions
+            .map(|(item, condition)| ShownItemIf {
+                item,
+                answers: condition.answers.clone(),
+                not: condition.not,
+            })
+            .collect()
+    }
+
+    /// The conditions of an item on the answers of its own questionnaire, with the indices of the
+    /// items that they are about.
+    fn own_conditions<'q>(&'q self, item: &'q Item) -> impl Iterator<Item = (usize, &'q ShownIf)> {
+        let own = item.shown_if.iter().filter(|it| it.questionnaire.is_none());
+        own.filter_map(|condition| {
+            let other = self.items.iter().position(|it| it.id == condition.item)?;
+            Some((other, condition))
+        })
     }
 }

@@ -3,8 +3,7 @@
 
 use crate::address;
 use crate::checks::{Checked, characters, refuse, within};
-use crate::questionnaire::Questionnaire;
-use crate::shown::ShownIf;
+use crate::questionnaire::{Questionnaire, ShownIf};
 
 /// Maximum number of stages.
 pub const MAX_STAGES: usize = 50;

@@ -3,7 +3,8 @@
 //! validated. In other languages there are none: a researcher lists the items of a validated
 //! translation.
 
-use crate::questionnaire::{Item, ItemKind, Questionnaire};
+use crate::item_kind::ItemKind;
+use crate::questionnaire::{Item, Questionnaire};
 
 /// A language of the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

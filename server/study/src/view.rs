@@ -6,10 +6,10 @@ use std::collections::BTreeSet;
 
 use crate::Study;
 use crate::games::Phase;
-use crate::questionnaire::{ItemKind, Questionnaire};
+use crate::item_kind::ItemKind;
+use crate::questionnaire::{Questionnaire, ShownItemIf};
 use crate::recruiting::Recruiting;
 use crate::settings::{Hide, Labels};
-use crate::shown::ShownItemIf;
 use crate::stage::{Consent, ExternalQuestionnaire, Task, Text};
 use crate::state::{Participant, Status};
 use crate::templates::Language;
