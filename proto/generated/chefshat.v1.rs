@@ -9159,6 +9159,9 @@ pub struct StudyLink {
     /// Whether the participant joined by the open link, and has its own link already.
     #[prost(bool, tag = "4")]
     pub joined: bool,
+    /// Whether it is the link of a test participant.
+    #[prost(bool, tag = "5")]
+    pub test: bool,
 }
 /// A study. Only for researchers.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -9813,8 +9816,9 @@ pub struct AddStudyParticipantsRequest {
     #[prost(uint32, tag = "4")]
     pub count: u32,
     /// Whether they are test participants: they go through the study as others do, with conditions in the
-    /// same order of slots, but take no slot from those; no count and no exported data of others include
-    /// them. Those named by number are called "T01" and so on.
+    /// same order of slots, but take no slot from those, are not sent on at the end, and do not play a
+    /// game again that has no result. No count and no exported data of others include them. Those named
+    /// by number are called "T01" and so on. A study has at most 1000 of them.
     #[prost(bool, tag = "5")]
     pub test: bool,
 }

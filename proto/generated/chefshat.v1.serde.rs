@@ -38733,6 +38733,9 @@ impl serde::Serialize for StudyLink {
         if self.joined {
             len += 1;
         }
+        if self.test {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyLink", len)?;
         if self.number != 0 {
             struct_ser.serialize_field("number", &self.number)?;
@@ -38745,6 +38748,9 @@ impl serde::Serialize for StudyLink {
         }
         if self.joined {
             struct_ser.serialize_field("joined", &self.joined)?;
+        }
+        if self.test {
+            struct_ser.serialize_field("test", &self.test)?;
         }
         struct_ser.end()
     }
@@ -38760,6 +38766,7 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
             "pseudonym",
             "link",
             "joined",
+            "test",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -38768,6 +38775,7 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
             Pseudonym,
             Link,
             Joined,
+            Test,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -38793,6 +38801,7 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
                             "pseudonym" => Ok(GeneratedField::Pseudonym),
                             "link" => Ok(GeneratedField::Link),
                             "joined" => Ok(GeneratedField::Joined),
+                            "test" => Ok(GeneratedField::Test),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -38816,6 +38825,7 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
                 let mut pseudonym__ = None;
                 let mut link__ = None;
                 let mut joined__ = None;
+                let mut test__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Number => {
@@ -38844,6 +38854,12 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
                             }
                             joined__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::Test => {
+                            if test__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("test"));
+                            }
+                            test__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(StudyLink {
@@ -38851,6 +38867,7 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
                     pseudonym: pseudonym__.unwrap_or_default(),
                     link: link__.unwrap_or_default(),
                     joined: joined__.unwrap_or_default(),
+                    test: test__.unwrap_or_default(),
                 })
             }
         }

@@ -531,7 +531,7 @@ pub static STUDY_LEVEL: Shape = Shape { name: "chefshat.v1.StudyLevel", size: si
 /// `chefshat.v1.StudyLikert`.
 pub static STUDY_LIKERT: Shape = Shape { name: "chefshat.v1.StudyLikert", size: size_of::<crate::v1::StudyLikert>(), fields: &[Field { number: 1, list: false, kind: Kind::Number { size: 4, width: 0 } }, Field { number: 2, list: true, kind: Kind::Text }, ] };
 /// `chefshat.v1.StudyLink`.
-pub static STUDY_LINK: Shape = Shape { name: "chefshat.v1.StudyLink", size: size_of::<crate::v1::StudyLink>(), fields: &[Field { number: 1, list: false, kind: Kind::Number { size: 4, width: 0 } }, Field { number: 2, list: false, kind: Kind::Text }, Field { number: 3, list: false, kind: Kind::Text }, Field { number: 4, list: false, kind: Kind::Number { size: 1, width: 0 } }, ] };
+pub static STUDY_LINK: Shape = Shape { name: "chefshat.v1.StudyLink", size: size_of::<crate::v1::StudyLink>(), fields: &[Field { number: 1, list: false, kind: Kind::Number { size: 4, width: 0 } }, Field { number: 2, list: false, kind: Kind::Text }, Field { number: 3, list: false, kind: Kind::Text }, Field { number: 4, list: false, kind: Kind::Number { size: 1, width: 0 } }, Field { number: 5, list: false, kind: Kind::Number { size: 1, width: 0 } }, ] };
 /// `chefshat.v1.StudyNumber`.
 pub static STUDY_NUMBER: Shape = Shape { name: "chefshat.v1.StudyNumber", size: size_of::<crate::v1::StudyNumber>(), fields: &[Field { number: 1, list: false, kind: Kind::Number { size: 4, width: 0 } }, Field { number: 2, list: false, kind: Kind::Number { size: 4, width: 0 } }, Field { number: 3, list: false, kind: Kind::Text }, ] };
 /// `chefshat.v1.StudyParticipant`.

@@ -11,7 +11,7 @@ use crate::change::{Change, ConsentGiven, Joined};
 use crate::device::Device;
 use crate::games::Phase;
 use crate::questionnaire::{AnswerProblem, ItemAnswer};
-use crate::settings::MAX_PARTICIPANTS;
+use crate::settings::{MAX_PARTICIPANTS, MAX_TESTS};
 use crate::stage::{Step, Task};
 use crate::state::{Participant, Status};
 
@@ -68,6 +68,9 @@ pub enum Refusal {
     /// Too many participants, with those who left.
     #[error("a study has at most {MAX_PARTICIPANTS} participants, with those who left")]
     TooManyParticipants,
+    /// Too many test participants.
+    #[error("a study has at most {MAX_TESTS} test participants, with those who are done")]
+    TooManyTests,
 }
 
 /// Where a participant's command comes from.
@@ -92,8 +95,13 @@ impl Study {
             return Err(Refusal::Closed);
         }
         let first = self.next_number();
-        if self.participants().len() + pseudonyms.len() > MAX_PARTICIPANTS as usize {
-            return Err(Refusal::TooManyParticipants);
+        let alike = self.participants().values().filter(|it| it.test == test);
+        let (most, refusal) = match test {
+            true => (MAX_TESTS, Refusal::TooManyTests),
+            false => (MAX_PARTICIPANTS, Refusal::TooManyParticipants),
+        };
+        if alike.count() + pseudonyms.len() > most as usize {
+            return Err(refusal);
         }
         let participants = self.participants().values();
         let mut taken: BTreeSet<String> =
@@ -237,7 +245,7 @@ impl Study {
         let participant = self.check_answers(at, &answers, false)?;
         Ok(Change::Answered {
             number: at.number,
-            passed_over: self.passed_over_next(participant, &answers),
+            passed_over: self.passed_over_next(participant, Some(&answers)),
             answers: answers.into(),
             at_ms: now_ms,
         })
@@ -295,7 +303,7 @@ impl Study {
             number: at.number,
             step_over,
             passed_over: match step_over {
-                true => self.passed_over_next(participant, &[]),
+                true => self.passed_over_next(participant, None),
                 false => 0,
             },
             at_ms: now_ms,

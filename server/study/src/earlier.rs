@@ -39,6 +39,12 @@ impl<'a> EarlierAnswers<'a> {
         })
     }
 
+    /// Whether there is an item of a questionnaire that may be shown after these answers.
+    pub(crate) fn leave_items_of(&self, questionnaire: &Questionnaire) -> bool {
+        let mut items = questionnaire.items.iter();
+        items.any(|item| self.satisfy(&item.shown_if))
+    }
+
     /// Indices of the items of a questionnaire that may be shown after these answers, in the order of
     /// the definition.
     pub(crate) fn items_of(&self, questionnaire: &Questionnaire) -> Vec<usize> {

@@ -68,7 +68,7 @@ pub use questionnaire::{
 pub use recruiting::Recruiting;
 pub use settings::{
     Condition, Factor, Hide, Labels, MAX_FACTORS, MAX_GAMES, MAX_LEVELS, MAX_PARTICIPANTS,
-    MAX_SEEDS, MAX_STEPS, Settings,
+    MAX_SEEDS, MAX_STEPS, MAX_TESTS, Settings,
 };
 pub use stage::{
     Consent, ExternalQuestionnaire, MAX_BLOCK, MAX_STAGE_GAMES, MAX_STAGES, Part, Stage, Step,
@@ -216,22 +216,22 @@ impl Study {
         questionnaire: &Questionnaire,
     ) -> Vec<usize> {
         let steps = self.steps_of(participant).unwrap_or_default();
-        let given = given_answers(participant, &[]);
+        let given = given_answers(participant, None);
         EarlierAnswers::before(&steps, step, given).items_of(questionnaire)
     }
 
     /// Number of steps that a participant passes over after its step, where it gives these answers:
     /// those that are for others, and questionnaires of which no item is for it.
-    fn passed_over_next(&self, participant: &Participant, answers: &[ItemAnswer]) -> u32 {
+    fn passed_over_next(&self, participant: &Participant, answers: Option<&[ItemAnswer]>) -> u32 {
         let steps = self.steps_of(participant).unwrap_or_default();
         let is_for_others = |step: &usize| {
             let given = given_answers(participant, answers);
             let earlier = EarlierAnswers::before(&steps, *step, given);
-            let is_empty = match steps[*step].task {
-                Task::Questionnaire(it) => earlier.items_of(it).is_empty(),
-                _ => false,
+            let has_items = match steps[*step].task {
+                Task::Questionnaire(it) => earlier.leave_items_of(it),
+                _ => true,
             };
-            is_empty || !earlier.satisfy(steps[*step].shown_if)
+            !earlier.satisfy(steps[*step].shown_if) || !has_items
         };
         let next = participant.step() + 1..steps.len();
         next.take_while(is_for_others).count() as u32
@@ -303,7 +303,7 @@ impl Study {
     fn free_slot(&self, test: bool) -> Option<u32> {
         let kept = self.kept_slots(test);
         let slots = match test {
-            true => MAX_PARTICIPANTS,
+            true => MAX_TESTS,
             false => self.settings.participants,
         };
         (0..slots).find(|slot| !kept.contains(slot))
@@ -317,12 +317,12 @@ impl Study {
     }
 }
 
-/// The answers of a participant by step, with those that it gives at its own.
+/// The answers of a participant by step, with those that it gives at its own, if it does.
 fn given_answers<'p>(
     participant: &'p Participant,
-    now: &'p [ItemAnswer],
+    now: Option<&'p [ItemAnswer]>,
 ) -> impl Iterator<Item = (usize, &'p [ItemAnswer])> {
     let given = participant.answers.iter();
     let given = given.map(|(step, answers)| (*step, &answers[..]));
-    given.chain([(participant.step(), now)])
+    given.chain(now.map(|answers| (participant.step(), answers)))
 }

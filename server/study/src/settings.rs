@@ -13,6 +13,8 @@ use crate::templates::Language;
 
 /// Maximum number of slots, and of participants with those who left.
 pub const MAX_PARTICIPANTS: u32 = 10_000;
+/// Maximum number of test participants.
+pub const MAX_TESTS: u32 = 1000;
 /// Maximum number of factors.
 pub const MAX_FACTORS: usize = 8;
 /// Maximum number of levels of a factor.

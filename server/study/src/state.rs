@@ -87,6 +87,12 @@ impl Participant {
         self.joined.as_ref().map_or("", |it| &it.panel_id)
     }
 
+    /// Whether it has begun and is not over, so that the study must wait for it. Nobody waits for a test
+    /// participant.
+    pub fn is_in_the_middle(&self) -> bool {
+        self.status == Status::Active && !self.test
+    }
+
     /// Whether it keeps its slot. Without its data somebody else is needed there.
     pub fn holds_slot(&self) -> bool {
         let stays = matches!(self.status, Status::Active | Status::Completed);

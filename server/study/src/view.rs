@@ -150,7 +150,11 @@ impl Study {
             Status::Withdrawn | Status::DroppedOut | Status::Removed => &recruiting.left_url,
             Status::Invited | Status::Active => "",
         };
-        let url = Recruiting::filled_in(url, participant.panel_id());
+        // What a panel pays for was not done in a test.
+        let url = match participant.test {
+            true => None,
+            false => Recruiting::filled_in(url, participant.panel_id()),
+        };
         Content::End { reason, url }
     }
 

@@ -318,8 +318,33 @@ function Tests({ study }: { study: Study }) {
           </div>
         </form>
       )}
-      {testParticipants > 0 && <Export study={study} test />}
+      {testParticipants > 0 && (
+        <>
+          <TestLinks key={testParticipants} studyId={studyId} />
+          <Export study={study} test />
+        </>
+      )}
     </section>
+  );
+}
+
+function TestLinks({ studyId }: { studyId: string }) {
+  const [links, setLinks] = useState<StudyLink[]>([]);
+  const { busy, fault, run } = useAttempt();
+  const show = () =>
+    run(async () => {
+      setLinks((await linksOf(studyId)).filter(({ test }) => test));
+      return false;
+    });
+  return links.length > 0 ? (
+    <LinkList links={links.map((link) => ({ name: link.pseudonym, address: addressOf(link) }))} />
+  ) : (
+    <div>
+      <Button busy={busy} onClick={show}>
+        {t().studies.own.tests.links}
+      </Button>
+      {fault && <Notice kind="fault">{fault}</Notice>}
+    </div>
   );
 }
 
@@ -330,8 +355,8 @@ function Links({ studyId }: { studyId: string }) {
   const { busy, fault, run } = useAttempt();
   const show = () =>
     run(async () => {
-      // Those who joined have theirs.
-      setLinks((await linksOf(studyId)).filter(({ joined }) => !joined));
+      // Those who joined have theirs; those of test participants are not to be handed out.
+      setLinks((await linksOf(studyId)).filter(({ joined, test }) => !joined && !test));
       return false;
     });
   return (

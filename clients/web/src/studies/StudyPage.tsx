@@ -86,7 +86,7 @@ export function Taking({ part }: { part: Participating }) {
     <div class={css.study} data-part="study">
       {part.link.value === "lost" && <Notice kind="fault">{words.lost}</Notice>}
       <Progress view={view} />
-      {view.test && <TestNotice view={view} part={part} />}
+      {view.test && <TestNotice key={stageKey(view)} view={view} part={part} />}
       <Stage key={stageKey(view)} {...{ view, part }} />
       <Withdraw view={view} part={part} />
     </div>
@@ -125,18 +125,25 @@ function TestNotice({ view: { content }, part }: StageProps) {
   const words = t().studies.test;
   const { busy, fault, run } = useAttempt();
   const game = content.case === "game" && !content.value.ended ? content.value : undefined;
-  const goOn = () => run(() => part.proceed().then(() => false));
+  // The end of a game is shown a moment later.
+  const [gone, setGone] = useState(false);
+  const goOn = () =>
+    run(async () => {
+      await part.proceed();
+      setGone(true);
+      return false;
+    });
   return (
     <Notice kind="hint">
       <p>
         <b>{words.title}</b> {words.text}
       </p>
-      {content.case === "questionnaire" && (
+      {!gone && content.case === "questionnaire" && (
         <Button busy={busy} onClick={goOn}>
           {words.skip}
         </Button>
       )}
-      {game?.ticket && (
+      {!gone && game?.ticket && (
         <Button busy={busy} onClick={goOn}>
           {words.end}
         </Button>

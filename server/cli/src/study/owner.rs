@@ -59,7 +59,8 @@ pub(super) struct Links {
     /// Add a participant with this pseudonym. Do not use names of people. Repeatable.
     #[arg(long = "pseudonym", value_name = "NAME")]
     pseudonyms: Vec<String>,
-    /// Add test participants, who take no place: to look at the study as participants see it.
+    /// The links of test participants instead of those of all others. With --add or --pseudonym: add
+    /// test participants, who take no place.
     #[arg(long)]
     test: bool,
 }
@@ -191,9 +192,6 @@ impl Links {
         let owned = self.owned;
         let mut service = service(&owned.server).await?;
         let (study_id, owner_token) = (owned.study_id.clone(), owned.owner.token()?);
-        if self.test && self.add == 0 && self.pseudonyms.is_empty() {
-            return Err("say with --add or --pseudonym which test participants to add".into());
-        }
         let links = if self.add == 0 && self.pseudonyms.is_empty() {
             let request = v1::ListStudyLinksRequest {
                 study_id,
@@ -212,7 +210,7 @@ impl Links {
             let added = service.add_study_participants(request).await;
             added.map_err(refused)?.into_inner().links
         };
-        for link in &links {
+        for link in links.iter().filter(|link| link.test == self.test) {
             print_link(link, owned.server.url(), owned.json)?;
         }
         Ok(())
@@ -370,7 +368,7 @@ fn print_link(link: &v1::StudyLink, server: &str, json: bool) -> Result<(), Comm
         let (number, pseudonym) = (link.number, &link.pseudonym);
         return say(json!({
             "number": number, "pseudonym": pseudonym, "link": link.link, "address": address,
-            "joined": link.joined,
+            "joined": link.joined, "test": link.test,
         }));
     }
     say(format_args!(

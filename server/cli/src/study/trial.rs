@@ -17,6 +17,8 @@ use futures::stream::{self, StreamExt as _};
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use serde_json::json;
+use tokio::sync::watch;
+use tokio_util::task::AbortOnDropHandle;
 use tonic::{Status, Streaming};
 
 use super::connection::{refused, service};
@@ -43,7 +45,7 @@ pub(super) struct Test {
     /// The built-in agent that plays their games.
     #[arg(long, default_value = "random", value_parser = named_agent)]
     agent: NamedAgent,
-    /// Seed of their answers and of the agent, to repeat a test.
+    /// Seed of their answers and of the agent.
     #[arg(long)]
     seed: Option<u64>,
 }
@@ -75,10 +77,13 @@ impl Test {
         let completed = v1::StudyParticipantState::Completed;
         let completed = participants.iter().filter(|it| it.state() == completed);
         let completed = completed.count();
+        let games = participants.iter().flat_map(|it| &it.games);
+        let aborted = games.filter(|it| it.ended() == v1::RoomState::Aborted);
+        let aborted = aborted.count();
         if owned.json {
             say(json!({
-                "event": "tested", "completed": completed, "participants": participants,
-                "problems": problems,
+                "event": "tested", "completed": completed, "games_without_result": aborted,
+                "participants": participants, "problems": problems,
             }))?;
         } else {
             participants.iter().try_for_each(|it| say(line(it)))?;
@@ -87,8 +92,12 @@ impl Test {
             }
             let all = counted(self.participants.into(), "test participant");
             say(format_args!("{completed} of {all} completed the study"))?;
+            if aborted > 0 {
+                let games = counted(aborted.try_into()?, "game");
+                say(format_args!("{games} ended without a result"))?;
+            }
         }
-        Ok(match completed == numbers.len() {
+        Ok(match completed == numbers.len() && aborted == 0 {
             true => ExitCode::SUCCESS,
             false => ExitCode::FAILURE,
         })
@@ -102,8 +111,8 @@ impl Test {
     ) -> Result<BTreeMap<String, String>, CommandError> {
         let client = self.owned.server.connect().await?;
         let bar = progress::of_items(self.participants.into(), "test participants");
-        let taking_part = links.into_iter().map(|link| {
-            let seed = seed_for(&format!("test participant {}", link.number), self.seed);
+        let taking_part = links.into_iter().enumerate().map(|(index, link)| {
+            let seed = seed_for(&format!("test participant {index}"), self.seed);
             let tester = Tester {
                 client: client.clone(),
                 service: ParticipationServiceClient::new(client.channel()),
@@ -113,9 +122,17 @@ impl Test {
             };
             let bar = &bar;
             async move {
-                let ended = tester.take_part(link.link).await;
+                let mut service = tester.service.clone();
+                let ended = tester.take_part(link.link.clone()).await;
                 bar.inc(1);
-                Some((link.pseudonym, ended.err()?.to_string()))
+                let problem = ended.err()?;
+                // Its game is closed, and nobody waits for it.
+                let request = v1::WithdrawFromStudyRequest {
+                    link: link.link,
+                    delete_data: false,
+                };
+                let _ = service.withdraw_from_study(request).await;
+                Some((link.pseudonym, problem.to_string()))
             }
         });
         let taking_part = stream::iter(taking_part).buffer_unordered(self.at_once as usize);
@@ -147,7 +164,7 @@ impl Tester {
         };
         // While it is open, the participant counts as present.
         let followed = self.service.follow_participation(request).await;
-        let mut views = followed.map_err(refused)?.into_inner();
+        let mut views = Views::of(followed.map_err(refused)?.into_inner());
         let mut played = String::new();
         loop {
             let step = view.step;
@@ -162,10 +179,10 @@ impl Tester {
                         played = game.ticket;
                     }
                     // Its room, or its end, comes on the stream.
-                    following(&mut views, step).await
+                    views.next(step).await
                 }
                 Some(_) => self.proceed(step).await,
-                None => following(&mut views, step).await,
+                None => views.next(step).await,
             };
             view = next.map_err(refused)?;
         }
@@ -204,17 +221,37 @@ impl Tester {
     }
 }
 
-/// The next view of a stream that is not of an earlier step.
-async fn following(
-    views: &mut Streaming<v1::FollowParticipationResponse>,
-    step: u32,
-) -> Result<v1::StudyView, Status> {
-    loop {
-        let next = views.message().await?;
-        let next = next.ok_or_else(|| Status::unavailable("the server has ended the stream"))?;
-        match next.view {
-            Some(view) if view.step >= step => return Ok(view),
-            _ => {}
+/// The newest view of a stream, which is read to its end: what waits in it would hold up other answers.
+struct Views {
+    newest: watch::Receiver<Option<v1::StudyView>>,
+    _reading: AbortOnDropHandle<()>,
+}
+
+impl Views {
+    fn of(mut stream: Streaming<v1::FollowParticipationResponse>) -> Self {
+        let (sender, newest) = watch::channel(None);
+        let reading = tokio::spawn(async move {
+            while let Ok(Some(next)) = stream.message().await {
+                if next.view.is_some() {
+                    sender.send_replace(next.view);
+                }
+            }
+        });
+        Self {
+            newest,
+            _reading: AbortOnDropHandle::new(reading),
+        }
+    }
+
+    /// The next view that is not of an earlier step.
+    async fn next(&mut self, step: u32) -> Result<v1::StudyView, Status> {
+        loop {
+            let changed = self.newest.changed().await;
+            changed.map_err(|_| Status::unavailable("the server has ended the stream"))?;
+            let view = self.newest.borrow_and_update().clone();
+            if let Some(view) = view.filter(|view| view.step >= step) {
+                return Ok(view);
+            }
         }
     }
 }

@@ -530,7 +530,9 @@ fn code_of(refusal: &StudyRefusal) -> (Code, &'static str) {
         StudyRefusal::TooManySessions => (Code::ResourceExhausted, "TOO_MANY_SESSIONS"),
         StudyRefusal::TooManySaves => (Code::ResourceExhausted, "TOO_MANY_SAVES"),
         StudyRefusal::NameTaken(_) => (Code::AlreadyExists, "NAME_TAKEN"),
-        StudyRefusal::TooManyParticipants => (Code::ResourceExhausted, "TOO_MANY_PARTICIPANTS"),
+        StudyRefusal::TooManyParticipants | StudyRefusal::TooManyTests => {
+            (Code::ResourceExhausted, "TOO_MANY_PARTICIPANTS")
+        }
         StudyRefusal::PanelIdTaken => (Code::AlreadyExists, "PANEL_ID_TAKEN"),
         StudyRefusal::PanelId(_) => (Code::InvalidArgument, "PANEL_ID_REFUSED"),
         StudyRefusal::Answers(_) => (Code::InvalidArgument, "ANSWER_REFUSED"),

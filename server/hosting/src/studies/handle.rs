@@ -6,8 +6,8 @@ use std::sync::{Arc, MutexGuard};
 
 use chefshat_proto::v1;
 use chefshat_study::{
-    At, Change, Content, Device, ItemAnswer, Joined, ParticipantLink, Recruiting, Refusal,
-    SessionSecret, Study,
+    At, Change, Content, Device, ItemAnswer, Joined, Participant, ParticipantLink, Recruiting,
+    Refusal, SessionSecret, Study,
 };
 use tokio::sync::watch;
 
@@ -126,6 +126,7 @@ impl StudyHandle {
             pseudonym: participant.map_or_else(String::new, |it| it.pseudonym.clone()),
             link: ParticipantLink::new(&self.header.key, self.short_id(), number).to_text(),
             joined: participant.is_some_and(|it| it.joined.is_some()),
+            test: participant.is_some_and(|it| it.test),
         }
     }
 
@@ -545,9 +546,11 @@ impl StudyHandle {
     /// Whether nothing can change by itself any more: it is closed, and nobody is active.
     pub fn is_complete(&self) -> bool {
         let study = self.committed();
-        let is_active =
-            |it: &chefshat_study::Participant| it.status == chefshat_study::Status::Active;
-        study.is_closed() && !study.participants().values().any(is_active)
+        study.is_closed()
+            && !study
+                .participants()
+                .values()
+                .any(Participant::is_in_the_middle)
     }
 
     /// Reads the committed state.

@@ -148,7 +148,10 @@ impl Studies {
                     Err(active) => return Ok(Err(active)),
                 };
                 studies.forget_one(handle.id());
-                let participants = handle.read(|study| study.participants().len());
+                let participants = handle.read(|study| {
+                    let participants = study.participants().values();
+                    participants.filter(|it| !it.test).count()
+                });
                 Ok(Ok((participants, games)))
             }));
         deleting.await.map_err(|_| Stopped)?

@@ -157,14 +157,17 @@ impl Journaled for StudyTask {
                 self.unit.reply(reply, executed);
             }
             Message::Delete { force, reply } => {
-                let participants = self.unit.state.participants().iter();
-                let active = participants.filter(|(_, it)| it.status == Status::Active);
-                let active: Vec<u32> = active.map(|(number, _)| *number).collect();
-                if !active.is_empty() && !force {
+                let participants = self.unit.state.participants();
+                let middle = participants.values().filter(|it| it.is_in_the_middle());
+                let middle = middle.count();
+                if middle > 0 && !force {
                     // The caller may have gone.
-                    let _ = reply.send(Err(active.len()));
+                    let _ = reply.send(Err(middle));
                     return Ok(());
                 }
+                let active = participants.iter();
+                let active = active.filter(|(_, it)| it.status == Status::Active);
+                let active: Vec<u32> = active.map(|(number, _)| *number).collect();
                 let at_ms = (self.now)();
                 for number in active {
                     self.fold(Change::Removed { number, at_ms });

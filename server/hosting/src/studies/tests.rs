@@ -439,6 +439,56 @@ fn tables(files: &BTreeMap<String, Vec<u8>>) -> Tables {
     tables.collect()
 }
 
+#[tokio::test(start_paused = true)]
+async fn a_test_participant_ends_its_game_and_goes_on_and_nobody_waits_for_it() {
+    let lab = Lab::new().await;
+    let (study, rooms) = (&lab.study, lab.studies.rooms());
+    let added = study.add(Key::Local, vec![String::new(); 2], true).await;
+    let number = added.expect("it runs").expect("there is space");
+    // Another one is in the middle of the study to its end.
+    assert_eq!(lab.open(number + 1).await, Ok(1));
+    assert_eq!(lab.open(number).await, Ok(1));
+    let _present = study.present(number, 1).await;
+    let consented = study.consent(at(number, 0)).await;
+    assert_eq!(consented.expect("it runs"), Ok(0));
+    lab.settled().await;
+    let game = |number| study.read(|it| it.participants()[&number].games.last().cloned());
+    let ended = |number| game(number).and_then(|game| game.ended);
+    assert!(game(number).is_some() && ended(number).is_none());
+
+    // Nobody else ends a game, or waits for this one.
+    let _other = lab.begin().await;
+    let refused = study.proceed(at(1, 1), rooms).await;
+    assert_eq!(refused.expect("it runs"), Err(Refusal::GameNotOver));
+    let closing = study.proceed(at(number, 1), rooms).await;
+    assert_eq!(closing.expect("it runs"), Ok(0));
+    while ended(number).is_none() {
+        lab.settled().await;
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    assert_eq!(
+        ended(number).map(|(outcome, _)| outcome),
+        Some(chefshat_study::Outcome::Aborted)
+    );
+    assert!(ended(1).is_none());
+    let proceeded = study.proceed(at(number, 1), rooms).await;
+    assert_eq!(proceeded.expect("it runs"), Ok(0));
+    assert_eq!(study.read(|it| it.participants()[&number].step()), 2);
+    assert_eq!(lab.status(number), Status::Completed);
+    assert_eq!(lab.status(number + 1), Status::Active);
+    let removed = study.remove(Key::Local, 1, false).await;
+    assert!(removed.expect("it runs").is_ok());
+    study.close().await.expect("it runs");
+    assert!(study.is_complete());
+    let deleted = lab.studies.delete(Arc::clone(study), false).await;
+    assert_eq!(
+        deleted
+            .expect("it runs")
+            .map(|(participants, _)| participants),
+        Ok(2)
+    );
+}
+
 #[tokio::test]
 async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
     use v1::study_item::Kind;

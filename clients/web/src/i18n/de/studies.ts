@@ -150,6 +150,7 @@ export const studies: Texts["studies"] = {
       count: "Anzahl der Testteilnehmer",
       submit: "Testteilnehmer hinzufügen",
       mark: "Test",
+      links: "Ihre Links zeigen",
       export: "Daten der Testteilnehmer herunterladen (ZIP)",
     },
     openLink: {

@@ -146,6 +146,7 @@ export const studies = {
       count: "Number of test participants",
       submit: "Add test participants",
       mark: "test",
+      links: "Show their links",
       export: "Download the data of test participants (ZIP)",
     },
     openLink: {

@@ -148,6 +148,7 @@ export const studies: Texts["studies"] = {
       count: "Número de participantes de prueba",
       submit: "Añadir participantes de prueba",
       mark: "prueba",
+      links: "Mostrar sus enlaces",
       export: "Descargar los datos de los participantes de prueba (ZIP)",
     },
     openLink: {

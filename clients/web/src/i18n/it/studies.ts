@@ -148,6 +148,7 @@ export const studies: Texts["studies"] = {
       count: "Numero di partecipanti di prova",
       submit: "Aggiungi partecipanti di prova",
       mark: "prova",
+      links: "Mostra i loro link",
       export: "Scarica i dati dei partecipanti di prova (ZIP)",
     },
     openLink: {

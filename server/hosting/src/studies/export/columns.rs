@@ -770,7 +770,10 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
         "questionnaire_answered_at_ms",
         SINCE_EPOCH,
         "when the questionnaire was sent",
-        |row| optional(row.reached_at_ms(row.step + 1)),
+        |row| {
+            let was_sent = row.participant.answers.contains_key(&row.step);
+            optional(row.reached_at_ms(row.step + 1).filter(|_| was_sent))
+        },
     )
     .empty("it was not sent, or not shown")
 }

@@ -1405,6 +1405,7 @@ class StudyLink(_message.Message):
     PSEUDONYM_FIELD_NUMBER: _builtins.int
     LINK_FIELD_NUMBER: _builtins.int
     JOINED_FIELD_NUMBER: _builtins.int
+    TEST_FIELD_NUMBER: _builtins.int
     number: _builtins.int
     """Number of the participant."""
     pseudonym: _builtins.str
@@ -1415,6 +1416,8 @@ class StudyLink(_message.Message):
     """
     joined: _builtins.bool
     """Whether the participant joined by the open link, and has its own link already."""
+    test: _builtins.bool
+    """Whether it is the link of a test participant."""
     def __init__(
         self,
         *,
@@ -1422,10 +1425,11 @@ class StudyLink(_message.Message):
         pseudonym: _builtins.str = ...,
         link: _builtins.str = ...,
         joined: _builtins.bool = ...,
+        test: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["joined", b"joined", "link", b"link", "number", b"number", "pseudonym", b"pseudonym"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["joined", b"joined", "link", b"link", "number", b"number", "pseudonym", b"pseudonym", "test", b"test"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -204,8 +204,9 @@ class AddStudyParticipantsRequest(_message.Message):
     """Number of participants to add besides those, named by number such as "P01", at most 1000."""
     test: _builtins.bool
     """Whether they are test participants: they go through the study as others do, with conditions in the
-    same order of slots, but take no slot from those; no count and no exported data of others include
-    them. Those named by number are called "T01" and so on.
+    same order of slots, but take no slot from those, are not sent on at the end, and do not play a
+    game again that has no result. No count and no exported data of others include them. Those named
+    by number are called "T01" and so on. A study has at most 1000 of them.
     """
     @_builtins.property
     def pseudonyms(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
