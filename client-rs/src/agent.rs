@@ -32,6 +32,12 @@ pub trait Agent: Send {
     /// `invalid_attempts_left` is updated, and the times are those of the original request.
     fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId;
 
+    /// Chooses an action as [`Agent::decide`] does, which it calls by default, or none: then the
+    /// decision stays open until its time is over, and the server decides as the policy says.
+    fn try_decide(&mut self, request: &v1::DecisionRequest) -> Option<ActionId> {
+        Some(self.decide(request))
+    }
+
     /// Annotations to record with the decision; called after [`Agent::decide`]. See
     /// [`v1::Annotations`] for the limits.
     fn annotate(&mut self) -> Option<v1::Annotations> {
@@ -63,6 +69,9 @@ macro_rules! forward_agent {
         impl $($generics)* {
             fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
                 (**self).decide(request)
+            }
+            fn try_decide(&mut self, request: &v1::DecisionRequest) -> Option<ActionId> {
+                (**self).try_decide(request)
             }
             fn annotate(&mut self) -> Option<v1::Annotations> {
                 (**self).annotate()

@@ -238,7 +238,9 @@ impl<A: Agent> SeatSession<A> {
         let owed = std::mem::replace(&mut self.owed, Owed::Nothing);
         match (owed, &self.open) {
             (Owed::Decision, Some(request)) => {
-                let action = self.agent.decide(request);
+                let Some(action) = self.agent.try_decide(request) else {
+                    return;
+                };
                 let annotations = self.agent.annotate().filter(|annotations| {
                     let fits = annotations.encoded_len() <= MAX_ANNOTATIONS_BYTES;
                     if !fits {

@@ -11,6 +11,9 @@ use crate::v1::game_event::Kind;
 use crate::v1::seat_command::Command;
 use crate::{ActionId, Ending, Entropy};
 
+/// In place of an action: none is chosen.
+const NONE: u32 = u32::MAX;
+
 /// Answers with given actions, in order, and logs all calls.
 struct Scripted {
     log: Arc<Mutex<Vec<String>>>,
@@ -32,6 +35,9 @@ impl Agent for Scripted {
                 .pop_front()
                 .expect("asked more often than scripted"),
         )
+    }
+    fn try_decide(&mut self, request: &v1::DecisionRequest) -> Option<ActionId> {
+        Some(self.decide(request)).filter(|action| action.0 != NONE)
     }
     fn on_attached(&mut self, attached: &v1::Attached) {
         self.log_line(format!("attached {}", attached.seat));
@@ -242,6 +248,24 @@ fn answers_of_one_response_go_out_as_one_request_after_all_its_updates() {
     assert_eq!(harness.log(0), ["event 1", "event 2", "decide 9 None"]);
     assert_eq!(harness.log(1), ["event 1", "decide 4 None"]);
     assert_eq!(harness.log(2), ["event 1"]);
+}
+
+#[test]
+fn a_decision_without_an_action_stays_open() {
+    let mut harness = Harness::seated(&[5, NONE, NONE, 6]);
+    assert_eq!(harness.receive(vec![(0, decision(1))]), ["0:1=5"]);
+    let accepted = result(1, 5, v1::AnswerStatus::Accepted, None);
+    let sent = harness.receive(vec![(0, accepted), (0, decision(2))]);
+    assert_eq!(sent, Vec::<String>::new());
+    // Nothing is sent again with a new connection, which asks once more.
+    harness.connect(&[(0, 1, 1)]);
+    assert_eq!(
+        harness.receive(vec![(0, decision(2))]),
+        Vec::<String>::new()
+    );
+    assert_eq!(harness.log(0), ["decide 2 None"]);
+    // The server has decided.
+    assert_eq!(harness.receive(vec![(0, decision(3))]), ["0:3=6"]);
 }
 
 #[test]

@@ -137,7 +137,7 @@ impl Player {
                     false => ": too many to call it the model's game",
                 };
                 format!(
-                    "{result}, {} tokens for {} decisions, {} of them by the fallback{verdict}",
+                    "{result}, {} tokens for {} decisions, {} of them without its answer{verdict}",
                     grouped(spent.tokens),
                     grouped(spent.decisions),
                     grouped(spent.fallbacks)

@@ -191,7 +191,18 @@ impl Played {
     }
 }
 
+/// A game in which the seat decides in time, whatever the model says.
 async fn play(script: Script, decision_time: Duration, arguments: &[&str]) -> Played {
+    let policy = v1::RoomPolicy {
+        decision_time_ms: Some(u32::try_from(decision_time.as_millis()).expect("short")),
+        ..v1::RoomPolicy::default()
+    };
+    let played = play_by(script, policy, arguments).await;
+    played.check();
+    played
+}
+
+async fn play_by(script: Script, policy: v1::RoomPolicy, arguments: &[&str]) -> Played {
     let server = TestServer::start().await;
     let client = server.client().await;
     let (url, asked) = endpoint(script).await;
@@ -203,9 +214,8 @@ async fn play(script: Script, decision_time: Duration, arguments: &[&str]) -> Pl
     let created = client.create_room(v1::CreateRoomRequest {
         rules: Some(one_shift()),
         policy: Some(v1::RoomPolicy {
-            decision_time_ms: Some(u32::try_from(decision_time.as_millis()).expect("short")),
             max_invalid_attempts: Some(3),
-            ..v1::RoomPolicy::default()
+            ..policy
         }),
         seats: std::iter::once(open).chain(others).collect(),
         // Deals in which the model has more decisions than the tests look at.
@@ -230,13 +240,11 @@ async fn play(script: Script, decision_time: Duration, arguments: &[&str]) -> Pl
     let room = created.room.expect("a room");
     let game = until_over(&client, room.room_id).await;
     assert_eq!(game.room.seats[0].name, "test-1");
-    let played = Played {
+    Played {
         game,
         result,
         asked,
-    };
-    played.check();
-    played
+    }
 }
 
 /// Time enough for decisions on a busy machine.
@@ -327,6 +335,30 @@ async fn only_illegal_answers_end_with_the_fallback() {
         assert!(decision.invalid_attempts.len() <= 2, "{decision:?}");
     }
     assert!(!choices[0].0.invalid_attempts.is_empty());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn without_a_fallback_the_server_decides_and_takes_the_seat_over() {
+    let nonsense: Script = |_, _| Said::Text("I fold.".to_owned(), 900);
+    let policy = v1::RoomPolicy {
+        decision_time_ms: Some(200),
+        bank_ms: Some(0),
+        abort: v1::AbortPolicy::Never.into(),
+        ..v1::RoomPolicy::default()
+    };
+    let played = play_by(nonsense, policy, &["--fallback", "none", "--retries", "0"]).await;
+    let choices = played.choices();
+    for (decision, said) in &choices {
+        assert_ne!(decision.source(), v1::DecisionSource::Agent, "{said:?}");
+        assert!(said.is_empty(), "{said:?}");
+    }
+    assert_eq!(choices[0].0.source(), v1::DecisionSource::Timeout);
+    assert!(
+        played.result["decisions"].as_u64() > Some(3),
+        "{}",
+        played.result
+    );
+    assert_eq!(played.result["fallbacks"], played.result["decisions"]);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -1,7 +1,7 @@
 //! `chefshat agent llm`: a language model plays a seat, asked through the chat API that servers of
 //! models share. Each decision is a question of its own, with the table in words (`language`).
 //! Whatever the model does, the seat answers in time: without a usable answer, a built-in agent
-//! decides, and the record says so.
+//! decides, and the record says so; or nobody does, and the server decides when the time is over.
 
 mod endpoint;
 mod reply;
@@ -93,9 +93,10 @@ pub(crate) struct LlmArgs {
     /// more is reported as not the model's, and the exit code is 1.
     #[arg(long, value_name = "SHARE", default_value_t = 0.1, value_parser = share)]
     max_fallbacks: f64,
-    /// For llm: the built-in agent that decides without a usable answer; it does not search.
-    #[arg(long, value_name = "AGENT", default_value_t = AgentKind::Greedy.into(), value_parser = fallback)]
-    fallback: NamedAgent,
+    /// For llm: the built-in agent that decides without a usable answer; it does not search. With
+    /// "none" the decision stays open until its time is over, as if the model were away.
+    #[arg(long, value_name = "AGENT", default_value = AgentKind::Greedy.name(), value_parser = fallback)]
+    fallback: Fallback,
 }
 
 fn temperature(text: &str) -> Result<f32, String> {
@@ -115,11 +116,35 @@ fn share(text: &str) -> Result<f64, String> {
     share.ok_or_else(|| "a share is a number from 0 to 1".to_owned())
 }
 
-/// An agent that decides at once: a search would need time that the model has used.
-fn fallback(name: &str) -> Result<NamedAgent, String> {
+/// Who decides without a usable answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fallback {
+    /// An agent that decides at once: a search would need time that the model has used.
+    Agent(AgentKind),
+    /// Nobody.
+    None,
+}
+
+/// The name of no fallback.
+const NO_FALLBACK: &str = "none";
+
+fn fallback(name: &str) -> Result<Fallback, String> {
+    if name == NO_FALLBACK {
+        return Ok(Fallback::None);
+    }
     match named_agent(name)? {
-        agent @ NamedAgent::Kind(_) => Ok(agent),
+        NamedAgent::Kind(kind) => Ok(Fallback::Agent(kind)),
         NamedAgent::MonteCarlo(_) => Err("a fallback does not search".to_owned()),
+    }
+}
+
+impl Fallback {
+    /// The agent that decides where there is no choice.
+    fn at_once(self) -> AgentKind {
+        match self {
+            Self::Agent(kind) => kind,
+            Self::None => AgentKind::default(),
+        }
     }
 }
 
@@ -162,8 +187,9 @@ impl LlmArgs {
             budget: self.budget,
             max_fallbacks: self.max_fallbacks,
             retries: self.retries,
-            fallback: RemoteAgent::named(self.fallback, seed, Duration::ZERO),
-            fallback_name: self.fallback.name(),
+            fallback: self.fallback,
+            at_once: RemoteAgent::named(self.fallback.at_once().into(), seed, Duration::ZERO),
+            left_open: None,
             began: Instant::now(),
             live: Live::new(GameView::default(), None),
             spent: Spent::default(),
@@ -183,7 +209,7 @@ pub(crate) struct Spent {
     pub(crate) tokens: u64,
     /// Decisions with more than one legal action.
     pub(crate) decisions: u64,
-    /// Those that the fallback has taken.
+    /// Those of them without a usable answer of the model: the fallback's, or the server's.
     pub(crate) fallbacks: u64,
 }
 
@@ -194,8 +220,11 @@ pub(crate) struct LanguageModel {
     budget: u64,
     max_fallbacks: f64,
     retries: u32,
-    fallback: RemoteAgent,
-    fallback_name: String,
+    fallback: Fallback,
+    /// Decides where the model has no choice, and is the fallback if there is one.
+    at_once: RemoteAgent,
+    /// The last decision that nobody takes.
+    left_open: Option<u64>,
     began: Instant,
     live: Live,
     spent: Spent,
@@ -350,16 +379,21 @@ impl LanguageModel {
         Instant::now() + time.saturating_sub((time / RESERVE).clamp(least, most))
     }
 
-    /// The action of the fallback, with why it decides.
-    fn fall_back(&mut self, request: &v1::DecisionRequest, why: &str) -> ActionId {
-        warn!(
-            decision = request.decision_id,
-            why, "{} decides instead", self.fallback_name
-        );
+    /// The action of the fallback, if there is one, with why it decides.
+    fn fall_back(&mut self, request: &v1::DecisionRequest, why: &str) -> Option<ActionId> {
         self.spent.fallbacks += 1;
-        let words = format!("{}: {why}", self.fallback_name);
+        let decision = request.decision_id;
+        let Fallback::Agent(kind) = self.fallback else {
+            warn!(decision, why, "the decision is left to the server");
+            self.left_open = Some(decision);
+            self.said = v1::Annotations::default();
+            return None;
+        };
+        let name = kind.name();
+        warn!(decision, why, "{name} decides instead");
+        let words = format!("{name}: {why}");
         self.say(FALLBACK, language::reason(&words).unwrap_or_default());
-        self.fallback.decide(request)
+        Some(self.at_once.decide(request))
     }
 
     fn say(&mut self, key: &str, words: String) {
@@ -369,7 +403,15 @@ impl LanguageModel {
 
 impl Agent for LanguageModel {
     fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
+        let decided = self.try_decide(request);
+        decided.unwrap_or_else(|| self.at_once.decide(request))
+    }
+
+    fn try_decide(&mut self, request: &v1::DecisionRequest) -> Option<ActionId> {
         let id = request.decision_id;
+        if self.left_open == Some(id) {
+            return None;
+        }
         let again = (self.answered.as_ref()).is_some_and(|(answered, _)| *answered == id);
         if !again {
             self.answered = None;
@@ -383,7 +425,7 @@ impl Agent for LanguageModel {
         self.said = v1::Annotations::default();
         // Without a choice there is nothing to ask.
         if legal_count(request) == 1 {
-            return self.fallback.decide(request);
+            return Some(self.at_once.decide(request));
         }
         if !again {
             self.spent.decisions += 1;
@@ -405,7 +447,7 @@ impl Agent for LanguageModel {
                 if let Some(reason) = language::reason(&reason) {
                     self.say(language::REASON, reason);
                 }
-                ActionId(action)
+                Some(ActionId(action))
             }
             Err(why) => self.fall_back(request, &why),
         }
@@ -417,13 +459,13 @@ impl Agent for LanguageModel {
     }
 
     fn on_attached(&mut self, attached: &v1::Attached) {
-        self.fallback.on_attached(attached);
+        self.at_once.on_attached(attached);
         let now_ms = self.now_ms();
         self.live.take(Update::Attached(attached.clone()), now_ms);
     }
 
     fn on_event(&mut self, event: &v1::GameEvent) {
-        self.fallback.on_event(event);
+        self.at_once.on_event(event);
         match &event.kind {
             Some(v1::game_event::Kind::GameStarted(_)) => {
                 self.live = Live::new(GameView::default(), self.live.me);
@@ -456,6 +498,6 @@ impl Agent for LanguageModel {
     }
 
     fn on_game_over(&mut self, outcome: &Outcome) {
-        self.fallback.on_game_over(outcome);
+        self.at_once.on_game_over(outcome);
     }
 }

@@ -185,6 +185,10 @@ impl Agent for Teller {
         self.player.agent().decide(request)
     }
 
+    fn try_decide(&mut self, request: &v1::DecisionRequest) -> Option<ActionId> {
+        self.player.agent().try_decide(request)
+    }
+
     fn annotate(&mut self) -> Option<v1::Annotations> {
         self.player.agent().annotate()
     }
