@@ -1,6 +1,6 @@
 // Settings of a study from a file: TOML as docs/studies.md describes it, or JSON of the same form.
-// The names are those of StudySettings; values of enums may be short ("players"), and seeds are in
-// hexadecimal digits. The server checks the values.
+// The names are those of StudySettings; values of enums may be short ("players"), seeds are in
+// hexadecimal digits, and times of TOML may be dates. The server checks the values.
 
 import { fromJson, type JsonValue } from "@bufbuild/protobuf";
 import { base64Encode } from "@bufbuild/protobuf/wire";
@@ -26,10 +26,19 @@ const ENUMS: Readonly<Record<string, string>> = {
 };
 const SEEDS = ["assignment_seed", "seeds"];
 
-/** The value in the JSON form of the protocol. */
-function inProtocolForm(value: JsonValue, field = ""): JsonValue {
+/** A date of TOML in milliseconds since the Unix epoch. */
+function timeOf(time: Date, field: string): string {
+  if (!field.endsWith("_at_ms")) throw new Error(`${field}: it is no time`);
+  if (!/(Z|[+-]\d\d:\d\d)$/.test(time.toISOString()))
+    throw new Error(`${field}: give the time with its zone, such as 2031-05-01T18:00:00+02:00`);
+  return String(time.getTime());
+}
+
+/** The value in the JSON form of the protocol; a table of TOML may have dates. */
+function inProtocolForm(value: JsonValue | Date, field = ""): JsonValue {
   // The labels of a scale are texts, too, but a list of them.
   if (Array.isArray(value)) return value.map((item) => inProtocolForm(item, field === "labels" ? "" : field));
+  if (value instanceof Date) return timeOf(value, field);
   if (typeof value === "object" && value !== null)
     return Object.fromEntries(Object.entries(value).map(([name, item]) => [name, inProtocolForm(item, name)]));
   if (typeof value !== "string") return value;

@@ -8,6 +8,7 @@ use std::path::Path;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use chefshat_proto::v1;
+use chrono::DateTime;
 use serde_json::{Map, Value};
 use toml::de::{DeTable, DeValue};
 
@@ -26,6 +27,8 @@ const ENUMS: [(&str, &str); 10] = [
     ("kind", "PARTICIPANT_KIND_"),
     ("durability", "DURABILITY_"),
 ];
+/// What the names of fields with times end with: milliseconds since the Unix epoch.
+const TIME: &str = "_at_ms";
 /// Fields with bytes.
 const BYTES: [&str; 2] = ["seeds", "assignment_seed"];
 
@@ -82,9 +85,13 @@ fn convert(key: &str, value: &DeValue<'_>, folder: &Path) -> Result<Value, Strin
             number.map_err(|_| format!("{key}: not a number"))?.into()
         }
         DeValue::Boolean(set) => (*set).into(),
-        DeValue::Datetime(_) => {
-            return Err(format!("{key}: give milliseconds since the Unix epoch"));
+        DeValue::Datetime(time) if key.ends_with(TIME) => {
+            let time = DateTime::parse_from_rfc3339(&time.to_string());
+            let problem = "give the time with its zone, such as 2031-05-01T18:00:00+02:00";
+            let time = time.map_err(|_| format!("{key}: {problem}"))?;
+            time.timestamp_millis().into()
         }
+        DeValue::Datetime(_) => return Err(format!("{key}: it is no time")),
         DeValue::Array(items) => {
             // Labels of a condition are a value of an enum, those of an item a list of texts.
             let key = if key == "labels" { "" } else { key };
@@ -131,6 +138,7 @@ mod tests {
             order = "within"
             seeds = ["0000000000000000000000000000000000000000000000000000000000000001"]
             drop_out_after_ms = 60_000
+            closes_at_ms = 2031-05-01T18:00:00.5+02:00
             [[conditions]]
             id = "a"
             labels = "players"
@@ -152,6 +160,7 @@ mod tests {
         assert_eq!(settings.order(), v1::StudyOrder::Within);
         assert_eq!(settings.seeds[0][31], 1);
         assert_eq!(settings.drop_out_after_ms, 60_000);
+        assert_eq!(settings.closes_at_ms, 1_935_417_600_500);
         let condition = &settings.conditions[0];
         assert_eq!(condition.labels(), v1::StudyLabels::Players);
         assert_eq!(condition.hide().count(), 2);
@@ -177,6 +186,9 @@ mod tests {
             ("nam = \"x\"", "nam"),
             ("seeds = [\"12\", \"x\"]", "seeds"),
             ("order = \"sideways\"", "SIDEWAYS"),
+            ("closes_at_ms = 2031-05-01T18:00:00", "with its zone"),
+            ("closes_at_ms = 2031-05-01", "with its zone"),
+            ("name = 2031-05-01T18:00:00Z", "no time"),
             (
                 "stages = [{ text = { text_file = \"missing.md\" } }]",
                 "missing.md",
