@@ -69,6 +69,8 @@ pub const MIN_ANALYSIS_PATIENCE: Duration = Duration::from_secs(30);
 pub const MIN_ANALYSIS_UPDATE: Duration = Duration::from_millis(50);
 /// Largest record that may be imported, bytes as encoded.
 pub const MAX_IMPORT_BYTES: usize = 64 * 1024 * 1024;
+/// Bytes of records that are received for import in a second, of all imports together.
+pub const IMPORT_RATE: usize = 16 * 1024 * 1024;
 /// Most lines of a record that may be imported.
 pub const MAX_IMPORT_LINES: usize = 1_500_000;
 /// Most bytes of memory that the lines of all records take that are being imported.

@@ -15,6 +15,7 @@ mod limits;
 mod lists;
 mod lookup;
 mod new_room;
+mod pace;
 mod pages;
 mod play;
 mod pool;

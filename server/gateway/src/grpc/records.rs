@@ -23,6 +23,7 @@ use tonic::{Code, Request, Response, Status, Streaming};
 use super::forward::Gateway;
 use super::limits::charged;
 use super::lookup::RecordView;
+use super::pace::Pace;
 use super::pages;
 use super::recorded::{Recorded, SERIES_OPEN};
 use super::status::{
@@ -33,8 +34,8 @@ use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{FairSemaphore, Key, Permit, Shares};
 use chefshat_base::tasks::short;
 use chefshat_hosting::config::{
-    IMPORT_IDLE_TIMEOUT, IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES, MAX_IMPORT_MEMORY,
-    MAX_IMPORTS, MAX_RECORDS_SENT, RECORD_SEND_TIMEOUT, ServerConfig,
+    IMPORT_IDLE_TIMEOUT, IMPORT_RATE, IMPORT_TIMEOUT, MAX_IMPORT_BYTES, MAX_IMPORT_LINES,
+    MAX_IMPORT_MEMORY, MAX_IMPORTS, MAX_RECORDS_SENT, RECORD_SEND_TIMEOUT, ServerConfig,
 };
 use chefshat_hosting::tournaments::Tournaments;
 use chefshat_room::ids::Id;
@@ -49,6 +50,9 @@ const RECORDS_LOOKED_AT: usize = 500;
 /// Summaries read at a time while many records are streamed.
 const STREAM_PAGE: usize = 100;
 
+/// Bytes that a part of an import counts for at least.
+const LEAST_PART: usize = 1024;
+
 /// The service.
 #[derive(Debug, Clone)]
 pub struct Records {
@@ -59,6 +63,9 @@ pub struct Records {
     receiving: Arc<FairSemaphore>,
     /// The memory of records that are being imported, in KiB.
     imported: Arc<FairSemaphore>,
+    /// How fast their parts are received, all together: decoding them takes the threads that rooms
+    /// run on.
+    import_pace: Arc<Pace>,
     allow_import: bool,
     /// Signs records of which parts are left out.
     key: Option<Arc<SigningKey>>,
@@ -74,6 +81,7 @@ impl Records {
             sending: FairSemaphore::new(MAX_RECORDS_SENT, shares),
             receiving: FairSemaphore::new(MAX_IMPORTS, shares),
             imported: FairSemaphore::new(MAX_IMPORT_MEMORY / 1024, Shares::ALL),
+            import_pace: Arc::new(Pace::new(IMPORT_RATE)),
             allow_import: config.allow_import,
             key: config.signing_key.clone(),
         }
@@ -295,7 +303,7 @@ impl RecordService for Records {
             return Err(disk_nearly_full("the server's disk is nearly full"));
         }
         let _place = self.receiving.take(key).await;
-        let receiving = received(request.into_inner(), &self.imported, key);
+        let receiving = received(request.into_inner(), &self.imported, &self.import_pace, key);
         let receiving = timeout(IMPORT_TIMEOUT, receiving).await;
         let (lines, _memory) = receiving.map_err(|_| import_too_slow())??;
         let replaying = move || {
@@ -405,13 +413,18 @@ fn checked(filter: Option<v1::RecordFilter>) -> Result<v1::RecordFilter, Status>
 async fn received(
     mut requests: Streaming<v1::ImportRecordRequest>,
     memory: &Arc<FairSemaphore>,
+    pace: &Pace,
     key: Key,
 ) -> Result<(Vec<v1::RecordLine>, Vec<Permit>), Status> {
     let mut received = Received::default();
     loop {
         let next = timeout(IMPORT_IDLE_TIMEOUT, requests.message());
         match next.await.map_err(|_| import_too_slow())?? {
-            Some(request) => received.add(request, memory, key)?,
+            Some(request) => {
+                let before = received.bytes;
+                received.add(request, memory, key)?;
+                pace.pass((received.bytes - before).max(LEAST_PART)).await;
+            }
             None => return Ok(received.put_together()),
         }
     }

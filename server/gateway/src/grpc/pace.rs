@@ -1,0 +1,53 @@
+//! A rate that several tasks keep together.
+
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use tokio::time::{Instant, sleep_until};
+
+/// Lets so many bytes pass in a second, in the order in which they come.
+#[derive(Debug)]
+pub(super) struct Pace {
+    per_second: usize,
+    /// When all that came before has passed.
+    free_at: Mutex<Instant>,
+}
+
+impl Pace {
+    /// A rate of bytes in a second.
+    pub(super) fn new(per_second: usize) -> Self {
+        Self {
+            per_second,
+            free_at: Mutex::new(Instant::now()),
+        }
+    }
+
+    /// Waits until these bytes have passed.
+    pub(super) async fn pass(&self, bytes: usize) {
+        let time = Duration::from_secs_f64(bytes as f64 / self.per_second as f64);
+        let passed = {
+            let mut free_at = self.free_at.lock().unwrap_or_else(PoisonError::into_inner);
+            *free_at = (*free_at).max(Instant::now()) + time;
+            *free_at
+        };
+        sleep_until(passed).await;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test(start_paused = true)]
+    async fn what_comes_together_passes_one_after_the_other() {
+        let pace = Pace::new(1000);
+        let begun = Instant::now();
+        tokio::join!(pace.pass(500), pace.pass(250), pace.pass(0));
+        assert_eq!(begun.elapsed().as_millis(), 750);
+        // What was not used is not saved up.
+        tokio::time::sleep(Duration::from_secs(9)).await;
+        let begun = Instant::now();
+        pace.pass(2000).await;
+        assert_eq!(begun.elapsed().as_millis(), 2000);
+    }
+}
