@@ -33,7 +33,8 @@ pub trait Agent: Send {
     fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId;
 
     /// Chooses an action as [`Agent::decide`] does, which it calls by default, or none: then the
-    /// decision stays open until its time is over, and the server decides as the policy says.
+    /// decision stays open until its time is over, and the server decides as the policy says. A
+    /// substitute that takes the seat over for such decisions keeps it.
     fn try_decide(&mut self, request: &v1::DecisionRequest) -> Option<ActionId> {
         Some(self.decide(request))
     }

@@ -40,6 +40,8 @@ pub(crate) struct SeatSession<A> {
     owed: Owed,
     /// A substitute plays for the attached seat.
     substituted: bool,
+    /// The agent chose no action for the last decision.
+    left_open: bool,
     /// The agent knows of somebody whom the game waits for.
     awaits: bool,
     answers: u64,
@@ -62,6 +64,7 @@ impl<A: Agent> SeatSession<A> {
             answered: None,
             owed: Owed::Nothing,
             substituted: false,
+            left_open: false,
             awaits: false,
             answers: 0,
             ending: None,
@@ -232,13 +235,16 @@ impl<A: Agent> SeatSession<A> {
         if self.is_settled() {
             return;
         }
-        if std::mem::take(&mut self.substituted) {
+        // Who leaves decisions open leaves them to the substitute.
+        if std::mem::take(&mut self.substituted) && !self.left_open {
             out.push(command(handle, Command::Resume(v1::ResumeSeat {})));
         }
         let owed = std::mem::replace(&mut self.owed, Owed::Nothing);
         match (owed, &self.open) {
             (Owed::Decision, Some(request)) => {
-                let Some(action) = self.agent.try_decide(request) else {
+                let action = self.agent.try_decide(request);
+                self.left_open = action.is_none();
+                let Some(action) = action else {
                     return;
                 };
                 let annotations = self.agent.annotate().filter(|annotations| {

@@ -9973,10 +9973,10 @@ pub struct DeleteStudyRequest {
 /// The study was deleted.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct DeleteStudyResponse {
-    /// Number of its participants.
+    /// Number of its participants, without test participants.
     #[prost(uint32, tag = "1")]
     pub participants: u32,
-    /// Number of games that were deleted with their records.
+    /// Number of their games that were deleted with their records.
     #[prost(uint32, tag = "2")]
     pub games: u32,
 }
@@ -10375,9 +10375,9 @@ pub mod study_service_client {
             self.inner.unary(req, path, codec).await
         }
         /// Streams the study and its participants, then every change, at most about four times a second,
-        /// until the study is closed and nobody is active; in between heartbeats. NOT_FOUND
-        /// (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the client does
-        /// not read a message within 30 seconds).
+        /// until the study is closed and nobody but test participants is active; in between heartbeats.
+        /// NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the
+        /// client does not read a message within 30 seconds).
         pub async fn follow_study(
             &mut self,
             request: impl tonic::IntoRequest<super::FollowStudyRequest>,
@@ -10616,9 +10616,9 @@ pub mod study_service_server {
             + std::marker::Send
             + 'static;
         /// Streams the study and its participants, then every change, at most about four times a second,
-        /// until the study is closed and nobody is active; in between heartbeats. NOT_FOUND
-        /// (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the client does
-        /// not read a message within 30 seconds).
+        /// until the study is closed and nobody but test participants is active; in between heartbeats.
+        /// NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the
+        /// client does not read a message within 30 seconds).
         async fn follow_study(
             &self,
             request: tonic::Request<super::FollowStudyRequest>,

@@ -151,6 +151,7 @@ test.each([
 test("a time of TOML may be a date with its zone", async () => {
   const closing = (time: string) => settingsFrom(`closes_at_ms = ${time}\n[[conditions]]\nid = "A"\n`, "study.toml");
   expect((await closing("2031-05-01T18:00:00.5+02:00")).closesAtMs).toBe(1_935_417_600_500n);
+  expect((await closing("2031-05-01T18:00+02:00")).closesAtMs).toBe(1_935_417_600_000n);
   expect((await closing("1_935_417_600_500")).closesAtMs).toBe(1_935_417_600_500n);
   await expect(closing("2031-05-01T18:00:00")).rejects.toThrow("with its zone");
   await expect(closing("2031-05-01")).rejects.toThrow("with its zone");

@@ -329,14 +329,15 @@ function Tests({ study }: { study: Study }) {
 }
 
 function TestLinks({ studyId }: { studyId: string }) {
-  const [links, setLinks] = useState<StudyLink[]>([]);
+  const [links, setLinks] = useState<StudyLink[] | null>(null);
   const { busy, fault, run } = useAttempt();
   const show = () =>
     run(async () => {
       setLinks((await linksOf(studyId)).filter(({ test }) => test));
       return false;
     });
-  return links.length > 0 ? (
+  if (links?.length === 0) return <p class="soft">{t().studies.own.tests.noLinks}</p>;
+  return links ? (
     <LinkList links={links.map((link) => ({ name: link.pseudonym, address: addressOf(link) }))} />
   ) : (
     <div>

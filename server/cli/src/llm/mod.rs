@@ -94,7 +94,7 @@ pub(crate) struct LlmArgs {
     #[arg(long, value_name = "SHARE", default_value_t = 0.1, value_parser = share)]
     max_fallbacks: f64,
     /// For llm: the built-in agent that decides without a usable answer; it does not search. With
-    /// "none" the decision stays open until its time is over, as if the model were away.
+    /// "none" the decision stays open until its time is over; a substitute keeps the seat.
     #[arg(long, value_name = "AGENT", default_value = AgentKind::Greedy.name(), value_parser = fallback)]
     fallback: Fallback,
 }
@@ -190,6 +190,7 @@ impl LlmArgs {
             fallback: self.fallback,
             at_once: RemoteAgent::named(self.fallback.at_once().into(), seed, Duration::ZERO),
             left_open: None,
+            described: None,
             began: Instant::now(),
             live: Live::new(GameView::default(), None),
             spent: Spent::default(),
@@ -225,6 +226,8 @@ pub(crate) struct LanguageModel {
     at_once: RemoteAgent,
     /// The last decision that nobody takes.
     left_open: Option<u64>,
+    /// The decision with which the record says how the model is asked.
+    described: Option<u64>,
     began: Instant,
     live: Live,
     spent: Spent,
@@ -386,6 +389,7 @@ impl LanguageModel {
         let Fallback::Agent(kind) = self.fallback else {
             warn!(decision, why, "the decision is left to the server");
             self.left_open = Some(decision);
+            self.described.take_if(|described| *described == decision);
             self.said = v1::Annotations::default();
             return None;
         };
@@ -432,7 +436,8 @@ impl Agent for LanguageModel {
             self.before = self.spent.tokens;
             self.used = Used::default();
         }
-        if self.spent.decisions == 1 {
+        // With the first decision that it answers, as often as it is asked for that.
+        if *self.described.get_or_insert(id) == id {
             self.say_how();
         }
         self.say(MODEL, self.endpoint.model().to_owned());
@@ -470,6 +475,7 @@ impl Agent for LanguageModel {
             Some(v1::game_event::Kind::GameStarted(_)) => {
                 self.live = Live::new(GameView::default(), self.live.me);
                 self.spent = Spent::default();
+                (self.answered, self.left_open, self.described) = (None, None, None);
                 self.silent = 0;
             }
             Some(v1::game_event::Kind::ShiftStarted(_)) => self.silent = 0,

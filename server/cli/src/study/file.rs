@@ -86,6 +86,10 @@ fn convert(key: &str, value: &DeValue<'_>, folder: &Path) -> Result<Value, Strin
         }
         DeValue::Boolean(set) => (*set).into(),
         DeValue::Datetime(time) if key.ends_with(TIME) => {
+            let mut time = *time;
+            if let Some(clock) = &mut time.time {
+                clock.second.get_or_insert(0);
+            }
             let time = DateTime::parse_from_rfc3339(&time.to_string());
             let problem = "give the time with its zone, such as 2031-05-01T18:00:00+02:00";
             let time = time.map_err(|_| format!("{key}: {problem}"))?;
@@ -161,6 +165,8 @@ mod tests {
         assert_eq!(settings.seeds[0][31], 1);
         assert_eq!(settings.drop_out_after_ms, 60_000);
         assert_eq!(settings.closes_at_ms, 1_935_417_600_500);
+        let minutes = parse("closes_at_ms = 2031-05-01T18:00+02:00", Path::new(""));
+        assert_eq!(minutes.expect("valid").closes_at_ms, 1_935_417_600_000);
         let condition = &settings.conditions[0];
         assert_eq!(condition.labels(), v1::StudyLabels::Players);
         assert_eq!(condition.hide().count(), 2);

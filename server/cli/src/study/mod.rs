@@ -46,7 +46,7 @@ enum StudyAction {
     Links(owner::Links),
     /// Let test participants go through a study, with answers by chance.
     Test(trial::Test),
-    /// Follow the progress of a study until it is closed and nobody is active.
+    /// Follow the progress of a study until it is closed and nobody but test participants is active.
     Follow(owner::Follow),
     /// Write the data of a study into a folder.
     Export(owner::Export),

@@ -65,7 +65,7 @@ pub(super) struct Links {
     test: bool,
 }
 
-/// Follow the progress of a study until it is closed and nobody is active.
+/// Follow the progress of a study until it is closed and nobody but test participants is active.
 #[derive(Debug, Args)]
 pub(super) struct Follow {
     #[command(flatten)]

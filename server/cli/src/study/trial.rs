@@ -223,7 +223,7 @@ impl Tester {
 
 /// The newest view of a stream, which is read to its end: what waits in it would hold up other answers.
 struct Views {
-    newest: watch::Receiver<Option<v1::StudyView>>,
+    newest: watch::Receiver<Option<Result<v1::StudyView, Status>>>,
     _reading: AbortOnDropHandle<()>,
 }
 
@@ -231,9 +231,10 @@ impl Views {
     fn of(mut stream: Streaming<v1::FollowParticipationResponse>) -> Self {
         let (sender, newest) = watch::channel(None);
         let reading = tokio::spawn(async move {
-            while let Ok(Some(next)) = stream.message().await {
-                if next.view.is_some() {
-                    sender.send_replace(next.view);
+            while let Some(next) = stream.message().await.transpose() {
+                // A heartbeat has no view.
+                if let Some(next) = next.map(|next| next.view).transpose() {
+                    sender.send_replace(Some(next));
                 }
             }
         });
@@ -248,9 +249,10 @@ impl Views {
         loop {
             let changed = self.newest.changed().await;
             changed.map_err(|_| Status::unavailable("the server has ended the stream"))?;
-            let view = self.newest.borrow_and_update().clone();
-            if let Some(view) = view.filter(|view| view.step >= step) {
-                return Ok(view);
+            let newest = self.newest.borrow_and_update().clone();
+            match newest.transpose()? {
+                Some(view) if view.step >= step => return Ok(view),
+                _ => {}
             }
         }
     }

@@ -543,7 +543,7 @@ impl StudyHandle {
         sender.subscribe()
     }
 
-    /// Whether nothing can change by itself any more: it is closed, and nobody is active.
+    /// Whether nobody waits for it any more: it is closed, and nobody but test participants is active.
     pub fn is_complete(&self) -> bool {
         let study = self.committed();
         study.is_closed()

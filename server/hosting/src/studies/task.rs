@@ -278,12 +278,16 @@ impl Journaled for StudyTask {
             return Ok(false);
         }
         let participants = self.unit.state.participants().values();
-        let played: Vec<_> = participants.flat_map(|it| &it.games).collect();
-        for game in &played {
+        let played = participants.flat_map(|it| it.games.iter().map(|game| (it.test, game)));
+        let played: Vec<_> = played.collect();
+        for (_, game) in &played {
             self.unit.rooms.forget(Id(game.placed.room));
         }
-        let games: Vec<Id> = played.iter().map(|game| Id(game.placed.game)).collect();
-        let count = games.len();
+        let games: Vec<Id> = played
+            .iter()
+            .map(|(_, game)| Id(game.placed.game))
+            .collect();
+        let count = played.iter().filter(|(test, _)| !test).count();
         let store = self.unit.rooms.store();
         // The games first: a repetition completes what was interrupted in between.
         self.unit.rooms.delete_games(games).await?;

@@ -151,6 +151,7 @@ export const studies: Texts["studies"] = {
       submit: "Testteilnehmer hinzufügen",
       mark: "Test",
       links: "Ihre Links zeigen",
+      noLinks: "Alle Testteilnehmer sind fertig.",
       export: "Daten der Testteilnehmer herunterladen (ZIP)",
     },
     openLink: {

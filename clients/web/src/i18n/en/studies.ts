@@ -147,6 +147,7 @@ export const studies = {
       submit: "Add test participants",
       mark: "test",
       links: "Show their links",
+      noLinks: "All test participants are done.",
       export: "Download the data of test participants (ZIP)",
     },
     openLink: {

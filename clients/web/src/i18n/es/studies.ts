@@ -149,6 +149,7 @@ export const studies: Texts["studies"] = {
       submit: "Añadir participantes de prueba",
       mark: "prueba",
       links: "Mostrar sus enlaces",
+      noLinks: "Todos los participantes de prueba han terminado.",
       export: "Descargar los datos de los participantes de prueba (ZIP)",
     },
     openLink: {

@@ -149,6 +149,7 @@ export const studies: Texts["studies"] = {
       submit: "Aggiungi partecipanti di prova",
       mark: "prova",
       links: "Mostra i loro link",
+      noLinks: "Tutti i partecipanti di prova hanno finito.",
       export: "Scarica i dati dei partecipanti di prova (ZIP)",
     },
     openLink: {

@@ -632,9 +632,9 @@ class DeleteStudyResponse(_message.Message):
     PARTICIPANTS_FIELD_NUMBER: _builtins.int
     GAMES_FIELD_NUMBER: _builtins.int
     participants: _builtins.int
-    """Number of its participants."""
+    """Number of its participants, without test participants."""
     games: _builtins.int
-    """Number of games that were deleted with their records."""
+    """Number of their games that were deleted with their records."""
     def __init__(
         self,
         *,

@@ -141,9 +141,9 @@ class StudyServiceServicer(object):
 
     def FollowStudy(self, request, context):
         """Streams the study and its participants, then every change, at most about four times a second,
-        until the study is closed and nobody is active; in between heartbeats. NOT_FOUND
-        (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the client does
-        not read a message within 30 seconds).
+        until the study is closed and nobody but test participants is active; in between heartbeats.
+        NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the
+        client does not read a message within 30 seconds).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -56,9 +56,9 @@ class StudyServiceStub:
     """
     FollowStudy: _grpc.UnaryStreamMultiCallable[_study_service_pb2.FollowStudyRequest, _study_service_pb2.FollowStudyResponse]
     """Streams the study and its participants, then every change, at most about four times a second,
-    until the study is closed and nobody is active; in between heartbeats. NOT_FOUND
-    (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the client does
-    not read a message within 30 seconds).
+    until the study is closed and nobody but test participants is active; in between heartbeats.
+    NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the
+    client does not read a message within 30 seconds).
     """
     RemoveStudyParticipant: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.RemoveStudyParticipantRequest, _study_service_pb2.RemoveStudyParticipantResponse]
     """Removes a participant, whose slot is free again, and adds another in its place if requested. Its
@@ -120,9 +120,9 @@ class StudyServiceAsyncStub(StudyServiceStub):
     """
     FollowStudy: _aio.UnaryStreamMultiCallable[_study_service_pb2.FollowStudyRequest, _study_service_pb2.FollowStudyResponse]  # type: ignore[assignment]
     """Streams the study and its participants, then every change, at most about four times a second,
-    until the study is closed and nobody is active; in between heartbeats. NOT_FOUND
-    (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the client does
-    not read a message within 30 seconds).
+    until the study is closed and nobody but test participants is active; in between heartbeats.
+    NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the
+    client does not read a message within 30 seconds).
     """
     RemoveStudyParticipant: _aio.UnaryUnaryMultiCallable[_study_service_pb2.RemoveStudyParticipantRequest, _study_service_pb2.RemoveStudyParticipantResponse]  # type: ignore[assignment]
     """Removes a participant, whose slot is free again, and adds another in its place if requested. Its
@@ -217,9 +217,9 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_study_service_pb2.FollowStudyResponse], _abc.AsyncIterator[_study_service_pb2.FollowStudyResponse]]:
         """Streams the study and its participants, then every change, at most about four times a second,
-        until the study is closed and nobody is active; in between heartbeats. NOT_FOUND
-        (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the client does
-        not read a message within 30 seconds).
+        until the study is closed and nobody but test participants is active; in between heartbeats.
+        NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the
+        client does not read a message within 30 seconds).
         """
 
     @_abc_1.abstractmethod
