@@ -6,8 +6,8 @@ use std::time::Duration;
 
 use crate::access::{COST_OF_STREAM, Call, MessageLimits};
 use crate::config::{
-    FIRST_MESSAGE_TIMEOUT, IMPORT_IDLE_TIMEOUT, MAX_ANALYSES, MAX_ANALYSIS_TIME, MAX_FOLLOWERS,
-    MAX_IMPORT_MEMORY, MAX_IMPORTS, MAX_RECORDS_SENT, MAX_STUDIES, MAX_STUDY_DATA,
+    FIRST_MESSAGE_TIMEOUT, IMPORT_IDLE_TIMEOUT, IMPORT_RATE, MAX_ANALYSES, MAX_ANALYSIS_TIME,
+    MAX_FOLLOWERS, MAX_IMPORT_MEMORY, MAX_IMPORTS, MAX_RECORDS_SENT, MAX_STUDIES, MAX_STUDY_DATA,
     MAX_STUDY_MEMORY, MAX_STUDY_STREAMS, MAX_TOURNAMENTS, MAX_VECTOR_NETWORK_MULTIPLICATIONS,
     MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_STREAMS, RECORD_SEND_TIMEOUT, ServerConfig,
     VECTOR_SETUP_TIMEOUT,
@@ -188,8 +188,9 @@ fn of_all() -> String {
         (
             "imports at a time",
             format!(
-                "{}; others wait. {} without a part end one",
+                "{} with {} MiB a second together; others wait. {} without a part end one",
                 number(MAX_IMPORTS),
+                IMPORT_RATE >> 20,
                 seconds(IMPORT_IDLE_TIMEOUT)
             ),
             "",
