@@ -161,7 +161,7 @@ test("a question has markup, and its field a name without", async () => {
   await show(<FormattedQuestion text={text} />);
   expect(root.querySelectorAll("p, ol")).toHaveLength(0);
   expect(root.querySelector("em")?.textContent).toBe("really");
-  // What is no paragraph stands as it is written.
+  // Blocks other than paragraphs stand as they are written.
   expect(root.textContent).toContain("1. How *sure*");
   expect(plainText(text)).toBe("1. How *sure* are you, really?");
 });

@@ -188,24 +188,35 @@ impl Study {
         Some(order)
     }
 
+    /// The answers of a participant by step, each with its questionnaire and item.
+    pub fn answered_items<'s>(
+        &'s self,
+        participant: &'s Participant,
+    ) -> impl Iterator<Item = (usize, &'s Questionnaire, Option<&'s Item>, &'s ItemAnswer)> {
+        let steps = self.steps_of(participant).unwrap_or_default();
+        let answered = participant
+            .answers
+            .iter()
+            .filter_map(move |(step, answers)| match steps.get(*step)?.task {
+                Task::Questionnaire(it) => Some((*step, it, answers)),
+                _ => None,
+            });
+        answered.flat_map(|(step, it, answers)| {
+            let answers = answers.iter();
+            answers.map(move |answer| (step, it, it.items.get(answer.item), answer))
+        })
+    }
+
     /// Number of attention checks that a participant has answered, and of those that it passed.
     pub fn attention_checks(&self, participant: &Participant) -> (usize, usize) {
-        let steps = self.steps_of(participant).unwrap_or_default();
-        let (mut answered, mut passed) = (0, 0);
-        for (step, answers) in &participant.answers {
-            let Some(Task::Questionnaire(questionnaire)) = steps.get(*step).map(|it| it.task)
-            else {
-                continue;
-            };
-            for answer in answers.iter() {
-                let item = questionnaire.items.get(answer.item);
-                if let Some(passing) = item.and_then(|it| it.attention_check.as_ref()) {
-                    answered += 1;
-                    passed += usize::from(passing.is_passed_by(&answer.value));
-                }
-            }
-        }
-        (answered, passed)
+        let answered = self.answered_items(participant);
+        let checks = answered.filter_map(|(.., item, answer)| {
+            let passing = item?.attention_check.as_ref()?;
+            Some(passing.is_passed_by(&answer.value))
+        });
+        checks.fold((0, 0), |(answered, passed), has_passed| {
+            (answered + 1, passed + usize::from(has_passed))
+        })
     }
 
     /// Indices of the items of a step that a participant may be shown, whatever it enters there.

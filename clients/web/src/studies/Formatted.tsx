@@ -14,8 +14,8 @@ export function Formatted({ text }: { text: string }) {
 }
 
 /**
- * A question, in the legend of a group, where only words may stand: what is no paragraph is shown as it
- * is written.
+ * A question, in the legend of a group, where only words may stand: blocks other than paragraphs are
+ * shown as they are written.
  */
 export function FormattedQuestion({ text }: { text: string }) {
   const tree = useMemo(() => fromMarkdown(text), [text]);

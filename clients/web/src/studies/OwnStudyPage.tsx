@@ -328,14 +328,20 @@ function Tests({ study }: { study: Study }) {
   );
 }
 
-function TestLinks({ studyId }: { studyId: string }) {
+/** The links of a study that are wanted, once they are requested. */
+function useLinks(studyId: string, isWanted: (link: StudyLink) => boolean) {
   const [links, setLinks] = useState<StudyLink[] | null>(null);
   const { busy, fault, run } = useAttempt();
   const show = () =>
     run(async () => {
-      setLinks((await linksOf(studyId)).filter(({ test }) => test));
+      setLinks((await linksOf(studyId)).filter(isWanted));
       return false;
     });
+  return { links, show, busy, fault };
+}
+
+function TestLinks({ studyId }: { studyId: string }) {
+  const { links, show, busy, fault } = useLinks(studyId, ({ test }) => test);
   if (links?.length === 0) return <p class="soft">{t().studies.own.tests.noLinks}</p>;
   return links ? (
     <LinkList links={links.map((link) => ({ name: link.pseudonym, address: addressOf(link) }))} />
@@ -352,14 +358,8 @@ function TestLinks({ studyId }: { studyId: string }) {
 /** The links, requested when asked for: they let anybody take part. */
 function Links({ studyId }: { studyId: string }) {
   const words = t().studies.own.links;
-  const [links, setLinks] = useState<StudyLink[] | null>(null);
-  const { busy, fault, run } = useAttempt();
-  const show = () =>
-    run(async () => {
-      // Those who joined have theirs; those of test participants are not to be handed out.
-      setLinks((await linksOf(studyId)).filter(({ joined, test }) => !joined && !test));
-      return false;
-    });
+  // Those who joined have theirs; those of test participants are not to be handed out.
+  const { links, show, busy, fault } = useLinks(studyId, ({ joined, test }) => !joined && !test);
   return (
     <section class={`sheet ${css.part} ${css.links}`} data-part="links">
       <h2>{words.title}</h2>

@@ -168,9 +168,14 @@ function Table({ items, shown, children }: TableProps) {
   );
 }
 
+/** Whether each point has a label, and not the first and last alone. */
+function isAllLabelled(points: number, labels: readonly string[]): boolean {
+  return labels.length === points && points > 2;
+}
+
 /** The labels once; every item has them for a screen reader. */
 function TableHead({ likert: { points, labels } }: { likert: StudyLikert }) {
-  const all = labels.length === points && points > 2;
+  const all = isAllLabelled(points, labels);
   return (
     <div class={css.head} aria-hidden="true">
       <div class={all ? css.points : css.labels} style={{ "--points": points }}>
@@ -272,7 +277,7 @@ interface PointsProps extends Pick<ItemProps, "value" | "missing" | "onEnter"> {
 /** One of several points. */
 function Points({ id, points, labels, beside = false, value, onEnter }: PointsProps) {
   const words = t().studies.questionnaire;
-  const all = labels.length === points && points > 2;
+  const all = isAllLabelled(points, labels);
   const labelOf = (point: number) =>
     all ? labels[point - 1] : point === 1 ? labels[0] : point === points ? labels[labels.length - 1] : "";
   return (

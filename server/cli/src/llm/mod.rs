@@ -139,7 +139,7 @@ fn fallback(name: &str) -> Result<Fallback, String> {
 }
 
 impl Fallback {
-    /// The agent that decides where there is no choice.
+    /// The agent for decisions with one legal action.
     fn at_once(self) -> AgentKind {
         match self {
             Self::Agent(kind) => kind,

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use tokio::time::{Instant, sleep_until};
 
-/// Lets so many bytes pass in a second, in the order in which they come.
+/// A number of bytes per second, for tasks in the order in which they ask.
 #[derive(Debug)]
 pub(super) struct Pace {
     per_second: usize,

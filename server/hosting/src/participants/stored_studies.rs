@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use chefshat_record::pseudonym::Named;
 use chefshat_room::ids::Id;
-use chefshat_study::{Answer, Change, Study, Task};
+use chefshat_study::{Answer, Change, Study};
 use serde_json::json;
 
 use super::data::{DataError, ParticipantData};
@@ -106,28 +106,19 @@ impl ParticipantData {
                 "endedAtMs": participant.ended_at_ms,
                 "gameIds": games,
             } })];
-            let sequence = study.sequence_of(participant).unwrap_or_default();
-            let steps = study.settings().steps(sequence);
-            for (step, answers) in &participant.answers {
-                let Some(Task::Questionnaire(questionnaire)) = steps.get(*step).map(|it| it.task)
-                else {
-                    continue;
+            for (step, questionnaire, item, answer) in study.answered_items(participant) {
+                let value = match &answer.value {
+                    Answer::Number(number) => json!(number),
+                    Answer::Options(options) => json!(options),
+                    Answer::Text(text) => json!(text),
                 };
-                for answer in answers.iter() {
-                    let item = questionnaire.items.get(answer.item);
-                    let value = match &answer.value {
-                        Answer::Number(number) => json!(number),
-                        Answer::Options(options) => json!(options),
-                        Answer::Text(text) => json!(text),
-                    };
-                    lines.push(json!({ "answer": {
-                        "step": step,
-                        "questionnaire": questionnaire.id,
-                        "item": item.map(|item| &item.id),
-                        "value": value,
-                        "answeredAfterMs": answer.answered_after_ms,
-                    }, "studyId": id.to_string() }));
-                }
+                lines.push(json!({ "answer": {
+                    "step": step,
+                    "questionnaire": questionnaire.id,
+                    "item": item.map(|item| &item.id),
+                    "value": value,
+                    "answeredAfterMs": answer.answered_after_ms,
+                }, "studyId": id.to_string() }));
             }
             sheet.send(lines).await?;
             let all = self.store.traces(id).await?;

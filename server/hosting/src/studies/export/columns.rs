@@ -622,7 +622,7 @@ const SHOWN_IF: &str = "the earlier answers for which the item was shown: item, 
     `not` where other answers count, or none";
 const ATTENTION_CHECK: &str =
     "the answers that pass this attention check: its options, or the lowest and highest number";
-const NO_ATTENTION_CHECK: &str = "the item is no attention check";
+const NO_ATTENTION_CHECK: &str = "the item is not an attention check";
 
 const QUESTIONNAIRE: &str = "id of the questionnaire";
 const ITEM: &str = "id of the item in the questionnaire";
@@ -754,7 +754,7 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
         let passing = passing.zip(row.answer);
         optional(passing.map(|(passing, answer)| passing.is_passed_by(&answer.value)))
     })
-    .empty("the item is no attention check, or was not answered")
+    .empty("the item is not an attention check, or was not answered")
     .with("answered_after_ms", MILLISECONDS, AFTER, |row| {
         optional(row.answer.and_then(|it| it.answered_after_ms))
     })
