@@ -1,8 +1,9 @@
-//! The data of a study as files: the settings, tables of participants, games, items, answers and
-//! interface traces (`columns`), the records and samples of games, and what the columns mean
-//! (`table`). A file is sent in parts, so that none is in memory as a whole.
+//! The data of a study as files: the settings, tables of participants, games and interface traces
+//! (`columns`), of items and answers (`questionnaires`), the records and samples of games, and what the
+//! columns mean (`table`). A file is sent in parts, so that none is in memory as a whole.
 
 mod columns;
+mod questionnaires;
 mod table;
 
 use std::collections::BTreeMap;
@@ -21,9 +22,8 @@ use crate::config::STUDY_EXPORT_CHUNK;
 use crate::rooms::Rooms;
 use chefshat_room::ids::Id;
 use chefshat_store::{StoreError, StoredGame};
-use columns::{
-    AnswerRow, CodebookRow, GameResult, GameRow, ItemRow, ParticipantRow, SessionRow, TraceRow,
-};
+use columns::{CodebookRow, GameResult, GameRow, ParticipantRow, SessionRow, TraceRow};
+use questionnaires::{AnswerRow, ItemRow};
 use table::{Sheet, Table};
 
 /// Bytes that most lines of a table do not exceed.
@@ -365,7 +365,7 @@ pub(super) async fn record_of(
 
 /// Sends the items of all questionnaires.
 async fn items(study: &Study, sender: &mpsc::Sender<ExportedFile>) -> Result<Sheet, ExportError> {
-    let mut file = TableFile::new(columns::items(), sender).await?;
+    let mut file = TableFile::new(questionnaires::items(), sender).await?;
     for part in study.settings().stages.iter().flat_map(Stage::parts) {
         let Task::Questionnaire(questionnaire) = &part.task else {
             continue;
@@ -389,7 +389,7 @@ async fn answers(
     sender: &mpsc::Sender<ExportedFile>,
 ) -> Result<Sheet, ExportError> {
     let settings = study.settings();
-    let mut file = TableFile::new(columns::answers(settings), sender).await?;
+    let mut file = TableFile::new(questionnaires::answers(settings), sender).await?;
     for &(number, participant) in people {
         if participant.data_deleted {
             continue;
