@@ -76,6 +76,8 @@ pub struct Call {
     pub forwarded: bool,
     /// Whether its client sends a stream of messages.
     pub sends_many: bool,
+    /// Whether its service takes what its client sends at a pace of its own.
+    pub paced: bool,
     /// What each of its messages may be.
     pub message: MessageLimits,
     /// Calls that it counts as for its caller. Decoding a large message counts besides.
@@ -138,6 +140,14 @@ impl Call {
         }
     }
 
+    /// Its service takes the stream that its client sends at a pace of its own.
+    const fn paced(self) -> Self {
+        Self {
+            paced: true,
+            ..self
+        }
+    }
+
     const fn takes(self, bytes: usize, elements: usize, memory: usize) -> Self {
         Self {
             message: MessageLimits {
@@ -167,6 +177,7 @@ const fn call(path: &'static str, role: Role, scoped: Scoped) -> Call {
         heartbeats: false,
         forwarded: false,
         sends_many: false,
+        paced: false,
         message: MessageLimits::USUAL,
         charge: 1,
     }
@@ -434,6 +445,7 @@ pub const CALLS: &[Call] = &[
     records("/chefshat.v1.RecordService/StreamRecords").streaming(),
     call("/chefshat.v1.RecordService/ImportRecord", Host, Refused)
         .sending()
+        .paced()
         .takes(MAX_MESSAGE_BYTES, 16_384, 6 * MIB),
     call("/chefshat.v1.VectorService/Run", Player, Refused)
         .sending()

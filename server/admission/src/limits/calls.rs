@@ -29,6 +29,9 @@ pub const CALLS_AT_ONCE: u64 = 20_000;
 pub const BYTES_PER_CALL: u64 = 512;
 /// Bytes of a decoded message that cost as much as one call.
 pub const DECODED_BYTES_PER_CALL: u64 = 4 * 1024;
+/// A message of a stream, after its first, costs nothing if it takes no more bytes than this once it
+/// is decoded: the answers of a player, the actions of a batch.
+pub const MAX_FREE_DECODED: usize = 512 * 1024;
 /// Calls that creating a room counts as: it is written to the disk, with its game and record.
 pub const COST_OF_ROOM: u64 = 20;
 /// The same if the server plays all seats.
@@ -242,6 +245,11 @@ impl CallLimits {
     /// Charges what a call cost beyond its request.
     pub fn charge(&self, key: Key, cost: u64) {
         self.calls.charge(key, cost);
+    }
+
+    /// How long a caller that has been charged must wait for its next call.
+    pub fn wait(&self, key: Key) -> Duration {
+        self.calls.wait(key)
     }
 
     /// Takes the place of a stream that is already open for others; `None` if the caller has too many.

@@ -20,7 +20,7 @@ use std::time::Duration;
 pub use background::{Background, TimeSlice};
 pub use calls::{
     Admitted, BYTES_PER_CALL, COST_OF_BUILT_IN_GAME, COST_OF_ROOM, COST_OF_TOURNAMENT, CallLimits,
-    DECODED_BYTES_PER_CALL, Executing, HISTORY_STEP,
+    DECODED_BYTES_PER_CALL, Executing, HISTORY_STEP, MAX_FREE_DECODED,
 };
 pub use decoding::{Decoding, MAX_DECODED, MESSAGE_TIMEOUT, SMALL_DECODED, SMALL_MESSAGE};
 pub use fair_semaphore::{FairSemaphore, Permit};

@@ -15,7 +15,7 @@ use chefshat_proto::cost::{Cost, Excess, Field, Kind, Shape, shapes};
 use futures::future::{BoxFuture, Either};
 use http::{Request, Response};
 use http_body::Frame;
-use tokio::time::{Instant, Sleep, sleep_until};
+use tokio::time::{Instant, Sleep, sleep, sleep_until};
 use tonic::body::Body;
 use tonic::{Code, Status};
 use tower::{Layer, Service};
@@ -24,8 +24,8 @@ use super::limits::charged;
 use super::status::{Refusal, is_elsewhere, status};
 use chefshat_admission::access::{Call, MessageLimits};
 use chefshat_admission::limits::{
-    CallLimits, DECODED_BYTES_PER_CALL, Decoding, Key, MESSAGE_TIMEOUT, Permit, Refused,
-    SMALL_DECODED, SMALL_MESSAGE,
+    CallLimits, DECODED_BYTES_PER_CALL, Decoding, Key, MAX_FREE_DECODED, MESSAGE_TIMEOUT, Permit,
+    Refused, SMALL_DECODED, SMALL_MESSAGE,
 };
 use chefshat_wire::encoded::peer;
 
@@ -151,7 +151,7 @@ where
             input: Bytes::new(),
             partial: BytesMut::new(),
             state: State::Next,
-            any: false,
+            begun: 0,
             until: None,
         };
         let answering =
@@ -196,8 +196,8 @@ struct Messages {
     /// The beginning of the next message, if not all of it was read at once.
     partial: BytesMut,
     state: State,
-    /// Whether there was a message.
-    any: bool,
+    /// How many messages have begun.
+    begun: u64,
     /// When what the client has begun must have arrived: the next message of a stream, or all of
     /// another call. It begins when something does not arrive at once.
     until: Option<Pin<Box<Sleep>>>,
@@ -207,6 +207,8 @@ struct Messages {
 enum State {
     /// Before the next message.
     Next,
+    /// A stream whose last message cost its caller more than it may spend now waits with the next.
+    Rests(Pin<Box<Sleep>>),
     /// A long message waits until it may be read.
     MayReceive(usize, BoxFuture<'static, Result<Permit, Refused>>),
     /// A message of this many bytes with its prefix is read. One that is not small has a permit.
@@ -214,6 +216,7 @@ enum State {
     /// A message waits until it may be decoded.
     MayDecode {
         message: Bytes,
+        memory: usize,
         permit: BoxFuture<'static, Result<Permit, Refused>>,
         _received: Option<Permit>,
     },
@@ -247,6 +250,10 @@ impl Messages {
                         }
                     };
                 }
+                State::Rests(until) => {
+                    ready!(until.as_mut().poll(context));
+                    self.state = State::Next;
+                }
                 State::MayReceive(length, permit) => {
                     let permit = ready!(permit.as_mut().poll(context));
                     let permit = permit.map_err(|refused| Status::from(Refusal::from(refused)))?;
@@ -278,18 +285,22 @@ impl Messages {
                     let permit = self.memory().decode(self.key, memory);
                     self.state = State::MayDecode {
                         message,
+                        memory,
                         permit: Box::pin(permit),
                         _received: received,
                     };
                 }
                 State::MayDecode {
-                    message, permit, ..
+                    message,
+                    memory,
+                    permit,
+                    ..
                 } => {
                     let held = ready!(permit.as_mut().poll(context));
                     let held = held.map_err(|refused| Status::from(Refusal::from(refused)))?;
-                    let message = std::mem::take(message);
+                    let (message, memory) = (std::mem::take(message), *memory);
                     *self.permit.lock().expect("nothing panics under this lock") = Some(held);
-                    self.state = State::Next;
+                    self.state = self.after(memory);
                     return Poll::Ready(Ok(Step::Pass(message)));
                 }
             }
@@ -349,7 +360,8 @@ impl Messages {
             true => &self.input[..PREFIX],
             false => &self.partial[..PREFIX],
         };
-        if std::mem::replace(&mut self.any, true) && !self.call.sends_many {
+        self.begun += 1;
+        if self.begun > 1 && !self.call.sends_many {
             return Err(malformed("this call takes one message"));
         }
         if prefix.get_u8() != 0 {
@@ -365,6 +377,16 @@ impl Messages {
         }
     }
 
+    /// Where a body is after a message that took this memory: a stream that sends large ones goes on
+    /// when its caller may make another call.
+    fn after(&self, memory: usize) -> State {
+        let rests = self.call.sends_many && !self.call.paced && memory > MAX_FREE_DECODED;
+        match rests {
+            true => State::Rests(Box::pin(sleep(self.limits.wait(self.key)))),
+            false => State::Next,
+        }
+    }
+
     /// Counts the memory of a message, and charges its caller.
     fn cost(&self, message: &[u8]) -> Result<usize, Status> {
         let MessageLimits {
@@ -373,7 +395,8 @@ impl Messages {
         let cost = (self.shape.cost(message, Cost { elements, memory }))
             .map_err(|excess| refused(excess, &self.call.message))?;
         let charge = cost.memory as u64 / DECODED_BYTES_PER_CALL;
-        if charge > 0 && !self.call.streams {
+        let costs = self.begun == 1 || cost.memory > MAX_FREE_DECODED;
+        if charge > 0 && costs && !self.call.paced {
             self.limits.charge(self.key, charge);
         }
         Ok(cost.memory)
@@ -496,6 +519,7 @@ mod tests {
     use super::*;
     use chefshat_admission::access::CALLS;
     use chefshat_admission::limits::Shares;
+    use chefshat_admission::limits::calls::{CALLS_AT_ONCE, CALLS_PER_SECOND};
 
     /// Longest message that is decoded here, bytes.
     const READ: usize = 16 * 1024;
@@ -836,6 +860,64 @@ mod tests {
             let found = reason_of(&answer.expect("infallible"));
             assert_eq!(found.as_deref(), reason, "{path}");
         }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn the_messages_of_a_stream_cost_as_much_as_their_decoding() {
+        let limits = limits();
+        let mut services = DecodingLayer::new(Arc::clone(&limits)).layer(service_fn(read_whole));
+        let setup = |starts| v1::RunRequest {
+            request: Some(v1::run_request::Request::Setup(Box::new(v1::VectorSetup {
+                start: Some(v1::vector_setup::Start::Listed(v1::ListedStarts {
+                    starts: vec![v1::ListedStart::default(); starts],
+                })),
+                ..v1::VectorSetup::default()
+            }))),
+        };
+        let large = framed(&setup(5_000).encode_to_vec());
+        let small = framed(&setup(1_000).encode_to_vec());
+        let most = Cost::MAX;
+        let memory = |message: &[u8]| {
+            let shape = shape("/chefshat.v1.VectorService/Run");
+            shape.cost(&message[PREFIX..], most).expect("legal").memory
+        };
+        assert!(memory(&small) < MAX_FREE_DECODED && memory(&large) > MAX_FREE_DECODED);
+        let cost = |message: &[u8]| memory(message) as u64 / DECODED_BYTES_PER_CALL;
+        let time = |calls| calls as f64 / CALLS_PER_SECOND as f64;
+        let key = charged(&http::Extensions::new());
+        let mut send = async |path: &str, messages: &[&[u8]]| {
+            let begun = Instant::now();
+            let body = http_body_util::Full::new(Bytes::from(messages.concat()));
+            let answer = services.call(request(path, Body::new(body))).await;
+            assert_eq!(reason_of(&answer.expect("infallible")), None, "{path}");
+            begun.elapsed().as_secs_f64()
+        };
+        limits.charge(key, CALLS_AT_ONCE);
+        // The first message of a stream costs; small ones after it do not.
+        let run = "/chefshat.v1.VectorService/Run";
+        assert_eq!(send(run, &[&small, &small, &small]).await, 0.0);
+        let wait = limits.wait(key).as_secs_f64();
+        assert!((wait - time(cost(&small))).abs() < 0.001, "{wait}");
+        // After each large one a stream rests.
+        let rested = send(run, &[&large, &large, &small]).await;
+        let expected = time(cost(&small) + 2 * cost(&large));
+        assert!((rested - expected).abs() < 0.01, "{rested} {expected}");
+        // Imports have a pace of their own.
+        let import = framed(
+            &v1::ImportRecordRequest {
+                lines: vec![v1::RecordLine::default(); 1_000],
+            }
+            .encode_to_vec(),
+        );
+        assert_eq!(
+            send(
+                "/chefshat.v1.RecordService/ImportRecord",
+                &[&import, &import]
+            )
+            .await,
+            0.0
+        );
+        assert_eq!(limits.wait(key), Duration::ZERO);
     }
 
     #[tokio::test]
