@@ -9015,6 +9015,13 @@ pub struct StudySettings {
     /// How people without a link of their own take part; by default nobody does.
     #[prost(message, optional, tag = "15")]
     pub recruiting: ::core::option::Option<StudyRecruiting>,
+    /// Milliseconds since the Unix epoch when the study closes, if it is not closed, and the server
+    /// deletes it with all its data, as DeleteStudy with `force`: at most two hours later, since it waits
+    /// until it is sure of the time. In the future when the study is created, and not before
+    /// `closes_at_ms`; 0: when its owner deletes it. Participants are told this date with what they
+    /// consent to.
+    #[prost(uint64, tag = "16")]
+    pub deletes_at_ms: u64,
 }
 /// A participant's device, as its page describes it. Sent by participants; exported data have it.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -9237,6 +9244,10 @@ pub struct StudyView {
     /// Whether this is a test participant, who may continue without answering and playing (ContinueStudy).
     #[prost(bool, tag = "13")]
     pub test: bool,
+    /// Milliseconds since the Unix epoch when the server deletes all data of the study; 0: no date is
+    /// set.
+    #[prost(uint64, tag = "14")]
+    pub deletes_at_ms: u64,
     /// What is shown.
     #[prost(oneof = "study_view::Content", tags = "7, 8, 9, 10, 11, 12")]
     pub content: ::core::option::Option<study_view::Content>,

@@ -40495,6 +40495,9 @@ impl serde::Serialize for StudySettings {
         if self.recruiting.is_some() {
             len += 1;
         }
+        if self.deletes_at_ms != 0 {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudySettings", len)?;
         if !self.name.is_empty() {
             struct_ser.serialize_field("name", &self.name)?;
@@ -40549,6 +40552,11 @@ impl serde::Serialize for StudySettings {
         if let Some(v) = self.recruiting.as_ref() {
             struct_ser.serialize_field("recruiting", v)?;
         }
+        if self.deletes_at_ms != 0 {
+            #[allow(clippy::needless_borrow)]
+            #[allow(clippy::needless_borrows_for_generic_args)]
+            struct_ser.serialize_field("deletesAtMs", ToString::to_string(&self.deletes_at_ms).as_str())?;
+        }
         struct_ser.end()
     }
 }
@@ -40578,6 +40586,8 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
             "closes_at_ms",
             "closesAtMs",
             "recruiting",
+            "deletes_at_ms",
+            "deletesAtMs",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -40597,6 +40607,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
             DropOutAfterMs,
             ClosesAtMs,
             Recruiting,
+            DeletesAtMs,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -40633,6 +40644,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                             "dropOutAfterMs" | "drop_out_after_ms" => Ok(GeneratedField::DropOutAfterMs),
                             "closesAtMs" | "closes_at_ms" => Ok(GeneratedField::ClosesAtMs),
                             "recruiting" => Ok(GeneratedField::Recruiting),
+                            "deletesAtMs" | "deletes_at_ms" => Ok(GeneratedField::DeletesAtMs),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -40667,6 +40679,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                 let mut drop_out_after_ms__ = None;
                 let mut closes_at_ms__ = None;
                 let mut recruiting__ = None;
+                let mut deletes_at_ms__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Name => {
@@ -40772,6 +40785,14 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                             }
                             recruiting__ = map_.next_value()?;
                         }
+                        GeneratedField::DeletesAtMs => {
+                            if deletes_at_ms__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("deletesAtMs"));
+                            }
+                            deletes_at_ms__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
                     }
                 }
                 Ok(StudySettings {
@@ -40790,6 +40811,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                     drop_out_after_ms: drop_out_after_ms__.unwrap_or_default(),
                     closes_at_ms: closes_at_ms__.unwrap_or_default(),
                     recruiting: recruiting__,
+                    deletes_at_ms: deletes_at_ms__.unwrap_or_default(),
                 })
             }
         }
@@ -42423,6 +42445,9 @@ impl serde::Serialize for StudyView {
         if self.test {
             len += 1;
         }
+        if self.deletes_at_ms != 0 {
+            len += 1;
+        }
         if self.content.is_some() {
             len += 1;
         }
@@ -42447,6 +42472,11 @@ impl serde::Serialize for StudyView {
         }
         if self.test {
             struct_ser.serialize_field("test", &self.test)?;
+        }
+        if self.deletes_at_ms != 0 {
+            #[allow(clippy::needless_borrow)]
+            #[allow(clippy::needless_borrows_for_generic_args)]
+            struct_ser.serialize_field("deletesAtMs", ToString::to_string(&self.deletes_at_ms).as_str())?;
         }
         if let Some(v) = self.content.as_ref() {
             match v {
@@ -42487,6 +42517,8 @@ impl<'de> serde::Deserialize<'de> for StudyView {
             "steps",
             "traces",
             "test",
+            "deletes_at_ms",
+            "deletesAtMs",
             "consent",
             "questionnaire",
             "external_questionnaire",
@@ -42505,6 +42537,7 @@ impl<'de> serde::Deserialize<'de> for StudyView {
             Steps,
             Traces,
             Test,
+            DeletesAtMs,
             Consent,
             Questionnaire,
             ExternalQuestionnaire,
@@ -42539,6 +42572,7 @@ impl<'de> serde::Deserialize<'de> for StudyView {
                             "steps" => Ok(GeneratedField::Steps),
                             "traces" => Ok(GeneratedField::Traces),
                             "test" => Ok(GeneratedField::Test),
+                            "deletesAtMs" | "deletes_at_ms" => Ok(GeneratedField::DeletesAtMs),
                             "consent" => Ok(GeneratedField::Consent),
                             "questionnaire" => Ok(GeneratedField::Questionnaire),
                             "externalQuestionnaire" | "external_questionnaire" => Ok(GeneratedField::ExternalQuestionnaire),
@@ -42571,6 +42605,7 @@ impl<'de> serde::Deserialize<'de> for StudyView {
                 let mut steps__ = None;
                 let mut traces__ = None;
                 let mut test__ = None;
+                let mut deletes_at_ms__ = None;
                 let mut content__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
@@ -42619,6 +42654,14 @@ impl<'de> serde::Deserialize<'de> for StudyView {
                                 return Err(serde::de::Error::duplicate_field("test"));
                             }
                             test__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::DeletesAtMs => {
+                            if deletes_at_ms__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("deletesAtMs"));
+                            }
+                            deletes_at_ms__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
                         }
                         GeneratedField::Consent => {
                             if content__.is_some() {
@@ -42672,6 +42715,7 @@ impl<'de> serde::Deserialize<'de> for StudyView {
                     steps: steps__.unwrap_or_default(),
                     traces: traces__.unwrap_or_default(),
                     test: test__.unwrap_or_default(),
+                    deletes_at_ms: deletes_at_ms__.unwrap_or_default(),
                     content: content__,
                 })
             }

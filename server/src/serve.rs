@@ -323,6 +323,10 @@ impl Server {
                 retention.follow(keep).boxed(),
             ));
         }
+        tracker.spawn(until_closing(
+            LongTask::StudyDeletion,
+            Arc::clone(&studies).delete_when_due().boxed(),
+        ));
         // Above any encryption, because it reads frames.
         let first_bytes = config.first_bytes_timeout;
         let incoming = incoming.map_ok(move |connection| Metered::new(connection, first_bytes));

@@ -95,6 +95,9 @@ test("the form makes the settings of a study, and says what is missing", async (
     "fullUrl",
     "idParameter",
   ]);
+  const tomorrow = new Date(Date.now() + 86_400_000).toISOString().slice(0, 16);
+  const dated = await settingsOf({ ...filled, closesAt: tomorrow, deletesAt: tomorrow });
+  expect([dated.closesAtMs, dated.deletesAtMs]).toEqual(Array(2).fill(BigInt(Date.parse(tomorrow))));
   const within = await settingsOf({ ...filled, within: true });
   expect(within.stages?.map(({ stage }) => stage?.case)).toEqual(["consent", "practice", "perCondition", "text"]);
 });
@@ -113,6 +116,9 @@ test.each([
   [{ participants: "0" }, "participants"],
   [{ games: "many" }, "games"],
   [{ external: "http://forms.example" }, "external"],
+  [{ closesAt: "2020-05-01T18:00" }, "closesAt"],
+  [{ deletesAt: "tomorrow" }, "deletesAt"],
+  [{ closesAt: "2931-05-01T18:00", deletesAt: "2930-05-01T18:00" }, "deletesAt"],
   [
     {
       conditions: [

@@ -8,7 +8,12 @@ import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
 import { ParticipantSchema } from "../src/gen/chefshat/v1/room_pb";
-import { type StudyShownItem, StudyShownItemSchema, StudyTraceKind } from "../src/gen/chefshat/v1/study_pb";
+import {
+  type StudyShownItem,
+  StudyShownItemSchema,
+  StudyTraceKind,
+  StudyViewSchema,
+} from "../src/gen/chefshat/v1/study_pb";
 import { ContinueStudyResponseSchema, type SaveAnswersRequest } from "../src/gen/chefshat/v1/study_service_pb";
 import { setLanguage } from "../src/i18n";
 import { remembered } from "../src/store";
@@ -173,6 +178,19 @@ test.each([
   await press("Delete now");
   expect(sent.at(-1)).toEqual({ call: "withdraw", request: { link: LINK, deleteData: true } });
   expect(root.querySelector('[data-part="withdraw"]')).toBeNull();
+});
+
+test("who is asked to consent learns until when there are data", async () => {
+  const { streams } = fakeStudy([CONSENT]);
+  await show();
+  expect(root.textContent).not.toContain("deleted from the server");
+  streams[0]?.push(
+    create(StudyViewSchema, { ...viewOf([CONSENT], 0), deletesAtMs: BigInt(Date.UTC(2031, 11, 30, 11)) }),
+  );
+  await settled();
+  expect(root.textContent).toContain(
+    "All data of this study are deleted from the server by December 30, 2031 at the latest.",
+  );
 });
 
 test("another device that opens the study is said clearly, and can be answered", async () => {

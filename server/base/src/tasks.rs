@@ -34,6 +34,8 @@ long_tasks! {
     NodeHealth,
     /// Deletes old games.
     Retention,
+    /// Deletes studies at their dates.
+    StudyDeletion,
     /// Delivers webhooks.
     Webhooks,
     /// Closes connections whose answers are not read.

@@ -31,12 +31,13 @@ use crate::tls::TlsFiles;
 use crate::webhooks::WebhookSettings;
 
 /// What the server runs in [`the_tasks_of_a_server_sleep_while_nothing_is_due`].
-const OF_A_SERVER: [LongTask; 16] = [
+const OF_A_SERVER: [LongTask; 17] = [
     LongTask::Room,
     LongTask::Tournament,
     LongTask::Study,
     LongTask::ProcessClock,
     LongTask::Retention,
+    LongTask::StudyDeletion,
     LongTask::Webhooks,
     LongTask::StalledConnections,
     LongTask::TokenFile,

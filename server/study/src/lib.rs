@@ -279,7 +279,7 @@ impl Study {
     /// The change that follows by itself at this time, if any: the study closes, or a participant
     /// drops out. To be folded before the next is asked for.
     pub fn next(&mut self, now_ms: u64) -> Option<Change> {
-        let closes_at = self.settings.closes_at_ms;
+        let closes_at = self.settings.end_ms();
         if closes_at.is_some_and(|at_ms| at_ms <= now_ms) && !self.is_closed() {
             return Some(Change::Closed);
         }
@@ -299,7 +299,7 @@ impl Study {
     pub fn wake_at(&self) -> Option<u64> {
         let limit_ms = self.settings.drop_out_after_ms;
         let drop_out = self.presence.next_drop_out_ms(limit_ms);
-        let close = self.settings.closes_at_ms.filter(|_| !self.is_closed());
+        let close = self.settings.end_ms().filter(|_| !self.is_closed());
         drop_out.into_iter().chain(close).min()
     }
 

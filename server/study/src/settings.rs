@@ -59,6 +59,8 @@ pub struct Settings {
     pub drop_out_after_ms: u64,
     /// When the study closes, in milliseconds since the Unix epoch.
     pub closes_at_ms: Option<u64>,
+    /// When all its data are deleted, in milliseconds since the Unix epoch.
+    pub deletes_at_ms: Option<u64>,
     /// How people without a link of their own take part.
     pub recruiting: Recruiting,
 }
@@ -178,7 +180,18 @@ impl Settings {
         self.check_stages()?;
         self.recruiting.check("recruiting")?;
         let away = self.drop_out_after_ms;
-        within("drop_out_after_ms", away, 60_000..=604_800_000)
+        within("drop_out_after_ms", away, 60_000..=604_800_000)?;
+        match (self.closes_at_ms, self.deletes_at_ms) {
+            (Some(closes), Some(deletes)) if closes > deletes => {
+                refuse("deletes_at_ms", "the study closes only after that")
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// When the study closes, in milliseconds since the Unix epoch.
+    pub(crate) fn end_ms(&self) -> Option<u64> {
+        self.closes_at_ms.or(self.deletes_at_ms)
     }
 
     fn check_design(&self) -> Checked {

@@ -34,6 +34,7 @@ pub fn settings() -> Settings {
         traces: false,
         drop_out_after_ms: 60_000,
         closes_at_ms: None,
+        deletes_at_ms: None,
         recruiting: Recruiting::default(),
     }
 }

@@ -31,6 +31,8 @@ pub struct View {
     pub traces: bool,
     /// Whether this is a test participant.
     pub test: bool,
+    /// When all data of the study are deleted, in milliseconds since the Unix epoch.
+    pub deletes_at_ms: Option<u64>,
     /// The content.
     pub content: Content,
 }
@@ -139,6 +141,7 @@ impl Study {
             steps: self.step_count(),
             traces: settings.traces,
             test: participant.test,
+            deletes_at_ms: settings.deletes_at_ms,
             content,
         })
     }

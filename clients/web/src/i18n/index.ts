@@ -55,6 +55,11 @@ export function dateLocale(): string {
   return navigator.languages.find((one) => one.startsWith(language.value)) ?? language.value;
 }
 
+/** A day, from milliseconds since the Unix epoch. */
+export function dateOf(ms: bigint): string {
+  return new Intl.DateTimeFormat(dateLocale(), { dateStyle: "long" }).format(Number(ms));
+}
+
 /** Chooses the initial language and loads its texts. */
 export async function startLanguage(): Promise<void> {
   const asked = new URLSearchParams(location.search).get("lang");

@@ -14,6 +14,7 @@ import { createStudy } from "./owning";
 import { settingsFrom } from "./settings-file";
 import {
   type ConditionForm,
+  DATES,
   emptyForm,
   faultsOf,
   hasTemplates,
@@ -224,6 +225,19 @@ function FromForm() {
       {text("external", words.external, words.externalHint)}
       {long("debriefing", words.debriefing)}
       {check("traces", words.traces)}
+      <div class={css.fields}>
+        {DATES.map((name) => (
+          <TextField
+            key={name}
+            type="datetime-local"
+            label={words[name]}
+            hint={name === "deletesAt" ? words.deletesAtHint : undefined}
+            value={form[name]}
+            onText={(typed) => change({ [name]: typed })}
+            fault={faults[name]}
+          />
+        ))}
+      </div>
       {check("openLink", words.openLink)}
       {form.openLink && (
         <div class={css.fields} data-part="panel">

@@ -117,6 +117,7 @@ function Owned({ studyId }: { studyId: string }) {
 export function OwnStudy({ study, participants }: FollowedStudy) {
   const words = t().studies.own;
   const { studyId, settings, closed } = study;
+  const deletesAtMs = settings?.deletesAtMs ?? 0n;
   return (
     <div class={css.page} data-part="own-study">
       <header class={css.head}>
@@ -129,6 +130,7 @@ export function OwnStudy({ study, participants }: FollowedStudy) {
         <Export study={study} test={false} />
       </header>
       {closed && <Notice kind="hint">{words.isClosed}</Notice>}
+      {deletesAtMs > 0n && <Notice kind="hint">{words.deletes(momentOf(deletesAtMs))}</Notice>}
       <Counts study={study} participants={participants} />
       {!closed && study.openLink && <OpenLink study={study} />}
       {!closed && <Add studyId={studyId} />}
@@ -503,11 +505,14 @@ function Row({ study, participant }: { study: Study; participant: StudyParticipa
 
 function seenWords({ beganAtMs, endedAtMs, sessions }: StudyParticipant): string {
   const words = t().studies.own.board;
-  const moment = (ms: bigint) =>
-    new Intl.DateTimeFormat(dateLocale(), { dateStyle: "short", timeStyle: "short" }).format(Number(ms));
-  if (endedAtMs > 0n) return words.ended(moment(endedAtMs));
-  if (beganAtMs > 0n) return `${words.began(moment(beganAtMs))} · ${words.sessions(sessions)}`;
+  if (endedAtMs > 0n) return words.ended(momentOf(endedAtMs));
+  if (beganAtMs > 0n) return `${words.began(momentOf(beganAtMs))} · ${words.sessions(sessions)}`;
   return "";
+}
+
+/** A point in time, milliseconds since the Unix epoch. */
+function momentOf(ms: bigint): string {
+  return new Intl.DateTimeFormat(dateLocale(), { dateStyle: "short", timeStyle: "short" }).format(Number(ms));
 }
 
 function Export({ study, test }: { study: Study; test: boolean }) {

@@ -13,7 +13,7 @@ import {
   type StudyView,
 } from "../gen/chefshat/v1/study_pb";
 import { leaveOut } from "../hiding";
-import { showLanguage, t } from "../i18n";
+import { dateOf, showLanguage, t } from "../i18n";
 import { announce } from "../parts/Announcer";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
@@ -30,6 +30,9 @@ import { StageTitle } from "./Stage";
 import css from "./Study.module.css";
 import { StudyGame } from "./StudyGame";
 import { safeAddress } from "./safe-address";
+
+/** How long after its date the data of a study are deleted, at most. */
+const DELETION_TAKES_MS = 7_200_000n;
 
 /** The page. */
 export function StudyPage({ route }: PageProps<"study">) {
@@ -162,7 +165,7 @@ function Stage({ view, part }: StageProps) {
   const { content, step, title, traces, pseudonym } = view;
   switch (content.case) {
     case "consent":
-      return <Consent consent={content.value} {...{ title, part }} />;
+      return <Consent consent={content.value} {...{ view, part }} />;
     case "questionnaire":
       return (
         <section class={`sheet ${css.stage}`}>
@@ -182,7 +185,7 @@ function Stage({ view, part }: StageProps) {
   }
 }
 
-function Consent({ consent, title, part }: { consent: StudyConsent; title: string; part: Participating }) {
+function Consent({ consent, view, part }: StageProps & { consent: StudyConsent }) {
   const words = t().studies.consent;
   const [agreed, setAgreed] = useState(false);
   const [tried, setTried] = useState(false);
@@ -198,12 +201,13 @@ function Consent({ consent, title, part }: { consent: StudyConsent; title: strin
       <section class={css.consent} aria-label={words.textLabel}>
         <Formatted text={consent.text} />
       </section>
-      <p class="soft small">{words.version(consent.version)}</p>
+      {aboutConsent(consent, view).map((line) => (
+        <p key={line} class="soft small">
+          {line}
+        </p>
+      ))}
       <div>
-        <Button
-          look="quiet"
-          onClick={() => download(copyOf(title, consent), "consent.txt", "text/plain;charset=utf-8")}
-        >
+        <Button look="quiet" onClick={() => download(copyOf(consent, view), "consent.txt", "text/plain;charset=utf-8")}>
           {words.copy}
         </Button>
       </div>
@@ -226,9 +230,16 @@ function Consent({ consent, title, part }: { consent: StudyConsent; title: strin
   );
 }
 
+/** What the server adds to the text of a consent: its version, and until when there are data. */
+function aboutConsent({ version }: StudyConsent, { deletesAtMs }: StudyView): string[] {
+  const words = t().studies.consent;
+  const deletion = deletesAtMs > 0n ? [words.deletion(dateOf(deletesAtMs + DELETION_TAKES_MS))] : [];
+  return [words.version(version), ...deletion];
+}
+
 /** The text of a consent as a file for the participant. */
-function copyOf(title: string, { text, version }: StudyConsent): string {
-  return `${title}\n\n${text}\n\n${t().studies.consent.version(version)}\n`;
+function copyOf(consent: StudyConsent, view: StudyView): string {
+  return `${[view.title, consent.text, ...aboutConsent(consent, view)].join("\n\n")}\n`;
 }
 
 function Text({ text, part }: { text: StudyText; part: Participating }) {

@@ -31,6 +31,9 @@ export interface StudyForm {
   readonly external: string;
   readonly debriefing: string;
   readonly traces: boolean;
+  /** When the study closes and when it is deleted, as date fields have them: local time, or empty. */
+  readonly closesAt: string;
+  readonly deletesAt: string;
   readonly openLink: boolean;
   readonly idParameter: string;
   readonly completedUrl: string;
@@ -40,6 +43,9 @@ export interface StudyForm {
 
 /** The addresses of a panel, by their names in the form and in the protocol. */
 export const PANEL_URLS = ["completedUrl", "leftUrl", "fullUrl"] as const;
+
+/** The dates of a study. */
+export const DATES = ["closesAt", "deletesAt"] as const;
 
 /** Whether the questionnaires Godspeed and NASA-TLX have texts in this language. */
 export function hasTemplates(language: Language): boolean {
@@ -68,6 +74,8 @@ export function emptyForm(language: Language): StudyForm {
     external: "",
     debriefing: "",
     traces: false,
+    closesAt: "",
+    deletesAt: "",
     openLink: false,
     idParameter: "",
     completedUrl: "",
@@ -109,6 +117,10 @@ export function faultsOf(form: StudyForm): StudyFaults {
   const addresses = ["external", ...(form.openLink ? PANEL_URLS : [])] as const;
   for (const field of addresses)
     if (form[field] !== "" && !form[field].startsWith("https://")) faults[field] = words.address;
+  for (const field of DATES)
+    if (form[field] !== "" && !(Date.parse(form[field]) > Date.now())) faults[field] = words.passed;
+  if (!faults.deletesAt && Date.parse(form.closesAt) > Date.parse(form.deletesAt))
+    faults.deletesAt = words.deletedFirst;
   if (form.openLink && form.idParameter !== "" && !ID.test(form.idParameter)) faults.idParameter = words.id;
   return faults;
 }
@@ -150,8 +162,15 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
     })),
     stages,
     traces: form.traces,
+    closesAtMs: millisecondsOf(form.closesAt),
+    deletesAtMs: millisecondsOf(form.deletesAt),
     ...(form.openLink && { recruiting: recruitingOf(form) }),
   };
+}
+
+/** A date field in milliseconds since the Unix epoch; 0 if it is empty. */
+function millisecondsOf(typed: string): bigint {
+  return typed === "" ? 0n : BigInt(Date.parse(typed));
 }
 
 function recruitingOf({ idParameter, completedUrl, leftUrl, fullUrl }: StudyForm) {

@@ -4,7 +4,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
 import { type Tournament, type TournamentGame, TournamentGameState } from "../gen/chefshat/v1/tournament_pb";
-import { t } from "../i18n";
+import { dateOf, t } from "../i18n";
 import { Button, ButtonLink } from "../parts/Button";
 import { Drawing } from "../parts/Drawing";
 import { Notice } from "../parts/Notice";
@@ -14,7 +14,7 @@ import { type LiveTournament, useGames, useTournament } from "./following";
 import css from "./Results.module.css";
 import { Standings } from "./Standings";
 import { isEnded, nameIn, playedRounds } from "./structure";
-import { dateOf, dealsWords, formatWord, inShort, settingsWords } from "./words";
+import { dealsWords, formatWord, inShort, settingsWords } from "./words";
 
 /** The page. */
 export function ResultsPage({ route }: PageProps<"results">) {

@@ -1,9 +1,9 @@
 // What the certificates of a tournament say. Printed by ResultsPage.tsx.
 
 import { type Tournament, type TournamentStanding, TournamentState } from "../gen/chefshat/v1/tournament_pb";
-import { decimal, t } from "../i18n";
+import { dateOf, decimal, t } from "../i18n";
 import { meanScore, nameOf, participantOf } from "./structure";
-import { dateOf, formatWord } from "./words";
+import { formatWord } from "./words";
 
 /** The texts of one certificate. */
 export interface Certificate {

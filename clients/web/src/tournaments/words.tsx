@@ -48,11 +48,6 @@ export function madeWords({ createdAtMs }: Tournament): string {
   return t().tournaments.made(moment(createdAtMs));
 }
 
-/** A date, without the time; milliseconds since the Unix epoch. */
-export function dateOf(ms: bigint): string {
-  return new Intl.DateTimeFormat(dateLocale(), { dateStyle: "long" }).format(Number(ms));
-}
-
 /** A point in time, milliseconds since the Unix epoch. */
 function moment(ms: bigint): string {
   const dates = new Intl.DateTimeFormat(dateLocale(), { dateStyle: "medium", timeStyle: "short" });

@@ -255,12 +255,14 @@ test("people of a panel take part by the open link, once each, and go on where t
     rules: { preset: "paper", faces: 8 },
     seats: Array.from({ length: 3 }, () => ({ filledBy: { case: "builtInAgent" as const, value: "random" } })),
   };
-  const plan = { participants: 1, factors: [], conditions: [condition], stages, recruiting };
+  const deletesAtMs = BigInt(Date.UTC(2031, 11, 30, 11));
+  const plan = { participants: 1, factors: [], conditions: [condition], stages, recruiting, deletesAtMs };
   const { studyId, ownerToken } = await newStudy(server, plan);
   const researcher = await person(browser);
   await researcher.page.goto(`${server.url}/studies/${studyId}`);
   await researcher.page.getByLabel("Owner token").fill(ownerToken);
   await researcher.page.getByRole("button", { name: "Use this key" }).click();
+  await researcher.page.getByText("The study is deleted with all its data on ").waitFor();
   const shown = researcher.page.locator('[data-part~="open-link"] [data-part~="invite-link"]');
   const asked = ((await shown.textContent()) ?? "").trim();
   const openLink = asked.replace("?PROLIFIC_PID=", "");
@@ -281,7 +283,9 @@ test("people of a panel take part by the open link, once each, and go on where t
     ada.page.waitForEvent("download"),
     ada.page.getByRole("button", { name: "Save a copy of this text" }).click(),
   ]);
-  expect(readFileSync(await copy.path(), "utf8")).toContain("We record your games.");
+  const kept = readFileSync(await copy.path(), "utf8");
+  expect(kept).toContain("We record your games.");
+  expect(kept).toContain("2031 at the latest.");
   // The panel's link leads the same browser to the same participation.
   await ada.page.goto(`${openLink}?PROLIFIC_PID=ada`);
   await until(() => ada.page.url() === own);

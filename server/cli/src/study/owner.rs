@@ -6,6 +6,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use chefshat_proto::v1;
+use chrono::{DateTime, SecondsFormat};
 use clap::Args;
 use serde_json::json;
 
@@ -404,8 +405,16 @@ pub(super) fn open_address(server: &str, study: &v1::Study) -> Option<String> {
 fn summary(study: &v1::Study) -> String {
     let name = study.settings.as_ref().map_or("", |it| it.name.as_str());
     let state = if study.closed { "closed" } else { "open" };
+    let deletes_at_ms = study.settings.as_ref().map_or(0, |it| it.deletes_at_ms);
+    let deletion = (i64::try_from(deletes_at_ms).ok())
+        .filter(|at_ms| *at_ms > 0)
+        .and_then(DateTime::from_timestamp_millis)
+        .map_or_else(String::new, |at| {
+            let at = at.to_rfc3339_opts(SecondsFormat::Secs, true);
+            format!("; it is deleted with all its data on {at}")
+        });
     format!(
-        "study {} ({name}) is {state}: {} completed, {} active, {} invited, {} left",
+        "study {} ({name}) is {state}: {} completed, {} active, {} invited, {} left{deletion}",
         study.study_id, study.completed, study.active, study.invited, study.left
     )
 }

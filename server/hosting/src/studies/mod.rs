@@ -2,6 +2,7 @@
 //! participant does next; `task` runs one study; `export` gathers its data.
 
 mod data;
+mod expiry;
 mod export;
 mod games;
 mod handle;
@@ -81,7 +82,8 @@ impl Studies {
     ) -> Result<(Arc<StudyHandle>, Token), CreateProblem> {
         let durable = self.rooms.store().outlives_server();
         // Long settings take milliseconds to check.
-        let checking = tokio::task::spawn_blocking(move || check(settings, durable));
+        let now_ms = (self.common.now)();
+        let checking = tokio::task::spawn_blocking(move || check(settings, durable, now_ms));
         let checked = (checking.await)
             .map_err(|error| StoreError::Failed(format!("checking settings failed: {error}")))?
             .map_err(CreateProblem::Settings)?;
@@ -165,10 +167,20 @@ impl Studies {
     }
 }
 
-fn check(settings: v1::StudySettings, durable: bool) -> Result<Checked, SettingsProblem> {
+fn check(
+    settings: v1::StudySettings,
+    durable: bool,
+    now_ms: u64,
+) -> Result<Checked, SettingsProblem> {
     let settings = convert::complete_settings(settings, random_bytes, durable)?;
     let plan = convert::study_plan(&settings)?;
     let core = Study::new(Arc::clone(&plan.core))?;
+    if plan.core.deletes_at_ms.is_some_and(|at_ms| at_ms <= now_ms) {
+        return Err(SettingsProblem {
+            field: "deletes_at_ms".to_owned(),
+            problem: "this time has passed: give milliseconds since the Unix epoch".to_owned(),
+        });
+    }
     let memory = memory_of(&settings);
     Ok(Checked {
         settings,

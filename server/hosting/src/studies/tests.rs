@@ -1,5 +1,6 @@
 //! Studies of a server whose clock is stopped: dropping out, and deleting a study.
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -20,12 +21,15 @@ const LIMIT: Duration = Duration::from_secs(60);
 std::thread_local! {
     /// When the test of this thread began, on its stopped clock.
     static BEGAN: OnceLock<tokio::time::Instant> = const { OnceLock::new() };
+    /// How much the time of day of this thread is ahead, milliseconds.
+    static AHEAD_MS: Cell<u64> = const { Cell::new(0) };
 }
 
 /// A time of day that advances with the clock of the test.
 fn stopped_clock() -> u64 {
     let began = BEGAN.with(|began| *began.get_or_init(tokio::time::Instant::now));
-    1_000_000 + u64::try_from(began.elapsed().as_millis()).expect("not that long")
+    let passed = u64::try_from(began.elapsed().as_millis()).expect("not that long");
+    1_000_000 + passed + AHEAD_MS.get()
 }
 
 /// A study of two participants who read a text and consent.
@@ -298,6 +302,50 @@ async fn a_study_is_deleted_once_nobody_is_in_the_middle_of_it() {
         "its task has ended"
     );
     assert!(study.is_complete());
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_study_is_deleted_at_its_date_and_not_when_the_clock_jumps() {
+    const HOUR: Duration = Duration::from_secs(3_600);
+    let deletes_at_ms = stopped_clock() + 10 * 3_600 * 1_000;
+    let dated = v1::StudySettings {
+        deletes_at_ms,
+        drop_out_after_ms: 604_800_000,
+        ..settings()
+    };
+    let lab = Lab::with(&ServerConfig::default(), dated.clone(), 2).await;
+    let id = lab.study.id();
+    let other = lab.studies.create(settings(), None, Key::Local).await;
+    let other = other.expect("valid settings").0;
+    let deleting = tokio::spawn(Arc::clone(&lab.studies).delete_when_due());
+    let is_there = |id| lab.studies.get(id).is_some();
+    assert_eq!(lab.open(1).await, Ok(1));
+    let present = lab.study.present(1, 1).await;
+
+    // The clock is a year ahead for three quarters of an hour.
+    AHEAD_MS.set(365 * 24 * 3_600 * 1_000);
+    tokio::time::sleep(HOUR * 3 / 4).await;
+    AHEAD_MS.set(0);
+    tokio::time::sleep(HOUR * 8).await;
+    assert!(is_there(id));
+
+    // Somebody is in the middle of it when its time has come.
+    tokio::time::sleep(HOUR * 2).await;
+    assert!(is_there(id));
+    assert_eq!(lab.status(1), Status::Active);
+    tokio::time::sleep(HOUR).await;
+    assert!(!is_there(id));
+    drop(present);
+    assert!(lab.store.study(id).await.expect("readable").is_none());
+    assert!(is_there(other.id()));
+    deleting.abort();
+
+    let refused = lab.studies.create(dated, None, Key::Local).await;
+    let refused = refused.map(drop).expect_err("its date has passed");
+    assert!(
+        refused.to_string().starts_with("deletes_at_ms: "),
+        "{refused}"
+    );
 }
 
 #[tokio::test(start_paused = true)]

@@ -1,7 +1,9 @@
 //! Participants: beginning, sessions, steps, dropping out, withdrawing, being removed.
 
+use std::sync::Arc;
+
 use chefshat_study::testing::{settings, within};
-use chefshat_study::{At, Content, End, Refusal, Settings, Status};
+use chefshat_study::{At, Content, End, Refusal, Settings, Status, Study};
 
 use super::support::Lab;
 
@@ -250,6 +252,21 @@ fn a_full_or_closed_study_accepts_nobody() {
     // Who has begun continues, also in a new session.
     lab.complete(1);
     assert_eq!(status(&lab, 1), Status::Completed);
+}
+
+#[test]
+fn a_study_closes_when_its_data_are_deleted_and_not_after_that() {
+    let mut settings = settings();
+    settings.deletes_at_ms = Some(2_000_000);
+    let mut lab = Lab::new(settings.clone(), 1);
+    lab.begin(1);
+    assert_eq!(lab.study.view(1).unwrap().deletes_at_ms, Some(2_000_000));
+    assert_eq!(lab.study.wake_at(), Some(2_000_000));
+    lab.wait(1_000_000);
+    assert!(lab.study.is_closed());
+    settings.closes_at_ms = Some(2_000_001);
+    let refused = Study::new(Arc::new(settings)).unwrap_err();
+    assert_eq!(refused.field, "deletes_at_ms");
 }
 
 #[test]

@@ -244,6 +244,7 @@ pub fn study_plan(message: &v1::StudySettings) -> Result<StudyPlan, SettingsProb
             traces: message.traces,
             drop_out_after_ms: message.drop_out_after_ms,
             closes_at_ms: Some(message.closes_at_ms).filter(|at_ms| *at_ms > 0),
+            deletes_at_ms: Some(message.deletes_at_ms).filter(|at_ms| *at_ms > 0),
             recruiting: recruiting(message.recruiting.clone().unwrap_or_default()),
         }),
         name: message.name.clone(),

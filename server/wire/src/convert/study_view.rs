@@ -22,6 +22,7 @@ pub fn study_view(view: View, ticket_of: impl FnOnce(Id) -> String) -> v1::Study
         steps: number(view.steps),
         traces: view.traces,
         test: view.test,
+        deletes_at_ms: view.deletes_at_ms.unwrap_or(0),
         content: Some(match view.content {
             Content::Consent(consent) => Message::Consent(v1::StudyConsent {
                 text: consent.text,

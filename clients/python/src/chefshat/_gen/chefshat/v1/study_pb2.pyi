@@ -1088,6 +1088,7 @@ class StudySettings(_message.Message):
     DROP_OUT_AFTER_MS_FIELD_NUMBER: _builtins.int
     CLOSES_AT_MS_FIELD_NUMBER: _builtins.int
     RECRUITING_FIELD_NUMBER: _builtins.int
+    DELETES_AT_MS_FIELD_NUMBER: _builtins.int
     name: _builtins.str
     """Name for researchers, 1..=64 characters. Participants never see it."""
     title: _builtins.str
@@ -1113,6 +1114,13 @@ class StudySettings(_message.Message):
     """
     closes_at_ms: _builtins.int
     """Milliseconds since the Unix epoch when the study closes; 0: when its owner closes it."""
+    deletes_at_ms: _builtins.int
+    """Milliseconds since the Unix epoch when the study closes, if it is not closed, and the server
+    deletes it with all its data, as DeleteStudy with `force`: at most two hours later, since it waits
+    until it is sure of the time. In the future when the study is created, and not before
+    `closes_at_ms`; 0: when its owner deletes it. Participants are told this date with what they
+    consent to.
+    """
     @_builtins.property
     def factors(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyFactor]:
         """The factors, at most 8."""
@@ -1154,10 +1162,11 @@ class StudySettings(_message.Message):
         drop_out_after_ms: _builtins.int = ...,
         closes_at_ms: _builtins.int = ...,
         recruiting: Global___StudyRecruiting | None = ...,
+        deletes_at_ms: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["recruiting", b"recruiting"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["assignment_seed", b"assignment_seed", "block_size", b"block_size", "closes_at_ms", b"closes_at_ms", "conditions", b"conditions", "drop_out_after_ms", b"drop_out_after_ms", "factors", b"factors", "language", b"language", "name", b"name", "order", b"order", "participants", b"participants", "recruiting", b"recruiting", "seeds", b"seeds", "stages", b"stages", "title", b"title", "traces", b"traces"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["assignment_seed", b"assignment_seed", "block_size", b"block_size", "closes_at_ms", b"closes_at_ms", "conditions", b"conditions", "deletes_at_ms", b"deletes_at_ms", "drop_out_after_ms", b"drop_out_after_ms", "factors", b"factors", "language", b"language", "name", b"name", "order", b"order", "participants", b"participants", "recruiting", b"recruiting", "seeds", b"seeds", "stages", b"stages", "title", b"title", "traces", b"traces"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -1536,6 +1545,7 @@ class StudyView(_message.Message):
     GAME_FIELD_NUMBER: _builtins.int
     END_FIELD_NUMBER: _builtins.int
     TEST_FIELD_NUMBER: _builtins.int
+    DELETES_AT_MS_FIELD_NUMBER: _builtins.int
     title: _builtins.str
     """Title of the study."""
     language: _builtins.str
@@ -1550,6 +1560,10 @@ class StudyView(_message.Message):
     """Whether the page should send interface traces (RecordTraces)."""
     test: _builtins.bool
     """Whether this is a test participant, who may continue without answering and playing (ContinueStudy)."""
+    deletes_at_ms: _builtins.int
+    """Milliseconds since the Unix epoch when the server deletes all data of the study; 0: no date is
+    set.
+    """
     @_builtins.property
     def consent(self) -> Global___StudyConsent:
         """A text to agree to: GiveConsent or WithdrawFromStudy."""
@@ -1590,10 +1604,11 @@ class StudyView(_message.Message):
         game: Global___StudyShownGame | None = ...,
         end: Global___StudyEnd | None = ...,
         test: _builtins.bool = ...,
+        deletes_at_ms: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "content", b"content", "end", b"end", "external_questionnaire", b"external_questionnaire", "game", b"game", "questionnaire", b"questionnaire", "text", b"text"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "content", b"content", "end", b"end", "external_questionnaire", b"external_questionnaire", "game", b"game", "language", b"language", "pseudonym", b"pseudonym", "questionnaire", b"questionnaire", "step", b"step", "steps", b"steps", "test", b"test", "text", b"text", "title", b"title", "traces", b"traces"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "content", b"content", "deletes_at_ms", b"deletes_at_ms", "end", b"end", "external_questionnaire", b"external_questionnaire", "game", b"game", "language", b"language", "pseudonym", b"pseudonym", "questionnaire", b"questionnaire", "step", b"step", "steps", b"steps", "test", b"test", "text", b"text", "title", b"title", "traces", b"traces"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType_content: _TypeAlias = _typing.Literal["consent", "questionnaire", "external_questionnaire", "text", "game", "end"]  # noqa: Y015
     _WhichOneofArgType_content: _TypeAlias = _typing.Literal["content", b"content"]  # noqa: Y015
