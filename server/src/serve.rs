@@ -360,7 +360,7 @@ impl Server {
         }
         let forwarding = (peers.as_ref()).map(|port| {
             let directory = Arc::clone(rooms.directory());
-            grpc::ForwardLayer::new(directory, port.peers(), Arc::clone(&calls))
+            grpc::ForwardLayer::new(directory, port.peers(rooms.metrics()), Arc::clone(&calls))
         });
         let play = grpc::Play::new(
             Arc::clone(&rooms),

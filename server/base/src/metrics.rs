@@ -184,6 +184,7 @@ pub struct Metrics {
     node_lease: Gauge,
     takeovers: Counter,
     not_resumed: Counter,
+    peer_errors: Counter,
     outboxes: Mutex<Vec<Weak<dyn Queue>>>,
 }
 
@@ -268,6 +269,11 @@ impl Default for Metrics {
                 all,
                 "not_resumed",
                 "Rooms, tournaments and studies that could not be resumed and stand still",
+            ),
+            peer_errors: plain(
+                all,
+                "peer_errors",
+                "Connections to other nodes that could not be opened",
             ),
             outboxes: Mutex::default(),
             registry: Mutex::new(registry),
@@ -422,6 +428,11 @@ impl Metrics {
     /// Counts a unit that the node is about to resume.
     pub fn taken_over(&self) {
         self.takeovers.inc();
+    }
+
+    /// Counts a connection to another node that could not be opened.
+    pub fn peer_error(&self) {
+        self.peer_errors.inc();
     }
 
     /// Counts a unit that could not be resumed.

@@ -21,11 +21,12 @@ use tokio_util::either::Either;
 use tonic::body::Body;
 use tonic::transport::{Channel, Endpoint};
 use tower::{ServiceExt as _, service_fn};
+use tracing::warn;
 
 use crate::connections::{self, Connection, Connections, Limits};
 use crate::handshakes::Handshakes;
 use crate::tls::{MaybeTls, Tls, TlsError, TlsFiles};
-use chefshat_admission::limits::Shares;
+use chefshat_admission::limits::{LogPace, Shares};
 use chefshat_base::metrics::Metrics;
 use chefshat_base::proxies::TrustedProxies;
 use chefshat_hosting::cluster::Peer;
@@ -56,6 +57,8 @@ pub const CONNECTION_WINDOW: u32 = 1 << 30;
 /// nodes, whose connection must survive it.
 pub const MAX_RESET_STREAMS: usize = 1 << 20;
 
+/// Most lines of the log in a minute about nodes that cannot be reached.
+const LOGGED: u32 = 6;
 /// Most connections from other nodes at a time: each has one, and a few that are ending.
 const MAX_PEER_CONNECTIONS: usize = 512;
 /// How much of them one machine may have. In tests and at home, it has all nodes.
@@ -128,9 +131,13 @@ impl PeerPort {
     }
 
     /// The connections to other nodes.
-    pub fn peers(&self) -> Arc<Peers> {
+    pub fn peers(&self, metrics: &Arc<Metrics>) -> Arc<Peers> {
         Arc::new(Peers {
-            tls: self.tls.as_ref().map(|tls| tls.files.clone()),
+            opening: Arc::new(Opening {
+                tls: self.tls.as_ref().map(|tls| tls.files.clone()),
+                metrics: Arc::clone(metrics),
+                logged: LogPace::new(LOGGED),
+            }),
             channels: Mutex::default(),
         })
     }
@@ -178,7 +185,7 @@ impl PeerPort {
 /// The connections to other nodes, opened when they are first needed and again when they break.
 #[derive(Debug)]
 pub struct Peers {
-    tls: Option<TlsFiles>,
+    opening: Arc<Opening>,
     /// By endpoint, with the time of the last use.
     channels: Mutex<BTreeMap<Arc<str>, (Channel, Instant)>>,
 }
@@ -206,8 +213,11 @@ impl Peers {
         });
         let endpoint = Arc::clone(&peer.endpoint);
         let (channel, used) = channels.entry(endpoint).or_insert_with_key(|endpoint| {
-            let (tls, address) = (self.tls.clone(), Arc::clone(endpoint));
-            let connector = service_fn(move |_: Uri| connect(tls.clone(), Arc::clone(&address)));
+            let (opening, address) = (Arc::clone(&self.opening), Arc::clone(endpoint));
+            let connector = service_fn(move |_: Uri| {
+                let (opening, address) = (Arc::clone(&opening), Arc::clone(&address));
+                async move { opening.open(&address).await }
+            });
             let name = Endpoint::from_static("http://chefshat-node");
             let channel = name
                 .http2_keep_alive_interval(PING_INTERVAL)
@@ -228,12 +238,32 @@ impl Peers {
 /// The stream of a connection to another node.
 type ToPeer = Either<TcpStream, Box<TlsStream<TcpStream>>>;
 
-/// Connects to another node.
-async fn connect(tls: Option<TlsFiles>, address: Arc<str>) -> io::Result<TokioIo<ToPeer>> {
-    let connecting = async {
-        let stream = TcpStream::connect(&*address).await?;
+/// How connections to other nodes are opened.
+#[derive(Debug)]
+struct Opening {
+    tls: Option<TlsFiles>,
+    metrics: Arc<Metrics>,
+    logged: LogPace,
+}
+
+impl Opening {
+    /// Connects to another node.
+    async fn open(&self, address: &str) -> io::Result<TokioIo<ToPeer>> {
+        let connected = tokio::time::timeout(CONNECT_TIMEOUT, self.connect(address)).await;
+        let connected = connected.unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()));
+        if let Err(error) = &connected {
+            self.metrics.peer_error();
+            if self.logged.admits() {
+                warn!(%address, %error, "another node cannot be reached");
+            }
+        }
+        connected.map(TokioIo::new)
+    }
+
+    async fn connect(&self, address: &str) -> io::Result<ToPeer> {
+        let stream = TcpStream::connect(address).await?;
         stream.set_nodelay(true)?;
-        let Some(files) = tls else {
+        let Some(files) = &self.tls else {
             return Ok(Either::Left(stream));
         };
         // Read for each connection: the files may have been renewed.
@@ -241,15 +271,13 @@ async fn connect(tls: Option<TlsFiles>, address: Arc<str>) -> io::Result<TokioIo
         let name = ServerName::try_from(PEER_NAME).expect("a valid name");
         let stream = TlsConnector::from(config).connect(name, stream).await?;
         Ok(Either::Right(Box::new(stream)))
-    };
-    let connected = tokio::time::timeout(CONNECT_TIMEOUT, connecting).await;
-    connected
-        .unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()))
-        .map(TokioIo::new)
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use futures::FutureExt as _;
     use tokio::io::AsyncReadExt as _;
 
@@ -267,7 +295,7 @@ mod tests {
     #[tokio::test(start_paused = true)]
     async fn the_connections_to_nodes_that_are_gone_are_forgotten() {
         let (_, port) = port().await;
-        let peers = port.peers();
+        let peers = port.peers(&Arc::default());
         let peer = |number: u32| Peer {
             node: format!("node-{number}").into(),
             endpoint: format!("192.0.2.1:{number}").into(),
@@ -279,6 +307,57 @@ mod tests {
         }
         let live = peers.channels.lock().expect("nothing panicked").len();
         assert_eq!(live, 11, "those of ten minutes, and the one in use");
+    }
+
+    /// The files of a node whose certificate an authority of its own has signed.
+    fn certified(folder: &Path) -> TlsFiles {
+        let made = rcgen::generate_simple_self_signed([PEER_NAME.to_owned()]).expect("signed");
+        let files = TlsFiles {
+            certificate: folder.join("node.pem"),
+            key: folder.join("node.key"),
+            client_authority: Some(folder.join("node.pem")),
+        };
+        std::fs::write(&files.certificate, made.cert.pem()).expect("written");
+        std::fs::write(&files.key, made.signing_key.serialize_pem()).expect("written");
+        files
+    }
+
+    #[tokio::test]
+    async fn nodes_that_cannot_be_reached_are_counted() {
+        let folders = [(); 2].map(|()| tempfile::tempdir().expect("a folder"));
+        let [own, other] = folders.each_ref().map(|folder| certified(folder.path()));
+        let listen = || TcpListener::bind("127.0.0.1:0");
+        let port = PeerPort::new(listen().await.expect("a port"), Some(own)).expect("usable");
+        let metrics = Arc::default();
+        let peers = port.peers(&metrics);
+        let errors = async |address: SocketAddr| {
+            let peer = Peer {
+                node: "other".into(),
+                endpoint: address.to_string().into(),
+            };
+            let sent = peers.send(&peer, Request::new(Body::empty())).await;
+            sent.expect_err("it cannot be reached");
+            metrics.text()
+        };
+
+        let closed = listen().await.expect("a port").local_addr().expect("bound");
+        assert!(
+            errors(closed)
+                .await
+                .contains("chefshat_peer_errors_total 1\n")
+        );
+        // Its certificate is of another authority.
+        let listener = listen().await.expect("a port");
+        let address = listener.local_addr().expect("bound");
+        let strange = PeerPort::new(listener, Some(other)).expect("usable");
+        let incoming = strange.incoming(&Arc::default()).expect("a thread");
+        let accepting = tokio::spawn(incoming.for_each(async |_| {}));
+        assert!(
+            errors(address)
+                .await
+                .contains("chefshat_peer_errors_total 2\n")
+        );
+        accepting.abort();
     }
 
     #[tokio::test]

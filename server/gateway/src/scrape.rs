@@ -109,6 +109,8 @@ impl Collector for ServerState {
         let draining = u64::from(rooms.is_shutting_down());
         let help = "1 while the server stops, else 0";
         to.gauge("draining", help, None, draining)?;
+        let help = "Most rooms that wait or play at a time (--max-rooms)";
+        to.gauge("rooms_limit", help, None, rooms.max_rooms() as u64)?;
         pauses(rooms.process_clock(), &mut to)?;
         queues(&rooms, &mut to)?;
         states(&tournaments, &mut to)?;

@@ -136,6 +136,11 @@ impl Rooms {
         }))
     }
 
+    /// Most rooms that wait or play at a time.
+    pub fn max_rooms(&self) -> usize {
+        self.max_rooms
+    }
+
     /// Charges a caller for something of this size that is stored, but that no game needs.
     ///
     /// # Errors

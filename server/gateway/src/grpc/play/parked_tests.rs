@@ -292,7 +292,7 @@ async fn stream_of_gateway(node: &Node, directory: &Arc<Says>) -> Stream {
     let own = TcpListener::bind("127.0.0.1:0").await.expect("a port");
     let peers = PeerPort::new(own, None)
         .expect("a loopback address")
-        .peers();
+        .peers(&Arc::default());
     let limits = Arc::new(CallLimits::new(Shares::default()));
     let known: Arc<dyn Directory> = Arc::clone(directory) as _;
     let gateway = ForwardLayer::new(known, peers, limits).gateway(&http::Request::new(()));
