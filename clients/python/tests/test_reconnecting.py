@@ -130,6 +130,18 @@ def test_a_substituted_seat_resumes_once(stage: Stage) -> None:
     assert stage.commands() == [(0, "resume")]
 
 
+def test_who_leaves_a_decision_open_leaves_the_seat_to_the_substitute(stage: Stage) -> None:
+    (ask,) = stage.receive(decision(1))
+    stage.session.answer(ask, None)
+    stage.receive(substituted(1))
+    assert stage.commands() == []
+    # It decides again, and so takes the seat back again.
+    (ask,) = stage.receive(returned(2), decision(2))
+    stage.answer(ask)
+    stage.receive(substituted(3))
+    assert stage.commands() == [(0, "resume")]
+
+
 def test_a_substitution_that_is_over_is_not_answered(stage: Stage) -> None:
     (ask,) = stage.receive(substituted(1), returned(2), decision(1))
     assert stage.commands() == []

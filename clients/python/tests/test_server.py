@@ -296,3 +296,30 @@ def test_a_seat_that_was_given_up_is_free(real_address: str) -> None:
         with pytest.raises(chefshat.ChefsHatError, match="TICKET_UNKNOWN"):
             client.leave_room(left)
         assert client.join_room(room.join_code, "Ben").seat == 0
+
+
+class Undecided(Agent):
+    """Leaves all decisions open, and counts them and who takes the seat over."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+        self.changes: list[str | None] = []
+
+    def decide(self, request: Decision) -> None:
+        self.asked += 1
+
+    def on_event(self, event: pb.GameEvent) -> None:
+        if event.HasField("substituted") or event.HasField("returned"):
+            self.changes.append(event.WhichOneof("kind"))
+
+
+def test_the_seat_of_who_leaves_decisions_open_stays_with_the_substitute(real_address: str) -> None:
+    with chefshat.Client(real_address) as client:
+        policy = pb.RoomPolicy(decision_time_ms=20, bank_ms=0, pace_ms=0, abort=pb.ABORT_POLICY_NEVER, max_timeouts=2)
+        room = client.create_room("undecided", rules=pb.RuleSet(target_shifts=1), policy=policy, seats=[None, *["random"] * 3])
+        agent = Undecided()
+        result = client.play(agent, client.join_room(room.join_code, "Undecided").ticket)
+    assert result.finished
+    assert result.decisions == 0
+    assert agent.asked >= 2
+    assert agent.changes == ["substituted"]

@@ -18,7 +18,7 @@ class Agent(ABC):
     """
 
     @abstractmethod
-    def decide(self, request: Decision) -> int | Awaitable[int]:
+    def decide(self, request: Decision) -> int | Awaitable[int | None] | None:
         """Chooses an action.
 
         Called again with the same `decision_id` if the answer was invalid, up to `request.invalid_attempts_left` times.
@@ -27,7 +27,9 @@ class Agent(ABC):
             request: the decision, with the observation of the seat.
 
         Returns:
-            The index of the action, one of `request.legal_actions`. Under `chefshat.aio` this method may be `async`.
+            The index of the action, one of `request.legal_actions`; or None, which leaves the decision open until its time is over:
+            then the server decides as the policy of the room says, and a substitute that takes the seat over for it keeps it. Under
+            `chefshat.aio` this method may be `async`.
         """
 
     def on_attached(self, seat: SeatInfo) -> None:

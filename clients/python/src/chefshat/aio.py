@@ -101,7 +101,7 @@ class _Run:
         self._thinking.add(task)
         task.add_done_callback(self._thinking.discard)
 
-    async def _think(self, ask: Ask, action: Awaitable[int]) -> None:
+    async def _think(self, ask: Ask, action: Awaitable[int | None]) -> None:
         """Waits for an agent's answer and sends it over the then current connection."""
         self._session.answer(ask, await action)
         call = self._call

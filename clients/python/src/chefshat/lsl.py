@@ -180,7 +180,7 @@ class MarkedAgent(Agent):
         self._wait_s = wait_s
         self._markers: MarkerStream | None = None
 
-    def decide(self, request: Decision) -> int | Awaitable[int]:
+    def decide(self, request: Decision) -> int | Awaitable[int | None] | None:
         """Asks the agent."""
         return self._agent.decide(request)
 

@@ -39,6 +39,8 @@ class SeatSession:
         self.live_from = 0
         # A substitute plays for the connected seat, which has not resumed yet.
         self.substituted = False
+        # The agent has left its last decision open.
+        self.left_open = False
         # The agent knows of somebody whom the game waits for.
         self.awaits = False
         # The decision that the agent is making.

@@ -206,11 +206,15 @@ class PlaySession:
             self._resume(seat)
         return asks
 
-    def answer(self, ask: Ask, action: SupportsIndex) -> None:
-        """Answers a decision. If the seat is not attached, the answer is sent when it is attached again."""
+    def answer(self, ask: Ask, action: SupportsIndex | None) -> None:
+        """Answers a decision, or leaves it open. If the seat is not attached, the answer is sent when it is attached again."""
         seat, decision = ask
         if seat.asked is not decision:
             return  # The server has closed the decision.
+        seat.left_open = action is None
+        if action is None:
+            seat.asked = None
+            return
         answer = pb.Answer(decision_id=decision.decision_id, action=action.__index__(), annotations=self._annotations(ask))
         seat.asked = None
         seat.unacknowledged = answer
@@ -238,8 +242,8 @@ class PlaySession:
             )
 
     def _resume(self, seat: SeatSession) -> None:
-        """Takes the seat back from its substitute, if it has one."""
-        if seat.substituted and seat.handle is not None and not seat.game_is_over:
+        """Takes the seat back from its substitute, if it has one. Who leaves decisions open leaves them to the substitute."""
+        if seat.substituted and not seat.left_open and seat.handle is not None and not seat.game_is_over:
             self._outbox.append(pb.SeatCommand(handle=seat.handle, resume=pb.ResumeSeat()))
         seat.substituted = False
 

@@ -57,11 +57,11 @@ class RobotPlayer(chefshat.Agent):
         # The gift decided last at a physical table: number of the decision, face and receiver.
         self._gift: tuple[int, int, int] | None = None
 
-    async def decide(self, request: Decision) -> int:
+    async def decide(self, request: Decision) -> int | None:
         """Lets the agent decide, and the robot act. Illegal actions of the agent are answered at once, without an act."""
         asked = time.monotonic()
         action = await self._agent.decide(request)
-        if action in request.legal_actions:
+        if action is not None and action in request.legal_actions:
             self._body.observe(request.request.observation)
             await self._act(request, action, asked)
         return action
@@ -148,9 +148,9 @@ class _Aside:
         self._thread = None if is_coroutine else ThreadPoolExecutor(1, thread_name_prefix="agent")
         # What it is still to hear, and the decision that it computes.
         self._told: deque[Future[None]] = deque()
-        self._deciding: Future[int | Awaitable[int]] | None = None
+        self._deciding: Future[int | Awaitable[int | None] | None] | None = None
 
-    async def decide(self, request: Decision) -> int:
+    async def decide(self, request: Decision) -> int | None:
         """Lets it decide, after it has heard everything.
 
         Raises:
@@ -162,7 +162,8 @@ class _Aside:
             self._deciding = self._thread.submit(self._agent.decide, request)
             answer = await asyncio.wrap_future(self._deciding)
         self._raise()
-        return int(await answer if isinstance(answer, Awaitable) else answer)
+        action = await answer if isinstance(answer, Awaitable) else answer
+        return None if action is None else int(action)
 
     def tell(self, what: Callable[[chefshat.Agent], None]) -> None:
         """Tells it something. What it raised before is raised here."""
