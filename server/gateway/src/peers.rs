@@ -280,6 +280,7 @@ mod tests {
 
     use futures::FutureExt as _;
     use tokio::io::AsyncReadExt as _;
+    use tokio::net::TcpSocket;
 
     use super::*;
 
@@ -340,9 +341,12 @@ mod tests {
             metrics.text()
         };
 
-        let closed = listen().await.expect("a port").local_addr().expect("bound");
+        // Nobody listens there, and the port is not given to others.
+        let closed = TcpSocket::new_v4().expect("a socket");
+        closed.bind(([127, 0, 0, 1], 0).into()).expect("a port");
+        let closed_at = closed.local_addr().expect("bound");
         assert!(
-            errors(closed)
+            errors(closed_at)
                 .await
                 .contains("chefshat_peer_errors_total 1\n")
         );
