@@ -257,7 +257,7 @@ fn of_each() -> String {
         (
             "calls",
             format!(
-                "{}. An answer costs one more for each {} bytes, a message for each {} bytes that it takes once it is decoded (within a stream only one of more than {} KiB, after which the stream rests until its client may call again; imports have a rate of their own), a stream {}, a new room or a participant who joins a study {}, a room of built-in agents, a tournament, or the deletion of a participant's data {}",
+                "{}. An answer costs one more for each {} bytes, a message for each {} bytes that it takes once it is decoded (within a stream only one of more than {} KiB, which waits until its client may make another call; imports have a rate of their own), a stream {}, a new room or a participant who joins a study {}, a room of built-in agents, a tournament, or the deletion of a participant's data {}",
                 rate(calls::CALLS_PER_SECOND, calls::CALLS_AT_ONCE),
                 calls::BYTES_PER_CALL,
                 number(calls::DECODED_BYTES_PER_CALL),

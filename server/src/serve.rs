@@ -63,6 +63,10 @@ use crate::wire::peer::peer_service_server::PeerServiceServer;
 
 /// Largest request headers, bytes.
 const MAX_HEADER_BYTES: u32 = 16 * 1024;
+/// Most bytes of a client that wait on one stream to be read.
+const CLIENT_STREAM_WINDOW: u32 = 256 * 1024;
+/// Most bytes that wait on all streams of a connection: one that is not read does not hold up others.
+const CLIENT_CONNECTION_WINDOW: u32 = 1024 * 1024;
 
 /// Why serving failed.
 #[derive(Debug, thiserror::Error)]
@@ -415,6 +419,8 @@ impl Server {
             .accept_http1(true)
             .tcp_nodelay(true)
             .http2_max_header_list_size(MAX_HEADER_BYTES)
+            .initial_stream_window_size(CLIENT_STREAM_WINDOW)
+            .initial_connection_window_size(CLIENT_CONNECTION_WINDOW)
             .max_concurrent_streams(Some(MAX_STREAMS_PER_CONNECTION))
             .layer(ForwardedLayer::new(config.trusted_proxies.clone()))
             .layer(OriginLayer::new(origins))

@@ -76,8 +76,8 @@ pub struct Call {
     pub forwarded: bool,
     /// Whether its client sends a stream of messages.
     pub sends_many: bool,
-    /// Whether its service takes what its client sends at a pace of its own.
-    pub paced: bool,
+    /// Whether its service limits the rate of what its client sends.
+    pub has_own_rate: bool,
     /// What each of its messages may be.
     pub message: MessageLimits,
     /// Calls that it counts as for its caller. Decoding a large message counts besides.
@@ -140,10 +140,10 @@ impl Call {
         }
     }
 
-    /// Its service takes the stream that its client sends at a pace of its own.
-    const fn paced(self) -> Self {
+    /// Its service limits the rate of the stream that its client sends.
+    const fn with_own_rate(self) -> Self {
         Self {
-            paced: true,
+            has_own_rate: true,
             ..self
         }
     }
@@ -177,7 +177,7 @@ const fn call(path: &'static str, role: Role, scoped: Scoped) -> Call {
         heartbeats: false,
         forwarded: false,
         sends_many: false,
-        paced: false,
+        has_own_rate: false,
         message: MessageLimits::USUAL,
         charge: 1,
     }
@@ -445,7 +445,7 @@ pub const CALLS: &[Call] = &[
     records("/chefshat.v1.RecordService/StreamRecords").streaming(),
     call("/chefshat.v1.RecordService/ImportRecord", Host, Refused)
         .sending()
-        .paced()
+        .with_own_rate()
         .takes(MAX_MESSAGE_BYTES, 16_384, 6 * MIB),
     call("/chefshat.v1.VectorService/Run", Player, Refused)
         .sending()

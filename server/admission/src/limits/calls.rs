@@ -30,7 +30,8 @@ pub const BYTES_PER_CALL: u64 = 512;
 /// Bytes of a decoded message that cost as much as one call.
 pub const DECODED_BYTES_PER_CALL: u64 = 4 * 1024;
 /// A message of a stream, after its first, costs nothing if it takes no more bytes than this once it
-/// is decoded: the answers of a player, the actions of a batch.
+/// is decoded: the answers of a player, the actions of a batch. A larger one waits until its caller
+/// may make another call.
 pub const MAX_FREE_DECODED: usize = 512 * 1024;
 /// Calls that creating a room counts as: it is written to the disk, with its game and record.
 pub const COST_OF_ROOM: u64 = 20;
@@ -248,8 +249,20 @@ impl CallLimits {
     }
 
     /// How long a caller that has been charged must wait for its next call.
+    #[cfg(any(test, feature = "testing"))]
     pub fn wait(&self, key: Key) -> Duration {
         self.calls.wait(key)
+    }
+
+    /// Waits until a caller that has been charged may make its next call.
+    pub async fn may_call(&self, key: Key) {
+        loop {
+            let wait = self.calls.wait(key);
+            if wait.is_zero() {
+                return;
+            }
+            tokio::time::sleep(wait).await;
+        }
     }
 
     /// Takes the place of a stream that is already open for others; `None` if the caller has too many.

@@ -15,7 +15,7 @@ use chefshat_proto::cost::{Cost, Excess, Field, Kind, Shape, shapes};
 use futures::future::{BoxFuture, Either};
 use http::{Request, Response};
 use http_body::Frame;
-use tokio::time::{Instant, Sleep, sleep, sleep_until};
+use tokio::time::{Instant, Sleep, sleep_until};
 use tonic::body::Body;
 use tonic::{Code, Status};
 use tower::{Layer, Service};
@@ -174,6 +174,14 @@ where
     }
 }
 
+/// The memory from which messages of players take, or those of all others.
+fn memory_of(limits: &CallLimits, plays: bool) -> &Decoding {
+    match plays {
+        true => limits.playing(),
+        false => limits.decoding(),
+    }
+}
+
 fn take(permit: &HeldPermit) -> Option<Permit> {
     (permit.lock().expect("nothing panics under this lock")).take()
 }
@@ -207,8 +215,6 @@ struct Messages {
 enum State {
     /// Before the next message.
     Next,
-    /// A stream whose last message cost its caller more than it may spend now waits with the next.
-    Rests(Pin<Box<Sleep>>),
     /// A long message waits until it may be read.
     MayReceive(usize, BoxFuture<'static, Result<Permit, Refused>>),
     /// A message of this many bytes with its prefix is read. One that is not small has a permit.
@@ -216,7 +222,6 @@ enum State {
     /// A message waits until it may be decoded.
     MayDecode {
         message: Bytes,
-        memory: usize,
         permit: BoxFuture<'static, Result<Permit, Refused>>,
         _received: Option<Permit>,
     },
@@ -250,10 +255,6 @@ impl Messages {
                         }
                     };
                 }
-                State::Rests(until) => {
-                    ready!(until.as_mut().poll(context));
-                    self.state = State::Next;
-                }
                 State::MayReceive(length, permit) => {
                     let permit = ready!(permit.as_mut().poll(context));
                     let permit = permit.map_err(|refused| Status::from(Refusal::from(refused)))?;
@@ -280,27 +281,23 @@ impl Messages {
                     let cost = || self.cost(&message[PREFIX..]);
                     let memory = beside_tasks(message.len(), cost)?;
                     if memory <= SMALL_DECODED {
+                        self.limits.charge(self.key, self.charge(memory));
                         return Poll::Ready(Ok(Step::Pass(message)));
                     }
-                    let permit = self.memory().decode(self.key, memory);
                     self.state = State::MayDecode {
                         message,
-                        memory,
-                        permit: Box::pin(permit),
+                        permit: self.decode(memory),
                         _received: received,
                     };
                 }
                 State::MayDecode {
-                    message,
-                    memory,
-                    permit,
-                    ..
+                    message, permit, ..
                 } => {
                     let held = ready!(permit.as_mut().poll(context));
                     let held = held.map_err(|refused| Status::from(Refusal::from(refused)))?;
-                    let (message, memory) = (std::mem::take(message), *memory);
+                    let message = std::mem::take(message);
                     *self.permit.lock().expect("nothing panics under this lock") = Some(held);
-                    self.state = self.after(memory);
+                    self.state = State::Next;
                     return Poll::Ready(Ok(Step::Pass(message)));
                 }
             }
@@ -309,10 +306,7 @@ impl Messages {
 
     /// The memory from which its messages take.
     fn memory(&self) -> &Decoding {
-        match self.call.plays() {
-            true => self.limits.playing(),
-            false => self.limits.decoding(),
-        }
+        memory_of(&self.limits, self.call.plays())
     }
 
     /// Nothing has arrived now: ready when what the client has begun is too slow. A stream may be
@@ -377,28 +371,41 @@ impl Messages {
         }
     }
 
-    /// Where a body is after a message that took this memory: a stream that sends large ones goes on
-    /// when its caller may make another call.
-    fn after(&self, memory: usize) -> State {
-        let rests = self.call.sends_many && !self.call.paced && memory > MAX_FREE_DECODED;
-        match rests {
-            true => State::Rests(Box::pin(sleep(self.limits.wait(self.key)))),
-            false => State::Next,
+    /// A permit to decode a message into this many bytes. Its caller is charged; a large message of a
+    /// stream waits until the caller may make another call, which holds up its own streams alone.
+    fn decode(&self, memory: usize) -> BoxFuture<'static, Result<Permit, Refused>> {
+        let (limits, key) = (Arc::clone(&self.limits), self.key);
+        let (calls, plays) = (self.charge(memory), self.call.plays());
+        let is_large = memory > MAX_FREE_DECODED;
+        let waits = is_large && self.call.sends_many && !self.call.has_own_rate;
+        Box::pin(async move {
+            if waits {
+                limits.may_call(key).await;
+            }
+            limits.charge(key, calls);
+            let permit = memory_of(&limits, plays).decode(key, memory);
+            permit.await
+        })
+    }
+
+    /// How many calls a message counts as that is decoded into this many bytes.
+    fn charge(&self, memory: usize) -> u64 {
+        let is_large = memory > MAX_FREE_DECODED && !self.call.has_own_rate;
+        let counts = self.begun == 1 || is_large;
+        if counts {
+            memory as u64 / DECODED_BYTES_PER_CALL
+        } else {
+            0
         }
     }
 
-    /// Counts the memory of a message, and charges its caller.
+    /// Counts the memory of a message.
     fn cost(&self, message: &[u8]) -> Result<usize, Status> {
         let MessageLimits {
             elements, memory, ..
         } = self.call.message;
         let cost = (self.shape.cost(message, Cost { elements, memory }))
             .map_err(|excess| refused(excess, &self.call.message))?;
-        let charge = cost.memory as u64 / DECODED_BYTES_PER_CALL;
-        let costs = self.begun == 1 || cost.memory > MAX_FREE_DECODED;
-        if charge > 0 && costs && !self.call.paced {
-            self.limits.charge(self.key, charge);
-        }
         Ok(cost.memory)
     }
 }
@@ -898,26 +905,40 @@ mod tests {
         assert_eq!(send(run, &[&small, &small, &small]).await, 0.0);
         let wait = limits.wait(key).as_secs_f64();
         assert!((wait - time(cost(&small))).abs() < 0.001, "{wait}");
-        // After each large one a stream rests.
-        let rested = send(run, &[&large, &large, &small]).await;
-        let expected = time(cost(&small) + 2 * cost(&large));
-        assert!((rested - expected).abs() < 0.01, "{rested} {expected}");
-        // Imports have a pace of their own.
-        let import = framed(
-            &v1::ImportRecordRequest {
-                lines: vec![v1::RecordLine::default(); 1_000],
-            }
-            .encode_to_vec(),
-        );
-        assert_eq!(
-            send(
-                "/chefshat.v1.RecordService/ImportRecord",
-                &[&import, &import]
-            )
-            .await,
-            0.0
-        );
-        assert_eq!(limits.wait(key), Duration::ZERO);
+        // Each large one waits for what came before it.
+        let waited = send(run, &[&large, &large, &small]).await;
+        let expected = time(cost(&small) + cost(&large));
+        assert!((waited - expected).abs() < 0.01, "{waited} {expected}");
+        let wait = limits.wait(key).as_secs_f64();
+        assert!((wait - time(cost(&large))).abs() < 0.01, "{wait}");
+        // Streams of one caller wait for each other: together they take as long.
+        let (path, body) = (run, [large.as_slice(), &large].concat());
+        let begun = Instant::now();
+        let together = (0..3).map(|_| {
+            let body = http_body_util::Full::new(Bytes::from(body.clone()));
+            services.call(request(path, Body::new(body)))
+        });
+        for answer in futures::future::join_all(together.collect::<Vec<_>>()).await {
+            assert_eq!(reason_of(&answer.expect("infallible")), None);
+        }
+        let expected = time(6 * cost(&large));
+        let waited = begun.elapsed().as_secs_f64();
+        assert!((waited - expected).abs() < 0.01, "{waited} {expected}");
+
+        // Imports have a rate of their own: only their first message counts.
+        tokio::time::sleep(limits.wait(key)).await;
+        let import = v1::ImportRecordRequest {
+            lines: vec![v1::RecordLine::default(); 1_000],
+        };
+        let import = framed(&import.encode_to_vec());
+        let path = "/chefshat.v1.RecordService/ImportRecord";
+        let body = http_body_util::Full::new(Bytes::from(import.repeat(3)));
+        let answer = services.call(request(path, Body::new(body))).await;
+        assert_eq!(reason_of(&answer.expect("infallible")), None);
+        let most = shape(path).cost(&import[PREFIX..], Cost::MAX);
+        let expected = time(most.expect("legal").memory as u64 / DECODED_BYTES_PER_CALL);
+        let wait = limits.wait(key).as_secs_f64();
+        assert!((wait - expected).abs() < 0.01, "{wait} {expected}");
     }
 
     #[tokio::test]
