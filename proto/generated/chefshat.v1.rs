@@ -8904,7 +8904,7 @@ pub struct StudyStage {
     #[prost(message, repeated, tag = "8")]
     pub shown_if: ::prost::alloc::vec::Vec<StudyShownIf>,
     /// What the participant does.
-    #[prost(oneof = "study_stage::Stage", tags = "1, 2, 3, 4, 5, 6, 7")]
+    #[prost(oneof = "study_stage::Stage", tags = "1, 2, 3, 4, 5, 6, 7, 9")]
     pub stage: ::core::option::Option<study_stage::Stage>,
 }
 /// Nested message and enum types in `StudyStage`.
@@ -8933,7 +8933,18 @@ pub mod study_stage {
         /// Does these stages for each of its conditions.
         #[prost(message, tag = "7")]
         PerCondition(super::StudyBlock),
+        /// Takes part no longer; only with `shown_if`.
+        #[prost(message, tag = "9")]
+        ScreenOut(super::StudyScreenOut),
     }
+}
+/// Ends the participation of those whose answers show that the study is not for them: they are
+/// screened out, and their slots are free again. What they have answered is kept.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct StudyScreenOut {
+    /// What they read, in Markdown (StudyText), at most 2000 characters; may be empty.
+    #[prost(string, tag = "1")]
+    pub text: ::prost::alloc::string::String,
 }
 /// How people take part who were not given a link of their own, for example from a panel such as
 /// Prolific, SONA or MTurk.
@@ -8960,6 +8971,9 @@ pub struct StudyRecruiting {
     /// As `completed_url`, for those who cannot begin because the study is closed or full.
     #[prost(string, tag = "5")]
     pub full_url: ::prost::alloc::string::String,
+    /// As `completed_url`, for those who are screened out (StudyScreenOut); empty: as `left_url`.
+    #[prost(string, tag = "6")]
+    pub screened_out_url: ::prost::alloc::string::String,
 }
 /// The settings of a study. In a request an unset field means its default; in a response every field
 /// is set that the server knew when the study was created.
@@ -9009,17 +9023,18 @@ pub struct StudySettings {
     /// nobody has the slot.
     #[prost(uint64, tag = "13")]
     pub drop_out_after_ms: u64,
-    /// Milliseconds since the Unix epoch when the study closes; 0: when its owner closes it.
+    /// Milliseconds since the Unix epoch when the study closes, before the year 10000; 0: when its owner
+    /// closes it.
     #[prost(uint64, tag = "14")]
     pub closes_at_ms: u64,
     /// How people without a link of their own take part; by default nobody does.
     #[prost(message, optional, tag = "15")]
     pub recruiting: ::core::option::Option<StudyRecruiting>,
     /// Milliseconds since the Unix epoch when the study closes, if it is not closed, and the server
-    /// deletes it with all its data, as DeleteStudy with `force`: at most two hours later, since it waits
-    /// until it is sure of the time. In the future when the study is created, and not before
-    /// `closes_at_ms`; 0: when its owner deletes it. Participants are told this date with what they
-    /// consent to.
+    /// deletes it with all its data, as DeleteStudy with `force`: when it has run for an hour after this
+    /// time, so that a clock that jumps deletes nothing, and within two hours. In the future when the
+    /// study is created, before the year 10000, and not before `closes_at_ms`; 0: when its owner deletes
+    /// it. Participants are told this date with what they consent to.
     #[prost(uint64, tag = "16")]
     pub deletes_at_ms: u64,
 }
@@ -9388,6 +9403,9 @@ pub struct StudyEnd {
     /// Where the page sends the participant next (StudyRecruiting); empty if nowhere.
     #[prost(string, tag = "2")]
     pub url: ::prost::alloc::string::String,
+    /// The text of StudyScreenOut, in Markdown; empty for other reasons.
+    #[prost(string, tag = "3")]
+    pub text: ::prost::alloc::string::String,
 }
 /// An answer to an item. Sent by participants.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -9619,6 +9637,8 @@ pub enum StudyParticipantState {
     DroppedOut = 5,
     /// It was removed by the study's owner.
     Removed = 6,
+    /// It was screened out (StudyScreenOut).
+    ScreenedOut = 7,
 }
 impl StudyParticipantState {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -9634,6 +9654,7 @@ impl StudyParticipantState {
             Self::Withdrawn => "STUDY_PARTICIPANT_STATE_WITHDRAWN",
             Self::DroppedOut => "STUDY_PARTICIPANT_STATE_DROPPED_OUT",
             Self::Removed => "STUDY_PARTICIPANT_STATE_REMOVED",
+            Self::ScreenedOut => "STUDY_PARTICIPANT_STATE_SCREENED_OUT",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -9646,6 +9667,7 @@ impl StudyParticipantState {
             "STUDY_PARTICIPANT_STATE_WITHDRAWN" => Some(Self::Withdrawn),
             "STUDY_PARTICIPANT_STATE_DROPPED_OUT" => Some(Self::DroppedOut),
             "STUDY_PARTICIPANT_STATE_REMOVED" => Some(Self::Removed),
+            "STUDY_PARTICIPANT_STATE_SCREENED_OUT" => Some(Self::ScreenedOut),
             _ => None,
         }
     }
@@ -9666,6 +9688,8 @@ pub enum StudyEndReason {
     DroppedOut = 4,
     /// It was removed by the researchers.
     Removed = 5,
+    /// Its answers showed that the study is not for it (StudyScreenOut).
+    ScreenedOut = 6,
 }
 impl StudyEndReason {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -9680,6 +9704,7 @@ impl StudyEndReason {
             Self::DataDeleted => "STUDY_END_REASON_DATA_DELETED",
             Self::DroppedOut => "STUDY_END_REASON_DROPPED_OUT",
             Self::Removed => "STUDY_END_REASON_REMOVED",
+            Self::ScreenedOut => "STUDY_END_REASON_SCREENED_OUT",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -9691,6 +9716,7 @@ impl StudyEndReason {
             "STUDY_END_REASON_DATA_DELETED" => Some(Self::DataDeleted),
             "STUDY_END_REASON_DROPPED_OUT" => Some(Self::DroppedOut),
             "STUDY_END_REASON_REMOVED" => Some(Self::Removed),
+            "STUDY_END_REASON_SCREENED_OUT" => Some(Self::ScreenedOut),
             _ => None,
         }
     }
@@ -16494,7 +16520,8 @@ pub mod vector_service_client {
         /// (SETUP_TOO_LATE, CLIENT_IDLE, CLIENT_TOO_SLOW), UNAVAILABLE (SHUTTING_DOWN); a request above
         /// max_vector_message_bytes ends it with OUT_OF_RANGE. The limits are in
         /// ServerService.GetServerInfo. A batch has at most max_vector_batch_bytes: allow your client to
-        /// receive that much.
+        /// receive that much. A request that takes more than 512 KiB once it is decoded counts as several
+        /// calls of the client, and waits until the client may make another call.
         pub async fn run(
             &mut self,
             request: impl tonic::IntoStreamingRequest<Message = super::RunRequest>,
@@ -16552,7 +16579,8 @@ pub mod vector_service_server {
         /// (SETUP_TOO_LATE, CLIENT_IDLE, CLIENT_TOO_SLOW), UNAVAILABLE (SHUTTING_DOWN); a request above
         /// max_vector_message_bytes ends it with OUT_OF_RANGE. The limits are in
         /// ServerService.GetServerInfo. A batch has at most max_vector_batch_bytes: allow your client to
-        /// receive that much.
+        /// receive that much. A request that takes more than 512 KiB once it is decoded counts as several
+        /// calls of the client, and waits until the client may make another call.
         async fn run(
             &self,
             request: tonic::Request<tonic::Streaming<super::RunRequest>>,

@@ -37029,6 +37029,9 @@ impl serde::Serialize for StudyEnd {
         if !self.url.is_empty() {
             len += 1;
         }
+        if !self.text.is_empty() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyEnd", len)?;
         if self.reason != 0 {
             let v = StudyEndReason::try_from(self.reason)
@@ -37037,6 +37040,9 @@ impl serde::Serialize for StudyEnd {
         }
         if !self.url.is_empty() {
             struct_ser.serialize_field("url", &self.url)?;
+        }
+        if !self.text.is_empty() {
+            struct_ser.serialize_field("text", &self.text)?;
         }
         struct_ser.end()
     }
@@ -37050,12 +37056,14 @@ impl<'de> serde::Deserialize<'de> for StudyEnd {
         const FIELDS: &[&str] = &[
             "reason",
             "url",
+            "text",
         ];
 
         #[allow(clippy::enum_variant_names)]
         enum GeneratedField {
             Reason,
             Url,
+            Text,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -37079,6 +37087,7 @@ impl<'de> serde::Deserialize<'de> for StudyEnd {
                         match value {
                             "reason" => Ok(GeneratedField::Reason),
                             "url" => Ok(GeneratedField::Url),
+                            "text" => Ok(GeneratedField::Text),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -37100,6 +37109,7 @@ impl<'de> serde::Deserialize<'de> for StudyEnd {
             {
                 let mut reason__ = None;
                 let mut url__ = None;
+                let mut text__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Reason => {
@@ -37114,11 +37124,18 @@ impl<'de> serde::Deserialize<'de> for StudyEnd {
                             }
                             url__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::Text => {
+                            if text__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("text"));
+                            }
+                            text__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(StudyEnd {
                     reason: reason__.unwrap_or_default(),
                     url: url__.unwrap_or_default(),
+                    text: text__.unwrap_or_default(),
                 })
             }
         }
@@ -37138,6 +37155,7 @@ impl serde::Serialize for StudyEndReason {
             Self::DataDeleted => "STUDY_END_REASON_DATA_DELETED",
             Self::DroppedOut => "STUDY_END_REASON_DROPPED_OUT",
             Self::Removed => "STUDY_END_REASON_REMOVED",
+            Self::ScreenedOut => "STUDY_END_REASON_SCREENED_OUT",
         };
         serializer.serialize_str(variant)
     }
@@ -37155,6 +37173,7 @@ impl<'de> serde::Deserialize<'de> for StudyEndReason {
             "STUDY_END_REASON_DATA_DELETED",
             "STUDY_END_REASON_DROPPED_OUT",
             "STUDY_END_REASON_REMOVED",
+            "STUDY_END_REASON_SCREENED_OUT",
         ];
 
         struct GeneratedVisitor;
@@ -37201,6 +37220,7 @@ impl<'de> serde::Deserialize<'de> for StudyEndReason {
                     "STUDY_END_REASON_DATA_DELETED" => Ok(StudyEndReason::DataDeleted),
                     "STUDY_END_REASON_DROPPED_OUT" => Ok(StudyEndReason::DroppedOut),
                     "STUDY_END_REASON_REMOVED" => Ok(StudyEndReason::Removed),
+                    "STUDY_END_REASON_SCREENED_OUT" => Ok(StudyEndReason::ScreenedOut),
                     _ => Err(serde::de::Error::unknown_variant(value, FIELDS)),
                 }
             }
@@ -39442,6 +39462,7 @@ impl serde::Serialize for StudyParticipantState {
             Self::Withdrawn => "STUDY_PARTICIPANT_STATE_WITHDRAWN",
             Self::DroppedOut => "STUDY_PARTICIPANT_STATE_DROPPED_OUT",
             Self::Removed => "STUDY_PARTICIPANT_STATE_REMOVED",
+            Self::ScreenedOut => "STUDY_PARTICIPANT_STATE_SCREENED_OUT",
         };
         serializer.serialize_str(variant)
     }
@@ -39460,6 +39481,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipantState {
             "STUDY_PARTICIPANT_STATE_WITHDRAWN",
             "STUDY_PARTICIPANT_STATE_DROPPED_OUT",
             "STUDY_PARTICIPANT_STATE_REMOVED",
+            "STUDY_PARTICIPANT_STATE_SCREENED_OUT",
         ];
 
         struct GeneratedVisitor;
@@ -39507,6 +39529,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipantState {
                     "STUDY_PARTICIPANT_STATE_WITHDRAWN" => Ok(StudyParticipantState::Withdrawn),
                     "STUDY_PARTICIPANT_STATE_DROPPED_OUT" => Ok(StudyParticipantState::DroppedOut),
                     "STUDY_PARTICIPANT_STATE_REMOVED" => Ok(StudyParticipantState::Removed),
+                    "STUDY_PARTICIPANT_STATE_SCREENED_OUT" => Ok(StudyParticipantState::ScreenedOut),
                     _ => Err(serde::de::Error::unknown_variant(value, FIELDS)),
                 }
             }
@@ -40174,6 +40197,9 @@ impl serde::Serialize for StudyRecruiting {
         if !self.full_url.is_empty() {
             len += 1;
         }
+        if !self.screened_out_url.is_empty() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyRecruiting", len)?;
         if self.open_link {
             struct_ser.serialize_field("openLink", &self.open_link)?;
@@ -40189,6 +40215,9 @@ impl serde::Serialize for StudyRecruiting {
         }
         if !self.full_url.is_empty() {
             struct_ser.serialize_field("fullUrl", &self.full_url)?;
+        }
+        if !self.screened_out_url.is_empty() {
+            struct_ser.serialize_field("screenedOutUrl", &self.screened_out_url)?;
         }
         struct_ser.end()
     }
@@ -40210,6 +40239,8 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
             "leftUrl",
             "full_url",
             "fullUrl",
+            "screened_out_url",
+            "screenedOutUrl",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -40219,6 +40250,7 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
             CompletedUrl,
             LeftUrl,
             FullUrl,
+            ScreenedOutUrl,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -40245,6 +40277,7 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
                             "completedUrl" | "completed_url" => Ok(GeneratedField::CompletedUrl),
                             "leftUrl" | "left_url" => Ok(GeneratedField::LeftUrl),
                             "fullUrl" | "full_url" => Ok(GeneratedField::FullUrl),
+                            "screenedOutUrl" | "screened_out_url" => Ok(GeneratedField::ScreenedOutUrl),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -40269,6 +40302,7 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
                 let mut completed_url__ = None;
                 let mut left_url__ = None;
                 let mut full_url__ = None;
+                let mut screened_out_url__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::OpenLink => {
@@ -40301,6 +40335,12 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
                             }
                             full_url__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::ScreenedOutUrl => {
+                            if screened_out_url__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("screenedOutUrl"));
+                            }
+                            screened_out_url__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(StudyRecruiting {
@@ -40309,10 +40349,102 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
                     completed_url: completed_url__.unwrap_or_default(),
                     left_url: left_url__.unwrap_or_default(),
                     full_url: full_url__.unwrap_or_default(),
+                    screened_out_url: screened_out_url__.unwrap_or_default(),
                 })
             }
         }
         deserializer.deserialize_struct("chefshat.v1.StudyRecruiting", FIELDS, GeneratedVisitor)
+    }
+}
+impl serde::Serialize for StudyScreenOut {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if !self.text.is_empty() {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyScreenOut", len)?;
+        if !self.text.is_empty() {
+            struct_ser.serialize_field("text", &self.text)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyScreenOut {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "text",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Text,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "text" => Ok(GeneratedField::Text),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = StudyScreenOut;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.StudyScreenOut")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<StudyScreenOut, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut text__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Text => {
+                            if text__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("text"));
+                            }
+                            text__ = Some(map_.next_value()?);
+                        }
+                    }
+                }
+                Ok(StudyScreenOut {
+                    text: text__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.StudyScreenOut", FIELDS, GeneratedVisitor)
     }
 }
 impl serde::Serialize for StudySemanticDifferential {
@@ -41889,6 +42021,9 @@ impl serde::Serialize for StudyStage {
                 study_stage::Stage::PerCondition(v) => {
                     struct_ser.serialize_field("perCondition", v)?;
                 }
+                study_stage::Stage::ScreenOut(v) => {
+                    struct_ser.serialize_field("screenOut", v)?;
+                }
             }
         }
         struct_ser.end()
@@ -41912,6 +42047,8 @@ impl<'de> serde::Deserialize<'de> for StudyStage {
             "text",
             "per_condition",
             "perCondition",
+            "screen_out",
+            "screenOut",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -41924,6 +42061,7 @@ impl<'de> serde::Deserialize<'de> for StudyStage {
             Games,
             Text,
             PerCondition,
+            ScreenOut,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -41953,6 +42091,7 @@ impl<'de> serde::Deserialize<'de> for StudyStage {
                             "games" => Ok(GeneratedField::Games),
                             "text" => Ok(GeneratedField::Text),
                             "perCondition" | "per_condition" => Ok(GeneratedField::PerCondition),
+                            "screenOut" | "screen_out" => Ok(GeneratedField::ScreenOut),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -42029,6 +42168,13 @@ impl<'de> serde::Deserialize<'de> for StudyStage {
                                 return Err(serde::de::Error::duplicate_field("perCondition"));
                             }
                             stage__ = map_.next_value::<::std::option::Option<_>>()?.map(study_stage::Stage::PerCondition)
+;
+                        }
+                        GeneratedField::ScreenOut => {
+                            if stage__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("screenOut"));
+                            }
+                            stage__ = map_.next_value::<::std::option::Option<_>>()?.map(study_stage::Stage::ScreenOut)
 ;
                         }
                     }

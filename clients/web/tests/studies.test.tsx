@@ -9,6 +9,7 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
 import { ParticipantSchema } from "../src/gen/chefshat/v1/room_pb";
 import {
+  StudyEndReason,
   type StudyShownItem,
   StudyShownItemSchema,
   StudyTraceKind,
@@ -180,7 +181,7 @@ test.each([
   expect(root.querySelector('[data-part="withdraw"]')).toBeNull();
 });
 
-test("who is asked to consent learns until when there are data", async () => {
+test("who is asked to consent reads on which date all data are deleted", async () => {
   const { streams } = fakeStudy([CONSENT]);
   await show();
   expect(root.textContent).not.toContain("deleted from the server");
@@ -191,6 +192,17 @@ test("who is asked to consent learns until when there are data", async () => {
   expect(root.textContent).toContain(
     "All data of this study are deleted from the server by December 30, 2031 at the latest.",
   );
+});
+
+test("who is screened out reads why, and can have the data deleted", async () => {
+  const end = { reason: StudyEndReason.SCREENED_OUT, text: "For **adults** only.", url: "https://panel.example/out" };
+  fakeStudy([{ case: "end", value: end }]);
+  await show();
+  expect(title()).toBe("The study is over for you");
+  expect(root.textContent).toContain("this study is meant for other people");
+  expect(root.querySelector("strong")?.textContent).toBe("adults");
+  expect(root.querySelector<HTMLAnchorElement>('[data-part="go-on"]')?.href).toBe("https://panel.example/out");
+  expect(button("Delete my data…")).toBeDefined();
 });
 
 test("another device that opens the study is said clearly, and can be answered", async () => {

@@ -92,6 +92,13 @@ pub enum Change {
         /// When, in milliseconds since the Unix epoch.
         at_ms: u64,
     },
+    /// A participant came to a step that screens it out.
+    ScreenedOut {
+        /// The participant.
+        number: u32,
+        /// When, in milliseconds since the Unix epoch.
+        at_ms: u64,
+    },
     /// A participant withdrew.
     Withdrew {
         /// The participant.
@@ -125,6 +132,7 @@ impl Change {
             | Self::GameEnded { number, .. }
             | Self::Continued { number, .. }
             | Self::DroppedOut { number, .. }
+            | Self::ScreenedOut { number, .. }
             | Self::Withdrew { number, .. }
             | Self::Removed { number, .. } => Some(*number),
             Self::Closed => None,

@@ -293,7 +293,9 @@ impl Study {
             Task::Questionnaire(_) if participant.test => 0,
             Task::Practice { .. } => 1,
             Task::Games { count } => *count,
-            Task::Consent(_) | Task::Questionnaire(_) => return Err(Refusal::StepMismatch),
+            Task::Consent(_) | Task::Questionnaire(_) | Task::ScreenOut(_) => {
+                return Err(Refusal::StepMismatch);
+            }
         };
         if count > 0 && !matches!(Phase::of(participant), Phase::Over(_)) {
             return Err(Refusal::GameNotOver);
@@ -306,6 +308,18 @@ impl Study {
                 true => self.passed_over_next(participant, None),
                 false => 0,
             },
+            at_ms: now_ms,
+        })
+    }
+
+    /// The change that ends the participation of somebody who has come to a step that screens it out;
+    /// `None` for all others.
+    pub fn screen_out(&self, number: u32, now_ms: u64) -> Option<Change> {
+        let participant = self.participant(number)?;
+        let is_active = participant.status == Status::Active;
+        let is_out = matches!(self.step_of(participant)?.task, Task::ScreenOut(_));
+        (is_active && is_out).then_some(Change::ScreenedOut {
+            number,
             at_ms: now_ms,
         })
     }

@@ -71,8 +71,8 @@ pub use settings::{
     MAX_SEEDS, MAX_STEPS, MAX_TESTS, Settings,
 };
 pub use stage::{
-    Consent, ExternalQuestionnaire, MAX_BLOCK, MAX_STAGE_GAMES, MAX_STAGES, Part, Stage, Step,
-    Task, Text,
+    Consent, ExternalQuestionnaire, MAX_BLOCK, MAX_STAGE_GAMES, MAX_STAGES, Part, ScreenOut, Stage,
+    Step, Task, Text,
 };
 pub use state::{Participant, PlayedGame, Status};
 pub use templates::{Language, Template};

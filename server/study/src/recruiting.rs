@@ -22,6 +22,8 @@ pub struct Recruiting {
     pub left_url: String,
     /// Where it sends those who cannot begin; empty: nowhere.
     pub full_url: String,
+    /// Where it sends those who are screened out; empty: as those who leave.
+    pub screened_out_url: String,
 }
 
 impl Recruiting {
@@ -38,6 +40,7 @@ impl Recruiting {
             ("completed_url", &self.completed_url),
             ("left_url", &self.left_url),
             ("full_url", &self.full_url),
+            ("screened_out_url", &self.screened_out_url),
         ] {
             let field = format!("{field}.{name}");
             if url.is_empty() {
@@ -84,6 +87,14 @@ impl Recruiting {
     pub(crate) fn filled_in(url: &str, id: &str) -> Option<String> {
         let lacks_id = url.contains(PLACEHOLDER) && id.is_empty();
         (!url.is_empty() && !lacks_id).then(|| address::filled_in(url, PLACEHOLDER, id))
+    }
+
+    /// Where those are sent who are screened out; empty: nowhere.
+    pub(crate) fn screened_out_url(&self) -> &str {
+        match self.screened_out_url.is_empty() {
+            true => &self.left_url,
+            false => &self.screened_out_url,
+        }
     }
 
     /// Where somebody with this id is sent who cannot begin.

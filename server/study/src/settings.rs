@@ -65,6 +65,9 @@ pub struct Settings {
     pub recruiting: Recruiting,
 }
 
+/// The last date that is written with four digits of the year, in milliseconds since the Unix epoch.
+const MAX_TIME_MS: u64 = 253_402_300_799_999;
+
 /// A factor of the design.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Factor {
@@ -181,6 +184,12 @@ impl Settings {
         self.recruiting.check("recruiting")?;
         let away = self.drop_out_after_ms;
         within("drop_out_after_ms", away, 60_000..=604_800_000)?;
+        for (field, at_ms) in [
+            ("closes_at_ms", self.closes_at_ms),
+            ("deletes_at_ms", self.deletes_at_ms),
+        ] {
+            within(field, at_ms.unwrap_or(0), 0..=MAX_TIME_MS)?;
+        }
         match (self.closes_at_ms, self.deletes_at_ms) {
             (Some(closes), Some(deletes)) if closes > deletes => {
                 refuse("deletes_at_ms", "the study closes only after that")

@@ -57,6 +57,8 @@ pub enum Task {
     },
     /// Reads a text.
     Text(Text),
+    /// Takes part no longer.
+    ScreenOut(ScreenOut),
 }
 
 /// A text to agree to.
@@ -75,6 +77,13 @@ pub struct ExternalQuestionnaire {
     pub text: String,
     /// The address, which begins with https://.
     pub url: String,
+}
+
+/// The end of a participation by earlier answers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ScreenOut {
+    /// What the participant reads, at most 2000 characters.
+    pub text: String,
 }
 
 /// A text to read.
@@ -171,6 +180,12 @@ impl Part {
         if is_for_all && !self.shown_if.is_empty() {
             return refuse(shown_if, "consent and games are for all participants");
         }
+        if matches!(self.task, Task::ScreenOut(_)) && self.shown_if.is_empty() {
+            return refuse(
+                shown_if,
+                "say after which answers participants are screened out",
+            );
+        }
         ShownIf::check_all(&self.shown_if, &shown_if, earlier, None)?;
         let Task::Questionnaire(questionnaire) = &self.task else {
             return Ok(());
@@ -211,6 +226,10 @@ impl Task {
             Self::Text(text) => {
                 characters(&format!("{field}.text.title"), &text.title, 0..=128)?;
                 characters(&format!("{field}.text.text"), &text.text, 1..=MAX_TEXT)
+            }
+            Self::ScreenOut(out) => {
+                let field = format!("{field}.screen_out.text");
+                characters(&field, &out.text, 0..=MAX_TEXT_ABOVE)
             }
         }
     }

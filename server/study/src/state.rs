@@ -24,6 +24,8 @@ pub enum Status {
     DroppedOut,
     /// Was removed by the study's owner.
     Removed,
+    /// Was screened out by its answers.
+    ScreenedOut,
 }
 
 /// A participant.
@@ -103,7 +105,7 @@ impl Participant {
     pub(crate) fn ends_by_withdrawing(&self, delete_data: bool) -> bool {
         match self.status {
             Status::Withdrawn => false,
-            Status::Completed | Status::Removed => !delete_data,
+            Status::Completed | Status::Removed | Status::ScreenedOut => !delete_data,
             Status::Invited | Status::Active | Status::DroppedOut => true,
         }
     }
@@ -258,6 +260,11 @@ impl StudyState {
             Change::DroppedOut { number, at_ms } => {
                 if let Some(participant) = self.active(*number) {
                     participant.end(Status::DroppedOut, *at_ms);
+                }
+            }
+            Change::ScreenedOut { number, at_ms } => {
+                if let Some(participant) = self.active(*number) {
+                    participant.end(Status::ScreenedOut, *at_ms);
                 }
             }
             Change::Withdrew {

@@ -56,6 +56,8 @@ pub enum Content {
         reason: End,
         /// Where the page sends the participant next, if anywhere.
         url: Option<String>,
+        /// What the study says to those who are screened out, or empty.
+        text: String,
     },
 }
 
@@ -117,6 +119,8 @@ pub enum End {
     DroppedOut,
     /// It was removed by the study's owner.
     Removed,
+    /// It was screened out by its answers.
+    ScreenedOut,
 }
 
 impl Study {
@@ -131,6 +135,7 @@ impl Study {
             Status::Withdrawn => self.end(participant, End::Withdrawn),
             Status::DroppedOut => self.end(participant, End::DroppedOut),
             Status::Removed => self.end(participant, End::Removed),
+            Status::ScreenedOut => self.end(participant, End::ScreenedOut),
         };
         let settings = self.settings();
         Some(View {
@@ -151,6 +156,7 @@ impl Study {
         let url = match participant.status {
             Status::Completed => &recruiting.completed_url,
             Status::Withdrawn | Status::DroppedOut | Status::Removed => &recruiting.left_url,
+            Status::ScreenedOut => recruiting.screened_out_url(),
             Status::Invited | Status::Active => "",
         };
         // What a panel pays for was not done in a test.
@@ -158,7 +164,11 @@ impl Study {
             true => None,
             false => Recruiting::filled_in(url, participant.panel_id()),
         };
-        Content::End { reason, url }
+        let text = match self.step_of(participant).map(|step| step.task) {
+            Some(Task::ScreenOut(out)) if reason == End::ScreenedOut => out.text.clone(),
+            _ => String::new(),
+        };
+        Content::End { reason, url, text }
     }
 
     fn content(&self, number: u32, participant: &Participant) -> Option<Content> {
@@ -172,6 +182,7 @@ impl Study {
             }
             Task::External(it) => Content::External(it.filled_in(&participant.pseudonym)),
             Task::Text(text) => Content::Text(text.clone()),
+            Task::ScreenOut(_) => self.end(participant, End::ScreenedOut),
             Task::Practice { .. } => Content::Game(self.shown_game(participant, true, 1)),
             Task::Games { count } => Content::Game(self.shown_game(participant, false, *count)),
         })

@@ -22,6 +22,7 @@ fn recruited() -> v1::StudySettings {
             completed_url: "https://panel.example/done?id={id}".to_owned(),
             left_url: "https://panel.example/left".to_owned(),
             full_url: FULL.to_owned(),
+            ..v1::StudyRecruiting::default()
         }),
         ..settings()
     }

@@ -93,6 +93,8 @@ function FromForm() {
   const words = t().studies.make;
   const [form, setForm] = useState<StudyForm>(() => emptyForm(language.peek()));
   const [tried, setTried] = useState(false);
+  // Dates of which only a part is entered are empty in the form.
+  const [unfinished, setUnfinished] = useState<readonly string[]>([]);
   const [requestId] = useState(newRequestId);
   const { offered } = useOffered();
   const { busy, fault, run } = useAttempt();
@@ -104,7 +106,11 @@ function FromForm() {
   const submit = (event: Event) => {
     event.preventDefault();
     setTried(true);
-    if (Object.keys(faultsOf(form)).length > 0) return;
+    const typed = event.currentTarget as HTMLFormElement;
+    const isUnfinished = (name: string) => (typed.elements.namedItem(name) as HTMLInputElement).validity.badInput;
+    const unfinished = DATES.filter(isUnfinished);
+    setUnfinished(unfinished);
+    if (unfinished.length > 0 || Object.keys(faultsOf(form)).length > 0) return;
     run(async () => navigate({ page: "ownStudy", studyId: await createStudy(await settingsOf(form), requestId) }));
   };
   const text = (
@@ -229,12 +235,13 @@ function FromForm() {
         {DATES.map((name) => (
           <TextField
             key={name}
+            name={name}
             type="datetime-local"
             label={words[name]}
             hint={name === "deletesAt" ? words.deletesAtHint : undefined}
             value={form[name]}
             onText={(typed) => change({ [name]: typed })}
-            fault={faults[name]}
+            fault={unfinished.includes(name) ? words.problems.unfinished : faults[name]}
           />
         ))}
       </div>

@@ -431,6 +431,7 @@ const LEFT = [
   StudyParticipantState.WITHDRAWN,
   StudyParticipantState.DROPPED_OUT,
   StudyParticipantState.REMOVED,
+  StudyParticipantState.SCREENED_OUT,
   StudyParticipantState.COMPLETED,
 ];
 

@@ -230,7 +230,7 @@ function Consent({ consent, view, part }: StageProps & { consent: StudyConsent }
   );
 }
 
-/** What the server adds to the text of a consent: its version, and until when there are data. */
+/** What the server adds to the text of a consent: its version, and the date on which all data are deleted. */
 function aboutConsent({ version }: StudyConsent, { deletesAtMs }: StudyView): string[] {
   const words = t().studies.consent;
   const deletion = deletesAtMs > 0n ? [words.deletion(dateOf(deletesAtMs + DELETION_TAKES_MS))] : [];
@@ -303,6 +303,7 @@ const ENDS: Partial<Record<StudyEndReason, keyof ReturnType<typeof t>["studies"]
   [StudyEndReason.DATA_DELETED]: "deleted",
   [StudyEndReason.DROPPED_OUT]: "droppedOut",
   [StudyEndReason.REMOVED]: "removed",
+  [StudyEndReason.SCREENED_OUT]: "screenedOut",
 };
 
 /** A link to the site from which the participant came. */
@@ -318,13 +319,14 @@ function GoOn({ url }: { url: string }) {
   );
 }
 
-function End({ end: { reason, url }, pseudonym }: { end: StudyEnd; pseudonym: string }) {
+function End({ end: { reason, url, text }, pseudonym }: { end: StudyEnd; pseudonym: string }) {
   const words = t().studies.end;
   const which = ENDS[reason] ?? "completed";
   return (
     <section class={`sheet ${css.stage}`} data-part="study-end">
       <StageTitle>{reason === StudyEndReason.COMPLETED ? words.thanks : words.title}</StageTitle>
       <p>{words.texts[which]}</p>
+      {text && <Formatted text={text} />}
       {pseudonym && <p class="soft">{words.pseudonym(pseudonym)}</p>}
       {url ? <GoOn url={url} /> : <p>{words.close}</p>}
     </section>

@@ -10,6 +10,7 @@ export const STATES = [
   StudyParticipantState.WITHDRAWN,
   StudyParticipantState.DROPPED_OUT,
   StudyParticipantState.REMOVED,
+  StudyParticipantState.SCREENED_OUT,
 ] as const;
 
 /** A state's name in the texts. */
@@ -25,6 +26,8 @@ export function stateName(state: StudyParticipantState) {
       return "droppedOut";
     case StudyParticipantState.REMOVED:
       return "removed";
+    case StudyParticipantState.SCREENED_OUT:
+      return "screenedOut";
     default:
       return "invited";
   }

@@ -327,3 +327,20 @@ test("people of a panel take part by the open link, once each, and go on where t
   await expect.poll(() => rows.allInnerTexts()).toHaveLength(3);
   expect((await rows.allInnerTexts()).join()).toMatch(/ada[\s\S]*completed/);
 });
+
+test("a date of which only a part is entered is no study without one", async () => {
+  const { page, faults } = await person(browser);
+  await page.goto(`${server.url}/studies/new`);
+  const form = page.locator('[data-part="study-form"]');
+  await form.getByLabel("Name for researchers").fill("dated");
+  await form.getByLabel("Title that participants see").fill("Cooking together");
+  await form.getByLabel("Consent text", { exact: true }).fill("We record your games.");
+  const date = form.getByLabel("All data are deleted on");
+  await date.pressSequentially("3012");
+  await form.getByRole("button", { name: "Create the study" }).click();
+  await form.getByText("Enter day and time, or leave it empty.").waitFor();
+  await date.fill("2031-12-30T12:00");
+  await form.getByRole("button", { name: "Create the study" }).click();
+  await page.getByText("The study is deleted with all its data on ").waitFor();
+  expect(faults).toEqual([]);
+});

@@ -74,15 +74,16 @@ impl Test {
         let shown = researcher.get_study(request).await.map_err(refused)?;
         let mut participants = shown.into_inner().participants;
         participants.retain(|it| numbers.contains(&it.number));
-        let completed = v1::StudyParticipantState::Completed;
-        let completed = participants.iter().filter(|it| it.state() == completed);
-        let completed = completed.count();
+        let count = |state| participants.iter().filter(|it| it.state() == state).count();
+        let completed = count(v1::StudyParticipantState::Completed);
+        let screened_out = count(v1::StudyParticipantState::ScreenedOut);
         let games = participants.iter().flat_map(|it| &it.games);
         let aborted = games.filter(|it| it.ended() == v1::RoomState::Aborted);
         let aborted = aborted.count();
         if owned.json {
             say(json!({
-                "event": "tested", "completed": completed, "games_without_result": aborted,
+                "event": "tested", "completed": completed, "screened_out": screened_out,
+                "games_without_result": aborted,
                 "participants": participants, "problems": problems,
             }))?;
         } else {
@@ -92,15 +93,21 @@ impl Test {
             }
             let all = counted(self.participants.into(), "test participant");
             say(format_args!("{completed} of {all} completed the study"))?;
+            if screened_out > 0 {
+                let out = counted(screened_out.try_into()?, "test participant");
+                say(format_args!("{out} screened out"))?;
+            }
             if aborted > 0 {
                 let games = counted(aborted.try_into()?, "game");
                 say(format_args!("{games} ended without a result"))?;
             }
         }
-        Ok(match completed == numbers.len() && aborted == 0 {
-            true => ExitCode::SUCCESS,
-            false => ExitCode::FAILURE,
-        })
+        Ok(
+            match completed + screened_out == numbers.len() && aborted == 0 {
+                true => ExitCode::SUCCESS,
+                false => ExitCode::FAILURE,
+            },
+        )
     }
 
     /// Lets those with these links take part. Returns the problems of those who could not, by

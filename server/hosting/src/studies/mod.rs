@@ -82,8 +82,7 @@ impl Studies {
     ) -> Result<(Arc<StudyHandle>, Token), CreateProblem> {
         let durable = self.rooms.store().outlives_server();
         // Long settings take milliseconds to check.
-        let now_ms = (self.common.now)();
-        let checking = tokio::task::spawn_blocking(move || check(settings, durable, now_ms));
+        let checking = tokio::task::spawn_blocking(move || check(settings, durable));
         let checked = (checking.await)
             .map_err(|error| StoreError::Failed(format!("checking settings failed: {error}")))?
             .map_err(CreateProblem::Settings)?;
@@ -104,6 +103,14 @@ impl Studies {
         owner: Token,
         charged: Key,
     ) -> Result<New<StudyTask>, CreateProblem> {
+        // A repeated request for a study that there is does not come here.
+        let deletes_at_ms = checked.plan.core.deletes_at_ms;
+        if deletes_at_ms.is_some_and(|at_ms| at_ms <= (self.common.now)()) {
+            return Err(CreateProblem::Settings(SettingsProblem {
+                field: "deletes_at_ms".to_owned(),
+                problem: "this time has passed".to_owned(),
+            }));
+        }
         let budget = &self.common.memory;
         let share = budget.share_of(charged);
         let memory = budget.try_take_many(charged, checked.memory.div_ceil(1024).min(share));
@@ -167,20 +174,10 @@ impl Studies {
     }
 }
 
-fn check(
-    settings: v1::StudySettings,
-    durable: bool,
-    now_ms: u64,
-) -> Result<Checked, SettingsProblem> {
+fn check(settings: v1::StudySettings, durable: bool) -> Result<Checked, SettingsProblem> {
     let settings = convert::complete_settings(settings, random_bytes, durable)?;
     let plan = convert::study_plan(&settings)?;
     let core = Study::new(Arc::clone(&plan.core))?;
-    if plan.core.deletes_at_ms.is_some_and(|at_ms| at_ms <= now_ms) {
-        return Err(SettingsProblem {
-            field: "deletes_at_ms".to_owned(),
-            problem: "this time has passed: give milliseconds since the Unix epoch".to_owned(),
-        });
-    }
     let memory = memory_of(&settings);
     Ok(Checked {
         settings,

@@ -323,8 +323,14 @@ impl StudyTask {
         if !self.deletion.is_empty() {
             return Err(Refusal::Closed);
         }
-        let (changes, number) = command(&self.unit.state, (self.now)())?;
-        changes.into_iter().for_each(|change| self.fold(change));
+        let now_ms = (self.now)();
+        let (changes, number) = command(&self.unit.state, now_ms)?;
+        for change in changes {
+            let participant = change.number();
+            self.fold(change);
+            let ended = participant.and_then(|it| self.unit.state.screen_out(it, now_ms));
+            ended.into_iter().for_each(|change| self.fold(change));
+        }
         Ok(number)
     }
 

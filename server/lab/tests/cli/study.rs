@@ -181,6 +181,67 @@ games = { count = 1 }
 "#;
 
 #[test]
+fn those_whose_answers_screen_them_out_are_counted_apart() {
+    let folder = TempDir::new().unwrap();
+    let (_server, url) = serve(&folder.path().join("data"));
+    let (owner, file) = (
+        folder.path().join("owner"),
+        folder.path().join("screening.toml"),
+    );
+    let screening = "[[stages]]
+shown_if = [{ questionnaire = \"before\", item = \"liked\", answers = { max = 1 } }]
+screen_out = { text = \"This study is for those who like it.\" }
+[[stages]]
+games";
+    std::fs::write(&file, QUESTIONS.replacen("[[stages]]\ngames", screening, 1)).unwrap();
+    let (owner, out) = (owner.to_str().unwrap(), folder.path().join("out"));
+    let create = format!(
+        "study create {} --owner-file {owner} --json",
+        file.display()
+    );
+    let created = run(&url, &create).well().json();
+    let id = created["study"]["studyId"].as_str().unwrap();
+    let tested = run(
+        &url,
+        &format!("study test {id} --participants 16 --seed 7 --owner-file {owner} --json"),
+    );
+    let tested = tested.well().json();
+    run(
+        &url,
+        &format!(
+            "study export {id} --test --out {} --owner-file {owner}",
+            out.display()
+        ),
+    )
+    .well();
+    let rows = |file: &str| -> Vec<BTreeMap<String, String>> {
+        let rows = csv::Reader::from_path(out.join(file)).unwrap();
+        rows.into_deserialize().map(Result::unwrap).collect()
+    };
+    let (participants, answers) = (rows("participants.csv"), rows("answers.csv"));
+    let count = |state: &str| {
+        participants
+            .iter()
+            .filter(|it| it["state"] == state)
+            .count()
+    };
+    let (completed, screened_out) = (count("completed"), count("screened_out"));
+    assert_eq!(completed + screened_out, 16);
+    assert!(completed > 2 && screened_out > 2, "{completed}");
+    assert_eq!(tested["completed"], completed);
+    assert_eq!(tested["screened_out"], screened_out);
+    assert_eq!(rows("games.csv").len(), completed);
+    for participant in &participants {
+        let mut answers = answers
+            .iter()
+            .filter(|it| it["number"] == participant["number"]);
+        let liked = answers.find(|it| it["item"] == "liked").unwrap();
+        let is_out = participant["state"] == "screened_out";
+        assert_eq!(is_out, liked["answer"] == "1", "{participant:?}");
+    }
+}
+
+#[test]
 fn test_participants_go_through_a_study_by_what_they_are_shown() {
     let folder = TempDir::new().unwrap();
     let (_server, url) = serve(&folder.path().join("data"));

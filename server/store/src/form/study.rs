@@ -31,7 +31,7 @@ struct HeaderForm {
 
 #[derive(Clone, PartialEq, Message)]
 struct ChangeForm {
-    #[prost(oneof = "KindForm", tags = "1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12")]
+    #[prost(oneof = "KindForm", tags = "1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13")]
     kind: Option<KindForm>,
 }
 
@@ -61,6 +61,8 @@ enum KindForm {
     Closed(bool),
     #[prost(message, tag = "12")]
     Saved(AnsweredForm),
+    #[prost(message, tag = "13")]
+    ScreenedOut(MarkForm),
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -448,6 +450,7 @@ fn kind_of(change: &Change) -> KindForm {
             ..mark(number, at_ms, *step_over)
         }),
         Change::DroppedOut { number, at_ms } => KindForm::DroppedOut(mark(number, at_ms, false)),
+        Change::ScreenedOut { number, at_ms } => KindForm::ScreenedOut(mark(number, at_ms, false)),
         Change::Withdrew {
             number,
             delete_data,
@@ -526,6 +529,10 @@ fn change_of(kind: KindForm) -> Result<Change, Unreadable> {
             at_ms: form.at_ms,
         },
         KindForm::DroppedOut(form) => Change::DroppedOut {
+            number: form.number,
+            at_ms: form.at_ms,
+        },
+        KindForm::ScreenedOut(form) => Change::ScreenedOut {
             number: form.number,
             at_ms: form.at_ms,
         },

@@ -130,6 +130,7 @@ fn every_change() -> Vec<Change> {
             at_ms,
         },
         Change::DroppedOut { number, at_ms },
+        Change::ScreenedOut { number, at_ms },
         Change::Withdrew {
             number,
             delete_data: true,

@@ -17,7 +17,11 @@ fn slot(lab: &Lab, number: u32) -> Option<u32> {
 
 /// The end of a participation without an address to go on to.
 fn over(reason: End) -> Content {
-    Content::End { reason, url: None }
+    Content::End {
+        reason,
+        url: None,
+        text: String::new(),
+    }
 }
 
 #[test]
@@ -264,9 +268,13 @@ fn a_study_closes_when_its_data_are_deleted_and_not_after_that() {
     assert_eq!(lab.study.wake_at(), Some(2_000_000));
     lab.wait(1_000_000);
     assert!(lab.study.is_closed());
-    settings.closes_at_ms = Some(2_000_001);
-    let refused = Study::new(Arc::new(settings)).unwrap_err();
-    assert_eq!(refused.field, "deletes_at_ms");
+    // Before it closes, or given in microseconds.
+    for (closes_at_ms, deletes_at_ms) in [(2_000_001, 2_000_000), (0, 1_900_000_000_000_000)] {
+        settings.closes_at_ms = Some(closes_at_ms);
+        settings.deletes_at_ms = Some(deletes_at_ms);
+        let refused = Study::new(Arc::new(settings.clone())).unwrap_err();
+        assert_eq!(refused.field, "deletes_at_ms");
+    }
 }
 
 #[test]

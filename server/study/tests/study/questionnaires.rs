@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chefshat_study::testing::{settings, within};
 use chefshat_study::{
-    Answer, AnswerSet, Change, Content, Item, ItemAnswer, ItemKind, Language, MAX_SAVES, Part,
-    Questionnaire, Refusal, Settings, ShownIf, Stage, Status, Study, Task, Template, Text,
+    Answer, AnswerSet, Change, Content, End, Item, ItemAnswer, ItemKind, Language, MAX_SAVES, Part,
+    Questionnaire, Refusal, ScreenOut, Settings, ShownIf, Stage, Status, Study, Task, Template,
+    Text,
 };
 
 use super::support::{Lab, answer, valid};
@@ -310,6 +311,86 @@ fn earlier_answers_decide_what_is_shown() {
         }
         assert_eq!(lab.folded_again(), lab.study);
     }
+}
+
+#[test]
+fn who_is_screened_out_is_over_and_its_slot_is_free_again() {
+    let (min, max, unit) = (0, 99, String::new());
+    let young = ShownIf {
+        questionnaire: Some("first".to_owned()),
+        item: "age".to_owned(),
+        answers: AnswerSet {
+            max: Some(17),
+            ..AnswerSet::default()
+        },
+        not: false,
+    };
+    let text = "For adults.".to_owned();
+    let screen_out = Part {
+        task: Task::ScreenOut(ScreenOut { text: text.clone() }),
+        shown_if: vec![young],
+    };
+    let first = Task::Questionnaire(Questionnaire {
+        id: "first".to_owned(),
+        items: vec![item("age", ItemKind::Number { min, max, unit })],
+        ..questionnaire()
+    });
+    let mut settings = settings();
+    settings.participants = 1;
+    settings.recruiting.left_url = "https://panel.example/left".to_owned();
+    let stages = [Stage::once(first), Stage::Once(screen_out.clone())];
+    settings.stages.splice(1..1, stages);
+    let mut lab = Lab::new(settings.clone(), 2);
+    let answered = |lab: &mut Lab, number, age| {
+        lab.begin(number);
+        let age = vec![answer(0, Answer::Number(age))];
+        let change = lab.study.answer(lab.at(number), age, lab.now_ms).unwrap();
+        lab.fold(change);
+    };
+    answered(&mut lab, 1, 17);
+    let participant = lab.study.participant(1).unwrap();
+    assert_eq!(participant.status, Status::ScreenedOut);
+    assert_eq!(participant.ended_at_ms, Some(lab.now_ms));
+    assert!(
+        !participant.answers.is_empty(),
+        "what it has answered is kept"
+    );
+    let end = |url: &str, text: &str| Content::End {
+        reason: End::ScreenedOut,
+        url: Some(url.to_owned()),
+        text: text.to_owned(),
+    };
+    let content = |lab: &Lab| lab.study.view(1).unwrap().content;
+    assert_eq!(content(&lab), end("https://panel.example/left", &text));
+    assert_eq!(lab.study.proceed(lab.at(1), 0), Err(Refusal::Over));
+
+    // The slot is for the next one, who goes on.
+    answered(&mut lab, 2, 18);
+    assert_eq!(lab.study.participant(2).unwrap().slot, Some(0));
+    lab.complete(2);
+    let participant = lab.study.participant(2).unwrap();
+    assert_eq!(participant.status, Status::Completed);
+    assert_eq!(participant.passed_over, [2].into());
+    assert_eq!(lab.folded_again(), lab.study);
+
+    // Its data are deleted at its wish; the journal without them leads to the same state.
+    let deleted = lab.study.withdraw(1, true, 0).unwrap().unwrap();
+    lab.fold(deleted);
+    let participant = lab.study.participant(1).unwrap();
+    assert_eq!(participant.status, Status::ScreenedOut);
+    for change in &mut lab.changes {
+        change.forget(1);
+    }
+    assert_eq!(lab.folded_again(), lab.study);
+
+    // It has an address of its own, and needs answers.
+    settings.recruiting.screened_out_url = "https://panel.example/out".to_owned();
+    let mut lab = Lab::new(settings.clone(), 1);
+    answered(&mut lab, 1, 0);
+    assert_eq!(content(&lab), end("https://panel.example/out", &text));
+    settings.stages[2] = Stage::once(screen_out.task);
+    let refused = Study::new(settings).unwrap_err();
+    assert_eq!(refused.field, "stages[2].shown_if");
 }
 
 #[test]

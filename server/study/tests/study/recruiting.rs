@@ -17,6 +17,7 @@ fn recruited() -> Settings {
             completed_url: "https://panel.example/done?id={id}&cc=ABC".to_owned(),
             left_url: "https://panel.example/left".to_owned(),
             full_url: "https://panel.example/full?id={id}".to_owned(),
+            screened_out_url: String::new(),
         },
         ..settings()
     }
@@ -98,7 +99,7 @@ fn without_a_panel_an_id_is_not_kept() {
 #[test]
 fn participants_go_on_where_the_panel_says() {
     let end = |lab: &Lab, number| match lab.study.view(number).unwrap().content {
-        Content::End { reason, url } => (reason, url),
+        Content::End { reason, url, .. } => (reason, url),
         content => panic!("it is not over: {content:?}"),
     };
     let mut lab = Lab::new(recruited(), 1);
@@ -124,7 +125,7 @@ fn the_id_at_the_panel_is_deleted_with_the_data() {
     changes.extend(folded(&changes).withdraw(1, true, 2000).unwrap());
     let before = folded(&changes);
     assert_eq!(before.participant(1).unwrap().panel_id(), "");
-    let Content::End { reason, url } = before.view(1).unwrap().content else {
+    let Content::End { reason, url, .. } = before.view(1).unwrap().content else {
         panic!("it is over");
     };
     assert_eq!(reason, End::DataDeleted);

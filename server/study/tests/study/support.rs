@@ -34,9 +34,15 @@ impl Lab {
         lab
     }
 
+    /// Folds a change, and the end of a participant whom it screens out.
     pub(crate) fn fold(&mut self, change: Change) {
-        self.study.fold(&change);
-        self.changes.push(change);
+        let mut next = Some(change);
+        while let Some(change) = next {
+            self.study.fold(&change);
+            let number = change.number();
+            self.changes.push(change);
+            next = number.and_then(|it| self.study.screen_out(it, self.now_ms));
+        }
     }
 
     pub(crate) fn add(&mut self, count: usize) {

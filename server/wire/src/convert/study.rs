@@ -13,7 +13,8 @@ use chefshat_room::policy::{Durability, Policy, Visibility};
 use chefshat_study::{
     AnswerSet, Condition, Consent, Device, ExternalQuestionnaire, Factor, Hide, Item, ItemKind,
     Labels, Language, Order, Outcome, Part, Participant, PlayedGame, Pointer, Questionnaire,
-    Recruiting, Settings, SettingsProblem, ShownIf, Stage, Status, Study, Task, Template, Text,
+    Recruiting, ScreenOut, Settings, SettingsProblem, ShownIf, Stage, Status, Study, Task,
+    Template, Text,
 };
 
 use super::agent::check_budget;
@@ -293,6 +294,7 @@ fn recruiting(message: v1::StudyRecruiting) -> Recruiting {
         completed_url: message.completed_url,
         left_url: message.left_url,
         full_url: message.full_url,
+        screened_out_url: message.screened_out_url,
     }
 }
 
@@ -484,6 +486,9 @@ fn task_of(field: &str, message: &v1::StudyStage) -> Result<Task, SettingsProble
             title: text.title.clone(),
             text: text.text.clone(),
         }),
+        Some(Message::ScreenOut(out)) => Task::ScreenOut(ScreenOut {
+            text: out.text.clone(),
+        }),
     })
 }
 
@@ -630,7 +635,7 @@ pub fn study_to_proto(
             Status::Invited => 0,
             Status::Active => 1,
             Status::Completed => 2,
-            Status::Withdrawn | Status::DroppedOut | Status::Removed => 3,
+            Status::Withdrawn | Status::DroppedOut | Status::Removed | Status::ScreenedOut => 3,
         }] += 1;
     }
     let [invited, active, completed, left] = counts;
@@ -741,6 +746,7 @@ pub fn participant_state(status: Status) -> v1::StudyParticipantState {
         Status::Withdrawn => v1::StudyParticipantState::Withdrawn,
         Status::DroppedOut => v1::StudyParticipantState::DroppedOut,
         Status::Removed => v1::StudyParticipantState::Removed,
+        Status::ScreenedOut => v1::StudyParticipantState::ScreenedOut,
     }
 }
 

@@ -40,9 +40,10 @@ pub fn study_view(view: View, ticket_of: impl FnOnce(Id) -> String) -> v1::Study
                 text: text.text,
             }),
             Content::Game(game) => Message::Game(shown_game(&game, ticket_of)),
-            Content::End { reason, url } => Message::End(v1::StudyEnd {
+            Content::End { reason, url, text } => Message::End(v1::StudyEnd {
                 reason: end_reason(reason).into(),
                 url: url.unwrap_or_default(),
+                text,
             }),
         }),
     }
@@ -118,6 +119,7 @@ fn end_reason(end: End) -> v1::StudyEndReason {
         End::DataDeleted => v1::StudyEndReason::DataDeleted,
         End::DroppedOut => v1::StudyEndReason::DroppedOut,
         End::Removed => v1::StudyEndReason::Removed,
+        End::ScreenedOut => v1::StudyEndReason::ScreenedOut,
     }
 }
 

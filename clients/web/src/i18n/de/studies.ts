@@ -73,6 +73,7 @@ export const studies: Texts["studies"] = {
       droppedOut:
         "Sie waren zu lange weg, daher wurde Ihr Platz an jemand anderen vergeben. Wenn Sie weitermachen möchten, fragen Sie die Studienleitung.",
       removed: "Die Studienleitung hat Ihre Teilnahme beendet. Wenn Sie Fragen haben, wenden Sie sich an sie.",
+      screenedOut: "Ihre Antworten zeigen, dass diese Studie für andere Personen gedacht ist. Danke für Ihre Zeit.",
     },
     pseudonym: (pseudonym) =>
       `Ihr Code in der Studie ist ${pseudonym}. Nennen Sie ihn, wenn Sie Fragen zu Ihren Daten haben.`,
@@ -116,6 +117,7 @@ export const studies: Texts["studies"] = {
       withdrawn: "zurückgezogen",
       droppedOut: "ausgeblieben",
       removed: "entfernt",
+      screenedOut: "ausgeschieden durch Antworten",
     },
     board: {
       title: "Fortschritt",
@@ -254,6 +256,7 @@ export const studies: Texts["studies"] = {
       number: (least, most) => `Gib eine Zahl von ${least} bis ${most} ein.`,
       id: "Verwende 1 bis 64 Buchstaben, Ziffern, „_“, „-“ oder „.“.",
       twice: "Zwei Bedingungen haben diesen Namen.",
+      unfinished: "Gib Tag und Uhrzeit ein, oder lass das Feld leer.",
       passed: "Gib eine Zeit ein, die noch nicht vorbei ist.",
       deletedFirst: "Gib eine Zeit ein, zu der die Studie schon geschlossen ist.",
       address: "Gib eine Adresse ein, die mit https:// beginnt.",

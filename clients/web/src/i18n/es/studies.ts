@@ -72,6 +72,7 @@ export const studies: Texts["studies"] = {
       droppedOut:
         "Su ausencia fue demasiado larga y su plaza pasó a otra persona. Si quiere continuar, pregunte al equipo del estudio.",
       removed: "El equipo del estudio ha terminado su participación. Si tiene preguntas, diríjase a él.",
+      screenedOut: "Sus respuestas muestran que este estudio es para otras personas. Gracias por su tiempo.",
     },
     pseudonym: (pseudonym) => `Su código en el estudio es ${pseudonym}. Indíquelo si tiene preguntas sobre sus datos.`,
     close: "Puede cerrar esta página.",
@@ -114,6 +115,7 @@ export const studies: Texts["studies"] = {
       withdrawn: "retirado",
       droppedOut: "ausente",
       removed: "excluido",
+      screenedOut: "descartado por sus respuestas",
     },
     board: {
       title: "Progreso",
@@ -252,8 +254,9 @@ export const studies: Texts["studies"] = {
       number: (least, most) => `Escribe un número del ${least} al ${most}.`,
       id: "Usa de 1 a 64 letras, cifras, «_», «-» o «.».",
       twice: "Dos condiciones tienen este nombre.",
-      passed: "Escribe una hora que no haya pasado.",
-      deletedFirst: "Escribe una hora posterior al cierre del estudio.",
+      unfinished: "Escribe el día y la hora, o deja el campo vacío.",
+      passed: "Escribe una fecha que no haya pasado.",
+      deletedFirst: "Escribe una fecha posterior al cierre del estudio.",
       address: "Escribe una dirección que empiece por https://.",
     },
   },

@@ -222,13 +222,14 @@ fn state_name(status: Status) -> String {
 }
 
 /// What participants can be, as in `StudyParticipantState`.
-const STATES: [(Status, &str); 6] = [
+const STATES: [(Status, &str); 7] = [
     (Status::Invited, "has not opened its link"),
     (Status::Active, "has begun"),
     (Status::Completed, "has completed all steps"),
     (Status::Withdrawn, "has withdrawn"),
     (Status::DroppedOut, "had no page open for too long"),
     (Status::Removed, "was removed by the study's owner"),
+    (Status::ScreenedOut, "was screened out by its answers"),
 ];
 
 /// A game of a participant.

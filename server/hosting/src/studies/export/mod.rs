@@ -148,6 +148,7 @@ impl StudyHandle {
             recruiting.completed_url.clear();
             recruiting.left_url.clear();
             recruiting.full_url.clear();
+            recruiting.screened_out_url.clear();
         }
         study
     }

@@ -169,6 +169,8 @@ class _StudyParticipantStateEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[
     """It had no page open for too long."""
     STUDY_PARTICIPANT_STATE_REMOVED: _StudyParticipantState.ValueType  # 6
     """It was removed by the study's owner."""
+    STUDY_PARTICIPANT_STATE_SCREENED_OUT: _StudyParticipantState.ValueType  # 7
+    """It was screened out (StudyScreenOut)."""
 
 class StudyParticipantState(_StudyParticipantState, metaclass=_StudyParticipantStateEnumTypeWrapper):
     """The state of a participant."""
@@ -187,6 +189,8 @@ STUDY_PARTICIPANT_STATE_DROPPED_OUT: StudyParticipantState.ValueType  # 5
 """It had no page open for too long."""
 STUDY_PARTICIPANT_STATE_REMOVED: StudyParticipantState.ValueType  # 6
 """It was removed by the study's owner."""
+STUDY_PARTICIPANT_STATE_SCREENED_OUT: StudyParticipantState.ValueType  # 7
+"""It was screened out (StudyScreenOut)."""
 Global___StudyParticipantState: _TypeAlias = StudyParticipantState  # noqa: Y015
 
 class _StudyEndReason:
@@ -207,6 +211,8 @@ class _StudyEndReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_StudyE
     """It was away for too long, and its place was given to somebody else."""
     STUDY_END_REASON_REMOVED: _StudyEndReason.ValueType  # 5
     """It was removed by the researchers."""
+    STUDY_END_REASON_SCREENED_OUT: _StudyEndReason.ValueType  # 6
+    """Its answers showed that the study is not for it (StudyScreenOut)."""
 
 class StudyEndReason(_StudyEndReason, metaclass=_StudyEndReasonEnumTypeWrapper):
     """Why nothing more is shown."""
@@ -223,6 +229,8 @@ STUDY_END_REASON_DROPPED_OUT: StudyEndReason.ValueType  # 4
 """It was away for too long, and its place was given to somebody else."""
 STUDY_END_REASON_REMOVED: StudyEndReason.ValueType  # 5
 """It was removed by the researchers."""
+STUDY_END_REASON_SCREENED_OUT: StudyEndReason.ValueType  # 6
+"""Its answers showed that the study is not for it (StudyScreenOut)."""
 Global___StudyEndReason: _TypeAlias = StudyEndReason  # noqa: Y015
 
 class _StudyTraceKind:
@@ -959,6 +967,7 @@ class StudyStage(_message.Message):
     GAMES_FIELD_NUMBER: _builtins.int
     TEXT_FIELD_NUMBER: _builtins.int
     PER_CONDITION_FIELD_NUMBER: _builtins.int
+    SCREEN_OUT_FIELD_NUMBER: _builtins.int
     SHOWN_IF_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def consent(self) -> Global___StudyConsent:
@@ -989,6 +998,10 @@ class StudyStage(_message.Message):
         """Does these stages for each of its conditions."""
 
     @_builtins.property
+    def screen_out(self) -> Global___StudyScreenOut:
+        """Takes part no longer; only with `shown_if`."""
+
+    @_builtins.property
     def shown_if(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyShownIf]:
         """Participants pass over it unless all of these hold, at most 4. Not for consent, games and
         `per_condition`.
@@ -1004,17 +1017,42 @@ class StudyStage(_message.Message):
         games: Global___StudyGames | None = ...,
         text: Global___StudyText | None = ...,
         per_condition: Global___StudyBlock | None = ...,
+        screen_out: Global___StudyScreenOut | None = ...,
         shown_if: _abc.Iterable[Global___StudyShownIf] | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "external_questionnaire", b"external_questionnaire", "games", b"games", "per_condition", b"per_condition", "practice", b"practice", "questionnaire", b"questionnaire", "stage", b"stage", "text", b"text"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "external_questionnaire", b"external_questionnaire", "games", b"games", "per_condition", b"per_condition", "practice", b"practice", "questionnaire", b"questionnaire", "screen_out", b"screen_out", "stage", b"stage", "text", b"text"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "external_questionnaire", b"external_questionnaire", "games", b"games", "per_condition", b"per_condition", "practice", b"practice", "questionnaire", b"questionnaire", "shown_if", b"shown_if", "stage", b"stage", "text", b"text"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "external_questionnaire", b"external_questionnaire", "games", b"games", "per_condition", b"per_condition", "practice", b"practice", "questionnaire", b"questionnaire", "screen_out", b"screen_out", "shown_if", b"shown_if", "stage", b"stage", "text", b"text"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_stage: _TypeAlias = _typing.Literal["consent", "questionnaire", "external_questionnaire", "practice", "games", "text", "per_condition"]  # noqa: Y015
+    _WhichOneofReturnType_stage: _TypeAlias = _typing.Literal["consent", "questionnaire", "external_questionnaire", "practice", "games", "text", "per_condition", "screen_out"]  # noqa: Y015
     _WhichOneofArgType_stage: _TypeAlias = _typing.Literal["stage", b"stage"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_stage) -> _WhichOneofReturnType_stage | None: ...
 
 Global___StudyStage: _TypeAlias = StudyStage  # noqa: Y015
+
+@_typing.final
+class StudyScreenOut(_message.Message):
+    """Ends the participation of those whose answers show that the study is not for them: they are
+    screened out, and their slots are free again. What they have answered is kept.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TEXT_FIELD_NUMBER: _builtins.int
+    text: _builtins.str
+    """What they read, in Markdown (StudyText), at most 2000 characters; may be empty."""
+    def __init__(
+        self,
+        *,
+        text: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["text", b"text"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___StudyScreenOut: _TypeAlias = StudyScreenOut  # noqa: Y015
 
 @_typing.final
 class StudyRecruiting(_message.Message):
@@ -1029,6 +1067,7 @@ class StudyRecruiting(_message.Message):
     COMPLETED_URL_FIELD_NUMBER: _builtins.int
     LEFT_URL_FIELD_NUMBER: _builtins.int
     FULL_URL_FIELD_NUMBER: _builtins.int
+    SCREENED_OUT_URL_FIELD_NUMBER: _builtins.int
     open_link: _builtins.bool
     """Whether the study has an open link (`open_link` of Study): everyone who opens it takes part."""
     id_parameter: _builtins.str
@@ -1048,6 +1087,8 @@ class StudyRecruiting(_message.Message):
     """
     full_url: _builtins.str
     """As `completed_url`, for those who cannot begin because the study is closed or full."""
+    screened_out_url: _builtins.str
+    """As `completed_url`, for those who are screened out (StudyScreenOut); empty: as `left_url`."""
     def __init__(
         self,
         *,
@@ -1056,10 +1097,11 @@ class StudyRecruiting(_message.Message):
         completed_url: _builtins.str = ...,
         left_url: _builtins.str = ...,
         full_url: _builtins.str = ...,
+        screened_out_url: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["completed_url", b"completed_url", "full_url", b"full_url", "id_parameter", b"id_parameter", "left_url", b"left_url", "open_link", b"open_link"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["completed_url", b"completed_url", "full_url", b"full_url", "id_parameter", b"id_parameter", "left_url", b"left_url", "open_link", b"open_link", "screened_out_url", b"screened_out_url"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -1113,13 +1155,15 @@ class StudySettings(_message.Message):
     nobody has the slot.
     """
     closes_at_ms: _builtins.int
-    """Milliseconds since the Unix epoch when the study closes; 0: when its owner closes it."""
+    """Milliseconds since the Unix epoch when the study closes, before the year 10000; 0: when its owner
+    closes it.
+    """
     deletes_at_ms: _builtins.int
     """Milliseconds since the Unix epoch when the study closes, if it is not closed, and the server
-    deletes it with all its data, as DeleteStudy with `force`: at most two hours later, since it waits
-    until it is sure of the time. In the future when the study is created, and not before
-    `closes_at_ms`; 0: when its owner deletes it. Participants are told this date with what they
-    consent to.
+    deletes it with all its data, as DeleteStudy with `force`: when it has run for an hour after this
+    time, so that a clock that jumps deletes nothing, and within two hours. In the future when the
+    study is created, before the year 10000, and not before `closes_at_ms`; 0: when its owner deletes
+    it. Participants are told this date with what they consent to.
     """
     @_builtins.property
     def factors(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyFactor]:
@@ -1817,19 +1861,23 @@ class StudyEnd(_message.Message):
 
     REASON_FIELD_NUMBER: _builtins.int
     URL_FIELD_NUMBER: _builtins.int
+    TEXT_FIELD_NUMBER: _builtins.int
     reason: Global___StudyEndReason.ValueType
     """The reason."""
     url: _builtins.str
     """Where the page sends the participant next (StudyRecruiting); empty if nowhere."""
+    text: _builtins.str
+    """The text of StudyScreenOut, in Markdown; empty for other reasons."""
     def __init__(
         self,
         *,
         reason: Global___StudyEndReason.ValueType = ...,
         url: _builtins.str = ...,
+        text: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["reason", b"reason", "url", b"url"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["reason", b"reason", "text", b"text", "url", b"url"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -58,7 +58,8 @@ class VectorServiceServicer(object):
         (SETUP_TOO_LATE, CLIENT_IDLE, CLIENT_TOO_SLOW), UNAVAILABLE (SHUTTING_DOWN); a request above
         max_vector_message_bytes ends it with OUT_OF_RANGE. The limits are in
         ServerService.GetServerInfo. A batch has at most max_vector_batch_bytes: allow your client to
-        receive that much.
+        receive that much. A request that takes more than 512 KiB once it is decoded counts as several
+        calls of the client, and waits until the client may make another call.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -54,7 +54,8 @@ class VectorServiceStub:
     (SETUP_TOO_LATE, CLIENT_IDLE, CLIENT_TOO_SLOW), UNAVAILABLE (SHUTTING_DOWN); a request above
     max_vector_message_bytes ends it with OUT_OF_RANGE. The limits are in
     ServerService.GetServerInfo. A batch has at most max_vector_batch_bytes: allow your client to
-    receive that much.
+    receive that much. A request that takes more than 512 KiB once it is decoded counts as several
+    calls of the client, and waits until the client may make another call.
     """
 
 @_typing.type_check_only
@@ -74,7 +75,8 @@ class VectorServiceAsyncStub(VectorServiceStub):
     (SETUP_TOO_LATE, CLIENT_IDLE, CLIENT_TOO_SLOW), UNAVAILABLE (SHUTTING_DOWN); a request above
     max_vector_message_bytes ends it with OUT_OF_RANGE. The limits are in
     ServerService.GetServerInfo. A batch has at most max_vector_batch_bytes: allow your client to
-    receive that much.
+    receive that much. A request that takes more than 512 KiB once it is decoded counts as several
+    calls of the client, and waits until the client may make another call.
     """
 
 class VectorServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -97,7 +99,8 @@ class VectorServiceServicer(metaclass=_abc_1.ABCMeta):
         (SETUP_TOO_LATE, CLIENT_IDLE, CLIENT_TOO_SLOW), UNAVAILABLE (SHUTTING_DOWN); a request above
         max_vector_message_bytes ends it with OUT_OF_RANGE. The limits are in
         ServerService.GetServerInfo. A batch has at most max_vector_batch_bytes: allow your client to
-        receive that much.
+        receive that much. A request that takes more than 512 KiB once it is decoded counts as several
+        calls of the client, and waits until the client may make another call.
         """
 
 def add_VectorServiceServicer_to_server(servicer: VectorServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...
