@@ -313,7 +313,7 @@ class Undecided(Agent):
             self.changes.append(event.WhichOneof("kind"))
 
 
-def test_the_seat_of_who_leaves_decisions_open_stays_with_the_substitute(real_address: str) -> None:
+def test_a_seat_whose_decisions_are_left_open_stays_with_the_substitute(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
         policy = pb.RoomPolicy(decision_time_ms=20, bank_ms=0, pace_ms=0, abort=pb.ABORT_POLICY_NEVER, max_timeouts=2)
         room = client.create_room("undecided", rules=pb.RuleSet(target_shifts=1), policy=policy, seats=[None, *["random"] * 3])

@@ -41,6 +41,8 @@ class SeatSession:
         self.substituted = False
         # The agent has left its last decision open.
         self.left_open = False
+        # The same of any decision.
+        self.has_left_open = False
         # The agent knows of somebody whom the game waits for.
         self.awaits = False
         # The decision that the agent is making.

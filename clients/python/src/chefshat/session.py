@@ -211,8 +211,10 @@ class PlaySession:
         seat, decision = ask
         if seat.asked is not decision:
             return  # The server has closed the decision.
-        seat.left_open = action is None
         if action is None:
+            if not seat.has_left_open:
+                LOG.warning("decision %d of seat %d is left open, as `decide` returned None", decision.decision_id, decision.seat)
+            seat.left_open = seat.has_left_open = True
             seat.asked = None
             return
         answer = pb.Answer(decision_id=decision.decision_id, action=action.__index__(), annotations=self._annotations(ask))
@@ -376,6 +378,7 @@ class PlaySession:
         if seat.info is None:
             return  # Decisions only reach attached seats.
         seat.asked = Decision(request, seat.info, attempts_left)
+        seat.left_open = False
         asks.append(Ask(seat, seat.asked))
 
     def _result(self, seat: SeatSession, result: pb.AnswerResult, asks: list[Ask]) -> None:
