@@ -65,7 +65,8 @@ use crate::wire::peer::peer_service_server::PeerServiceServer;
 const MAX_HEADER_BYTES: u32 = 16 * 1024;
 /// Most bytes of a client that wait on one stream to be read.
 const CLIENT_STREAM_WINDOW: u32 = 256 * 1024;
-/// Most bytes that wait on all streams of a connection: one that is not read does not hold up others.
+/// Most bytes that wait on all streams of a connection: one that is not read leaves most of them to
+/// others.
 const CLIENT_CONNECTION_WINDOW: u32 = 1024 * 1024;
 
 /// Why serving failed.

@@ -372,7 +372,7 @@ impl Messages {
     }
 
     /// A permit to decode a message into this many bytes. Its caller is charged; a large message of a
-    /// stream waits until the caller may make another call, which holds up its own streams alone.
+    /// stream waits first until the caller may make another call.
     fn decode(&self, memory: usize) -> BoxFuture<'static, Result<Permit, Refused>> {
         let (limits, key) = (Arc::clone(&self.limits), self.key);
         let (calls, plays) = (self.charge(memory), self.call.plays());
