@@ -8933,7 +8933,7 @@ pub mod study_stage {
         /// Does these stages for each of its conditions.
         #[prost(message, tag = "7")]
         PerCondition(super::StudyBlock),
-        /// Takes part no longer; only with `shown_if`.
+        /// Ends the participation; only with `shown_if`.
         #[prost(message, tag = "9")]
         ScreenOut(super::StudyScreenOut),
     }
@@ -8942,7 +8942,8 @@ pub mod study_stage {
 /// screened out, and their slots are free again. What they have answered is kept.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StudyScreenOut {
-    /// What they read, in Markdown (StudyText), at most 2000 characters; may be empty.
+    /// What they read, in Markdown (StudyText), at most 2000 characters. Empty: that the study is meant
+    /// for other people.
     #[prost(string, tag = "1")]
     pub text: ::prost::alloc::string::String,
 }
@@ -9030,11 +9031,11 @@ pub struct StudySettings {
     /// How people without a link of their own take part; by default nobody does.
     #[prost(message, optional, tag = "15")]
     pub recruiting: ::core::option::Option<StudyRecruiting>,
-    /// Milliseconds since the Unix epoch when the study closes, if it is not closed, and the server
-    /// deletes it with all its data, as DeleteStudy with `force`: when it has run for an hour after this
-    /// time, so that a clock that jumps deletes nothing, and within two hours. In the future when the
-    /// study is created, before the year 10000, and not before `closes_at_ms`; 0: when its owner deletes
-    /// it. Participants are told this date with what they consent to.
+    /// Milliseconds since the Unix epoch when the study closes, if it is not closed. The server deletes
+    /// it with all its data, as DeleteStudy with `force`, one to two hours later: it checks for an hour
+    /// that this time has passed, so that a wrong clock deletes nothing. In the future when the study is
+    /// created, before the year 10000, and not before `closes_at_ms`; 0: when its owner deletes it.
+    /// Participants are told this date with what they consent to.
     #[prost(uint64, tag = "16")]
     pub deletes_at_ms: u64,
 }
@@ -9224,7 +9225,7 @@ pub struct Study {
     /// Number of participants who have completed it, also if their data were deleted since.
     #[prost(uint32, tag = "12")]
     pub completed: u32,
-    /// Number of participants who have withdrawn, dropped out or were removed.
+    /// Number of participants who have withdrawn, dropped out, or were removed or screened out.
     #[prost(uint32, tag = "13")]
     pub left: u32,
     /// The open link, if the settings have one: 30 characters that need no escaping. The page's address

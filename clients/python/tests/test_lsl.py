@@ -11,12 +11,12 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from subprocess import PIPE, Popen
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 import chefshat
-from chefshat import RandomAgent, pb
+from chefshat import Client, RandomAgent, pb
 from chefshat._gen.chefshat.v1.study_service_pb2_grpc import ParticipationServiceStub, StudyServiceStub
 from chefshat.clock import DRIFT, WANTED_ERROR_S, RoomClock
 from chefshat.network import grpc
@@ -204,6 +204,17 @@ class Participant:
                 break
         request = pb.ContinueStudyRequest(session=self.session, step=self.view.step)
         self.view = self.service.ContinueStudy(request).view
+
+
+@pytest.mark.parametrize("state", ["COMPLETED", "WITHDRAWN", "REMOVED", "SCREENED_OUT"])
+def test_a_participation_that_is_over_has_no_more_games(state: str) -> None:
+    class Followed:
+        def follow_study(self, study_id: str, owner_token: str) -> Iterator[pb.StudyParticipant]:
+            assert (study_id, owner_token) == ("study", "owner")
+            yield pb.StudyParticipant(number=3, state=pb.StudyParticipantState.Value(f"STUDY_PARTICIPANT_STATE_{state}"))
+            raise AssertionError("it goes on")
+
+    assert lsl.next_game(cast(Client, Followed()), "study", "owner", 3, set()) is None
 
 
 def test_the_command_sends_all_games_of_a_participant_of_a_study(

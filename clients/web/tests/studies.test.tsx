@@ -199,10 +199,14 @@ test("who is screened out reads why, and can have the data deleted", async () =>
   fakeStudy([{ case: "end", value: end }]);
   await show();
   expect(title()).toBe("The study is over for you");
-  expect(root.textContent).toContain("this study is meant for other people");
+  expect(root.textContent).not.toContain("This study is meant for other people");
   expect(root.querySelector("strong")?.textContent).toBe("adults");
   expect(root.querySelector<HTMLAnchorElement>('[data-part="go-on"]')?.href).toBe("https://panel.example/out");
   expect(button("Delete my data…")).toBeDefined();
+  await act(() => render(null, root));
+  fakeStudy([{ case: "end", value: { ...end, text: "" } }]);
+  await show();
+  expect(root.textContent).toContain("This study is meant for other people");
 });
 
 test("another device that opens the study is said clearly, and can be answered", async () => {

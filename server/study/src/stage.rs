@@ -57,7 +57,7 @@ pub enum Task {
     },
     /// Reads a text.
     Text(Text),
-    /// Takes part no longer.
+    /// Ends the participation.
     ScreenOut(ScreenOut),
 }
 

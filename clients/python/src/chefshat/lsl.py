@@ -319,7 +319,12 @@ def next_game(client: Client, study_id: str, owner_token: str, number: int, know
 
     The first time, those that are over are known.
     """
-    over = (pb.STUDY_PARTICIPANT_STATE_COMPLETED, pb.STUDY_PARTICIPANT_STATE_WITHDRAWN, pb.STUDY_PARTICIPANT_STATE_REMOVED)
+    over = (
+        pb.STUDY_PARTICIPANT_STATE_COMPLETED,
+        pb.STUDY_PARTICIPANT_STATE_WITHDRAWN,
+        pb.STUDY_PARTICIPANT_STATE_REMOVED,
+        pb.STUDY_PARTICIPANT_STATE_SCREENED_OUT,
+    )
     is_first = not known
     print(f"waiting for a game of participant {number}", file=sys.stderr, flush=True)
     for participant in client.follow_study(study_id, owner_token):

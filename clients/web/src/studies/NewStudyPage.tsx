@@ -240,7 +240,10 @@ function FromForm() {
             label={words[name]}
             hint={name === "deletesAt" ? words.deletesAtHint : undefined}
             value={form[name]}
-            onText={(typed) => change({ [name]: typed })}
+            onText={(typed) => {
+              change({ [name]: typed });
+              setUnfinished(unfinished.filter((one) => one !== name));
+            }}
             fault={unfinished.includes(name) ? words.problems.unfinished : faults[name]}
           />
         ))}

@@ -325,8 +325,7 @@ function End({ end: { reason, url, text }, pseudonym }: { end: StudyEnd; pseudon
   return (
     <section class={`sheet ${css.stage}`} data-part="study-end">
       <StageTitle>{reason === StudyEndReason.COMPLETED ? words.thanks : words.title}</StageTitle>
-      <p>{words.texts[which]}</p>
-      {text && <Formatted text={text} />}
+      {text ? <Formatted text={text} /> : <p>{words.texts[which]}</p>}
       {pseudonym && <p class="soft">{words.pseudonym(pseudonym)}</p>}
       {url ? <GoOn url={url} /> : <p>{words.close}</p>}
     </section>

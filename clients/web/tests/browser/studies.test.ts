@@ -338,8 +338,10 @@ test("a date of which only a part is entered is no study without one", async () 
   const date = form.getByLabel("All data are deleted on");
   await date.pressSequentially("3012");
   await form.getByRole("button", { name: "Create the study" }).click();
-  await form.getByText("Enter day and time, or leave it empty.").waitFor();
+  const asked = form.getByText("Enter the day and the time, or leave the field empty.");
+  await asked.waitFor();
   await date.fill("2031-12-30T12:00");
+  await asked.waitFor({ state: "hidden" });
   await form.getByRole("button", { name: "Create the study" }).click();
   await page.getByText("The study is deleted with all its data on ").waitFor();
   expect(faults).toEqual([]);

@@ -102,12 +102,11 @@ impl Test {
                 say(format_args!("{games} ended without a result"))?;
             }
         }
-        Ok(
-            match completed + screened_out == numbers.len() && aborted == 0 {
-                true => ExitCode::SUCCESS,
-                false => ExitCode::FAILURE,
-            },
-        )
+        let all_ended = completed + screened_out == numbers.len() && aborted == 0;
+        Ok(match all_ended && completed > 0 {
+            true => ExitCode::SUCCESS,
+            false => ExitCode::FAILURE,
+        })
     }
 
     /// Lets those with these links take part. Returns the problems of those who could not, by

@@ -29,8 +29,9 @@ const _: () = assert!(
 #[derive(Debug)]
 struct Passed {
     since: Instant,
-    /// Whether its deletion was requested. It completes when the games of the study have ended.
-    requested: bool,
+    /// The study whose deletion was requested; it completes when its games have ended. One that was
+    /// resumed since is another, which knows of no request.
+    requested: Option<Arc<StudyHandle>>,
 }
 
 impl Studies {
@@ -51,11 +52,15 @@ impl Studies {
                     let since = Instant::now();
                     Passed {
                         since,
-                        requested: false,
+                        requested: None,
                     }
                 });
-                if it.since.elapsed() >= CONFIRMATION_TIME && !it.requested {
-                    it.requested = true;
+                let is_requested = it
+                    .requested
+                    .as_ref()
+                    .is_some_and(|it| Arc::ptr_eq(it, &study));
+                if it.since.elapsed() >= CONFIRMATION_TIME && !is_requested {
+                    it.requested = Some(Arc::clone(&study));
                     due.push(study);
                 }
             }
@@ -76,7 +81,7 @@ impl Studies {
             let deleting = stream::iter(deleting).buffer_unordered(DELETED_AT_ONCE);
             let failed: Vec<Option<Id>> = deleting.collect().await;
             for id in failed.into_iter().flatten() {
-                passed.entry(id).and_modify(|it| it.requested = false);
+                passed.entry(id).and_modify(|it| it.requested = None);
             }
         }
     }

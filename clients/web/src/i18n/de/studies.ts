@@ -73,7 +73,7 @@ export const studies: Texts["studies"] = {
       droppedOut:
         "Sie waren zu lange weg, daher wurde Ihr Platz an jemand anderen vergeben. Wenn Sie weitermachen möchten, fragen Sie die Studienleitung.",
       removed: "Die Studienleitung hat Ihre Teilnahme beendet. Wenn Sie Fragen haben, wenden Sie sich an sie.",
-      screenedOut: "Ihre Antworten zeigen, dass diese Studie für andere Personen gedacht ist. Danke für Ihre Zeit.",
+      screenedOut: "Diese Studie ist für andere Personen gedacht. Danke für Ihre Zeit.",
     },
     pseudonym: (pseudonym) =>
       `Ihr Code in der Studie ist ${pseudonym}. Nennen Sie ihn, wenn Sie Fragen zu Ihren Daten haben.`,
@@ -117,7 +117,7 @@ export const studies: Texts["studies"] = {
       withdrawn: "zurückgezogen",
       droppedOut: "ausgeblieben",
       removed: "entfernt",
-      screenedOut: "ausgeschieden durch Antworten",
+      screenedOut: "nicht passend",
     },
     board: {
       title: "Fortschritt",

@@ -70,7 +70,7 @@ export const studies = {
       droppedOut:
         "You were away for too long, so your place was given to someone else. If you want to continue, ask the researchers.",
       removed: "The researchers have ended your participation. If you have questions, ask them.",
-      screenedOut: "Your answers show that this study is meant for other people. Thank you for your time.",
+      screenedOut: "This study is meant for other people. Thank you for your time.",
     },
     pseudonym: (pseudonym: string) =>
       `Your code in the study is ${pseudonym}. Give it if you have questions about your data.`,
@@ -252,7 +252,7 @@ export const studies = {
       number: (least: number, most: number) => `Enter a number from ${least} to ${most}.`,
       id: "Use 1 to 64 letters, digits, “_”, “-” or “.”.",
       twice: "Two conditions have this name.",
-      unfinished: "Enter day and time, or leave it empty.",
+      unfinished: "Enter the day and the time, or leave the field empty.",
       passed: "Enter a time that has not passed.",
       deletedFirst: "Enter a time after the study has closed.",
       address: "Enter an address that begins with https://.",

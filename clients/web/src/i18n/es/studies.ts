@@ -72,7 +72,7 @@ export const studies: Texts["studies"] = {
       droppedOut:
         "Su ausencia fue demasiado larga y su plaza pasó a otra persona. Si quiere continuar, pregunte al equipo del estudio.",
       removed: "El equipo del estudio ha terminado su participación. Si tiene preguntas, diríjase a él.",
-      screenedOut: "Sus respuestas muestran que este estudio es para otras personas. Gracias por su tiempo.",
+      screenedOut: "Este estudio es para otras personas. Gracias por su tiempo.",
     },
     pseudonym: (pseudonym) => `Su código en el estudio es ${pseudonym}. Indíquelo si tiene preguntas sobre sus datos.`,
     close: "Puede cerrar esta página.",
@@ -115,7 +115,7 @@ export const studies: Texts["studies"] = {
       withdrawn: "retirado",
       droppedOut: "ausente",
       removed: "excluido",
-      screenedOut: "descartado por sus respuestas",
+      screenedOut: "no apto",
     },
     board: {
       title: "Progreso",

@@ -72,7 +72,7 @@ export const studies: Texts["studies"] = {
       droppedOut:
         "La Sua assenza è stata troppo lunga e il Suo posto è passato a un’altra persona. Se vuole continuare, chieda a chi conduce lo studio.",
       removed: "Chi conduce lo studio ha concluso la Sua partecipazione. Se ha domande, chieda a chi lo conduce.",
-      screenedOut: "Le Sue risposte mostrano che questo studio è pensato per altre persone. Grazie del Suo tempo.",
+      screenedOut: "Questo studio è pensato per altre persone. Grazie del Suo tempo.",
     },
     pseudonym: (pseudonym) => `Il Suo codice nello studio è ${pseudonym}. Lo indichi se ha domande sui Suoi dati.`,
     close: "Può chiudere questa pagina.",
@@ -115,7 +115,7 @@ export const studies: Texts["studies"] = {
       withdrawn: "con ritiro",
       droppedOut: "assente",
       removed: "escluso",
-      screenedOut: "scartato dalle risposte",
+      screenedOut: "non idoneo",
     },
     board: {
       title: "Avanzamento",

@@ -999,7 +999,7 @@ class StudyStage(_message.Message):
 
     @_builtins.property
     def screen_out(self) -> Global___StudyScreenOut:
-        """Takes part no longer; only with `shown_if`."""
+        """Ends the participation; only with `shown_if`."""
 
     @_builtins.property
     def shown_if(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyShownIf]:
@@ -1040,7 +1040,9 @@ class StudyScreenOut(_message.Message):
 
     TEXT_FIELD_NUMBER: _builtins.int
     text: _builtins.str
-    """What they read, in Markdown (StudyText), at most 2000 characters; may be empty."""
+    """What they read, in Markdown (StudyText), at most 2000 characters. Empty: that the study is meant
+    for other people.
+    """
     def __init__(
         self,
         *,
@@ -1159,11 +1161,11 @@ class StudySettings(_message.Message):
     closes it.
     """
     deletes_at_ms: _builtins.int
-    """Milliseconds since the Unix epoch when the study closes, if it is not closed, and the server
-    deletes it with all its data, as DeleteStudy with `force`: when it has run for an hour after this
-    time, so that a clock that jumps deletes nothing, and within two hours. In the future when the
-    study is created, before the year 10000, and not before `closes_at_ms`; 0: when its owner deletes
-    it. Participants are told this date with what they consent to.
+    """Milliseconds since the Unix epoch when the study closes, if it is not closed. The server deletes
+    it with all its data, as DeleteStudy with `force`, one to two hours later: it checks for an hour
+    that this time has passed, so that a wrong clock deletes nothing. In the future when the study is
+    created, before the year 10000, and not before `closes_at_ms`; 0: when its owner deletes it.
+    Participants are told this date with what they consent to.
     """
     @_builtins.property
     def factors(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyFactor]:
@@ -1532,7 +1534,7 @@ class Study(_message.Message):
     completed: _builtins.int
     """Number of participants who have completed it, also if their data were deleted since."""
     left: _builtins.int
-    """Number of participants who have withdrawn, dropped out or were removed."""
+    """Number of participants who have withdrawn, dropped out, or were removed or screened out."""
     open_link: _builtins.str
     """The open link, if the settings have one: 30 characters that need no escaping. The page's address
     for it is the path "/study/" and this text.
