@@ -376,8 +376,7 @@ impl Messages {
     fn decode(&self, memory: usize) -> BoxFuture<'static, Result<Permit, Refused>> {
         let (limits, key) = (Arc::clone(&self.limits), self.key);
         let (calls, plays) = (self.charge(memory), self.call.plays());
-        let is_large = memory > MAX_FREE_DECODED;
-        let waits = is_large && self.call.sends_many && !self.call.has_own_rate;
+        let waits = self.call.sends_many && self.is_large(memory);
         Box::pin(async move {
             if waits {
                 limits.may_call(key).await;
@@ -390,13 +389,15 @@ impl Messages {
 
     /// How many calls a message counts as that is decoded into this many bytes.
     fn charge(&self, memory: usize) -> u64 {
-        let is_large = memory > MAX_FREE_DECODED && !self.call.has_own_rate;
-        let counts = self.begun == 1 || is_large;
-        if counts {
-            memory as u64 / DECODED_BYTES_PER_CALL
-        } else {
-            0
+        match self.begun == 1 || self.is_large(memory) {
+            true => memory as u64 / DECODED_BYTES_PER_CALL,
+            false => 0,
         }
+    }
+
+    /// Whether a message that is decoded into this many bytes counts wherever in a stream it is.
+    fn is_large(&self, memory: usize) -> bool {
+        memory > MAX_FREE_DECODED && !self.call.has_own_rate
     }
 
     /// Counts the memory of a message.
