@@ -315,10 +315,10 @@ impl Study {
     /// The change that ends the participation of somebody who has come to a step that screens it out;
     /// `None` for all others.
     pub fn screen_out(&self, number: u32, now_ms: u64) -> Option<Change> {
-        let participant = self.participant(number)?;
-        let is_active = participant.status == Status::Active;
-        let is_out = matches!(self.step_of(participant)?.task, Task::ScreenOut(_));
-        (is_active && is_out).then_some(Change::ScreenedOut {
+        let participant = self.participant(number);
+        let active = participant.filter(|it| it.status == Status::Active)?;
+        let is_out = matches!(self.step_of(active)?.task, Task::ScreenOut(_));
+        is_out.then_some(Change::ScreenedOut {
             number,
             at_ms: now_ms,
         })

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
-use futures::{StreamExt as _, stream};
+use futures::{StreamExt as _, future, stream};
 use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
 use tracing::{info, warn};
 
@@ -79,8 +79,8 @@ impl Studies {
                 }
             });
             let deleting = stream::iter(deleting).buffer_unordered(DELETED_AT_ONCE);
-            let failed: Vec<Option<Id>> = deleting.collect().await;
-            for id in failed.into_iter().flatten() {
+            let failed: Vec<Id> = deleting.filter_map(future::ready).collect().await;
+            for id in failed {
                 passed.entry(id).and_modify(|it| it.requested = None);
             }
         }

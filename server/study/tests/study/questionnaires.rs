@@ -314,7 +314,7 @@ fn earlier_answers_decide_what_is_shown() {
 }
 
 #[test]
-fn who_is_screened_out_is_over_and_its_slot_is_free_again() {
+fn screening_out_ends_a_participation_and_frees_its_slot() {
     let (min, max, unit) = (0, 99, String::new());
     let young = ShownIf {
         questionnaire: Some("first".to_owned()),
