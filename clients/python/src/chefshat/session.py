@@ -244,7 +244,7 @@ class PlaySession:
             )
 
     def _resume(self, seat: SeatSession) -> None:
-        """Takes the seat back from its substitute, if it has one. Who leaves decisions open leaves them to the substitute."""
+        """Takes the seat back from its substitute, if it has one and the agent has not left its last decision open."""
         if seat.substituted and not seat.left_open and seat.handle is not None and not seat.game_is_over:
             self._outbox.append(pb.SeatCommand(handle=seat.handle, resume=pb.ResumeSeat()))
         seat.substituted = False
