@@ -9,6 +9,7 @@ import { AnswerStatus } from "../src/gen/chefshat/v1/decision_pb";
 import { ActResponseSchema, type SeatUpdate, SeatUpdateSchema } from "../src/gen/chefshat/v1/play_service_pb";
 import { setLanguage } from "../src/i18n";
 import { startActing } from "../src/table/acting";
+import { gesture } from "../src/table/expressions";
 import { emptyTable } from "../src/table/model/state";
 
 const AWAY = new ConnectError("away", Code.Unavailable);
@@ -130,4 +131,20 @@ test("a call for a decision that is gone does not keep the next one from being a
   await vi.advanceTimersByTimeAsync(0);
   expect(acting.sending.value).toBe(false);
   expect(acting.trouble.value).toBe("");
+});
+
+test("expressions arrive in the order in which they were shown", async () => {
+  const arrived: string[] = [];
+  vi.spyOn(playApi, "act").mockImplementation(async ({ command }) => {
+    const label = command?.case === "express" ? (command.value.label ?? "") : "";
+    // The first call is slow, and the second fails.
+    await new Promise((resolve) => setTimeout(resolve, label === "joy" ? 3_000 : 0));
+    arrived.push(label);
+    if (label === "surprise") throw AWAY;
+    return create(ActResponseSchema, {});
+  });
+  const acting = startActing("ticket", emptyTable(), 0, false);
+  for (const label of ["joy", "surprise", "sadness"] as const) acting.express(gesture(label));
+  await vi.advanceTimersByTimeAsync(5_000);
+  expect(arrived).toEqual(["joy", "surprise", "sadness"]);
 });

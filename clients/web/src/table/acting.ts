@@ -60,7 +60,7 @@ export interface Acting {
   answer(action: number, automatic?: Automatic): void;
   /** Asks for a hint for the open decision. */
   askHint(): void;
-  /** Shows an expression to the table. */
+  /** Shows an expression to the table, after those shown before it. */
   express(gesture: Gesture): void;
   /** Takes the seat back from a substitute. */
   resume(): void;
@@ -74,6 +74,8 @@ export function startActing(ticket: string, table: TableState, seat: number | un
   const sending = computed(() => answering.value !== undefined && live.value.decision?.id === answering.value);
   const trouble = signal("");
   const hint = signal<GivenHint | undefined>(undefined);
+  /** Ends when the last expression has been sent. */
+  let expressed = Promise.resolve();
   /** The open decision and when it was first rendered. */
   let shown = { id: 0n, atMs: 0 };
 
@@ -172,7 +174,10 @@ export function startActing(ticket: string, table: TableState, seat: number | un
     apply,
     answer: (action, automatic) => void answer(action, automatic),
     askHint: () => void askHint(),
-    express: (gesture) => void send({ case: "express", value: gesture }),
+    express: (gesture) => {
+      // One after the other: of calls made together the second may arrive first.
+      expressed = expressed.then(() => send({ case: "express", value: gesture }));
+    },
     resume: () => void send({ case: "resume", value: {} }),
   };
 }
