@@ -1,6 +1,7 @@
 //! How a person or the operating system asks a program to end.
 
 use std::io;
+use std::process::ExitCode;
 
 #[cfg(windows)]
 use tokio::signal::windows as system;
@@ -28,6 +29,9 @@ mod system {
     }
 }
 
+/// Exit code after Ctrl-C, as shells use it.
+const INTERRUPTED: u8 = 130;
+
 /// What asked the program to end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stop {
@@ -37,6 +41,17 @@ pub enum Stop {
     Terminate,
     /// The end of the terminal.
     HangUp,
+}
+
+impl Stop {
+    /// The exit code of a program that ends for it before its work is done.
+    #[must_use]
+    pub fn exit_code(self) -> ExitCode {
+        match self {
+            Self::Interrupt => ExitCode::from(INTERRUPTED),
+            Self::Terminate | Self::HangUp => ExitCode::FAILURE,
+        }
+    }
 }
 
 /// What asks a program to end, from its first call on.

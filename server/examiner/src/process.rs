@@ -1,5 +1,5 @@
 //! The agent's process: started from a command with placeholders, in its own process group, so that
-//! all of it ends with its case. Its output is logged, and the last lines are kept in memory.
+//! all of it ends with its case or its games. Its output is logged, and the last lines are kept in memory.
 
 use std::collections::VecDeque;
 use std::ffi::OsString;
@@ -12,7 +12,7 @@ use std::time::Duration;
 #[cfg(unix)]
 use rustix::process::{Pid, Signal, kill_process_group};
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWriteExt as _};
-use tokio::process::{Child, Command};
+use tokio::process::{Child, ChildStdin, Command};
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
@@ -29,13 +29,13 @@ pub struct AgentCommand(Vec<String>);
 
 /// The values of the placeholders.
 #[derive(Debug, Clone)]
-pub(super) struct Places {
-    /// `host:port` of the examiner.
-    pub(super) address: String,
+pub struct Places {
+    /// `host:port` of the server.
+    pub address: String,
     /// Join code of the room or the tournament.
-    pub(super) code: String,
+    pub code: String,
     /// Display name.
-    pub(super) name: String,
+    pub name: String,
 }
 
 impl AgentCommand {
@@ -56,20 +56,43 @@ impl AgentCommand {
         Self::mentioning("{tournament}", words)
     }
 
+    /// A command that plays many games, given as words. If it mentions `{code}`, it is started for
+    /// each; otherwise it is started once and reads a line for each game from its standard input: the
+    /// address of the server and the join code, separated by a space.
+    ///
+    /// # Errors
+    /// The missing placeholder.
+    pub fn for_games(words: Vec<String>) -> Result<Self, String> {
+        let command = Self(words);
+        match command.mentions("{code}") {
+            true => Self::new(command.0),
+            false => Ok(command),
+        }
+    }
+
+    /// Whether its process reads from its standard input which games to play.
+    pub fn reads_games(&self) -> bool {
+        !self.mentions("{code}") && !self.mentions("{tournament}")
+    }
+
+    fn mentions(&self, place: &str) -> bool {
+        self.0.iter().any(|word| word.contains(place))
+    }
+
     fn mentioning(code: &str, words: Vec<String>) -> Result<Self, String> {
-        let mentions = |place: &str| words.iter().any(|word| word.contains(place));
-        if !mentions(code) {
+        let command = Self(words);
+        if !command.mentions(code) {
             return Err(format!(
                 "the command needs {code} in place of the join code, for instance --code {code}"
             ));
         }
-        if !mentions("{address}") && !mentions("{url}") {
+        if !command.mentions("{address}") && !command.mentions("{url}") {
             return Err(
                 "the command needs {address} (host:port) or {url} (http://host:port) in place of the server's address"
                     .into(),
             );
         }
-        Ok(Self(words))
+        Ok(command)
     }
 
     /// The words as they were given.
@@ -94,7 +117,7 @@ impl AgentCommand {
 /// A running process. Dropping it kills the process and, where processes have groups, everything it
 /// started.
 #[derive(Debug)]
-pub(super) struct AgentProcess {
+pub struct AgentProcess {
     child: Child,
     #[cfg(unix)]
     group: Option<Pid>,
@@ -110,7 +133,10 @@ struct Log {
 
 impl AgentProcess {
     /// Starts it. `log`: a file for its output.
-    pub(super) async fn start(
+    ///
+    /// # Errors
+    /// The program or the file.
+    pub async fn start(
         command: &AgentCommand,
         places: &Places,
         log: Option<PathBuf>,
@@ -119,12 +145,16 @@ impl AgentProcess {
             Some(path) => Some(tokio::fs::File::create(path).await?),
             None => None,
         };
+        let reads_games = command.reads_games();
         let mut words = command.filled(places).into_iter();
         let program = words.next().unwrap_or_default();
         let mut command = Command::new(program);
         command
             .args(words)
-            .stdin(Stdio::null())
+            .stdin(match reads_games {
+                true => Stdio::piped(),
+                false => Stdio::null(),
+            })
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .kill_on_drop(true);
@@ -158,13 +188,22 @@ impl AgentProcess {
         })
     }
 
-    /// Waits until it has exited.
-    pub(super) async fn ended(&mut self) -> io::Result<ExitStatus> {
+    /// Where it reads which games to play, until that is dropped; `None` if it reads none.
+    pub fn games(&mut self) -> Option<ChildStdin> {
+        self.child.stdin.take()
+    }
+
+    /// Waits until it has exited. Cancel safe. It reads no games from then on, unless [`Self::games`]
+    /// was called.
+    ///
+    /// # Errors
+    /// Its status is unknown.
+    pub async fn ended(&mut self) -> io::Result<ExitStatus> {
         self.child.wait().await
     }
 
     /// Kills it and returns the last lines of its output.
-    pub(super) async fn finish(mut self, most: usize) -> Vec<String> {
+    pub async fn finish(mut self, most: usize) -> Vec<String> {
         self.kill();
         for reader in std::mem::take(&mut self.readers) {
             // A process that left the group may hold the output open; it is not waited for.

@@ -10,15 +10,13 @@ use std::time::Duration;
 
 use anstyle::{AnsiColor, Style};
 use chefshat_cli::error::{CommandError, say};
-use chefshat_cli::stops::{Stop, Stops};
+use chefshat_cli::stops::Stops;
 use chefshat_examiner::case::{CASES, Case, Patience};
 use chefshat_examiner::{AgentCommand, Examination, Outcome, Waiting};
 use clap::Args;
 
 /// Time to wait for an agent that a person starts.
 const BY_HAND: Duration = Duration::from_secs(600);
-/// Exit code after Ctrl-C, as shells use it.
-const INTERRUPTED: u8 = 130;
 
 /// Test whether an agent, in any language, plays correctly, even when a move is rejected or the
 /// connection drops.
@@ -75,10 +73,7 @@ impl CheckAgent {
         tokio::select! {
             code = self.examine() => code,
             // Returning ends the agent's processes, which are in a process group of their own.
-            stop = stops.next() => Ok(match stop {
-                Stop::Interrupt => ExitCode::from(INTERRUPTED),
-                _ => ExitCode::FAILURE,
-            }),
+            stop = stops.next() => Ok(stop.exit_code()),
         }
     }
 
