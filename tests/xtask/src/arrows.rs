@@ -54,6 +54,18 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &["chefshat-engine", "chefshat-agents", "chefshat-referee"],
     ),
     (
+        "chefshat-benchmark",
+        &[
+            "chefshat-engine",
+            "chefshat-proto",
+            "chefshat-agents",
+            "chefshat-search",
+            "chefshat-tournament",
+            "chefshat-simulation",
+            "chefshat-record",
+        ],
+    ),
+    (
         "chefshat-vector",
         &[
             "chefshat-engine",

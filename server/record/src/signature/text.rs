@@ -19,6 +19,11 @@ pub(super) fn signature_of(line: &v1::RecordLine) -> Option<&v1::RecordSignature
 pub struct TextHash(pub(super) [u8; 32]);
 
 impl TextHash {
+    /// The bytes of the hash.
+    pub fn bytes(self) -> [u8; 32] {
+        self.0
+    }
+
     /// The hash of a record in its canonical text.
     pub(super) fn of(lines: &[v1::RecordLine]) -> Self {
         (lines.iter()).fold(Self::default(), |hash, line| hash.and_line(line))

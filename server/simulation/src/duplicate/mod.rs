@@ -44,7 +44,7 @@ pub enum Contender {
 
 impl Contender {
     /// Creates the agent for one game.
-    fn agent(&self, rules: &RuleSet, seed: [u8; 32]) -> BuiltInAgent {
+    pub fn agent(&self, rules: &RuleSet, seed: [u8; 32]) -> BuiltInAgent {
         match self {
             Contender::Kind(kind) => BuiltInAgent::new(*kind, seed),
             Contender::Network(network) => BuiltInAgent::network(Arc::clone(network)),

@@ -1,0 +1,287 @@
+//! What a record proves about the game of a deal: that it is complete and correct, has the deal,
+//! the rules, the limits and the opponents of the task, and that these opponents decided exactly as
+//! they do. Who took the agent's decisions, no record can prove.
+
+use std::collections::VecDeque;
+use std::num::NonZeroU32;
+
+use chefshat_agents::{BuiltInAgent, Following, Listener, play_agents};
+use chefshat_engine::{ActionId, Decision, Event, Mask, MetricsRecorder, Observation, Seat};
+use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
+use chefshat_record::convert::rules_to_proto;
+use chefshat_record::jsonl::Record;
+use chefshat_record::outcome::is_by_fallback;
+use chefshat_record::replay::{ReplayError, walk_file};
+use chefshat_record::signature::{PublicKey, TextHash};
+use chefshat_search::named_agent;
+use thiserror::Error;
+
+use crate::task::Task;
+
+/// Why a record does not count for the game of a deal.
+#[derive(Debug, Error)]
+pub enum Problem {
+    /// It is wrong or incomplete.
+    #[error("line {}: {}", .0.line, .0.problem)]
+    Wrong(#[from] ReplayError),
+    /// Its game was aborted.
+    #[error("the game was aborted")]
+    Aborted,
+    /// Parts of it are missing.
+    #[error("parts were removed from the record; download the whole one")]
+    Redacted,
+    /// It is of another deal.
+    #[error("the game has another seed than this deal of the task")]
+    OtherDeal,
+    /// It has other rules.
+    #[error("the game has other rules than the task")]
+    OtherRules,
+    /// It allows more than the task.
+    #[error("the room allowed {0}, other than the task")]
+    OtherPolicy(&'static str),
+    /// Other opponents.
+    #[error("seat {seat} was not the built-in agent {wanted}")]
+    OtherOpponent {
+        /// The seat, from 0.
+        seat: usize,
+        /// The opponent of the task.
+        wanted: String,
+    },
+    /// An opponent did not decide as it does.
+    #[error(
+        "seat {seat} is called {name}, but decision {decision} of the game is not the one that {name} takes"
+    )]
+    Deviates {
+        /// The seat, from 0.
+        seat: usize,
+        /// The opponent.
+        name: String,
+        /// Number of the decision in the game, from 1.
+        decision: usize,
+    },
+}
+
+/// What the agent reached in the game of a deal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GameScore {
+    /// Points of the agent in the whole game.
+    pub points: u64,
+    /// Shifts of the game.
+    pub shifts: u32,
+    /// Place of the agent in the game, from 1.
+    pub place: u8,
+    /// Decisions of the agent's seat.
+    pub decisions: u64,
+    /// Those that it did not take itself: defaults after timeouts or invalid attempts, decisions of
+    /// the room's substitute, and those of its own fallback.
+    pub fallback_decisions: u64,
+    /// Its invalid attempts.
+    pub invalid_attempts: u64,
+    /// Decision times that were measured, in microseconds.
+    pub decision_times_us: Vec<u64>,
+    /// Whose key signed the record.
+    pub signed_by: Option<PublicKey>,
+    /// The hash of the text of the record.
+    pub record: TextHash,
+}
+
+/// Checks the record of the game of a deal, by its index from 0.
+///
+/// # Errors
+/// What prevents it from counting.
+pub fn check(task: &Task, deal: usize, record: &Record) -> Result<GameScore, Problem> {
+    let replayed = walk_file(record, |_| {})?;
+    if replayed.state != v1::RoomState::Finished {
+        return Err(Problem::Aborted);
+    }
+    if replayed.redacted {
+        return Err(Problem::Redacted);
+    }
+    let lines = || record.lines.iter().filter_map(|line| line.line.as_ref());
+    let seed = lines().find_map(|line| match line {
+        Line::Event(v1::GameEvent {
+            kind: Some(Kind::GameEnded(ended)),
+            ..
+        }) => Some(ended.reveal.as_ref()?.game_seed.as_slice()),
+        _ => None,
+    });
+    if seed != Some(task.seed(deal).0.as_slice()) {
+        return Err(Problem::OtherDeal);
+    }
+    // A record that was walked has a header.
+    let header = lines().find_map(|line| match line {
+        Line::Header(header) => Some(header),
+        _ => None,
+    });
+    check_header(task, deal, header.unwrap_or(&v1::RecordHeader::default()))?;
+    let decisions = lines().filter_map(|line| match line {
+        Line::Decision(decision) => Some(decision),
+        _ => None,
+    });
+    let decisions: Vec<&v1::DecisionRecord> = decisions.collect();
+    let played = play_again(task, deal, &decisions)?;
+    let seat = task.seat(deal).index();
+    let own = (decisions.into_iter()).filter(|decision| decision.seat as usize == seat);
+    let mut score = GameScore {
+        signed_by: replayed.signed_by,
+        record: record.text,
+        ..played
+    };
+    for decision in own {
+        score.decisions += 1;
+        score.invalid_attempts += decision.invalid_attempts.len() as u64;
+        let is_own = decision.source() == v1::DecisionSource::Agent
+            && !decision.annotations.as_ref().is_some_and(is_by_fallback);
+        score.fallback_decisions += u64::from(!is_own);
+        if is_own && decision.decision_time_us > 0 {
+            score.decision_times_us.push(decision.decision_time_us);
+        }
+    }
+    Ok(score)
+}
+
+fn check_header(task: &Task, deal: usize, header: &v1::RecordHeader) -> Result<(), Problem> {
+    if header.origin() != v1::GameOrigin::FixedSeed {
+        return Err(Problem::OtherDeal);
+    }
+    if header.rules.as_ref() != Some(&rules_to_proto(&task.rule_set())) {
+        return Err(Problem::OtherRules);
+    }
+    let (given, wanted) = (header.policy.clone().unwrap_or_default(), task.policy());
+    // An unset time is none that a record can have, and not shorter than any.
+    let time = given.decision_time_ms.unwrap_or(u32::MAX);
+    let others = [
+        (time > task.decision_time_ms, "a longer time for decisions"),
+        (given.bank_ms != wanted.bank_ms, "a time bank"),
+        (
+            !given.clocks.is_empty(),
+            "clocks of their own for some kinds",
+        ),
+        (
+            given.max_invalid_attempts != wanted.max_invalid_attempts,
+            "another number of invalid attempts",
+        ),
+        (given.hints, "hints"),
+    ];
+    if let Some((_, what)) = others.iter().find(|(differs, _)| *differs) {
+        return Err(Problem::OtherPolicy(what));
+    }
+    for (seat, wanted) in task.opponents(deal).into_iter().enumerate() {
+        let Some(wanted) = wanted.map(|agent| agent.name()) else {
+            continue;
+        };
+        let given = header.seats.get(seat).map(|it| &it.built_in_agent);
+        if given != Some(&wanted) {
+            return Err(Problem::OtherOpponent { seat, wanted });
+        }
+    }
+    Ok(())
+}
+
+/// Plays the game again with the recorded decisions of the agent, and compares those of its
+/// opponents. Returns its result.
+fn play_again(
+    task: &Task,
+    deal: usize,
+    decisions: &[&v1::DecisionRecord],
+) -> Result<GameScore, Problem> {
+    let (rules, own) = (task.rule_set(), task.seat(deal));
+    let opponents = task.opponents(deal);
+    let given = (decisions.iter())
+        .filter(|decision| decision.seat as usize == own.index())
+        .map(|decision| action(decision));
+    let given = Given(given.collect());
+    let mut agents: Vec<BuiltInAgent> = (opponents.iter().enumerate())
+        .map(|(seat, opponent)| match opponent {
+            None => BuiltInAgent::following(Box::new(given.clone())),
+            Some(opponent) => {
+                let seed = task.agent_seed(deal, Seat::new(seat));
+                named_agent(*opponent, &rules, seed)
+            }
+        })
+        .collect();
+    let mut witness = Witness {
+        recorder: MetricsRecorder::new(rules, None),
+        own,
+        decisions: Vec::with_capacity(decisions.len()),
+        points: 0,
+        shifts: 0,
+    };
+    // Once an opponent has deviated, a recorded action may be illegal.
+    let attempts = Some(NonZeroU32::MIN);
+    let standings = play_agents(rules, task.seed(deal), attempts, &mut agents, &mut witness);
+    let differs = |(number, (seat, played)): (usize, &(Seat, ActionId))| {
+        let recorded = decisions.get(number);
+        let is_same =
+            recorded.is_some_and(|it| it.seat as usize == seat.index() && action(it) == *played);
+        (!is_same).then_some((number, *seat))
+    };
+    if let Some((number, seat)) = witness.decisions.iter().enumerate().find_map(differs) {
+        let name = opponents[seat.index()].map_or_else(String::new, |agent| agent.name());
+        return Err(Problem::Deviates {
+            seat: seat.index(),
+            name,
+            decision: number + 1,
+        });
+    }
+    let place = standings.iter().find(|(_, seat, _)| *seat == own);
+    Ok(GameScore {
+        points: witness.points,
+        shifts: witness.shifts,
+        place: place.map_or(0, |(place, ..)| place),
+        decisions: 0,
+        fallback_decisions: 0,
+        invalid_attempts: 0,
+        decision_times_us: Vec::new(),
+        signed_by: None,
+        record: TextHash::default(),
+    })
+}
+
+fn action(decision: &v1::DecisionRecord) -> ActionId {
+    // No action has the last number, so another decision is found there.
+    ActionId::new(u16::try_from(decision.action).unwrap_or(u16::MAX))
+}
+
+/// An agent that takes given decisions.
+#[derive(Debug, Clone)]
+struct Given(VecDeque<ActionId>);
+
+impl Following for Given {
+    fn name(&self) -> &'static str {
+        "given"
+    }
+
+    fn on_event(&mut self, _: Seat, _: &Event) {}
+
+    fn decide(&mut self, _: &Observation, legal: &Mask) -> ActionId {
+        let first = legal.iter().next().expect("a decision has a legal action");
+        self.0.pop_front().unwrap_or(first)
+    }
+
+    fn boxed_clone(&self) -> Box<dyn Following> {
+        Box::new(self.clone())
+    }
+}
+
+/// Notes what the agent gets in a game.
+struct Witness {
+    recorder: MetricsRecorder,
+    own: Seat,
+    decisions: Vec<(Seat, ActionId)>,
+    points: u64,
+    shifts: u32,
+}
+
+impl Listener for Witness {
+    fn on_event(&mut self, event: &Event) {
+        if let Some(shift) = self.recorder.on_event(event) {
+            self.points += u64::from(shift.seats[self.own].points);
+            self.shifts += 1;
+        }
+    }
+
+    fn on_decision(&mut self, decision: Decision, action: ActionId) {
+        self.decisions.push((decision.seat, action));
+    }
+}
