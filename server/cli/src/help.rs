@@ -22,6 +22,7 @@ pub(crate) const GROUPS: [(&str, &[&str]); 6] = [
             "render",
             "simulate",
             "compare",
+            "bench",
             "ratings",
             "experiment",
             "check-agent",

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 pub const PROGRAM: &str = "chefshat-lab";
 
 /// Its commands, as `chefshat --help` lists them. `chefshat-lab` tests that these are all.
-pub const COMMANDS: [(&str, &str); 9] = [
+pub const COMMANDS: [(&str, &str); 10] = [
     (
         "export",
         "Export records as a dataset: Parquet, CSV or JSON Lines, with a dataset card",
@@ -21,6 +21,10 @@ pub const COMMANDS: [(&str, &str); 9] = [
     (
         "compare",
         "Compare two agents on duplicate deals: the same deals for both, in all seats",
+    ),
+    (
+        "bench",
+        "Play the benchmark ChefsHat-v1, check submissions, print tables of results",
     ),
     ("ratings", "Recompute the leaderboard from records"),
     ("experiment", "Run an experiment of the paper"),

@@ -85,13 +85,13 @@ enum SeatsFlag {
     One,
 }
 
-/// One of the two agents.
-struct Entrant {
+/// An agent that plays in this process.
+pub(crate) struct Entrant {
     /// As given on the command line.
-    given: String,
+    pub(crate) given: String,
     /// Short name for the title and tables.
-    label: String,
-    contender: Contender,
+    pub(crate) label: String,
+    pub(crate) contender: Contender,
     /// Of an agent that searches.
     search: Option<Searchers>,
 }
@@ -144,7 +144,7 @@ impl Compare {
 
 impl Entrant {
     /// Reads a built-in agent, or else a network file.
-    fn of(given: &str) -> Result<Entrant, CommandError> {
+    pub(crate) fn of(given: &str) -> Result<Entrant, CommandError> {
         match given.parse() {
             Ok(NamedAgent::Kind(kind)) => {
                 return Ok(Entrant {

@@ -1,6 +1,7 @@
 //! `chefshat-lab`: what needs datasets, pictures, simulations or examinations, beside all commands of
 //! `chefshat`, which starts it for these.
 
+mod bench;
 mod check_agent;
 mod compare;
 mod conformance;
@@ -37,6 +38,8 @@ enum Command {
     Simulate(simulate::Simulate),
     /// Compare two agents on duplicate deals: the same deals for both, in all seats.
     Compare(compare::Compare),
+    /// Play the benchmark ChefsHat-v1, check submissions, print tables of results.
+    Bench(bench::BenchCommand),
     /// Recompute the leaderboard from records.
     Ratings(ratings::RatingsCommand),
     /// Run an experiment of the paper.
@@ -57,6 +60,7 @@ impl Commands for Command {
             Self::Render(command) => command.run(),
             Self::Simulate(command) => command.run(),
             Self::Compare(command) => command.run(),
+            Self::Bench(command) => command.run(),
             Self::Ratings(command) => command.run(),
             Self::Experiment(command) => command.run(),
             Self::CheckAgent(command) => in_runtime(command.run()),

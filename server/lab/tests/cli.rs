@@ -7,6 +7,7 @@
 )]
 
 mod cli {
+    mod bench;
     mod branching;
     mod check_agent;
     mod cluster;

@@ -1,0 +1,159 @@
+//! `chefshat bench`: plays the tasks of the benchmark ChefsHat-v1, checks the folders of records that
+//! others submit, and prints tables of results. `chefshat-benchmark` has the tasks and decides what
+//! counts.
+
+mod folder;
+mod hosted;
+mod offline;
+mod pool;
+mod report;
+mod run;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use chefshat_benchmark::{BENCHMARK, Task, TaskResult, tasks};
+use chefshat_cli::error::{CommandError, say};
+use chefshat_cli::numbers::counted;
+use chefshat_cli::output::{heading, line, rules_in_short};
+use chefshat_cli::program::in_runtime;
+use clap::{Args, Subcommand};
+use serde_json::json;
+
+use folder::Folder;
+
+const HELP: &str = "\
+An agent plays one game on each deal of a task, always against the same built-in agents. What it can prove is in the records of its games: \
+`submit` replays each, and computes again every decision of its opponents. docs/benchmark.md says how to cite a result.
+
+Examples:
+  chefshat bench tasks
+  chefshat bench run shift --agent greedy --out results/greedy
+  chefshat bench run shift --out results/mine --name mine -- python agent.py
+  chefshat bench run shift --out results/mine --deals 20 -- ./agent {address} {code}
+  chefshat bench submit results/mine
+  chefshat bench table results/*";
+
+/// Play the benchmark ChefsHat-v1, check submissions, print tables of results.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct BenchCommand {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// List the tasks.
+    Tasks(Tasks),
+    /// Play a task, and keep the records of its games in a folder.
+    Run(run::Run),
+    /// Check a folder of records and print its result.
+    Submit(Submit),
+    /// Compare results, with the differences on the same deals.
+    Table(TableCommand),
+    /// Play all tasks with the built-in agents, and these against each other: the tables of
+    /// docs/benchmark.md.
+    Pool(pool::Pool),
+}
+
+impl BenchCommand {
+    pub(super) fn run(self) -> Result<ExitCode, CommandError> {
+        match self.action {
+            Action::Tasks(command) => command.run(),
+            Action::Run(command) => in_runtime(command.run()),
+            Action::Submit(command) => command.run(),
+            Action::Table(command) => command.run(),
+            Action::Pool(command) => command.run(),
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+struct Tasks {
+    /// Print one JSON object with everything that the tasks fix but the seeds, which are the SHA-256
+    /// of the text "ChefsHat-v1 TASK DEAL", with deals from 0.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Tasks {
+    fn run(self) -> Result<ExitCode, CommandError> {
+        if self.json {
+            say(json!({"benchmark": BENCHMARK, "tasks": tasks()}))?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        let mut text = String::new();
+        for task in tasks() {
+            heading(&mut text, &task.name);
+            line(&mut text, &format!("{}.", task.about));
+            line(&mut text, &rules_in_short(&task.rule_set()));
+            let seconds = task.decision_time_ms / 1000;
+            let deals = counted(task.deals as u64, "deal");
+            line(&mut text, &format!("{deals}, {seconds} s for a decision"));
+        }
+        anstream::print!("{text}");
+        Ok(ExitCode::SUCCESS)
+    }
+}
+
+#[derive(Debug, Args)]
+struct Submit {
+    /// The folder that `chefshat bench run` wrote.
+    folder: PathBuf,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Submit {
+    fn run(self) -> Result<ExitCode, CommandError> {
+        let folder = Folder::open(&self.folder)?;
+        let result = folder.check()?;
+        folder.write_result(&result)?;
+        report::print(&result, self.json)
+    }
+}
+
+#[derive(Debug, Args)]
+struct TableCommand {
+    /// Folders that `chefshat bench run` wrote and `submit` checked, or their result.json.
+    #[arg(required = true)]
+    results: Vec<PathBuf>,
+    /// The agent to compare with, by name: one of the results, or a built-in agent, which is played
+    /// now.
+    #[arg(long, value_name = "AGENT", default_value = "greedy")]
+    versus: String,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+impl TableCommand {
+    fn run(self) -> Result<ExitCode, CommandError> {
+        let results = (self.results.iter())
+            .map(|path| folder::read_result(path))
+            .collect::<Result<Vec<TaskResult>, _>>()?;
+        let mut versus = Vec::new();
+        for task in tasks() {
+            let of_task: Vec<_> = results.iter().filter(|it| it.task == task.name).collect();
+            if of_task.is_empty() {
+                continue;
+            }
+            let named = of_task.iter().find(|it| it.agent.name == self.versus);
+            versus.push(match named {
+                Some(named) => (*named).clone(),
+                None => offline::reference(task, &self.versus)?,
+            });
+        }
+        report::print_table(&results, &versus, self.json)
+    }
+}
+
+/// The task of this name, for clap.
+fn task_named(name: &str) -> Result<&'static Task, String> {
+    Task::named(name).ok_or_else(|| {
+        let names: Vec<&str> = tasks().iter().map(|task| task.name.as_str()).collect();
+        format!("there is no such task; use one of {}", names.join(", "))
+    })
+}

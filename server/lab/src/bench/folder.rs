@@ -1,0 +1,166 @@
+//! The folder of a submission: `manifest.json` says what it is, `records/` has the record of each
+//! deal (`0000.jsonl`, …), and `result.json` what they show.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use chefshat_benchmark::{AgentInfo, BENCHMARK, GameScore, Task, TaskResult, check};
+use chefshat_cli::error::CommandError;
+use chefshat_cli::progress;
+use chefshat_record::atomic_file::AtomicFile;
+use chefshat_record::jsonl;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+const MANIFEST: &str = "manifest.json";
+const RESULT: &str = "result.json";
+/// Records that are named one by one when they do not count.
+const NAMED: usize = 5;
+
+/// What a folder is a result of.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Manifest {
+    pub(super) benchmark: String,
+    pub(super) task: String,
+    pub(super) agent: AgentInfo,
+    /// The built-in agent, network file or command that plays.
+    pub(super) command: String,
+}
+
+/// A folder of records with its manifest.
+pub(super) struct Folder {
+    path: PathBuf,
+    pub(super) task: &'static Task,
+    manifest: Manifest,
+}
+
+impl Folder {
+    /// Opens the folder of a submission.
+    pub(super) fn open(path: &Path) -> Result<Self, CommandError> {
+        let manifest: Manifest = read_json(&path.join(MANIFEST)).map_err(|error| {
+            format!("{error}; a submission is a folder that `chefshat bench run` wrote")
+        })?;
+        let named = Task::named(&manifest.task).filter(|_| manifest.benchmark == BENCHMARK);
+        let task = named.ok_or_else(|| {
+            let (benchmark, task) = (&manifest.benchmark, &manifest.task);
+            format!("this version has no task {task:?} of a benchmark {benchmark:?}")
+        })?;
+        Ok(Self {
+            path: path.to_owned(),
+            task,
+            manifest,
+        })
+    }
+
+    /// Opens the folder, or creates it. One that has games of something else is refused.
+    pub(super) fn create(path: &Path, manifest: Manifest) -> Result<Self, CommandError> {
+        let file = path.join(MANIFEST);
+        if file.exists() {
+            let folder = Self::open(path)?;
+            let is_same = folder.manifest.task == manifest.task
+                && folder.manifest.command == manifest.command;
+            if !is_same {
+                let (task, by) = (&folder.manifest.task, &folder.manifest.command);
+                return Err(format!(
+                    "{} has games of the task {task}, played by {by}; name another folder with --out",
+                    path.display()
+                )
+                .into());
+            }
+        }
+        fs::create_dir_all(path)
+            .map_err(|error| format!("{}: {error}; name another with --out", path.display()))?;
+        write_json(&file, &manifest)?;
+        Self::open(path)
+    }
+
+    /// The file of a deal's record.
+    pub(super) fn record(&self, deal: usize) -> PathBuf {
+        self.path.join("records").join(format!("{deal:04}.jsonl"))
+    }
+
+    /// The deals without a record, of the first `deals`.
+    pub(super) fn missing(&self, deals: usize) -> Vec<usize> {
+        (0..deals)
+            .filter(|deal| !self.record(*deal).exists())
+            .collect()
+    }
+
+    /// The game of a deal, if it has a record.
+    fn game(&self, deal: usize) -> Result<Option<GameScore>, CommandError> {
+        let path = self.record(deal);
+        if !path.exists() {
+            return Ok(None);
+        }
+        let record = jsonl::read_record(&path)?;
+        let score = check(self.task, deal, &record);
+        Ok(Some(score.map_err(|problem| {
+            format!("{}: {problem}", path.display())
+        })?))
+    }
+
+    /// Checks all records. Those that do not count are named in the result.
+    pub(super) fn check(&self) -> Result<TaskResult, CommandError> {
+        let bar = progress::of_items(self.task.deals as u64, "deals");
+        let games: Vec<_> = (0..self.task.deals)
+            .into_par_iter()
+            .map(|deal| {
+                let game = self.game(deal);
+                bar.inc(1);
+                game
+            })
+            .collect();
+        bar.finish_and_clear();
+        let mut refused = Vec::new();
+        let mut by_deal = Vec::new();
+        for game in games {
+            by_deal.push(game.unwrap_or_else(|error| {
+                refused.push(error.to_string());
+                None
+            }));
+        }
+        let last = by_deal.iter().rposition(Option::is_some);
+        by_deal.truncate(last.map_or(0, |last| last + 1));
+        if by_deal.is_empty() && refused.is_empty() {
+            return Err(format!("{} has no records", self.path.display()).into());
+        }
+        let mut result = TaskResult::of(self.task, self.manifest.agent.clone(), &by_deal);
+        let more = refused.len().saturating_sub(NAMED);
+        refused.truncate(NAMED);
+        result.problems.extend(refused);
+        if more > 0 {
+            result
+                .problems
+                .push(format!("{more} more records do not count"));
+        }
+        Ok(result)
+    }
+
+    /// Writes the result beside the records.
+    pub(super) fn write_result(&self, result: &TaskResult) -> Result<(), CommandError> {
+        write_json(&self.path.join(RESULT), result)
+    }
+}
+
+/// Reads a result from its file or its folder.
+pub(super) fn read_result(path: &Path) -> Result<TaskResult, CommandError> {
+    let file = match path.is_dir() {
+        true => path.join(RESULT),
+        false => path.to_owned(),
+    };
+    let result = read_json(&file);
+    Ok(result.map_err(|error| format!("{error}; `chefshat bench submit` writes it"))?)
+}
+
+fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, String> {
+    let text = fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
+    serde_json::from_slice(&text).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(&serde_json::to_vec_pretty(value)?)?;
+    file.write_all(b"\n")?;
+    Ok(file.finish()?)
+}

@@ -1,0 +1,65 @@
+//! Built-in agents and network files play in this process.
+
+use chefshat_benchmark::{AgentInfo, Task, TaskResult, check, play_offline};
+use chefshat_cli::error::CommandError;
+use chefshat_cli::progress;
+use chefshat_proto::v1;
+use chefshat_record::jsonl;
+use chefshat_simulation::Contender;
+use rayon::prelude::*;
+
+use crate::compare::Entrant;
+
+/// Plays the game of a deal and returns the text of its record.
+pub(super) fn play(task: &Task, deal: usize, entrant: &Entrant) -> Vec<v1::RecordLine> {
+    let rules = task.rule_set();
+    let name = match &entrant.contender {
+        Contender::Network(network) => format!("network:{}", &hex::encode(network.id().0)),
+        Contender::Kind(_) | Contender::Made(_) => entrant.label.clone(),
+    };
+    play_offline(task, deal, &name, |seed| {
+        entrant.contender.agent(&rules, seed)
+    })
+}
+
+/// Refuses a network that was trained for other games: it would play as another agent.
+pub(super) fn check_fits(task: &Task, entrant: &Entrant) -> Result<(), CommandError> {
+    match &entrant.contender {
+        Contender::Network(network) if !network.fits(&task.rule_set()) => Err(format!(
+            "{} was trained for games of another size than those of the task {}",
+            entrant.given, task.name
+        )
+        .into()),
+        _ => Ok(()),
+    }
+}
+
+/// The result of an agent, without a folder.
+pub(super) fn result(
+    task: &Task,
+    entrant: &Entrant,
+    deals: usize,
+) -> Result<TaskResult, CommandError> {
+    let bar = progress::of_items(deals as u64, "deals");
+    let games = (0..deals).into_par_iter().map(|deal| {
+        let lines = play(task, deal, entrant);
+        let text = jsonl::text(&lines)?;
+        let record = jsonl::read_text("".as_ref(), text.as_slice())?;
+        bar.inc(1);
+        Ok(Some(check(task, deal, &record)?))
+    });
+    let games = games.collect::<Result<Vec<_>, CommandError>>()?;
+    bar.finish_and_clear();
+    let agent = AgentInfo {
+        name: entrant.label.clone(),
+        ..AgentInfo::default()
+    };
+    Ok(TaskResult::of(task, agent, &games))
+}
+
+/// The result of a built-in agent with which others are compared.
+pub(super) fn reference(task: &Task, name: &str) -> Result<TaskResult, CommandError> {
+    let entrant = Entrant::of(name).map_err(|error| format!("--versus: {error}"))?;
+    check_fits(task, &entrant)?;
+    result(task, &entrant, task.deals)
+}

@@ -1,0 +1,178 @@
+//! Results as text and as JSON.
+
+use std::process::ExitCode;
+
+use chefshat_benchmark::{BENCHMARK, Figure, TaskResult, tasks};
+use chefshat_cli::error::{CommandError, say};
+use chefshat_cli::numbers::counted;
+use chefshat_cli::output::{heading, line, percent, table};
+use serde_json::{Value, json};
+
+/// Prints the result of a task. The exit code says whether it is valid.
+pub(super) fn print(result: &TaskResult, as_json: bool) -> Result<ExitCode, CommandError> {
+    match as_json {
+        true => say(serde_json::to_string(result)?)?,
+        false => anstream::print!("{}", text(result)),
+    }
+    Ok(match result.is_valid() {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::FAILURE,
+    })
+}
+
+fn text(result: &TaskResult) -> String {
+    let mut text = String::new();
+    let deals = counted(result.deals as u64, "deal");
+    let (task, name) = (&result.task, &result.agent.name);
+    heading(&mut text, &format!("{BENCHMARK} {task}: {name}, {deals}"));
+    let [low, high] = result.games_won.interval95.map(percent);
+    let rows = [
+        ("Points a Shift", of_figure(&result.points_per_shift)),
+        (
+            "Games won",
+            [percent(result.games_won.mean), format!("{low} … {high}")],
+        ),
+        ("Place", of_figure(&result.place)),
+    ];
+    let rows = rows.map(|(what, [mean, interval])| vec![what.to_owned(), mean, interval]);
+    table(
+        &mut text,
+        &["", "Mean", "95 % interval"],
+        &[0],
+        rows.into_iter(),
+    );
+    text.push('\n');
+    let decisions = counted(result.decisions, "decision");
+    line(
+        &mut text,
+        &format!(
+            "{decisions}, {}, {}",
+            counted(result.fallback_decisions, "fallback decision"),
+            counted(result.invalid_attempts, "invalid attempt")
+        ),
+    );
+    if let Some([median, most]) = result.decision_ms {
+        line(
+            &mut text,
+            &format!("time for a decision: median {median:.1} ms, 99th percentile {most:.1} ms"),
+        );
+    }
+    line(&mut text, &format!("records: {}", result.records_sha256));
+    line(
+        &mut text,
+        &format!("signed by: {}", result.signed_by.join(", ")),
+    );
+    for problem in &result.problems {
+        line(&mut text, &format!("not valid: {problem}"));
+    }
+    text
+}
+
+fn of_figure(figure: &Figure) -> [String; 2] {
+    let [low, high] = figure.interval95;
+    [
+        format!("{:.3}", figure.mean),
+        format!("{low:.3} … {high:.3}"),
+    ]
+}
+
+/// Prints the results by task, each beside its difference from the agent in `versus`.
+pub(super) fn print_table(
+    results: &[TaskResult],
+    versus: &[TaskResult],
+    as_json: bool,
+) -> Result<ExitCode, CommandError> {
+    match as_json {
+        true => say(table_json(results, versus))?,
+        false => anstream::print!("{}", table_text(results, versus)),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The results of a task, the best first, and the one with which they are compared.
+fn by_task<'r>(
+    results: &'r [TaskResult],
+    versus: &'r [TaskResult],
+) -> impl Iterator<Item = (&'r TaskResult, Vec<&'r TaskResult>)> {
+    tasks().iter().filter_map(move |task| {
+        let versus = versus.iter().find(|it| it.task == task.name)?;
+        let mut rows: Vec<_> = results.iter().filter(|it| it.task == task.name).collect();
+        let points = |it: &TaskResult| it.points_per_shift.mean;
+        rows.sort_by(|a, b| points(b).total_cmp(&points(a)));
+        Some((versus, rows))
+    })
+}
+
+/// The tables as text.
+pub(super) fn table_text(results: &[TaskResult], versus: &[TaskResult]) -> String {
+    let mut text = String::new();
+    for (versus, rows) in by_task(results, versus) {
+        heading(&mut text, &format!("{BENCHMARK} {}", versus.task));
+        let against = format!("against {}\nin its place", versus.agent.name);
+        let header = [
+            "",
+            "Points\na Shift",
+            "95 % interval",
+            "Games\nwon",
+            &against,
+            "95 % interval",
+        ];
+        let rows = rows.into_iter().map(|row| {
+            let [mean, interval] = of_figure(&row.points_per_shift);
+            let mut name = row.agent.name.clone();
+            if !row.is_valid() {
+                name.push_str(" *");
+            }
+            let mut cells = vec![name, mean, interval, percent(row.games_won.mean)];
+            match row
+                .paired_difference(versus)
+                .filter(|_| row.agent != versus.agent)
+            {
+                None => cells.extend(["".to_owned(), "".to_owned()]),
+                Some(difference) => {
+                    let figure = difference.points_per_shift;
+                    let [low, high] = figure.interval95.map(signed);
+                    cells.extend([signed(figure.mean), format!("{low} … {high}")]);
+                }
+            }
+            cells
+        });
+        table(&mut text, &header, &[0], rows);
+        text.push('\n');
+    }
+    if results.iter().any(|result| !result.is_valid()) {
+        line(&mut text, "* not valid: `chefshat bench submit` says why");
+    }
+    text
+}
+
+/// The tables as JSON.
+pub(super) fn table_json(results: &[TaskResult], versus: &[TaskResult]) -> Value {
+    let tasks = by_task(results, versus).map(|(versus, rows)| {
+        let rows = rows.into_iter().map(|row| {
+            let difference = row.paired_difference(versus);
+            json!({
+                "agent": row.agent,
+                "valid": row.is_valid(),
+                "deals": row.deals,
+                "points_per_shift": row.points_per_shift,
+                "games_won": row.games_won,
+                "place": row.place,
+                "difference": difference.map(|it| it.points_per_shift),
+                "common_deals": difference.map(|it| it.deals),
+                "records_sha256": row.records_sha256,
+            })
+        });
+        json!({
+            "task": versus.task,
+            "versus": versus.agent.name,
+            "rows": rows.collect::<Vec<_>>(),
+        })
+    });
+    json!({"benchmark": BENCHMARK, "tasks": tasks.collect::<Vec<_>>()})
+}
+
+/// A number with its sign.
+pub(super) fn signed(number: f64) -> String {
+    format!("{number:+.3}").replace('-', "−")
+}

@@ -1,0 +1,139 @@
+//! `chefshat bench run`: plays the games that a folder has not, and prints the result of all of them.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use chefshat_benchmark::{AgentInfo, BENCHMARK, Task};
+use chefshat_cli::connect::ServerArg;
+use chefshat_cli::error::CommandError;
+use chefshat_cli::progress;
+use chefshat_cli::stops::Stops;
+use chefshat_examiner::AgentCommand;
+use chefshat_record::jsonl;
+use clap::Args;
+use rayon::prelude::*;
+
+use super::folder::{Folder, Manifest};
+use super::{hosted, offline, report, task_named};
+use crate::compare::Entrant;
+
+const HELP: &str = "\
+A command without {code} is started once. It reads a line for each game from its standard input, the server's address and a join code, \
+separated by a space, plays it, and may play several at a time; in Python, chefshat.benchmark.play does that. A command with {code} is started \
+for each game; {address} stands for host:port, {url} for http://host:port.
+
+A run that was interrupted continues: games with a record are not played again.";
+
+/// Play a task, and keep the records of its games in a folder.
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Run {
+    /// The task; `chefshat bench tasks` lists them.
+    #[arg(value_parser = task_named)]
+    task: &'static Task,
+    /// The folder: manifest.json, records/ and result.json.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// A built-in agent or a network file, which plays in this process.
+    #[arg(long, conflicts_with_all = ["command", "server"], required_unless_present = "command")]
+    agent: Option<String>,
+    /// Name of the agent in tables. Default with --agent: that agent.
+    #[arg(long, required_unless_present = "agent")]
+    name: Option<String>,
+    /// How the agent plays and was made, in a sentence.
+    #[arg(long, default_value = "")]
+    description: String,
+    /// Where to read about it.
+    #[arg(long, default_value = "")]
+    url: String,
+    /// Play only this many of the deals: a first look, not a result.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
+    deals: Option<u64>,
+    /// Games at a time.
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=256))]
+    parallel: u16,
+    /// A server to play on, which signs the records if it has a key. Default: one in this process.
+    #[arg(long, value_name = "URL")]
+    server: Option<String>,
+    /// Token for that server.
+    #[arg(
+        long,
+        env = "CHEFSHAT_TOKEN",
+        hide_env_values = true,
+        requires = "server"
+    )]
+    token: Option<String>,
+    /// PEM file of the certificate authorities to trust, instead of the system's.
+    #[arg(long, value_name = "FILE", requires = "server")]
+    ca: Option<PathBuf>,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Command that starts the agent, in any language.
+    #[arg(last = true, value_name = "COMMAND")]
+    command: Vec<String>,
+}
+
+impl Run {
+    pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        let deals = self.deals.map_or(self.task.deals, |deals| deals as usize);
+        if deals > self.task.deals {
+            return Err(format!("--deals: the task has {} deals", self.task.deals).into());
+        }
+        let folder = match &self.agent {
+            Some(agent) => self.play_offline(agent, deals)?,
+            None => {
+                let mut stops = Stops::catch()?;
+                tokio::select! {
+                    folder = self.play_hosted(deals) => folder?,
+                    // Returning ends the agent's processes, which are in a process group of their own.
+                    stop = stops.next() => return Ok(stop.exit_code()),
+                }
+            }
+        };
+        let result = folder.check()?;
+        folder.write_result(&result)?;
+        report::print(&result, self.json)
+    }
+
+    /// Plays with an agent in this process.
+    fn play_offline(&self, agent: &str, deals: usize) -> Result<Folder, CommandError> {
+        let entrant = Entrant::of(agent)?;
+        offline::check_fits(self.task, &entrant)?;
+        let folder = self.folder(agent, &entrant.label)?;
+        let missing = folder.missing(deals);
+        let bar = progress::of_items(missing.len() as u64, "games");
+        missing.into_par_iter().try_for_each(|deal| {
+            let lines = offline::play(folder.task, deal, &entrant);
+            bar.inc(1);
+            jsonl::write(&folder.record(deal), &lines)
+        })?;
+        bar.finish_and_clear();
+        Ok(folder)
+    }
+
+    /// Plays with an agent that connects to a server.
+    async fn play_hosted(&self, deals: usize) -> Result<Folder, CommandError> {
+        let command = AgentCommand::for_games(self.command.clone())?;
+        let folder = self.folder(&self.command.join(" "), "")?;
+        let server = self.server.clone();
+        let server = server.map(|url| ServerArg::new(url, self.token.clone(), self.ca.clone()));
+        let parallel = usize::from(self.parallel);
+        hosted::play(&folder, &command, deals, parallel, server.as_ref()).await?;
+        Ok(folder)
+    }
+
+    fn folder(&self, command: &str, label: &str) -> Result<Folder, CommandError> {
+        let manifest = Manifest {
+            benchmark: BENCHMARK.to_owned(),
+            task: self.task.name.clone(),
+            agent: AgentInfo {
+                name: self.name.clone().unwrap_or_else(|| label.to_owned()),
+                description: self.description.clone(),
+                url: self.url.clone(),
+            },
+            command: command.to_owned(),
+        };
+        Folder::create(&self.out, manifest)
+    }
+}

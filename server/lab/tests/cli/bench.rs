@@ -1,0 +1,156 @@
+//! `chefshat bench`: an agent has the same result in this process and over the protocol, from one
+//! process or from one for each game; interrupted runs resume; records that do not count are named.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::run::{Ended, chefshat, fixture, typed};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_chefshat-lab");
+
+/// Plays the first deals of a task.
+fn run(task: &str, folder: &Path, agent: &[&str]) -> Ended {
+    let folder = folder.to_str().unwrap();
+    let start = [
+        "bench", "run", task, "--json", "--deals", "4", "--out", folder,
+    ];
+    chefshat(&[&start, agent].concat())
+}
+
+/// What does not depend on where the agent played.
+fn figures(ended: &Ended) -> [Value; 5] {
+    assert_eq!(
+        ended.code,
+        Some(1),
+        "four deals are not a valid result: {ended:?}"
+    );
+    let result = ended.json();
+    assert_eq!(result["problems"][0], "4 of 2500 deals");
+    assert_eq!(result["fallback_decisions"], 0);
+    [
+        "points_per_shift",
+        "games_won",
+        "place",
+        "by_deal",
+        "decisions",
+    ]
+    .map(|name| result[name].clone())
+}
+
+#[test]
+fn an_agent_has_the_same_result_wherever_it_plays() {
+    let folder = tempfile::tempdir().unwrap();
+    let [here, each, one] = ["here", "each", "one"].map(|name| folder.path().join(name));
+    let offline = run("game", &here, &["--agent", "greedy"]);
+    let each_game = [
+        "--name", "each", "--", PROGRAM, "agent", "greedy", "--server", "{url}", "--code", "{code}",
+    ];
+    let each_game = run("game", &each, &each_game);
+    let loops = format!(
+        "while read address code; do {PROGRAM} agent greedy --server http://$address --code $code; done"
+    );
+    let one_process = run("game", &one, &["--name", "one", "--", "sh", "-c", &loops]);
+    assert_eq!(figures(&each_game), figures(&offline));
+    assert_eq!(figures(&one_process), figures(&offline));
+    assert_eq!(offline.json()["decision_ms"], Value::Null);
+    assert!(each_game.json()["decision_ms"][0].as_f64() > Some(0.0));
+    for played in [&here, &each, &one] {
+        typed(&format!("verify {}", played.join("records").display())).well();
+    }
+    let table = typed(&format!(
+        "bench table {} {} --versus each",
+        here.display(),
+        each.display()
+    ));
+    let table = table.well();
+    table.assert_table_fits(3);
+    assert!(table.stdout.contains("+0.000"), "{}", table.stdout);
+}
+
+#[test]
+fn a_run_resumes_and_records_that_do_not_count_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path().join("greedy");
+    let whole = run("shift", &folder, &["--agent", "greedy"]);
+    let record = |deal: usize| folder.join("records").join(format!("{deal:04}.jsonl"));
+    fs::remove_file(record(2)).unwrap();
+    assert_eq!(run("shift", &folder, &["--agent", "greedy"]), whole);
+    fs::copy(record(0), record(1)).unwrap();
+    fs::write(record(2), "no record").unwrap();
+    let submitted = typed(&format!("bench submit {} --json", folder.display())).json();
+    assert_eq!(submitted["deals"], 2);
+    let problems = submitted["problems"].to_string();
+    for expected in [
+        "2 of 2500 deals",
+        "0001.jsonl: the game has another seed",
+        "0002.jsonl",
+    ] {
+        assert!(problems.contains(expected), "{problems}");
+    }
+    assert_eq!(submitted["by_deal"][1], Value::Null);
+    assert_eq!(submitted["by_deal"][3], whole.json()["by_deal"][3]);
+}
+
+#[test]
+fn errors_say_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    run("chess", &out, &["--agent", "greedy"]).assert_refused("use one of shift, game");
+    run("shift", &out, &[]).assert_refused("--agent");
+    run("shift", &out, &["--agent", "nobody"]).assert_failed("neither a built-in agent");
+    let small = fixture("network/small-table.safetensors");
+    let small = run("shift", &out, &["--agent", small.to_str().unwrap()]);
+    small.assert_failed("trained for games of another size");
+    let exits = run(
+        "shift",
+        &out,
+        &["--name", "it", "--", "sh", "-c", "echo away; exit 3"],
+    );
+    exits.assert_failed("exit status: 3");
+    exits.assert_failed("away");
+    let exits = [
+        "--name",
+        "it",
+        "--",
+        "sh",
+        "-c",
+        "echo {address} {code}; exit 3",
+    ];
+    let other = folder.path().join("other");
+    run("shift", &other, &exits).assert_failed("the agent exited before its end");
+    run("game", &other, &exits).assert_failed("name another folder with --out");
+    typed("bench submit nowhere").assert_failed("a folder that `chefshat bench run` wrote");
+    typed("bench table nowhere").assert_failed("nowhere");
+}
+
+#[test]
+fn the_tasks_are_data() {
+    let tasks = typed("bench tasks --json").well().json();
+    assert_eq!(tasks["benchmark"], "ChefsHat-v1");
+    let names = tasks["tasks"].as_array().unwrap().iter();
+    let names: Vec<_> = names.map(|task| task["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["shift", "game", "small_deck", "language_model"]);
+    let text = typed("bench tasks").well().stdout;
+    assert!(names.iter().all(|name| text.contains(name)), "{text}");
+}
+
+#[test]
+fn the_pool_has_a_row_and_a_column_for_each_agent() {
+    let flags = "--agents random,greedy --deals 10 --task-deals 10";
+    let pool = typed(&format!("bench pool {flags} --json")).well().json();
+    assert_eq!(pool["tasks"].as_array().unwrap().len(), 4);
+    let pairs = pool["cross"]["pairs"].as_array().unwrap();
+    assert_eq!(pairs.len(), 2);
+    assert_eq!(
+        (&pairs[1]["one"], &pairs[1]["others"]),
+        (&"greedy".into(), &"random".into())
+    );
+    assert!(
+        pairs[1]["difference"].as_f64() > Some(0.0),
+        "greedy is better: {pairs:?}"
+    );
+    let text = typed(&format!("bench pool {flags}")).well();
+    text.assert_table_fits(10);
+}
