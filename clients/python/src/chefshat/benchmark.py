@@ -1,0 +1,72 @@
+"""The benchmark ChefsHat-v1 (docs/benchmark.md): plays the games that `chefshat bench run` hands out.
+
+    class Mine(Agent):
+        def decide(self, decision):
+            ...
+
+    benchmark.play(Mine)
+
+in `agent.py` is an entrant: `chefshat bench run shift --out results/mine --name mine -- python agent.py`.
+"""
+
+import asyncio
+import sys
+import threading
+from collections.abc import Callable, Iterable
+
+from chefshat.agents import Agent
+from chefshat.aio import Client
+
+
+def play(make_agent: Callable[[], Agent], *, name: str = "entrant", games: Iterable[str] | None = None) -> int:
+    """Plays games until there are no more, several at a time.
+
+    Args:
+        make_agent: makes the agent of a game, for example its class.
+        name: display name in the rooms, 1..=64 characters.
+        games: a line for each game, the server's address and a join code, separated by a space; None: standard input.
+
+    Returns:
+        The number of games.
+
+    Raises:
+        ChefsHatError: a game could not be joined or played to its end. What an agent raises is passed on.
+    """
+    return asyncio.run(_play(make_agent, name, sys.stdin if games is None else games))
+
+
+async def _play(make_agent: Callable[[], Agent], name: str, games: Iterable[str]) -> int:
+    lines: asyncio.Queue[str | None] = asyncio.Queue()
+    loop = asyncio.get_running_loop()
+
+    def read() -> None:
+        try:
+            for line in games:
+                loop.call_soon_threadsafe(lines.put_nowait, line)
+            loop.call_soon_threadsafe(lines.put_nowait, None)
+        except RuntimeError:
+            return  # A game has failed, and the loop is closed.
+
+    # A daemon: whoever hands out the games may wait for this process before it ends the list.
+    threading.Thread(target=read, daemon=True).start()
+    clients: dict[str, Client] = {}
+    played = 0
+    try:
+        async with asyncio.TaskGroup() as group:
+            while (line := await lines.get()) is not None:
+                address, code = line.split()
+                if address not in clients:
+                    clients[address] = Client(address)
+                group.create_task(_play_one(clients[address], make_agent(), code, name))
+                played += 1
+    except BaseExceptionGroup as failed:
+        raise failed.exceptions[0] from None
+    finally:
+        for client in clients.values():
+            await client.close()
+    return played
+
+
+async def _play_one(client: Client, agent: Agent, code: str, name: str) -> None:
+    joined = await client.join_room(code, name)
+    await client.play(agent, joined.ticket)

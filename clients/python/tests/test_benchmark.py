@@ -1,0 +1,62 @@
+"""`chefshat bench run` with an agent in Python: one process plays all games, whose seeds are what the documents say."""
+
+import base64
+import hashlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from chefshat import Agent, Decision, benchmark
+
+pytestmark = pytest.mark.server
+
+AGENT = """
+from chefshat import Agent, benchmark
+
+class First(Agent):
+    def decide(self, decision):
+        return decision.legal_actions[FIRST]
+
+print(benchmark.play(First), "games")
+"""
+# Time limit in seconds.
+WAIT_S = 120
+DEALS = 6
+
+
+def run(real_binary: Path, folder: Path, program: str) -> "subprocess.CompletedProcess[str]":
+    """Plays the first deals of a task with a program in Python."""
+    bench = [str(real_binary), "bench", "run", "shift", "--json", "--deals", str(DEALS), "--out", str(folder)]
+    command = [*bench, "--name", "first", "--", sys.executable, "-c", program]
+    return subprocess.run(command, capture_output=True, text=True, timeout=WAIT_S)
+
+
+def test_one_process_plays_all_games(real_binary: Path, tmp_path: Path) -> None:
+    done = run(real_binary, tmp_path, AGENT.replace("FIRST", "0"))
+    assert done.returncode == 1, "six deals are not a valid result"
+    result = json.loads(done.stdout)
+    assert result["deals"] == DEALS, done.stderr
+    assert result["fallback_decisions"] == result["invalid_attempts"] == 0
+    assert result["problems"] == [f"{DEALS} of 2500 deals"]
+    for deal in range(DEALS):
+        lines = (tmp_path / "records" / f"{deal:04}.jsonl").read_text().splitlines()
+        [ended] = [line["event"]["gameEnded"] for line in map(json.loads, lines) if "gameEnded" in line.get("event", {})]
+        seed = hashlib.sha256(f"ChefsHat-v1 shift {deal}".encode()).digest()
+        assert base64.b64decode(ended["reveal"]["gameSeed"]) == seed
+
+
+def test_what_the_agent_raises_is_shown(real_binary: Path, tmp_path: Path) -> None:
+    done = run(real_binary, tmp_path, AGENT.replace("FIRST", "10_000"))
+    assert done.returncode == 1
+    assert "IndexError" in done.stderr
+
+
+def test_the_lines_of_games_may_come_from_anywhere() -> None:
+    class Never(Agent):
+        def decide(self, decision: Decision) -> int:
+            raise AssertionError(decision)
+
+    assert benchmark.play(Never, games=[]) == 0
