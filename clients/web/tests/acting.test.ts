@@ -147,4 +147,21 @@ test("expressions arrive in the order in which they were shown", async () => {
   for (const label of ["joy", "surprise", "sadness"] as const) acting.express(gesture(label));
   await vi.advanceTimersByTimeAsync(5_000);
   expect(arrived).toEqual(["joy", "surprise", "sadness"]);
+  expect(acting.trouble.value).not.toBe("");
+});
+
+test("expressions do not pile up behind a connection that is cut", async () => {
+  let calls = 0;
+  vi.spyOn(playApi, "act").mockImplementation(async () => {
+    calls += 1;
+    await new Promise((resolve) => setTimeout(resolve, 15_000));
+    throw AWAY;
+  });
+  const acting = startActing("ticket", emptyTable(), 0, false);
+  for (let taps = 0; taps < 100; taps += 1) acting.express(gesture("joy"));
+  await vi.advanceTimersByTimeAsync(600_000);
+  expect(calls).toBe(5);
+  acting.express(gesture("joy"));
+  await vi.advanceTimersByTimeAsync(0);
+  expect(calls).toBe(6);
 });

@@ -32,6 +32,9 @@ const ANSWER_LIMIT_MS = 5_000;
 const SHORTEST_PAUSE_MS = 250;
 const LONGEST_PAUSE_MS = 2_000;
 
+/** Expressions that wait for a slow connection; further ones would arrive long after they were meant. */
+const MAX_UNSENT = 5;
+
 /** An answer as it is sent. */
 interface Answer {
   decisionId: bigint;
@@ -76,6 +79,7 @@ export function startActing(ticket: string, table: TableState, seat: number | un
   const hint = signal<GivenHint | undefined>(undefined);
   /** Ends when the last expression has been sent. */
   let expressed = Promise.resolve();
+  let unsent = 0;
   /** The open decision and when it was first rendered. */
   let shown = { id: 0n, atMs: 0 };
 
@@ -160,7 +164,6 @@ export function startActing(ticket: string, table: TableState, seat: number | un
     if (!command) return;
     try {
       await playApi.act({ ticket, command }, { timeoutMs: CALL_LIMIT_MS });
-      trouble.value = "";
     } catch (thrown) {
       trouble.value = inWords(thrown);
     }
@@ -175,10 +178,19 @@ export function startActing(ticket: string, table: TableState, seat: number | un
     answer: (action, automatic) => void answer(action, automatic),
     askHint: () => void askHint(),
     express: (gesture) => {
+      trouble.value = "";
+      if (unsent >= MAX_UNSENT) return;
+      unsent += 1;
       // One after the other: of calls made together the second may arrive first.
-      expressed = expressed.then(() => send({ case: "express", value: gesture }));
+      expressed = expressed.then(async () => {
+        await send({ case: "express", value: gesture });
+        unsent -= 1;
+      });
     },
-    resume: () => void send({ case: "resume", value: {} }),
+    resume: () => {
+      trouble.value = "";
+      void send({ case: "resume", value: {} });
+    },
   };
 }
 
