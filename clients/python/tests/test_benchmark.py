@@ -5,6 +5,7 @@ import hashlib
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -59,4 +60,12 @@ def test_the_lines_of_games_may_come_from_anywhere() -> None:
         def decide(self, decision: Decision) -> int:
             raise AssertionError(decision)
 
+    def broken() -> Iterator[str]:
+        yield from ()
+        raise RuntimeError("torn")
+
     assert benchmark.play(Never, games=[]) == 0
+    with pytest.raises(ValueError, match="not an address and a join code"):
+        benchmark.play(Never, games=["127.0.0.1:1"])
+    with pytest.raises(RuntimeError, match="torn"):
+        benchmark.play(Never, games=broken())

@@ -1,6 +1,6 @@
-//! What a record proves about the game of a deal: that it is complete and correct, has the deal,
-//! the rules, the limits and the opponents of the task, and that these opponents decided exactly as
-//! they do. Who took the agent's decisions, no record can prove.
+//! Checks the record of a game: that it is complete and correct, has the deal, the rules, the limits
+//! and the opponents of the task, and that each decision of an opponent is the one that it takes. No
+//! record proves who took the decisions of the agent.
 
 use std::collections::VecDeque;
 use std::num::NonZeroU32;
@@ -10,7 +10,7 @@ use chefshat_engine::{ActionId, Decision, Event, Mask, MetricsRecorder, Observat
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::convert::rules_to_proto;
 use chefshat_record::jsonl::Record;
-use chefshat_record::outcome::is_by_fallback;
+use chefshat_record::outcome::{Identity, has_choice, is_by_fallback};
 use chefshat_record::replay::{ReplayError, walk_file};
 use chefshat_record::signature::{PublicKey, TextHash};
 use chefshat_search::named_agent;
@@ -31,13 +31,13 @@ pub enum Problem {
     #[error("parts were removed from the record; download the whole one")]
     Redacted,
     /// It is of another deal.
-    #[error("the game has another seed than this deal of the task")]
+    #[error("the game has a different seed than this deal of the task")]
     OtherDeal,
     /// It has other rules.
-    #[error("the game has other rules than the task")]
+    #[error("the game has different rules than the task")]
     OtherRules,
-    /// It allows more than the task.
-    #[error("the room allowed {0}, other than the task")]
+    /// It has other limits.
+    #[error("the room has a different policy than the task: {0}")]
     OtherPolicy(&'static str),
     /// Other opponents.
     #[error("seat {seat} was not the built-in agent {wanted}")]
@@ -47,10 +47,8 @@ pub enum Problem {
         /// The opponent of the task.
         wanted: String,
     },
-    /// An opponent did not decide as it does.
-    #[error(
-        "seat {seat} is called {name}, but decision {decision} of the game is not the one that {name} takes"
-    )]
+    /// An opponent took a decision that its agent does not take.
+    #[error("decision {decision} of the game, by seat {seat}, is not the one that {name} takes")]
     Deviates {
         /// The seat, from 0.
         seat: usize,
@@ -70,10 +68,14 @@ pub struct GameScore {
     pub shifts: u32,
     /// Place of the agent in the game, from 1.
     pub place: u8,
+    /// Who played: the participant at the agent's seat.
+    pub player: Identity,
     /// Decisions of the agent's seat.
     pub decisions: u64,
-    /// Those that it did not take itself: defaults after timeouts or invalid attempts, decisions of
-    /// the room's substitute, and those of its own fallback.
+    /// Those of them with more than one legal action.
+    pub choices: u64,
+    /// Choices that the agent did not take itself: defaults after timeouts or invalid attempts,
+    /// decisions of the room's substitute, and those of its own fallback.
     pub fallback_decisions: u64,
     /// Its invalid attempts.
     pub invalid_attempts: u64,
@@ -108,12 +110,12 @@ pub fn check(task: &Task, deal: usize, record: &Record) -> Result<GameScore, Pro
     if seed != Some(task.seed(deal).0.as_slice()) {
         return Err(Problem::OtherDeal);
     }
-    // A record that was walked has a header.
     let header = lines().find_map(|line| match line {
         Line::Header(header) => Some(header),
         _ => None,
     });
-    check_header(task, deal, header.unwrap_or(&v1::RecordHeader::default()))?;
+    let header = header.expect("a record that was replayed has a header");
+    check_header(task, deal, header)?;
     let decisions = lines().filter_map(|line| match line {
         Line::Decision(decision) => Some(decision),
         _ => None,
@@ -121,18 +123,30 @@ pub fn check(task: &Task, deal: usize, record: &Record) -> Result<GameScore, Pro
     let decisions: Vec<&v1::DecisionRecord> = decisions.collect();
     let played = play_again(task, deal, &decisions)?;
     let seat = task.seat(deal).index();
-    let own = (decisions.into_iter()).filter(|decision| decision.seat as usize == seat);
+    let player = header.seats.get(seat).map(Identity::of);
     let mut score = GameScore {
+        points: played.points,
+        shifts: played.shifts,
+        place: played.place,
+        player: player.expect("a record that was replayed has all seats"),
+        decisions: 0,
+        choices: 0,
+        fallback_decisions: 0,
+        invalid_attempts: 0,
+        decision_times_us: Vec::new(),
         signed_by: replayed.signed_by,
         record: record.text,
-        ..played
     };
+    let own = (decisions.into_iter()).filter(|decision| decision.seat as usize == seat);
     for decision in own {
         score.decisions += 1;
         score.invalid_attempts += decision.invalid_attempts.len() as u64;
         let is_own = decision.source() == v1::DecisionSource::Agent
             && !decision.annotations.as_ref().is_some_and(is_by_fallback);
-        score.fallback_decisions += u64::from(!is_own);
+        if has_choice(decision) {
+            score.choices += 1;
+            score.fallback_decisions += u64::from(!is_own);
+        }
         if is_own && decision.decision_time_us > 0 {
             score.decision_times_us.push(decision.decision_time_us);
         }
@@ -147,23 +161,7 @@ fn check_header(task: &Task, deal: usize, header: &v1::RecordHeader) -> Result<(
     if header.rules.as_ref() != Some(&rules_to_proto(&task.rule_set())) {
         return Err(Problem::OtherRules);
     }
-    let (given, wanted) = (header.policy.clone().unwrap_or_default(), task.policy());
-    // An unset time is none that a record can have, and not shorter than any.
-    let time = given.decision_time_ms.unwrap_or(u32::MAX);
-    let others = [
-        (time > task.decision_time_ms, "a longer time for decisions"),
-        (given.bank_ms != wanted.bank_ms, "a time bank"),
-        (
-            !given.clocks.is_empty(),
-            "clocks of their own for some kinds",
-        ),
-        (
-            given.max_invalid_attempts != wanted.max_invalid_attempts,
-            "another number of invalid attempts",
-        ),
-        (given.hints, "hints"),
-    ];
-    if let Some((_, what)) = others.iter().find(|(differs, _)| *differs) {
+    if let Some(what) = difference(&header.policy.clone().unwrap_or_default(), &task.policy()) {
         return Err(Problem::OtherPolicy(what));
     }
     for (seat, wanted) in task.opponents(deal).into_iter().enumerate() {
@@ -178,13 +176,63 @@ fn check_header(task: &Task, deal: usize, header: &v1::RecordHeader) -> Result<(
     Ok(())
 }
 
+/// The first limit in which a policy differs from that of the task, if it could help the agent.
+fn difference(given: &v1::RoomPolicy, wanted: &v1::RoomPolicy) -> Option<&'static str> {
+    let longest = wanted.decision_time_ms.unwrap_or(0);
+    let is_longer = |time: Option<u32>| time.is_some_and(|time| time > longest);
+    let has_bank = |bank: Option<u32>| bank.is_some_and(|bank| bank > 0);
+    let clocks = || given.clocks.iter();
+    let differences = [
+        (
+            given.decision_time_ms.is_none()
+                || is_longer(given.decision_time_ms)
+                || clocks().any(|clock| is_longer(clock.decision_time_ms)),
+            "a longer time for decisions",
+        ),
+        (
+            given.bank_ms.is_none()
+                || has_bank(given.bank_ms)
+                || clocks().any(|clock| has_bank(clock.bank_ms)),
+            "a time bank",
+        ),
+        (
+            given.max_invalid_attempts != wanted.max_invalid_attempts,
+            "the number of invalid attempts",
+        ),
+        (
+            given.max_timeouts != wanted.max_timeouts,
+            "the number of timeouts",
+        ),
+        (given.substitute != wanted.substitute, "the substitute"),
+        (given.abort != wanted.abort, "when a game is aborted"),
+        (
+            given.pace_ms != wanted.pace_ms,
+            "the pace of built-in agents",
+        ),
+        (
+            given.spectators_see_hands == Some(true),
+            "spectators see hands",
+        ),
+        (given.hints, "hints"),
+    ];
+    let found = differences.iter().find(|(differs, _)| *differs);
+    found.map(|(_, what)| *what)
+}
+
+/// The result of the agent in a game.
+struct Played {
+    points: u64,
+    shifts: u32,
+    place: u8,
+}
+
 /// Plays the game again with the recorded decisions of the agent, and compares those of its
-/// opponents. Returns its result.
+/// opponents.
 fn play_again(
     task: &Task,
     deal: usize,
     decisions: &[&v1::DecisionRecord],
-) -> Result<GameScore, Problem> {
+) -> Result<Played, Problem> {
     let (rules, own) = (task.rule_set(), task.seat(deal));
     let opponents = task.opponents(deal);
     let given = (decisions.iter())
@@ -225,16 +273,10 @@ fn play_again(
         });
     }
     let place = standings.iter().find(|(_, seat, _)| *seat == own);
-    Ok(GameScore {
+    Ok(Played {
         points: witness.points,
         shifts: witness.shifts,
         place: place.map_or(0, |(place, ..)| place),
-        decisions: 0,
-        fallback_decisions: 0,
-        invalid_attempts: 0,
-        decision_times_us: Vec::new(),
-        signed_by: None,
-        record: TextHash::default(),
     })
 }
 

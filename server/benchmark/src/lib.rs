@@ -8,5 +8,5 @@ mod task;
 
 pub use check::{GameScore, Problem, check};
 pub use offline::play_offline;
-pub use result::{AgentInfo, Figure, PairedDifference, TaskResult};
+pub use result::{AgentInfo, MeanWithInterval, PairedDifference, TaskResult};
 pub use task::{BENCHMARK, Task, tasks};

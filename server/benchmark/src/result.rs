@@ -1,5 +1,8 @@
 //! The result of an agent in a task: what is published, and compared with those of others.
 
+use std::collections::BTreeSet;
+
+use chefshat_record::outcome::Identity;
 use chefshat_tournament::statistics::{Moments, wilson95};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -7,7 +10,7 @@ use sha2::{Digest as _, Sha256};
 use crate::check::GameScore;
 use crate::task::{BENCHMARK, Task};
 
-/// The share of fallback decisions in a valid result, from 0 to 1.
+/// The share of choices in a valid result that may be fallback decisions, from 0 to 1.
 const MAX_FALLBACKS: f64 = 0.01;
 
 /// What an agent says about itself.
@@ -24,17 +27,30 @@ pub struct AgentInfo {
     pub url: String,
 }
 
+impl AgentInfo {
+    /// Whether its texts may be shown: a name of 1..=64 characters, others of at most 2000, and none
+    /// that are control characters.
+    pub fn is_printable(&self) -> bool {
+        let fits =
+            |text: &str, most| text.chars().count() <= most && !text.chars().any(char::is_control);
+        !self.name.is_empty()
+            && fits(&self.name, 64)
+            && fits(&self.description, 2000)
+            && fits(&self.url, 2000)
+    }
+}
+
 /// A mean over the games with its 95 % interval: 1.96 standard errors to either side, or Wilson's for
 /// a share. The games have different deals, so they are independent.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Figure {
+pub struct MeanWithInterval {
     /// The mean.
     pub mean: f64,
     /// The ends of the interval.
     pub interval95: [f64; 2],
 }
 
-impl Figure {
+impl MeanWithInterval {
     /// A share of games, with the interval of Wilson.
     fn of_share(successes: usize, trials: usize) -> Self {
         let interval = wilson95(successes as u64, trials as u64);
@@ -65,20 +81,24 @@ pub struct TaskResult {
     pub task: String,
     /// The agent.
     pub agent: AgentInfo,
-    /// Number of deals, the first of the task.
+    /// Number of games that count.
     pub deals: usize,
     /// What makes it invalid; empty for a valid one.
     pub problems: Vec<String>,
-    /// Points a Shift.
-    pub points_per_shift: Figure,
+    /// The mean of the games' points a Shift.
+    pub points_per_shift: MeanWithInterval,
     /// Share of games won, from 0 to 1.
-    pub games_won: Figure,
+    pub games_won: MeanWithInterval,
     /// Place in the game, from 1.
-    pub place: Figure,
+    pub place: MeanWithInterval,
+    /// The participants at the agent's seat, by the records; one in a valid result.
+    pub played_by: Vec<String>,
     /// Decisions of the agent's seat.
     pub decisions: u64,
-    /// Those that it did not take itself: defaults after timeouts or invalid attempts, decisions of
-    /// the room's substitute, and those of its own fallback.
+    /// Those of them with more than one legal action.
+    pub choices: u64,
+    /// Choices that the agent did not take itself: defaults after timeouts or invalid attempts,
+    /// decisions of the room's substitute, and those of its own fallback.
     pub fallback_decisions: u64,
     /// Its invalid attempts.
     pub invalid_attempts: u64,
@@ -93,49 +113,51 @@ pub struct TaskResult {
 }
 
 impl TaskResult {
-    /// The result of games, by deal; `None` where there is none, or one that does not count.
+    /// The result of games, by deal; `None` where there is none, or one that does not count. At least
+    /// two count.
     pub fn of(task: &Task, agent: AgentInfo, by_deal: &[Option<GameScore>]) -> Self {
         let games: Vec<&GameScore> = by_deal.iter().flatten().collect();
         let per_shift = |game: &GameScore| game.points as f64 / f64::from(game.shifts.max(1));
         let sum = |of: fn(&GameScore) -> u64| games.iter().copied().map(of).sum::<u64>();
-        let (decisions, fallback_decisions) = (
-            sum(|game| game.decisions),
-            sum(|game| game.fallback_decisions),
-        );
+        let choices = sum(|game| game.choices);
+        let fallback_decisions = sum(|game| game.fallback_decisions);
+        let played_by = distinct(games.iter().map(|game| in_words(&game.player)));
         let mut problems = Vec::new();
         if games.len() < task.deals {
             problems.push(format!("{} of {} deals", games.len(), task.deals));
         }
-        if fallback_decisions as f64 > MAX_FALLBACKS * decisions as f64 {
+        if let [first, second, ..] = &*played_by {
             problems.push(format!(
-                "{fallback_decisions} of {decisions} decisions were taken for it; at most one in a hundred may be"
+                "several participants played, such as {first} and {second}"
             ));
         }
-        let mut signed_by: Vec<String> = games
-            .iter()
-            .map(|game| {
-                (game.signed_by).map_or_else(|| "unsigned".to_owned(), |key| key.to_string())
-            })
-            .collect();
-        signed_by.sort_unstable();
-        signed_by.dedup();
+        if fallback_decisions as f64 > MAX_FALLBACKS * choices as f64 {
+            problems.push(format!(
+                "{fallback_decisions} of {choices} choices were fallback decisions; at most one in a hundred may be"
+            ));
+        }
+        let keys = games.iter().map(|game| game.signed_by);
+        let signed_by =
+            keys.map(|key| key.map_or_else(|| "unsigned".to_owned(), |key| key.to_string()));
         Self {
             benchmark: BENCHMARK.to_owned(),
             task: task.name.clone(),
             agent,
             deals: games.len(),
             problems,
-            points_per_shift: Figure::of(games.iter().copied().map(per_shift)),
-            games_won: Figure::of_share(
+            points_per_shift: MeanWithInterval::of(games.iter().copied().map(per_shift)),
+            games_won: MeanWithInterval::of_share(
                 games.iter().filter(|game| game.place == 1).count(),
                 games.len(),
             ),
-            place: Figure::of(games.iter().map(|game| f64::from(game.place))),
-            decisions,
+            place: MeanWithInterval::of(games.iter().map(|game| f64::from(game.place))),
+            played_by,
+            decisions: sum(|game| game.decisions),
+            choices,
             fallback_decisions,
             invalid_attempts: sum(|game| game.invalid_attempts),
             decision_ms: times(&games),
-            signed_by,
+            signed_by: distinct(signed_by),
             records_sha256: {
                 let digests = games.iter().map(|game| game.record.bytes());
                 let all = digests.fold(Sha256::new(), |all, digest| all.chain_update(digest));
@@ -153,7 +175,8 @@ impl TaskResult {
     }
 
     /// How many more points a Shift this agent has than another one, over the deals that both played:
-    /// with the same cards, seat and opponents. `None` for results of different tasks.
+    /// with the same cards, seat and opponents. `None` for results of different tasks, or with fewer
+    /// than two such deals.
     pub fn paired_difference(&self, other: &Self) -> Option<PairedDifference> {
         if (&self.benchmark, &self.task) != (&other.benchmark, &other.task) {
             return None;
@@ -161,9 +184,9 @@ impl TaskResult {
         let pairs = self.by_deal.iter().zip(&other.by_deal);
         let differences = pairs.filter_map(|(own, others)| Some((*own)? - (*others)?));
         let differences: Vec<f64> = differences.collect();
-        Some(PairedDifference {
+        (differences.len() > 1).then(|| PairedDifference {
             deals: differences.len(),
-            points_per_shift: Figure::of(differences.into_iter()),
+            points_per_shift: MeanWithInterval::of(differences.into_iter()),
         })
     }
 }
@@ -174,7 +197,26 @@ pub struct PairedDifference {
     /// Number of deals that both played.
     pub deals: usize,
     /// Difference of points a Shift.
-    pub points_per_shift: Figure,
+    pub points_per_shift: MeanWithInterval,
+}
+
+/// A participant, without what could not be shown.
+fn in_words(player: &Identity) -> String {
+    let name: String = (player.name.chars())
+        .filter(|letter| !letter.is_control())
+        .collect();
+    let key = &player.name_fingerprint;
+    match player.built_in {
+        true => format!("the built-in agent {name}"),
+        false if key.is_empty() => name,
+        false => format!("{name} ({key})"),
+    }
+}
+
+/// The texts without repetitions, in alphabetical order.
+fn distinct(texts: impl Iterator<Item = String>) -> Vec<String> {
+    let texts: BTreeSet<String> = texts.collect();
+    texts.into_iter().collect()
 }
 
 /// Median and 99th percentile of the decision times, in milliseconds.

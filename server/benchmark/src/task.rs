@@ -17,8 +17,8 @@ pub const BENCHMARK: &str = "ChefsHat-v1";
 const INVALID_ATTEMPTS: u32 = 10;
 /// Timeouts after which a substitute plays.
 const TIMEOUTS: u32 = 3;
-/// How long a room waits for the agent, in milliseconds.
-const WAITING_MS: u32 = 120_000;
+/// How long a room waits for the agent, in milliseconds: agents may play one game after the other.
+const WAITING_MS: u32 = 3_600_000;
 
 /// A task: an agent plays one game on each of a number of deals, always against the same opponents.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,4 +1,4 @@
-//! The tasks and what a record proves about them. Hosted games are in `tests/` of the repository.
+//! The tasks and what a record proves about them. Hosted games are tested with `chefshat bench`.
 
 use chefshat_agents::{AgentKind, BuiltInAgent, NamedAgent};
 use chefshat_benchmark::{
@@ -6,6 +6,7 @@ use chefshat_benchmark::{
 };
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::jsonl::{self, Record};
+use chefshat_record::outcome::{FALLBACK, Identity};
 use chefshat_record::signature::TextHash;
 use sha2::{Digest as _, Sha256};
 
@@ -37,6 +38,18 @@ fn the_tasks_never_change() {
         for deal in 0..2500 {
             hash.update(task.seed(deal).0);
         }
+        // Decisions of the opponents and of the agents that others are compared with.
+        for (deal, kind) in AgentKind::ALL.into_iter().enumerate() {
+            for line in played(task, deal, kind) {
+                if let Some(Line::Decision(decision)) = line.line {
+                    hash.update(
+                        [decision.seat, decision.action]
+                            .map(u32::to_le_bytes)
+                            .as_flattened(),
+                    );
+                }
+            }
+        }
         hex::encode(&hash.finalize()[..8])
     };
     let digests: Vec<_> = (tasks().iter())
@@ -44,10 +57,10 @@ fn the_tasks_never_change() {
         .collect();
     // Written down, so that results of different versions of the program stay comparable.
     let expected = [
-        ("shift", "563b13869c96a1c9"),
-        ("game", "9b5acb3df0157472"),
-        ("small_deck", "eb266c68ef1bffb0"),
-        ("language_model", "a1e203f90276ab88"),
+        ("shift", "d4aed45ae182c4a3"),
+        ("game", "35e313730d8a09fa"),
+        ("small_deck", "40a69409743b1b3f"),
+        ("language_model", "e82e71819716ae05"),
     ];
     assert_eq!(
         digests,
@@ -106,12 +119,107 @@ fn what_is_not_the_game_of_the_deal_is_refused() {
         problem(&weaker, 0),
         Problem::OtherOpponent { seat: 1, .. }
     ));
-    let slower = Task {
-        decision_time_ms: shift.decision_time_ms + 1,
-        ..shift.clone()
+}
+
+/// A change of a policy.
+type Mutation = fn(&mut v1::RoomPolicy);
+
+#[test]
+fn rooms_that_help_the_agent_are_refused() {
+    let clock = |change: fn(&mut v1::KindClock)| {
+        let mut clock = v1::KindClock {
+            kind: v1::ParticipantKind::Agent.into(),
+            ..v1::KindClock::default()
+        };
+        change(&mut clock);
+        clock
     };
-    let slow = record(&slower, 0);
-    assert!(matches!(problem(&slow, 0), Problem::OtherPolicy(_)));
+    let longer = clock(|clock| clock.decision_time_ms = Some(10_001));
+    let bank = clock(|clock| clock.bank_ms = Some(1));
+    // Servers give people an absence time of their own.
+    let absence = clock(|clock| clock.absence_time_ms = Some(20_000));
+    let refused: [(Mutation, &str); 9] = [
+        (
+            |policy| policy.decision_time_ms = Some(10_001),
+            "longer time",
+        ),
+        (|policy| policy.bank_ms = Some(1), "time bank"),
+        (
+            |policy| policy.max_invalid_attempts = Some(11),
+            "invalid attempts",
+        ),
+        (|policy| policy.max_timeouts = Some(4), "timeouts"),
+        (
+            |policy| policy.substitute = "trained".to_owned(),
+            "substitute",
+        ),
+        (
+            |policy| policy.abort = v1::AbortPolicy::AnyLost.into(),
+            "aborted",
+        ),
+        (|policy| policy.pace_ms = Some(1), "pace"),
+        (
+            |policy| {
+                policy.spectators_see_hands = Some(true);
+                policy.spectator_delay_decisions = Some(1);
+            },
+            "spectators see hands",
+        ),
+        (|policy| policy.hints = true, "hints"),
+    ];
+    let problem = |change: &dyn Fn(&mut v1::RoomPolicy)| {
+        let mut lines = played(task("shift"), 0, AgentKind::Greedy);
+        let mut policy = task("shift").policy();
+        change(&mut policy);
+        // Clocks of kinds are not those of built-in agents.
+        let bank = policy.bank_ms.unwrap_or(0);
+        for line in &mut lines {
+            match line.line.as_mut().expect("every line has a content") {
+                Line::Decision(decision) => decision.bank_left_ms = bank,
+                Line::Header(header) => change(header.policy.as_mut().expect("it has one")),
+                Line::Event(v1::GameEvent {
+                    kind: Some(v1::game_event::Kind::GameStarted(started)),
+                    ..
+                }) => change(started.policy.as_mut().expect("it has one")),
+                _ => {}
+            }
+        }
+        check(task("shift"), 0, &read(&lines))
+            .err()
+            .map(|it| it.to_string())
+    };
+    for (change, expected) in refused {
+        let problem = problem(&change).expect("it must not count");
+        assert!(problem.contains("different policy"), "{problem}");
+        assert!(problem.contains(expected), "{problem}");
+    }
+    for (clock, expected) in [(longer, "longer time"), (bank, "time bank")] {
+        let problem = problem(&|policy| policy.clocks = vec![clock]).expect("it must not count");
+        assert!(problem.contains(expected), "{problem}");
+    }
+    assert_eq!(problem(&|policy| policy.clocks = vec![absence]), None);
+}
+
+#[test]
+fn decisions_of_a_fallback_are_counted() {
+    let shift = task("shift");
+    let mut lines = played(shift, 0, AgentKind::Greedy);
+    for line in &mut lines {
+        if let Some(Line::Decision(decision)) = &mut line.line
+            && decision.seat == 0
+        {
+            let extra = [(FALLBACK.to_owned(), "greedy".to_owned())].into();
+            decision.annotations = Some(v1::Annotations {
+                extra,
+                ..v1::Annotations::default()
+            });
+        }
+    }
+    let score = check(shift, 0, &read(&lines)).expect("it is a correct record");
+    assert_eq!(score.fallback_decisions, score.choices);
+    assert!(score.choices > 0 && score.choices < score.decisions);
+    let own = check(shift, 0, &record(shift, 0)).expect("it is a correct record");
+    assert_eq!((own.choices, own.fallback_decisions), (score.choices, 0));
 }
 
 #[test]
@@ -145,12 +253,18 @@ fn opponents_that_do_not_play_as_they_do_are_found() {
 
 #[test]
 fn a_result_counts_with_all_deals_and_its_own_decisions() {
+    let player = Identity::of(&v1::Participant {
+        name: "Mia".to_owned(),
+        ..v1::Participant::default()
+    });
     let game = |points: u64, fallback_decisions: u64| {
         Some(GameScore {
             points,
             shifts: 1,
             place: 1,
-            decisions: 100,
+            player: player.clone(),
+            decisions: 200,
+            choices: 100,
             fallback_decisions,
             invalid_attempts: 0,
             decision_times_us: vec![1000, 3000],
@@ -167,14 +281,41 @@ fn a_result_counts_with_all_deals_and_its_own_decisions() {
     assert!(better.is_valid(), "{:?}", better.problems);
     assert_eq!(better.points_per_shift.mean, 4.0);
     assert_eq!(better.decision_ms, Some([1.0, 3.0]));
+    let other = Some(GameScore {
+        player: Identity {
+            name: "Ben".to_owned(),
+            ..player.clone()
+        },
+        ..game(5, 0).expect("it has a score")
+    });
+    let mixed = result(&[game(5, 0), other, game(5, 0), game(5, 0)]);
+    assert_eq!(
+        mixed.problems,
+        ["several participants played, such as Ben and Mia"]
+    );
     let worse = result(&[game(4, 0), game(2, 0), game(4, 0), game(2, 0)]);
     let versus = better.paired_difference(&worse).expect("the same task");
     // The same on every deal, so nothing is uncertain, although the points of the deals differ.
     assert_eq!(versus.points_per_shift.interval95, [1.0, 1.0]);
     assert_ne!(better.points_per_shift.interval95, [4.0, 4.0]);
+    let nothing_in_common = result(&[None, None, None, game(1, 0)]);
+    let first_two = result(&[game(1, 0), game(2, 0)]);
+    assert_eq!(first_two.paired_difference(&nothing_in_common), None);
     let incomplete = result(&[game(5, 0), None, game(5, 0), game(3, 0)]);
     assert!(!incomplete.is_valid());
     let versus = incomplete.paired_difference(&worse).expect("the same task");
     assert_eq!(versus.deals, 3, "only deals that both played");
     assert!(!result(&[game(5, 90), game(5, 0), game(5, 0), game(5, 0)]).is_valid());
+}
+
+#[test]
+fn texts_that_move_the_cursor_are_not_shown() {
+    let named = |name: &str| AgentInfo {
+        name: name.to_owned(),
+        ..AgentInfo::default()
+    };
+    assert!(named("Größe 7").is_printable());
+    for name in ["", "\u{1b}[2J", "a\nb", &"a".repeat(65)] {
+        assert!(!named(name).is_printable(), "{name:?}");
+    }
 }

@@ -21,6 +21,13 @@ pub fn counted(count: u64, what: &str) -> String {
     format!("{} {what}{plural}", grouped(count))
 }
 
+/// A difference with its sign: `+0.125`, `−0.125`.
+pub fn signed(number: f64) -> String {
+    // Avoids a signed zero.
+    let number = if number == 0.0 { 0.0 } else { number };
+    format!("{number:+.3}").replace('-', "−")
+}
+
 /// Parses a time such as 90d.
 pub fn duration(text: &str) -> Result<Duration, String> {
     let units = [('s', 1), ('m', 60), ('h', 3_600), ('d', 86_400)];

@@ -14,7 +14,7 @@ use tokio::time::{sleep, sleep_until};
 use super::case::{Case, Patience, Place};
 use super::exam::{Exam, Venue};
 use super::fault::{Fault, Finding};
-use super::process::{AgentCommand, AgentProcess, Places};
+use super::process::{AgentCommand, AgentProcess, Placeholders};
 use super::relay::{Desk, Port};
 use chefshat_server::config::ServerConfig;
 use chefshat_server::host::{Host, HostError};
@@ -182,7 +182,7 @@ impl Examination {
         match command {
             None => waiting(&Waiting { address, code }),
             Some(command) => {
-                let places = Places {
+                let places = Placeholders {
                     address: address.to_string(),
                     code,
                     name: NAME.into(),

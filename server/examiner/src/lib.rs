@@ -11,4 +11,4 @@ mod process;
 mod relay;
 
 pub use examination::{Examination, ExaminationError, Outcome, Waiting};
-pub use process::{AgentCommand, AgentProcess, Places};
+pub use process::{AgentCommand, AgentProcess, Placeholders};

@@ -29,8 +29,8 @@ pub struct AgentCommand(Vec<String>);
 
 /// The values of the placeholders.
 #[derive(Debug, Clone)]
-pub struct Places {
-    /// `host:port` of the server.
+pub struct Placeholders {
+    /// `host:port` of the server, or its URL if that begins with `https://`.
     pub address: String,
     /// Join code of the room or the tournament.
     pub code: String,
@@ -64,10 +64,13 @@ impl AgentCommand {
     /// The missing placeholder.
     pub fn for_games(words: Vec<String>) -> Result<Self, String> {
         let command = Self(words);
-        match command.mentions("{code}") {
-            true => Self::new(command.0),
-            false => Ok(command),
+        if command.mentions("{tournament}") {
+            return Err("{tournament} has no value here: the games are those of rooms".into());
         }
+        if command.mentions("{code}") {
+            return Self::new(command.0);
+        }
+        Ok(command)
     }
 
     /// Whether its process reads from its standard input which games to play.
@@ -100,8 +103,11 @@ impl AgentCommand {
         &self.0
     }
 
-    fn filled(&self, places: &Places) -> Vec<OsString> {
-        let url = format!("http://{}", places.address);
+    fn filled(&self, places: &Placeholders) -> Vec<OsString> {
+        let url = match places.address.contains("://") {
+            true => places.address.clone(),
+            false => format!("http://{}", places.address),
+        };
         let fill = |word: &String| {
             word.replace("{address}", &places.address)
                 .replace("{url}", &url)
@@ -138,7 +144,7 @@ impl AgentProcess {
     /// The program or the file.
     pub async fn start(
         command: &AgentCommand,
-        places: &Places,
+        places: &Placeholders,
         log: Option<PathBuf>,
     ) -> io::Result<Self> {
         let file = match log {
@@ -278,7 +284,7 @@ mod tests {
     #[test]
     fn placeholders_are_filled_in_everywhere() {
         let command = AgentCommand::new(words("run --server={url} {address} {code}/{name} {}"));
-        let places = Places {
+        let places = Placeholders {
             address: "127.0.0.1:7".into(),
             code: "BCDF".into(),
             name: "Ada".into(),
@@ -305,7 +311,7 @@ mod tests {
         let script = "echo one; echo two; sleep 600 & echo $!; wait";
         let command =
             AgentCommand((command.0.iter().map(|word| word.replace("XXX", script))).collect());
-        let places = Places {
+        let places = Placeholders {
             address: String::new(),
             code: String::new(),
             name: String::new(),

@@ -12,6 +12,7 @@ mod run;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use chefshat_agents::NamedAgent;
 use chefshat_benchmark::{BENCHMARK, Task, TaskResult, tasks};
 use chefshat_cli::error::{CommandError, say};
 use chefshat_cli::numbers::counted;
@@ -23,14 +24,14 @@ use serde_json::json;
 use folder::Folder;
 
 const HELP: &str = "\
-An agent plays one game on each deal of a task, always against the same built-in agents. What it can prove is in the records of its games: \
-`submit` replays each, and computes again every decision of its opponents. docs/benchmark.md says how to cite a result.
+An agent plays one game on each deal of a task, always against the same built-in agents. The records of its games prove the result: `submit` \
+replays each, and computes every decision of the opponents again. docs/benchmark.md says how to cite a result.
 
 Examples:
   chefshat bench tasks
   chefshat bench run shift --agent greedy --out results/greedy
   chefshat bench run shift --out results/mine --name mine -- python agent.py
-  chefshat bench run shift --out results/mine --deals 20 -- ./agent {address} {code}
+  chefshat bench run shift --out results/mine --name mine --deals 20 -- ./agent {address} {code}
   chefshat bench submit results/mine
   chefshat bench table results/*";
 
@@ -110,18 +111,18 @@ impl Submit {
     fn run(self) -> Result<ExitCode, CommandError> {
         let folder = Folder::open(&self.folder)?;
         let result = folder.check()?;
-        folder.write_result(&result)?;
         report::print(&result, self.json)
     }
 }
 
 #[derive(Debug, Args)]
 struct TableCommand {
-    /// Folders that `chefshat bench run` wrote and `submit` checked, or their result.json.
+    /// Folders that `chefshat bench run` wrote, which are checked, or files with results, which are
+    /// believed.
     #[arg(required = true)]
     results: Vec<PathBuf>,
-    /// The agent to compare with, by name: one of the results, or a built-in agent, which is played
-    /// now.
+    /// The agent to compare with: a built-in agent or a network file, which plays now, or the name of
+    /// one of the results.
     #[arg(long, value_name = "AGENT", default_value = "greedy")]
     versus: String,
     /// Print one JSON object.
@@ -140,8 +141,10 @@ impl TableCommand {
             if of_task.is_empty() {
                 continue;
             }
+            // Nobody takes the place of a built-in agent by its name.
+            let is_built_in = self.versus.parse::<NamedAgent>().is_ok();
             let named = of_task.iter().find(|it| it.agent.name == self.versus);
-            versus.push(match named {
+            versus.push(match named.filter(|_| !is_built_in) {
                 Some(named) => (*named).clone(),
                 None => offline::reference(task, &self.versus)?,
             });

@@ -16,7 +16,7 @@ use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use chefshat_cli::error::CommandError;
-use chefshat_cli::numbers::counted;
+use chefshat_cli::numbers::{counted, signed};
 use chefshat_cli::output::{self, heading, line, table};
 use chefshat_cli::rules_args::RulesArgs;
 use chefshat_cli::{progress, threads};
@@ -352,12 +352,6 @@ fn shortened(label: &str, most: usize) -> String {
     }
     let beginning: String = label.chars().take(most - 1).collect();
     format!("{beginning}…")
-}
-
-fn signed(number: f64) -> String {
-    // Avoids a signed zero.
-    let number = if number == 0.0 { 0.0 } else { number };
-    format!("{number:+.3}").replace('-', "−")
 }
 
 fn entrant_json(entrant: &Entrant) -> Value {

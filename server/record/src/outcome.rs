@@ -122,14 +122,15 @@ pub fn without_comments(annotations: &v1::Annotations) -> Option<v1::Annotations
     })
 }
 
+/// Whether more than one action was legal at a decision of a record.
+pub fn has_choice(decision: &v1::DecisionRecord) -> bool {
+    let ones = decision.action_mask.iter().map(|byte| byte.count_ones());
+    ones.sum::<u32>() > 1
+}
+
 /// Counts a decision of a record if its participant had a choice.
 pub(crate) fn add_choice(choices: &mut OwnChoices, decision: &v1::DecisionRecord) {
-    let legal: u32 = decision
-        .action_mask
-        .iter()
-        .map(|byte| byte.count_ones())
-        .sum();
-    if decision.source() == DecisionSource::Agent && legal > 1 {
+    if decision.source() == DecisionSource::Agent && has_choice(decision) {
         choices.add(decision.annotations.as_ref().is_some_and(is_by_fallback));
     }
 }

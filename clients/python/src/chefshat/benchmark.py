@@ -13,6 +13,7 @@ import asyncio
 import sys
 import threading
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 
 from chefshat.agents import Agent
 from chefshat.aio import Client
@@ -24,37 +25,48 @@ def play(make_agent: Callable[[], Agent], *, name: str = "entrant", games: Itera
     Args:
         make_agent: makes the agent of a game, for example its class.
         name: display name in the rooms, 1..=64 characters.
-        games: a line for each game, the server's address and a join code, separated by a space; None: standard input.
+        games: a line for each game, the server's address and a join code, separated by a space; None: standard input. A token and
+            a certificate authority come from CHEFSHAT_TOKEN and CHEFSHAT_CA.
 
     Returns:
         The number of games.
 
     Raises:
         ChefsHatError: a game could not be joined or played to its end. What an agent raises is passed on.
+        ValueError: a line is not a game.
     """
     return asyncio.run(_play(make_agent, name, sys.stdin if games is None else games))
 
 
 async def _play(make_agent: Callable[[], Agent], name: str, games: Iterable[str]) -> int:
-    lines: asyncio.Queue[str | None] = asyncio.Queue()
+    # None after the last line; an exception where reading failed.
+    lines: asyncio.Queue[str | Exception | None] = asyncio.Queue()
     loop = asyncio.get_running_loop()
+
+    def put(line: str | Exception | None) -> None:
+        # After a game has failed the loop is closed.
+        with suppress(RuntimeError):
+            loop.call_soon_threadsafe(lines.put_nowait, line)
 
     def read() -> None:
         try:
             for line in games:
-                loop.call_soon_threadsafe(lines.put_nowait, line)
-            loop.call_soon_threadsafe(lines.put_nowait, None)
-        except RuntimeError:
-            return  # A game has failed, and the loop is closed.
+                put(line)
+        except Exception as error:
+            put(error)
+        else:
+            put(None)
 
-    # A daemon: whoever hands out the games may wait for this process before it ends the list.
+    # A daemon: the command may wait for this process before it closes its standard input.
     threading.Thread(target=read, daemon=True).start()
     clients: dict[str, Client] = {}
     played = 0
     try:
         async with asyncio.TaskGroup() as group:
             while (line := await lines.get()) is not None:
-                address, code = line.split()
+                if isinstance(line, Exception):
+                    raise line
+                address, code = _game(line)
                 if address not in clients:
                     clients[address] = Client(address)
                 group.create_task(_play_one(clients[address], make_agent(), code, name))
@@ -65,6 +77,14 @@ async def _play(make_agent: Callable[[], Agent], name: str, games: Iterable[str]
         for client in clients.values():
             await client.close()
     return played
+
+
+def _game(line: str) -> tuple[str, str]:
+    """Reads the address and the join code of a game."""
+    words = line.split()
+    if len(words) != 2:
+        raise ValueError(f"{line!r} is not an address and a join code, as `chefshat bench run` writes them to standard input")
+    return words[0], words[1]
 
 
 async def _play_one(client: Client, agent: Agent, code: str, name: str) -> None:

@@ -4,7 +4,7 @@
 use chefshat_client::v1;
 
 use super::super::board::rating_in_words;
-use super::super::numbers::{counted, ordinal};
+use super::super::numbers::{counted, ordinal, signed};
 use super::super::output::{heading, percent, table};
 use crate::kind::kind_name;
 use crate::narration::clean;
@@ -165,7 +165,7 @@ pub(super) fn order(text: &mut String, field: &Field<'_>, pairs: &[v1::OrderConf
         vec![
             field.name(pair.upper),
             field.name(pair.lower),
-            format!("{:+.3}", pair.difference).replace('-', "−"),
+            signed(pair.difference),
             match pair.standard_error {
                 0.0 => "–".to_owned(),
                 error => format!("{error:.3}"),

@@ -1,6 +1,7 @@
 //! The folder of a submission: `manifest.json` says what it is, `records/` has the record of each
 //! deal (`0000.jsonl`, …), and `result.json` what they show.
 
+use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +15,11 @@ use serde::{Deserialize, Serialize};
 
 const MANIFEST: &str = "manifest.json";
 const RESULT: &str = "result.json";
+/// Bytes of the longest record that is read: a Shift has 30,000, a game of ten thousand turns a few
+/// millions.
+const MAX_RECORD: u64 = 64 << 20;
+/// Bytes of the longest other file.
+const MAX_JSON: u64 = 4 << 20;
 /// Records that are named one by one when they do not count.
 const NAMED: usize = 5;
 
@@ -41,11 +47,8 @@ impl Folder {
         let manifest: Manifest = read_json(&path.join(MANIFEST)).map_err(|error| {
             format!("{error}; a submission is a folder that `chefshat bench run` wrote")
         })?;
-        let named = Task::named(&manifest.task).filter(|_| manifest.benchmark == BENCHMARK);
-        let task = named.ok_or_else(|| {
-            let (benchmark, task) = (&manifest.benchmark, &manifest.task);
-            format!("this version has no task {task:?} of a benchmark {benchmark:?}")
-        })?;
+        check_agent(&manifest.agent)?;
+        let task = task_of(&manifest.benchmark, &manifest.task)?;
         Ok(Self {
             path: path.to_owned(),
             task,
@@ -69,6 +72,7 @@ impl Folder {
                 .into());
             }
         }
+        check_agent(&manifest.agent)?;
         fs::create_dir_all(path)
             .map_err(|error| format!("{}: {error}; name another with --out", path.display()))?;
         write_json(&file, &manifest)?;
@@ -90,8 +94,12 @@ impl Folder {
     /// The game of a deal, if it has a record.
     fn game(&self, deal: usize) -> Result<Option<GameScore>, CommandError> {
         let path = self.record(deal);
-        if !path.exists() {
+        let Ok(metadata) = fs::metadata(&path) else {
             return Ok(None);
+        };
+        if !metadata.is_file() || metadata.len() > MAX_RECORD {
+            let path = path.display();
+            return Err(format!("{path}: no game of a task has such a record").into());
         }
         let record = jsonl::read_record(&path)?;
         let score = check(self.task, deal, &record);
@@ -122,8 +130,10 @@ impl Folder {
         }
         let last = by_deal.iter().rposition(Option::is_some);
         by_deal.truncate(last.map_or(0, |last| last + 1));
-        if by_deal.is_empty() && refused.is_empty() {
-            return Err(format!("{} has no records", self.path.display()).into());
+        if by_deal.iter().flatten().count() < 2 {
+            let first = refused.first().map_or("it has no others", String::as_str);
+            let folder = self.path.display();
+            return Err(format!("{folder} has fewer than two records that count: {first}").into());
         }
         let mut result = TaskResult::of(self.task, self.manifest.agent.clone(), &by_deal);
         let more = refused.len().saturating_sub(NAMED);
@@ -143,19 +153,41 @@ impl Folder {
     }
 }
 
-/// Reads a result from its file or its folder.
+/// The result of a folder, checked now, or of a file.
 pub(super) fn read_result(path: &Path) -> Result<TaskResult, CommandError> {
-    let file = match path.is_dir() {
-        true => path.join(RESULT),
-        false => path.to_owned(),
-    };
-    let result = read_json(&file);
-    Ok(result.map_err(|error| format!("{error}; `chefshat bench submit` writes it"))?)
+    if path.is_dir() {
+        return Folder::open(path)?.check();
+    }
+    let result: TaskResult = read_json(path)?;
+    check_agent(&result.agent)?;
+    task_of(&result.benchmark, &result.task)?;
+    Ok(result)
+}
+
+/// The task of a manifest or a result.
+fn task_of(benchmark: &str, task: &str) -> Result<&'static Task, CommandError> {
+    let named = Task::named(task).filter(|_| benchmark == BENCHMARK);
+    Ok(named.ok_or_else(|| {
+        format!("this version of chefshat has no task {task:?} of a benchmark {benchmark:?}")
+    })?)
+}
+
+/// Refuses texts that cannot be shown.
+fn check_agent(agent: &AgentInfo) -> Result<(), CommandError> {
+    match agent.is_printable() {
+        true => Ok(()),
+        false => Err("the name of an agent has 1 to 64 characters, its description and its url at most 2000, and none of them control characters".into()),
+    }
 }
 
 fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, String> {
-    let text = fs::read(path).map_err(|error| format!("{}: {error}", path.display()))?;
-    serde_json::from_slice(&text).map_err(|error| format!("{}: {error}", path.display()))
+    let problem = |error: &dyn Display| format!("{}: {error}", path.display());
+    let metadata = fs::metadata(path).map_err(|error| problem(&error))?;
+    if !metadata.is_file() || metadata.len() > MAX_JSON {
+        return Err(problem(&"not a file of a submission"));
+    }
+    let text = fs::read(path).map_err(|error| problem(&error))?;
+    serde_json::from_slice(&text).map_err(|error| problem(&error))
 }
 
 fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {

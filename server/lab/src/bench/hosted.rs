@@ -1,22 +1,25 @@
 //! An agent in any language plays on a server, in a room for each deal. The records are the server's.
 
-use std::future::ready;
+use std::env;
 use std::pin::pin;
+use std::process::ExitStatus;
 use std::time::Duration;
 
 use chefshat_benchmark::check;
 use chefshat_cli::connect::ServerArg;
 use chefshat_cli::error::CommandError;
+use chefshat_cli::numbers::counted;
 use chefshat_cli::progress;
-use chefshat_client::Client;
-use chefshat_examiner::{AgentCommand, AgentProcess, Places};
+use chefshat_client::{Client, Error};
+use chefshat_examiner::{AgentCommand, AgentProcess, Placeholders};
+use chefshat_proto::v1::{self, game_event::Kind};
 use chefshat_record::jsonl;
 use chefshat_server::host::Host;
-use futures::{StreamExt as _, TryStreamExt as _, stream};
+use futures::{StreamExt as _, stream};
 use tokio::io::AsyncWriteExt as _;
 use tokio::process::ChildStdin;
 use tokio::sync::Mutex;
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
 use super::folder::Folder;
 
@@ -26,16 +29,22 @@ const NAME: &str = "entrant";
 const LAST_LINES: usize = 8;
 /// How long an agent may take to exit after its last game.
 const EXIT: Duration = Duration::from_secs(10);
-/// How long a game may take to end after the process of its agent has.
+/// How long a game may take to end after the process of its agent has exited, and a call to clean up.
 const END: Duration = Duration::from_secs(5);
+/// How often a record is asked for that the server does not have yet, and how long to wait between.
+const ATTEMPTS: u32 = 20;
+const PAUSE: Duration = Duration::from_millis(250);
+/// Failed games in a row after which there is no point in playing more.
+const FAILURES: usize = 5;
 
-/// Plays the games that the folder has not.
+/// Plays the games that are missing in the folder. Games that fail are named and leave the others
+/// alone, unless several fail in a row.
 pub(super) async fn play(
     folder: &Folder,
     command: &AgentCommand,
     deals: usize,
     parallel: usize,
-    server: Option<&ServerArg>,
+    server: Option<&str>,
 ) -> Result<(), CommandError> {
     let missing = folder.missing(deals);
     if missing.is_empty() {
@@ -45,17 +54,20 @@ pub(super) async fn play(
         Some(_) => None,
         None => Some(Host::in_memory(None).await?),
     };
-    let (client, url) = match (server, &host) {
-        (Some(server), _) => (server.connect().await?, server.url().to_owned()),
-        (None, Some(host)) => (Client::connect(host.url()).await?, host.url()),
-        (None, None) => unreachable!("without a server there is a host"),
+    let url = match (server, &host) {
+        (Some(server), _) => server.to_owned(),
+        (None, host) => host.as_ref().map(Host::url).unwrap_or_default(),
     };
-    let address = url.split_once("://").map_or(url.as_str(), |(_, rest)| rest);
+    // The process of the agent inherits these variables.
+    let token = env::var("CHEFSHAT_TOKEN").ok();
+    let ca = env::var_os("CHEFSHAT_CA").map(Into::into);
+    let client = ServerArg::new(url.clone(), token, ca).connect().await?;
     let games = Games {
         folder,
         command,
         client: &client,
-        address: address.trim_end_matches('/'),
+        // With TLS an agent must see the scheme.
+        address: url.trim_start_matches("http://").trim_end_matches('/'),
     };
     games.play(missing, parallel).await?;
     drop(client);
@@ -70,7 +82,7 @@ struct Games<'a> {
     folder: &'a Folder,
     command: &'a AgentCommand,
     client: &'a Client,
-    /// `host:port` of the server.
+    /// `host:port` of the server, or its URL with TLS.
     address: &'a str,
 }
 
@@ -82,17 +94,20 @@ impl Games<'_> {
         }
         let mut process = self.start(String::new()).await?;
         let games = process.games().map(Mutex::new);
-        let failed = tokio::select! {
-            played = self.play_each(deals, parallel, games.as_ref()) => played.err(),
-            status = process.ended() => {
-                Some(format!("the agent exited before its last game: {}", status?).into())
-            }
+        let played = tokio::select! {
+            played = self.play_each(deals, parallel, games.as_ref()) => played,
+            status = process.ended() => Err(exited(status?)),
         };
-        if let Some(error) = failed {
+        if let Err(error) = played {
+            // Games fail when the agent has exited: then that is what to say.
+            let error = match timeout(END, process.ended()).await {
+                Ok(Ok(status)) => exited(status),
+                _ => error,
+            };
             return Err(explained(error, process).await);
         }
+        // The agent reads no more games, and exits. If it does not, it is killed.
         drop(games);
-        // One that does not notice that there are no more games is killed.
         let _exited = timeout(EXIT, process.ended()).await;
         Ok(())
     }
@@ -104,13 +119,28 @@ impl Games<'_> {
         reads: Option<&Mutex<ChildStdin>>,
     ) -> Result<(), CommandError> {
         let bar = progress::of_items(deals.len() as u64, "games");
-        let games = stream::iter(deals).map(|deal| self.game(deal, reads));
-        let played = games.buffer_unordered(parallel).try_for_each(|()| {
+        let games =
+            stream::iter(deals).map(|deal| async move { (deal, self.game(deal, reads).await) });
+        let mut games = pin!(games.buffer_unordered(parallel));
+        let (mut failed, mut in_a_row) = (0, 0);
+        while let Some((deal, played)) = games.next().await {
             bar.inc(1);
-            ready(Ok(()))
-        });
-        played.await?;
+            let Err(error) = played else {
+                in_a_row = 0;
+                continue;
+            };
+            failed += 1;
+            in_a_row += 1;
+            if in_a_row == FAILURES || bar.length() == Some(failed) {
+                return Err(format!("the game of deal {deal}: {error}").into());
+            }
+            bar.suspend(|| anstream::eprintln!("the game of deal {deal}: {error}"));
+        }
         bar.finish_and_clear();
+        if failed > 0 {
+            let games = counted(failed, "game");
+            anstream::eprintln!("{games} failed; the same command plays what is missing");
+        }
         Ok(())
     }
 
@@ -122,33 +152,53 @@ impl Games<'_> {
     ) -> Result<(), CommandError> {
         let created = self.client.create_room(self.folder.task.room(deal)).await?;
         let room = created.room.unwrap_or_default();
-        let over = self.until_over(&room.room_id);
-        match reads {
-            Some(reads) => {
-                let line = format!("{} {}\n", self.address, created.join_code);
-                let written = reads.lock().await.write_all(line.as_bytes()).await;
-                written.map_err(|error| format!("the agent reads no more games: {error}"))?;
-                over.await?;
-            }
-            None => {
-                let mut process = self.start(created.join_code).await?;
-                if let Err(error) = until_both_over(over, &mut process).await {
-                    let error = format!("the game of deal {deal}: {error}").into();
-                    return Err(explained(error, process).await);
-                }
-            }
+        let played = self.until_over(&room, created.join_code, reads).await;
+        if played.is_err() {
+            // It would take a seat of the server's for as long as it waits for the agent.
+            let closing = self.client.close_room(room.room_id, created.owner_token);
+            let _closed = timeout(END, closing).await;
         }
-        let lines = self.client.record(&room.game_id).await?;
+        played?;
+        let lines = self.record(&room.game_id).await?;
         let text = jsonl::text(&lines)?;
         let path = self.folder.record(deal);
         let record = jsonl::read_text(&path, text.as_slice())?;
-        check(self.folder.task, deal, &record)
-            .map_err(|problem| format!("the game of deal {deal} does not count: {problem}"))?;
+        check(self.folder.task, deal, &record)?;
         Ok(jsonl::write(&path, &lines)?)
     }
 
+    /// Lets the agent play in a room, until its game is over.
+    async fn until_over(
+        &self,
+        room: &v1::Room,
+        code: String,
+        reads: Option<&Mutex<ChildStdin>>,
+    ) -> Result<(), CommandError> {
+        let over = self.until_ended(&room.room_id);
+        if let Some(reads) = reads {
+            let line = format!("{} {code}\n", self.address);
+            let written = reads.lock().await.write_all(line.as_bytes()).await;
+            written.map_err(|error| format!("the agent reads no more games: {error}"))?;
+            return over.await;
+        }
+        let mut process = self.start(code).await?;
+        let mut over = pin!(over);
+        let ended = tokio::select! {
+            ended = &mut over => ended,
+            status = process.ended() => {
+                let status = status?;
+                timeout(END, over).await.unwrap_or_else(|_| Err(exited(status)))
+            }
+        };
+        if let Err(error) = ended {
+            return Err(explained(error, process).await);
+        }
+        let _exited = timeout(EXIT, process.ended()).await;
+        Ok(())
+    }
+
     async fn start(&self, code: String) -> Result<AgentProcess, CommandError> {
-        let places = Places {
+        let places = Placeholders {
             address: self.address.to_owned(),
             code,
             name: NAME.to_owned(),
@@ -158,39 +208,41 @@ impl Games<'_> {
         Ok(started.map_err(|error| format!("{}: {error}", program.map_or("", String::as_str)))?)
     }
 
-    async fn until_over(&self, room_id: &str) -> Result<(), CommandError> {
+    /// Waits until a game has ended.
+    async fn until_ended(&self, room_id: &str) -> Result<(), CommandError> {
         let mut spectator = self.client.spectate(room_id, 0);
-        while spectator.next().await?.is_some() {}
-        Ok(())
+        let mut has_ended = false;
+        while let Some(event) = spectator.next().await? {
+            has_ended = matches!(event.kind, Some(Kind::GameEnded(_)));
+        }
+        match has_ended {
+            true => Ok(()),
+            false => Err("the room was closed; the agent has an hour to join".into()),
+        }
+    }
+
+    /// The record of a game that has ended. The server may need a moment to have it.
+    async fn record(&self, game_id: &str) -> Result<Vec<v1::RecordLine>, Error> {
+        for _ in 1..ATTEMPTS {
+            match self.client.record(game_id).await {
+                Err(error) if error.reason() == Some("GAME_RUNNING") => sleep(PAUSE).await,
+                record => return record,
+            }
+        }
+        self.client.record(game_id).await
     }
 }
 
-/// Waits until a game is over and the process that played it has exited, or was given time to.
-async fn until_both_over(
-    over: impl Future<Output = Result<(), CommandError>>,
-    process: &mut AgentProcess,
-) -> Result<(), CommandError> {
-    let mut over = pin!(over);
-    tokio::select! {
-        ended = &mut over => {
-            ended?;
-            let _exited = timeout(EXIT, process.ended()).await;
-            Ok(())
-        }
-        status = process.ended() => {
-            let status = status?;
-            let ended = timeout(END, over).await;
-            ended.map_err(|_| format!("the agent exited before its end: {status}"))?
-        }
-    }
+fn exited(status: ExitStatus) -> CommandError {
+    format!("the agent exited before the end: {status}").into()
 }
 
 /// An error with the last lines that the agent printed.
 async fn explained(error: CommandError, process: AgentProcess) -> CommandError {
     let lines = process.finish(LAST_LINES).await;
-    let lines: String = lines.iter().map(|line| format!("\n  | {line}")).collect();
-    match lines.is_empty() {
-        true => error,
-        false => format!("{error}; the agent's last lines:{lines}").into(),
+    if lines.is_empty() {
+        return error;
     }
+    let lines: String = lines.iter().map(|line| format!("\n  | {line}")).collect();
+    format!("{error}; the agent's last lines:{lines}").into()
 }

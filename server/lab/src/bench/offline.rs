@@ -6,6 +6,7 @@ use chefshat_cli::progress;
 use chefshat_proto::v1;
 use chefshat_record::jsonl;
 use chefshat_simulation::Contender;
+use chefshat_simulation::vector::Opponent;
 use rayon::prelude::*;
 
 use crate::compare::Entrant;
@@ -14,7 +15,7 @@ use crate::compare::Entrant;
 pub(super) fn play(task: &Task, deal: usize, entrant: &Entrant) -> Vec<v1::RecordLine> {
     let rules = task.rule_set();
     let name = match &entrant.contender {
-        Contender::Network(network) => format!("network:{}", &hex::encode(network.id().0)),
+        Contender::Network(network) => Opponent::Network(network.id()).name().into_owned(),
         Contender::Kind(_) | Contender::Made(_) => entrant.label.clone(),
     };
     play_offline(task, deal, &name, |seed| {

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use chefshat_benchmark::{TaskResult, tasks};
 use chefshat_cli::error::{CommandError, say};
-use chefshat_cli::numbers::counted;
+use chefshat_cli::numbers::{counted, signed};
 use chefshat_cli::output::{heading, line, table};
 use chefshat_cli::progress;
 use chefshat_engine::RuleSetSpec;
@@ -78,7 +78,12 @@ impl Pool {
                     results.push(offline::result(task, entrant, deals)?);
                 }
             }
-            versus.push(offline::result(task, &Entrant::of(VERSUS)?, deals)?);
+            let mut of_task = results.iter().rev().take(entrants.len());
+            let is_played = |it: &&TaskResult| it.task == task.name && it.agent.name == VERSUS;
+            versus.push(match of_task.find(is_played) {
+                Some(result) => result.clone(),
+                None => offline::result(task, &Entrant::of(VERSUS)?, deals)?,
+            });
         }
         Ok((results, versus))
     }
@@ -120,8 +125,9 @@ impl Pool {
             for column in 0..entrants.len() {
                 let pair = pairs.iter().find(|it| (it.row, it.column) == (row, column));
                 cells.push(pair.map_or_else(String::new, |pair| {
-                    let half = 1.96 * pair.points.standard_error();
-                    format!("{} ± {half:.3}", report::signed(pair.points.difference()))
+                    let difference = pair.points.difference();
+                    let half = pair.points.interval95().high - difference;
+                    format!("{} ± {half:.3}", signed(difference))
                 }));
             }
             cells

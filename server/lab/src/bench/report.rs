@@ -2,9 +2,9 @@
 
 use std::process::ExitCode;
 
-use chefshat_benchmark::{BENCHMARK, Figure, TaskResult, tasks};
+use chefshat_benchmark::{BENCHMARK, MeanWithInterval, PairedDifference, TaskResult, tasks};
 use chefshat_cli::error::{CommandError, say};
-use chefshat_cli::numbers::counted;
+use chefshat_cli::numbers::{counted, signed};
 use chefshat_cli::output::{heading, line, percent, table};
 use serde_json::{Value, json};
 
@@ -60,6 +60,10 @@ fn text(result: &TaskResult) -> String {
     line(&mut text, &format!("records: {}", result.records_sha256));
     line(
         &mut text,
+        &format!("played by: {}", result.played_by.join(", ")),
+    );
+    line(
+        &mut text,
         &format!("signed by: {}", result.signed_by.join(", ")),
     );
     for problem in &result.problems {
@@ -68,7 +72,7 @@ fn text(result: &TaskResult) -> String {
     text
 }
 
-fn of_figure(figure: &Figure) -> [String; 2] {
+fn of_figure(figure: &MeanWithInterval) -> [String; 2] {
     let [low, high] = figure.interval95;
     [
         format!("{:.3}", figure.mean),
@@ -103,6 +107,12 @@ fn by_task<'r>(
     })
 }
 
+/// The difference of a row from the agent that it is compared with; `None` for that one itself.
+fn difference(row: &TaskResult, versus: &TaskResult) -> Option<PairedDifference> {
+    let is_other = row.records_sha256 != versus.records_sha256;
+    is_other.then(|| row.paired_difference(versus)).flatten()
+}
+
 /// The tables as text.
 pub(super) fn table_text(results: &[TaskResult], versus: &[TaskResult]) -> String {
     let mut text = String::new();
@@ -124,10 +134,7 @@ pub(super) fn table_text(results: &[TaskResult], versus: &[TaskResult]) -> Strin
                 name.push_str(" *");
             }
             let mut cells = vec![name, mean, interval, percent(row.games_won.mean)];
-            match row
-                .paired_difference(versus)
-                .filter(|_| row.agent != versus.agent)
-            {
+            match difference(row, versus) {
                 None => cells.extend(["".to_owned(), "".to_owned()]),
                 Some(difference) => {
                     let figure = difference.points_per_shift;
@@ -141,7 +148,7 @@ pub(super) fn table_text(results: &[TaskResult], versus: &[TaskResult]) -> Strin
         text.push('\n');
     }
     if results.iter().any(|result| !result.is_valid()) {
-        line(&mut text, "* not valid: `chefshat bench submit` says why");
+        line(&mut text, "* not valid: --json says why");
     }
     text
 }
@@ -150,10 +157,10 @@ pub(super) fn table_text(results: &[TaskResult], versus: &[TaskResult]) -> Strin
 pub(super) fn table_json(results: &[TaskResult], versus: &[TaskResult]) -> Value {
     let tasks = by_task(results, versus).map(|(versus, rows)| {
         let rows = rows.into_iter().map(|row| {
-            let difference = row.paired_difference(versus);
+            let difference = difference(row, versus);
             json!({
                 "agent": row.agent,
-                "valid": row.is_valid(),
+                "problems": row.problems,
                 "deals": row.deals,
                 "points_per_shift": row.points_per_shift,
                 "games_won": row.games_won,
@@ -170,9 +177,4 @@ pub(super) fn table_json(results: &[TaskResult], versus: &[TaskResult]) -> Value
         })
     });
     json!({"benchmark": BENCHMARK, "tasks": tasks.collect::<Vec<_>>()})
-}
-
-/// A number with its sign.
-pub(super) fn signed(number: f64) -> String {
-    format!("{number:+.3}").replace('-', "−")
 }

@@ -1,10 +1,9 @@
-//! `chefshat bench run`: plays the games that a folder has not, and prints the result of all of them.
+//! `chefshat bench run`: plays the games that are missing in a folder, and prints the result of all.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use chefshat_benchmark::{AgentInfo, BENCHMARK, Task};
-use chefshat_cli::connect::ServerArg;
 use chefshat_cli::error::CommandError;
 use chefshat_cli::progress;
 use chefshat_cli::stops::Stops;
@@ -40,32 +39,22 @@ pub(super) struct Run {
     /// Name of the agent in tables. Default with --agent: that agent.
     #[arg(long, required_unless_present = "agent")]
     name: Option<String>,
-    /// How the agent plays and was made, in a sentence.
+    /// How the agent plays and was trained, in a sentence.
     #[arg(long, default_value = "")]
     description: String,
     /// Where to read about it.
     #[arg(long, default_value = "")]
     url: String,
-    /// Play only this many of the deals: a first look, not a result.
+    /// Play only this many of the deals. The result is not valid then.
     #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
     deals: Option<u64>,
-    /// Games at a time.
+    /// Games at a time, of a command.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=256))]
     parallel: u16,
-    /// A server to play on, which signs the records if it has a key. Default: one in this process.
+    /// A server to play on, which signs the records if it has a key; CHEFSHAT_TOKEN and CHEFSHAT_CA
+    /// are for it and for the agent. Default: one in this process.
     #[arg(long, value_name = "URL")]
     server: Option<String>,
-    /// Token for that server.
-    #[arg(
-        long,
-        env = "CHEFSHAT_TOKEN",
-        hide_env_values = true,
-        requires = "server"
-    )]
-    token: Option<String>,
-    /// PEM file of the certificate authorities to trust, instead of the system's.
-    #[arg(long, value_name = "FILE", requires = "server")]
-    ca: Option<PathBuf>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -76,30 +65,45 @@ pub(super) struct Run {
 
 impl Run {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
-        let deals = self.deals.map_or(self.task.deals, |deals| deals as usize);
-        if deals > self.task.deals {
-            return Err(format!("--deals: the task has {} deals", self.task.deals).into());
+        if self.agent.is_some() {
+            return self.finish(self.play_offline()?);
         }
-        let folder = match &self.agent {
-            Some(agent) => self.play_offline(agent, deals)?,
-            None => {
-                let mut stops = Stops::catch()?;
-                tokio::select! {
-                    folder = self.play_hosted(deals) => folder?,
-                    // Returning ends the agent's processes, which are in a process group of their own.
-                    stop = stops.next() => return Ok(stop.exit_code()),
-                }
-            }
+        let mut stops = Stops::catch()?;
+        let folder = tokio::select! {
+            folder = self.play_hosted() => folder?,
+            // Returning ends the agent's processes, which are in a process group of their own.
+            stop = stops.next() => return Ok(stop.exit_code()),
         };
+        let checking = tokio::task::spawn_blocking(move || self.finish(folder));
+        tokio::select! {
+            finished = checking => finished?,
+            stop = stops.next() => Ok(stop.exit_code()),
+        }
+    }
+
+    /// Checks the records, and prints the result.
+    fn finish(&self, folder: Folder) -> Result<ExitCode, CommandError> {
         let result = folder.check()?;
+        let printed = report::print(&result, self.json);
         folder.write_result(&result)?;
-        report::print(&result, self.json)
+        printed
+    }
+
+    /// The number of deals to play.
+    fn deals(&self) -> Result<usize, CommandError> {
+        let deals = self.deals.map_or(self.task.deals, |deals| deals as usize);
+        match deals > self.task.deals {
+            true => Err(format!("--deals: the task has {} deals", self.task.deals).into()),
+            false => Ok(deals),
+        }
     }
 
     /// Plays with an agent in this process.
-    fn play_offline(&self, agent: &str, deals: usize) -> Result<Folder, CommandError> {
+    fn play_offline(&self) -> Result<Folder, CommandError> {
+        let agent = self.agent.as_deref().unwrap_or_default();
         let entrant = Entrant::of(agent)?;
         offline::check_fits(self.task, &entrant)?;
+        let deals = self.deals()?;
         let folder = self.folder(agent, &entrant.label)?;
         let missing = folder.missing(deals);
         let bar = progress::of_items(missing.len() as u64, "games");
@@ -113,13 +117,13 @@ impl Run {
     }
 
     /// Plays with an agent that connects to a server.
-    async fn play_hosted(&self, deals: usize) -> Result<Folder, CommandError> {
+    async fn play_hosted(&self) -> Result<Folder, CommandError> {
         let command = AgentCommand::for_games(self.command.clone())?;
+        let deals = self.deals()?;
         let folder = self.folder(&self.command.join(" "), "")?;
-        let server = self.server.clone();
-        let server = server.map(|url| ServerArg::new(url, self.token.clone(), self.ca.clone()));
         let parallel = usize::from(self.parallel);
-        hosted::play(&folder, &command, deals, parallel, server.as_ref()).await?;
+        let server = self.server.as_deref();
+        hosted::play(&folder, &command, deals, parallel, server).await?;
         Ok(folder)
     }
 

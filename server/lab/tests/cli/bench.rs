@@ -70,6 +70,22 @@ fn an_agent_has_the_same_result_wherever_it_plays() {
 }
 
 #[test]
+fn every_task_can_be_hosted() {
+    let folder = tempfile::tempdir().unwrap();
+    for task in chefshat_benchmark::tasks() {
+        let out = folder.path().join(&task.name);
+        let agent = ["agent", "greedy", "--server", "{url}", "--code", "{code}"];
+        let played = run(
+            &task.name,
+            &out,
+            &[&["--name", "it", "--", PROGRAM], &agent[..]].concat(),
+        );
+        assert_eq!(played.json()["deals"], 4, "{played:?}");
+        assert_eq!(played.json()["played_by"], serde_json::json!(["greedy"]));
+    }
+}
+
+#[test]
 fn a_run_resumes_and_records_that_do_not_count_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path().join("greedy");
@@ -84,7 +100,7 @@ fn a_run_resumes_and_records_that_do_not_count_are_named() {
     let problems = submitted["problems"].to_string();
     for expected in [
         "2 of 2500 deals",
-        "0001.jsonl: the game has another seed",
+        "0001.jsonl: the game has a different seed",
         "0002.jsonl",
     ] {
         assert!(problems.contains(expected), "{problems}");
@@ -119,7 +135,7 @@ fn errors_say_what_to_do() {
         "echo {address} {code}; exit 3",
     ];
     let other = folder.path().join("other");
-    run("shift", &other, &exits).assert_failed("the agent exited before its end");
+    run("shift", &other, &exits).assert_failed("the agent exited before the end");
     run("game", &other, &exits).assert_failed("name another folder with --out");
     typed("bench submit nowhere").assert_failed("a folder that `chefshat bench run` wrote");
     typed("bench table nowhere").assert_failed("nowhere");

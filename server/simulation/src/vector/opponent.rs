@@ -35,6 +35,7 @@ impl Opponent {
     }
 }
 
+/// The name of a network in records, from the first 8 bytes of its id, or from all of them.
 fn network_name(id: &[u8]) -> String {
     format!("{}:{}", BuiltInAgent::NETWORK, hex::encode(id))
 }
