@@ -717,3 +717,47 @@ async fn what_cannot_be_asked_is_refused_before_a_seat_is_taken() {
         assert!(said.contains(expected), "{arguments:?}: {said}");
     }
 }
+
+/// The result of a model in two games of the benchmark.
+async fn benchmark(script: Script) -> Value {
+    let (url, _) = endpoint(script).await;
+    let folder = tempfile::tempdir().expect("a folder");
+    let program = set_up("CHEFSHAT_BIN");
+    let program = program.to_str().expect("a path in UTF-8");
+    let out = folder.path().to_str().expect("a path in UTF-8");
+    let start = ["bench", "run", "language_model", "--deals", "2", "--json"];
+    let mut command = chefshat(&start, KEY);
+    command.args(["--name", "test-1", "--out", out, "--", program]);
+    command.args(["agent", "llm", "--server", "{url}", "--code", "{code}"]);
+    command.args(["--endpoint", &url, "--model", "ada/test-1"]);
+    let output = patiently("two games", command.output()).await;
+    let output = output.expect("it runs");
+    let problems = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(
+        output.status.code(),
+        Some(1),
+        "two of 100 deals: {problems}"
+    );
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {problems}"))
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_model_has_a_result_in_the_benchmark_only_if_it_decides() {
+    let honest = benchmark(honest).await;
+    assert_eq!(honest["played_by"], json!(["test-1"]));
+    assert_eq!(honest["fallback_decisions"], 0);
+    assert_eq!(honest["problems"], json!(["2 of 100 deals"]));
+    let silent = benchmark(|asked, messages| match asked {
+        // The question before each game.
+        _ if messages.len() == 1 => Said::Text("{\"action\": 1}".into(), 10),
+        _ => Said::Text("I would rather not say.".into(), 10),
+    });
+    let silent = silent.await;
+    assert_eq!(silent["fallback_decisions"], silent["choices"]);
+    assert!(
+        silent["problems"][1]
+            .as_str()
+            .expect("a second problem")
+            .contains("fallback")
+    );
+}
