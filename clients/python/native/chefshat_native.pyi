@@ -143,5 +143,8 @@ class Position:
 
     def __reduce__(self) -> NoReturn: ...
 
+def trained_network() -> bytes:
+    """The file of the network of the built-in agent "trained". `chefshat.learn.network.load("trained")` reads it."""
+
 def action_texts(faces: int) -> list[str]:
     """Returns the texts of all actions of a deck with this number of faces, 4..=15."""

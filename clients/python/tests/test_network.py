@@ -11,7 +11,7 @@ import pytest
 import safetensors.numpy
 from hand_made import hand_made
 
-from chefshat import SeatInfo, pb
+from chefshat import SeatInfo, VectorEnv, pb
 from chefshat.learn import features, network
 from chefshat.learn.network import Layer, Network, NetworkFileError, NetworkInfo
 from chefshat.learn.play import NetworkAgent, RulesDoNotFit
@@ -172,3 +172,25 @@ def test_the_fixtures_are_reproduced(name: str) -> None:
     np.testing.assert_array_equal(inputs, np.array([row["features"] for row in rows], np.float32))
     np.testing.assert_allclose(net.outputs(inputs), [row["outputs"] for row in rows], rtol=1e-5, atol=1e-5)
     assert case.actions(net) == [row["action"] for row in rows]
+
+
+def test_the_built_in_network_is_loaded_by_its_name() -> None:
+    built_in = network.load("trained")
+    source = Path(__file__).parents[3] / "server" / "agents" / "src" / "network" / "trained.safetensors"
+    file = network.load(source)
+    assert built_in.info == file.info
+    assert built_in.info.name == "trained"
+    for (weight, bias), (weight_read, bias_read) in zip(file.layers, built_in.layers, strict=True):
+        np.testing.assert_array_equal(weight, weight_read)
+        np.testing.assert_array_equal(bias, bias_read)
+
+
+def test_logits_are_those_of_legal_actions() -> None:
+    net = network.load("trained")
+    with VectorEnv(games=8, opponents="greedy", seed=3) as env:
+        batch = env.reset()
+        for _ in range(20):
+            logits = net.logits_of(batch)
+            np.testing.assert_array_equal(np.isfinite(logits), batch.masks)
+            np.testing.assert_array_equal(np.argmax(logits, axis=1), net.actions_of(batch))
+            batch = env.step(net.actions_of(batch))

@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, MutexGuard, TryLockError};
 
-use chefshat_agents::AgentKind;
+use chefshat_agents::{AgentKind, Network};
 use chefshat_engine::{ActionId, ActionSpace};
 use chefshat_proto::v1;
 use chefshat_record::convert::FieldProblem;
@@ -227,6 +227,12 @@ pub(crate) fn action_texts(faces: u8) -> PyResult<Vec<String>> {
         .ok_or_else(|| PyValueError::new_err(format!("{faces} is not in 4..=15")))?;
     let texts = (0..space.size()).filter_map(|index| space.text(ActionId::new(index)));
     Ok(texts.collect())
+}
+
+/// The file of the network of the built-in agent `trained`.
+#[pyfunction]
+pub(crate) fn trained_network(py: Python<'_>) -> Bound<'_, PyBytes> {
+    PyBytes::new(py, Network::TRAINED_FILE)
 }
 
 /// Whether all built-in agents decide in less than a microsecond.

@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod chefshat_native {
     #[pymodule_export]
-    use crate::games::{Games, Refused, action_texts};
+    use crate::games::{Games, Refused, action_texts, trained_network};
     #[pymodule_export]
     use crate::search::Position;
     #[pymodule_export]

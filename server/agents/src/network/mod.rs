@@ -21,8 +21,7 @@ pub use file::{MAX_FILE_BYTES, NetworkError};
 
 /// The network of the built-in agent `trained`, loaded once.
 static TRAINED: LazyLock<Arc<Network>> = LazyLock::new(|| {
-    let file = include_bytes!("trained.safetensors");
-    Arc::new(Network::from_bytes(file).expect("the embedded file is valid"))
+    Arc::new(Network::from_bytes(Network::TRAINED_FILE).expect("the embedded file is valid"))
 });
 
 /// The input of a network.
@@ -86,6 +85,9 @@ pub struct Network {
 }
 
 impl Network {
+    /// The file of the network of the built-in agent `trained`.
+    pub const TRAINED_FILE: &[u8] = include_bytes!("trained.safetensors");
+
     /// The network of the built-in agent `trained`, which is part of the program.
     pub fn trained() -> &'static Arc<Network> {
         &TRAINED

@@ -157,7 +157,7 @@ def _common(command: argparse.ArgumentParser) -> None:
 
 
 def _evaluate(command: argparse.ArgumentParser) -> None:
-    command.add_argument("file", type=Path, help="the network")
+    command.add_argument("file", type=Path, help="the network, or trained: that of the built-in agent")
     command.add_argument(
         "--opponents",
         nargs="+",
@@ -212,7 +212,7 @@ def _deep_q_games(command: argparse.ArgumentParser) -> None:
 
 
 def _play(command: argparse.ArgumentParser) -> None:
-    command.add_argument("file", type=Path, help="the network")
+    command.add_argument("file", type=Path, help="the network, or trained: that of the built-in agent")
     join_options.add_server_options(command, required=True)
     join_options.add_options(command)
     command.add_argument("--name", help="display name, 1 to 64 characters; not needed with a ticket")

@@ -9,6 +9,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Literal, NamedTuple, Self, TypeAlias
 
 import numpy as np
@@ -19,8 +20,11 @@ import safetensors.numpy
 from chefshat.columns import Observations, Situations
 from chefshat.files import check_readable, write_atomically
 from chefshat.learn import features
+from chefshat.masks import unpack
 
 FORMAT = "chefshat-network-1"
+# The built-in agent that is a network.
+TRAINED = "trained"
 
 Floats = npt.NDArray[np.float32]
 Actions = npt.NDArray[np.uint16]
@@ -171,6 +175,15 @@ class Network:
             values = (np.fmax(values, 0) if number else values) @ weight.T + bias
         return values
 
+    def logits_of(self, situations: Situations) -> Floats:
+        """Returns the outputs of each row before their activation, (R, `info.output_width`) float32; -inf at illegal actions.
+
+        The softmax of a row is the policy that `ppo` trained, of which `actions_of` takes the most likely action.
+        """
+        observations, seats, kinds, masks = situations.observations, situations.seats, situations.kinds, situations.mask_bits
+        sums = self._sums(self.inputs(observations, seats, kinds, masks))
+        return np.where(unpack(masks, sums.shape[1]), sums, np.float32(-np.inf))
+
     def actions(
         self, observations: Observations, seats: features.Bytes, kinds: features.Bytes, mask_bits: features.Bytes
     ) -> Actions:
@@ -191,7 +204,7 @@ def best_legal(outputs: Floats, mask_bits: features.Bytes) -> Actions:
 
     NaN, from the overflow of large weights, counts as the lowest output.
     """
-    legal = np.unpackbits(mask_bits, axis=1, count=outputs.shape[1], bitorder="little").view(np.bool_)
+    legal = unpack(mask_bits, outputs.shape[1])
     best = np.argmax(np.where(legal & ~np.isnan(outputs), outputs, -np.inf), axis=1)
     # Where every legal output is the lowest, illegal ones are equal to them.
     allowed = np.take_along_axis(legal, best[:, np.newaxis], axis=1)[:, 0]
@@ -229,17 +242,36 @@ def save(
 
 
 def load(path: str | os.PathLike[str]) -> Network:
-    """Reads a network from a file. Raises `NetworkFileError` if it is not one, `OSError` if it cannot be read."""
-    check_readable(path, "network", "`python -m chefshat.learn ppo` or `deep-q` writes")
+    """Reads a network from a file, or that of the built-in agent: "trained", which is in chefshat-native.
+
+    Raises:
+        NetworkFileError: the file is not a network.
+        OSError: it cannot be read.
+        ModuleNotFoundError: "trained" without chefshat-native.
+    """
+    if os.fspath(path) == TRAINED:
+        import chefshat_native
+
+        file = chefshat_native.trained_network()
+    else:
+        check_readable(path, "network", "`python -m chefshat.learn ppo` or `deep-q` writes")
+        file = Path(path).read_bytes()
+    name = os.fspath(path)
     try:
-        with safetensors.safe_open(path, framework="np") as file:
-            info = NetworkInfo.of(file.metadata() or {})
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (it is not a mapping)
+        tensors = safetensors.numpy.load(file)
+        info = NetworkInfo.of(_metadata(file))
         layers = [Layer(tensors[f"layer{number}.weight"], tensors[f"layer{number}.bias"]) for number in range(len(tensors) // 2)]
         if len(tensors) % 2 or any(tensor.dtype not in (np.float16, np.float32) for tensor in tensors.values()):
             raise ValueError("its tensors are not pairs of weight and bias in float16 or float32")
         return Network(layers, info)
     except KeyError as missing:
-        raise NetworkFileError(f"{os.fspath(path)} is not a network: it has no tensor {missing}") from missing
+        raise NetworkFileError(f"{name} is not a network: it has no tensor {missing}") from missing
     except (ValueError, safetensors.SafetensorError) as error:
-        raise NetworkFileError(f"{os.fspath(path)} is not a network: {error}") from error
+        raise NetworkFileError(f"{name} is not a network: {error}") from error
+
+
+def _metadata(file: bytes) -> dict[str, str]:
+    """Returns the texts of a safetensors file: its header is JSON, after its length in 8 bytes, little-endian."""
+    length = int.from_bytes(file[:8], "little")
+    texts: dict[str, str] = json.loads(file[8 : 8 + length]).get("__metadata__", {})
+    return texts
