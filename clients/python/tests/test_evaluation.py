@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from chefshat.learn.evaluation import summed_up
+from chefshat.learn import network
+from chefshat.learn.evaluation import evaluate, summed_up
 
 
 def test_shifts_of_one_game_are_not_independent() -> None:
@@ -20,3 +21,12 @@ def test_independent_shifts_have_the_usual_error() -> None:
     points = np.random.default_rng(1).choice([5, 3, 1, 0], 400).astype(np.uint32)
     found = summed_up(("random",) * 3, 400, np.arange(400), points, np.array([1, 1, 1, 397]))
     assert found.standard_error == pytest.approx(float(points.std(ddof=1)) / 400**0.5)
+
+
+def test_a_player_takes_any_seat() -> None:
+    """The network of the built-in agent, among three of them, plays the same games from every seat: all points are shared out."""
+    trained = network.load("trained")
+    found = [evaluate(trained, "trained", games=10, seat=seat, seed=5) for seat in range(4)]
+    assert len({one.shifts for one in found}) == 1
+    assert sum(one.points for one in found) == pytest.approx(5 + 3 + 1)
+    assert len({one.points for one in found}) > 1

@@ -57,29 +57,31 @@ def evaluate(
     opponents: str | Sequence[str | Policy],
     *,
     games: int,
+    seat: int = 0,
     seed: Seed = None,
     rules: Rules = None,
     address: str | ServerAddress | None = None,
 ) -> Evaluation:
-    """Plays games with the player on seat 0; random deals make all seats equal.
+    """Plays games with the player on one seat. With random deals all seats are equal; with given seeds they are not.
 
     Args:
         player: a network, which takes the legal action with the highest output, or a function that chooses actions.
         opponents: built-in agents, network files or functions of the other seats, one for all or one for each.
         games: number of games.
+        seat: the player's seat, from 0.
         seed: seed of the deals.
         rules: the rule set.
         address: where the games are played; see `VectorEnv`.
 
     Raises:
         ChefsHatError: the games are refused, or the server does not answer.
-        ValueError: the network was trained for games of another size.
+        ValueError: the network was trained for games of another size, or there is no such seat.
     """
     network = player if isinstance(player, Network) else None
     with VectorEnv(
         address,
         min(games, SIDE_BY_SIDE),
-        client_seats=[0],
+        client_seats=[seat],
         opponents=opponents,
         episode="shift",
         decisions="turns" if network and network.info.output == "turns" else "all",
@@ -105,8 +107,8 @@ def evaluate(
         while True:
             assert batch.shifts is not None, "shift_statistics is set"
             indices.append(batch.shifts.indices)
-            points.append(batch.shifts.points[:, 0])
-            places.append(batch.shifts.places[:, 0])
+            points.append(batch.shifts.points[:, seat])
+            places.append(batch.shifts.places[:, seat])
             if batch.done:
                 break
             if isinstance(player, Network):
