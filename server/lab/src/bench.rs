@@ -13,7 +13,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use chefshat_agents::NamedAgent;
-use chefshat_benchmark::{BENCHMARK, Task, TaskResult, tasks};
+use chefshat_benchmark::{BENCHMARK, TaskResult, tasks};
 use chefshat_cli::error::{CommandError, say};
 use chefshat_cli::numbers::counted;
 use chefshat_cli::output::{heading, line, rules_in_short};
@@ -151,12 +151,4 @@ impl TableCommand {
         }
         report::print_table(&results, &versus, self.json)
     }
-}
-
-/// The task of this name, for clap.
-fn task_named(name: &str) -> Result<&'static Task, String> {
-    Task::named(name).ok_or_else(|| {
-        let names: Vec<&str> = tasks().iter().map(|task| task.name.as_str()).collect();
-        format!("there is no such task; use one of {}", names.join(", "))
-    })
 }

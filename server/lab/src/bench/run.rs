@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use chefshat_benchmark::{AgentInfo, BENCHMARK, Task};
+use chefshat_benchmark::{AgentInfo, BENCHMARK, Task, tasks};
 use chefshat_cli::error::CommandError;
 use chefshat_cli::progress;
 use chefshat_cli::stops::Stops;
@@ -13,7 +13,7 @@ use clap::Args;
 use rayon::prelude::*;
 
 use super::folder::{Folder, Manifest};
-use super::{hosted, offline, report, task_named};
+use super::{hosted, offline, report};
 use crate::compare::Entrant;
 
 const HELP: &str = "\
@@ -140,4 +140,12 @@ impl Run {
         };
         Folder::create(&self.out, manifest)
     }
+}
+
+/// The task of this name, for clap.
+fn task_named(name: &str) -> Result<&'static Task, String> {
+    Task::named(name).ok_or_else(|| {
+        let names: Vec<&str> = tasks().iter().map(|task| task.name.as_str()).collect();
+        format!("there is no such task; use one of {}", names.join(", "))
+    })
 }
