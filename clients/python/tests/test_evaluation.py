@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from chefshat import Batch
 from chefshat.learn import network
-from chefshat.learn.evaluation import evaluate, summed_up
+from chefshat.learn.evaluation import compare, evaluate, summed_up
 
 
 def test_shifts_of_one_game_are_not_independent() -> None:
@@ -30,3 +32,22 @@ def test_a_player_takes_any_seat() -> None:
     assert len({one.shifts for one in found}) == 1
     assert sum(one.points for one in found) == pytest.approx(5 + 3 + 1)
     assert len({one.points for one in found}) > 1
+
+
+def test_a_comparison_needs_no_luck_with_the_deals() -> None:
+    trained = network.load("trained")
+
+    def first_legal(batch: Batch) -> NDArray[np.intp]:
+        return np.asarray(batch.masks.argmax(axis=1), np.intp)
+
+    same = compare(trained, trained.actions_of, "greedy", deals=20, seed=5)
+    assert (same.difference, same.standard_error) == (0, 0)
+    found = compare(trained, first_legal, "greedy", deals=60, seats=[0, 2], seed=5)
+    assert found.points[0] - found.points[1] == pytest.approx(found.difference)
+    assert found.difference > 1
+    alone = [evaluate(player, "greedy", games=60, seed=5) for player in (trained, first_legal)]
+    independent = (alone[0].standard_error ** 2 + alone[1].standard_error ** 2) ** 0.5
+    assert 0 < found.standard_error < independent
+    assert "on 60 deals" in str(found)
+    with pytest.raises(ValueError, match="at least 2"):
+        compare(trained, first_legal, "greedy", deals=1)

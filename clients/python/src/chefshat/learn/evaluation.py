@@ -1,4 +1,4 @@
-"""The command `evaluate`: plays a network, or another policy, on one seat against built-in agents, over whole games.
+"""Plays a network, or another policy, on one seat against built-in agents: the command `evaluate`, and comparisons on equal deals.
 
 `chefshat compare` (the program) repeats deals with rotated seats, and so needs far fewer Shifts for the same certainty. How a
 network decides is in `network`.
@@ -7,8 +7,10 @@ network decides is in `network`.
 import argparse
 import dataclasses
 import json
+import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -77,6 +79,107 @@ def evaluate(
         ChefsHatError: the games are refused, or the server does not answer.
         ValueError: the network was trained for games of another size, or there is no such seat.
     """
+    played = _play(player, opponents, games, seat, seed, rules, address)
+    return summed_up(played.opponents, games, played.games, played.points, played.places)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two players that never meet, on the same deals, in the same seats and against the same opponents.
+
+    Attributes:
+        opponents: the agents of the other seats.
+        deals: deals played, each by both players from each of the seats.
+        points: points per Shift of the first and of the second player.
+        difference: those of the first minus those of the second.
+        standard_error: of `difference`; deals count as independent, what is played on one deal does not.
+    """
+
+    opponents: tuple[str, ...]
+    deals: int
+    points: tuple[float, float]
+    difference: float
+    standard_error: float
+
+    def __str__(self) -> str:
+        first, second = self.points
+        against = ", ".join(self.opponents)
+        return (
+            f"{self.difference:+.3f} ± {self.standard_error:.3f} points per Shift ({first:.3f} and {second:.3f}) "
+            f"against {against}, on {self.deals:,} deals"
+        )
+
+
+def compare(
+    first: Network | Policy,
+    second: Network | Policy,
+    opponents: str | Sequence[str | Policy],
+    *,
+    deals: int,
+    seats: Sequence[int] | None = None,
+    seed: Seed = None,
+    rules: Rules = None,
+    address: str | ServerAddress | None = None,
+) -> Comparison:
+    """Lets two players play the same deals from the same seats, which takes most of the chance out of their difference.
+
+    Opponents with random choices make them anew for each player. Agents that only connect to a server are compared by
+    `chefshat bench`.
+
+    Args:
+        first: a network, or a function that chooses actions.
+        second: the player to compare it with.
+        opponents: as for `evaluate`.
+        deals: number of deals, at least 2.
+        seats: the seats from which each deal is played, from 0; None: all of four.
+        seed: seed of the deals; None: random deals, the same for both.
+        rules: the rule set.
+        address: where the games are played; see `VectorEnv`.
+
+    Raises:
+        ChefsHatError: the games are refused, or the server does not answer.
+        ValueError: a network was trained for games of another size, there is no such seat, or fewer than two deals.
+    """
+    if deals < 2:
+        raise ValueError(f"{deals} deals: play at least 2, so that there is a standard error")
+    seats = range(4) if seats is None else seats
+    seed = secrets.randbits(64) if seed is None else seed
+    names: tuple[str, ...] = ()
+    by_deal = np.zeros((2, deals))
+    for number, player in enumerate((first, second)):
+        for seat in seats:
+            played = _play(player, opponents, deals, seat, seed, rules, address)
+            shifts = np.bincount(played.games, minlength=deals)
+            by_deal[number] += np.bincount(played.games, weights=played.points, minlength=deals) / shifts / len(seats)
+            names = played.opponents
+    differences = by_deal[0] - by_deal[1]
+    means = by_deal.mean(axis=1)
+    error = float(differences.std(ddof=1) / np.sqrt(deals))
+    return Comparison(names, deals, (float(means[0]), float(means[1])), float(differences.mean()), error)
+
+
+class _Played(NamedTuple):
+    """The Shifts of some games."""
+
+    # The agents of the other seats.
+    opponents: tuple[str, ...]
+    # By Shift, (S,): the index of its game, and the points of the player.
+    games: npt.NDArray[np.intp]
+    points: npt.NDArray[np.uint32]
+    # The count of each place, first to last.
+    places: npt.NDArray[np.intp]
+
+
+def _play(
+    player: Network | Policy,
+    opponents: str | Sequence[str | Policy],
+    games: int,
+    seat: int,
+    seed: Seed,
+    rules: Rules,
+    address: str | ServerAddress | None,
+) -> _Played:
+    """Plays games with the player on a seat."""
     network = player if isinstance(player, Network) else None
     with VectorEnv(
         address,
@@ -117,7 +220,7 @@ def evaluate(
                 actions = player(batch)
             batch = env.step(actions)
         taken = np.bincount(np.concatenate(places), minlength=env.players + 1)[1:]
-    return summed_up(names, games, np.concatenate(indices).astype(np.intp), np.concatenate(points), taken)
+    return _Played(names, np.concatenate(indices).astype(np.intp), np.concatenate(points), taken)
 
 
 def _name(opponent: str | Policy) -> str:
