@@ -41,6 +41,7 @@ def test_one_process_plays_all_games(real_binary: Path, tmp_path: Path) -> None:
     result = json.loads(done.stdout)
     assert result["deals"] == DEALS, done.stderr
     assert result["fallback_decisions"] == result["invalid_attempts"] == 0
+    assert result["played_by"] == ["first"]
     assert result["problems"] == [f"{DEALS} of 2500 deals"]
     for deal in range(DEALS):
         lines = (tmp_path / "records" / f"{deal:04}.jsonl").read_text().splitlines()
@@ -65,7 +66,7 @@ def test_the_lines_of_games_may_come_from_anywhere() -> None:
         raise RuntimeError("torn")
 
     assert benchmark.play(Never, games=[]) == 0
-    with pytest.raises(ValueError, match="not an address and a join code"):
+    with pytest.raises(ValueError, match="not an address, a join code and a name"):
         benchmark.play(Never, games=["127.0.0.1:1"])
     with pytest.raises(RuntimeError, match="torn"):
         benchmark.play(Never, games=broken())

@@ -5,7 +5,7 @@
 use std::collections::VecDeque;
 use std::num::NonZeroU32;
 
-use chefshat_agents::{BuiltInAgent, Following, Listener, play_agents};
+use chefshat_agents::{BuiltInAgent, Following, Listener, NamedAgent, play_agents};
 use chefshat_engine::{ActionId, Decision, Event, Mask, MetricsRecorder, Observation, Seat};
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::convert::rules_to_proto;
@@ -47,7 +47,7 @@ pub enum Problem {
         /// The opponent of the task.
         wanted: String,
     },
-    /// An opponent took a decision that its agent does not take.
+    /// A built-in agent took a decision that it does not take.
     #[error("decision {decision} of the game, by seat {seat}, is not the one that {name} takes")]
     Deviates {
         /// The seat, from 0.
@@ -121,14 +121,15 @@ pub fn check(task: &Task, deal: usize, record: &Record) -> Result<GameScore, Pro
         _ => None,
     });
     let decisions: Vec<&v1::DecisionRecord> = decisions.collect();
-    let played = play_again(task, deal, &decisions)?;
     let seat = task.seat(deal).index();
     let player = header.seats.get(seat).map(Identity::of);
+    let player = player.expect("a record that was replayed has all seats");
+    let played = play_again(task, deal, &player, &decisions)?;
     let mut score = GameScore {
         points: played.points,
         shifts: played.shifts,
         place: played.place,
-        player: player.expect("a record that was replayed has all seats"),
+        player,
         decisions: 0,
         choices: 0,
         fallback_decisions: 0,
@@ -226,26 +227,31 @@ struct Played {
     place: u8,
 }
 
-/// Plays the game again with the recorded decisions of the agent, and compares those of its
-/// opponents.
+/// The built-in agent that can be played again, if a participant is one.
+pub(crate) fn repeatable(player: &Identity) -> Option<NamedAgent> {
+    let named: Option<NamedAgent> = player.name.parse().ok().filter(|_| player.built_in);
+    named.filter(|agent| agent.search().is_none())
+}
+
+/// Plays the game again with the recorded decisions of the agent, unless that is a built-in one, and
+/// compares all decisions.
 fn play_again(
     task: &Task,
     deal: usize,
+    player: &Identity,
     decisions: &[&v1::DecisionRecord],
 ) -> Result<Played, Problem> {
     let (rules, own) = (task.rule_set(), task.seat(deal));
-    let opponents = task.opponents(deal);
+    let mut known = task.opponents(deal);
+    known[own.index()] = repeatable(player);
     let given = (decisions.iter())
         .filter(|decision| decision.seat as usize == own.index())
         .map(|decision| action(decision));
     let given = Given(given.collect());
-    let mut agents: Vec<BuiltInAgent> = (opponents.iter().enumerate())
-        .map(|(seat, opponent)| match opponent {
+    let mut agents: Vec<BuiltInAgent> = (known.iter().enumerate())
+        .map(|(seat, agent)| match agent {
             None => BuiltInAgent::following(Box::new(given.clone())),
-            Some(opponent) => {
-                let seed = task.agent_seed(deal, Seat::new(seat));
-                named_agent(*opponent, &rules, seed)
-            }
+            Some(agent) => named_agent(*agent, &rules, task.agent_seed(deal, Seat::new(seat))),
         })
         .collect();
     let mut witness = Witness {
@@ -265,7 +271,7 @@ fn play_again(
         (!is_same).then_some((number, *seat))
     };
     if let Some((number, seat)) = witness.decisions.iter().enumerate().find_map(differs) {
-        let name = opponents[seat.index()].map_or_else(String::new, |agent| agent.name());
+        let name = known[seat.index()].map_or_else(String::new, |agent| agent.name());
         return Err(Problem::Deviates {
             seat: seat.index(),
             name,

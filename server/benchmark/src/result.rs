@@ -7,7 +7,7 @@ use chefshat_tournament::statistics::{Moments, wilson95};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use crate::check::GameScore;
+use crate::check::{GameScore, repeatable};
 use crate::task::{BENCHMARK, Task};
 
 /// The share of choices in a valid result that may be fallback decisions, from 0 to 1.
@@ -207,7 +207,8 @@ fn in_words(player: &Identity) -> String {
         .collect();
     let key = &player.name_fingerprint;
     match player.built_in {
-        true => format!("the built-in agent {name}"),
+        true if repeatable(player).is_some() => format!("the built-in agent {name}"),
+        true => format!("{name}, built in, by its own account"),
         false if key.is_empty() => name,
         false => format!("{name} ({key})"),
     }

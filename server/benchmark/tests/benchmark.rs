@@ -252,6 +252,19 @@ fn opponents_that_do_not_play_as_they_do_are_found() {
 }
 
 #[test]
+fn nobody_plays_under_the_name_of_a_built_in_agent() {
+    let shift = task("shift");
+    let lines = play_offline(shift, 0, "greedy", |seed| {
+        BuiltInAgent::new(AgentKind::Random, seed)
+    });
+    let problem = check(shift, 0, &read(&lines)).expect_err("it was random");
+    assert!(
+        matches!(problem, Problem::Deviates { seat: 0, .. }),
+        "{problem}"
+    );
+}
+
+#[test]
 fn a_result_counts_with_all_deals_and_its_own_decisions() {
     let player = Identity::of(&v1::Participant {
         name: "Mia".to_owned(),

@@ -13,11 +13,12 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use chefshat_agents::NamedAgent;
-use chefshat_benchmark::{BENCHMARK, TaskResult, tasks};
+use chefshat_benchmark::{BENCHMARK, tasks};
 use chefshat_cli::error::{CommandError, say};
 use chefshat_cli::numbers::counted;
 use chefshat_cli::output::{heading, line, rules_in_short};
 use chefshat_cli::program::in_runtime;
+use chefshat_record::signature::PublicKey;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
@@ -81,7 +82,13 @@ struct Tasks {
 impl Tasks {
     fn run(self) -> Result<ExitCode, CommandError> {
         if self.json {
-            say(json!({"benchmark": BENCHMARK, "tasks": tasks()}))?;
+            let tasks = tasks().iter().map(|task| {
+                let mut data = serde_json::to_value(task)?;
+                data["policy"] = serde_json::to_value(task.policy())?;
+                Ok(data)
+            });
+            let tasks = tasks.collect::<Result<Vec<_>, serde_json::Error>>()?;
+            say(json!({"benchmark": BENCHMARK, "tasks": tasks}))?;
             return Ok(ExitCode::SUCCESS);
         }
         let mut text = String::new();
@@ -102,6 +109,9 @@ impl Tasks {
 struct Submit {
     /// The folder that `chefshat bench run` wrote.
     folder: PathBuf,
+    /// Accept only records that this key signed, as `chefshat key show` prints it. Can be repeated.
+    #[arg(long = "key", value_name = "KEY")]
+    keys: Vec<PublicKey>,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -110,7 +120,13 @@ struct Submit {
 impl Submit {
     fn run(self) -> Result<ExitCode, CommandError> {
         let folder = Folder::open(&self.folder)?;
-        let result = folder.check()?;
+        let mut result = folder.check()?;
+        let keys: Vec<String> = self.keys.iter().map(PublicKey::to_string).collect();
+        let is_other = |by: &&String| !keys.is_empty() && !keys.contains(by);
+        if let Some(by) = result.signed_by.iter().find(is_other) {
+            let problem = format!("there are records that are {by}, not signed by a key of --key");
+            result.problems.push(problem);
+        }
         report::print(&result, self.json)
     }
 }
@@ -132,9 +148,20 @@ struct TableCommand {
 
 impl TableCommand {
     fn run(self) -> Result<ExitCode, CommandError> {
-        let results = (self.results.iter())
-            .map(|path| folder::read_result(path))
-            .collect::<Result<Vec<TaskResult>, _>>()?;
+        let mut results = Vec::new();
+        let mut left_out = None;
+        for path in &self.results {
+            match folder::read_result(path) {
+                Ok(result) => results.push(result),
+                Err(error) => {
+                    anstream::eprintln!("left out: {error}");
+                    left_out = Some(error);
+                }
+            }
+        }
+        if let (true, Some(error)) = (results.is_empty(), left_out) {
+            return Err(error);
+        }
         let mut versus = Vec::new();
         for task in tasks() {
             let of_task: Vec<_> = results.iter().filter(|it| it.task == task.name).collect();
@@ -146,7 +173,9 @@ impl TableCommand {
             let named = of_task.iter().find(|it| it.agent.name == self.versus);
             versus.push(match named.filter(|_| !is_built_in) {
                 Some(named) => (*named).clone(),
-                None => offline::reference(task, &self.versus)?,
+                None => offline::reference(task, &self.versus).map_err(|error| {
+                    format!("--versus: none of the results has this name, and {error}")
+                })?,
             });
         }
         report::print_table(&results, &versus, self.json)

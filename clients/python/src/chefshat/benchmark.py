@@ -19,14 +19,13 @@ from chefshat.agents import Agent
 from chefshat.aio import Client
 
 
-def play(make_agent: Callable[[], Agent], *, name: str = "entrant", games: Iterable[str] | None = None) -> int:
-    """Plays games until there are no more, several at a time.
+def play(make_agent: Callable[[], Agent], *, games: Iterable[str] | None = None) -> int:
+    """Plays games until there are no more: as many at a time as are given, in one event loop.
 
     Args:
         make_agent: makes the agent of a game, for example its class.
-        name: display name in the rooms, 1..=64 characters.
-        games: a line for each game, the server's address and a join code, separated by a space; None: standard input. A token and
-            a certificate authority come from CHEFSHAT_TOKEN and CHEFSHAT_CA.
+        games: a line for each game, the server's address, a join code and the agent's name, separated by spaces; None: standard
+            input. A token and a certificate authority come from CHEFSHAT_TOKEN and CHEFSHAT_CA.
 
     Returns:
         The number of games.
@@ -35,10 +34,10 @@ def play(make_agent: Callable[[], Agent], *, name: str = "entrant", games: Itera
         ChefsHatError: a game could not be joined or played to its end. What an agent raises is passed on.
         ValueError: a line is not a game.
     """
-    return asyncio.run(_play(make_agent, name, sys.stdin if games is None else games))
+    return asyncio.run(_play(make_agent, sys.stdin if games is None else games))
 
 
-async def _play(make_agent: Callable[[], Agent], name: str, games: Iterable[str]) -> int:
+async def _play(make_agent: Callable[[], Agent], games: Iterable[str]) -> int:
     # None after the last line; an exception where reading failed.
     lines: asyncio.Queue[str | Exception | None] = asyncio.Queue()
     loop = asyncio.get_running_loop()
@@ -66,7 +65,7 @@ async def _play(make_agent: Callable[[], Agent], name: str, games: Iterable[str]
             while (line := await lines.get()) is not None:
                 if isinstance(line, Exception):
                     raise line
-                address, code = _game(line)
+                address, code, name = _game(line)
                 if address not in clients:
                     clients[address] = Client(address)
                 group.create_task(_play_one(clients[address], make_agent(), code, name))
@@ -79,12 +78,14 @@ async def _play(make_agent: Callable[[], Agent], name: str, games: Iterable[str]
     return played
 
 
-def _game(line: str) -> tuple[str, str]:
-    """Reads the address and the join code of a game."""
-    words = line.split()
-    if len(words) != 2:
-        raise ValueError(f"{line!r} is not an address and a join code, as `chefshat bench run` writes them to standard input")
-    return words[0], words[1]
+def _game(line: str) -> tuple[str, str, str]:
+    """Reads the address and the join code of a game, and the agent's name."""
+    words = line.strip().split(" ", 2)
+    if len(words) != 3:
+        raise ValueError(
+            f"{line!r} is not an address, a join code and a name, as `chefshat bench run` writes them to standard input"
+        )
+    return words[0], words[1], words[2]
 
 
 async def _play_one(client: Client, agent: Agent, code: str, name: str) -> None:

@@ -20,6 +20,8 @@ const RESULT: &str = "result.json";
 const MAX_RECORD: u64 = 64 << 20;
 /// Bytes of the longest other file.
 const MAX_JSON: u64 = 4 << 20;
+/// What is wrong with a result that is read from a file.
+const NOT_CHECKED: &str = "read from a file and not checked; name the folder";
 /// Records that are named one by one when they do not count.
 const NAMED: usize = 5;
 
@@ -47,7 +49,7 @@ impl Folder {
         let manifest: Manifest = read_json(&path.join(MANIFEST)).map_err(|error| {
             format!("{error}; a submission is a folder that `chefshat bench run` wrote")
         })?;
-        check_agent(&manifest.agent)?;
+        check_agent(path, &manifest.agent)?;
         let task = task_of(&manifest.benchmark, &manifest.task)?;
         Ok(Self {
             path: path.to_owned(),
@@ -59,8 +61,10 @@ impl Folder {
     /// Opens the folder, or creates it. One that has games of something else is refused.
     pub(super) fn create(path: &Path, manifest: Manifest) -> Result<Self, CommandError> {
         let file = path.join(MANIFEST);
-        if file.exists() {
-            let folder = Self::open(path)?;
+        if file.exists()
+            && let folder = Self::open(path)?
+            && folder.played() > 0
+        {
             let is_same = folder.manifest.task == manifest.task
                 && folder.manifest.command == manifest.command;
             if !is_same {
@@ -72,7 +76,7 @@ impl Folder {
                 .into());
             }
         }
-        check_agent(&manifest.agent)?;
+        check_agent(path, &manifest.agent)?;
         fs::create_dir_all(path)
             .map_err(|error| format!("{}: {error}; name another with --out", path.display()))?;
         write_json(&file, &manifest)?;
@@ -82,6 +86,16 @@ impl Folder {
     /// The file of a deal's record.
     pub(super) fn record(&self, deal: usize) -> PathBuf {
         self.path.join("records").join(format!("{deal:04}.jsonl"))
+    }
+
+    /// The name of the agent.
+    pub(super) fn name(&self) -> &str {
+        &self.manifest.agent.name
+    }
+
+    /// The number of deals with a record.
+    pub(super) fn played(&self) -> usize {
+        self.task.deals - self.missing(self.task.deals).len()
     }
 
     /// The deals without a record, of the first `deals`.
@@ -131,9 +145,13 @@ impl Folder {
         let last = by_deal.iter().rposition(Option::is_some);
         by_deal.truncate(last.map_or(0, |last| last + 1));
         if by_deal.iter().flatten().count() < 2 {
-            let first = refused.first().map_or("it has no others", String::as_str);
             let folder = self.path.display();
-            return Err(format!("{folder} has fewer than two records that count: {first}").into());
+            return Err(match refused.first() {
+                None => format!("{folder} has fewer than two records: play first").into(),
+                Some(first) => {
+                    format!("{folder} has fewer than two records that count: {first}").into()
+                }
+            });
         }
         let mut result = TaskResult::of(self.task, self.manifest.agent.clone(), &by_deal);
         let more = refused.len().saturating_sub(NAMED);
@@ -153,14 +171,15 @@ impl Folder {
     }
 }
 
-/// The result of a folder, checked now, or of a file.
+/// The result of a folder, checked now, or that of a file, which is marked.
 pub(super) fn read_result(path: &Path) -> Result<TaskResult, CommandError> {
     if path.is_dir() {
         return Folder::open(path)?.check();
     }
-    let result: TaskResult = read_json(path)?;
-    check_agent(&result.agent)?;
+    let mut result: TaskResult = read_json(path)?;
+    check_agent(path, &result.agent)?;
     task_of(&result.benchmark, &result.task)?;
+    result.problems = vec![NOT_CHECKED.to_owned()];
     Ok(result)
 }
 
@@ -173,11 +192,16 @@ fn task_of(benchmark: &str, task: &str) -> Result<&'static Task, CommandError> {
 }
 
 /// Refuses texts that cannot be shown.
-fn check_agent(agent: &AgentInfo) -> Result<(), CommandError> {
-    match agent.is_printable() {
-        true => Ok(()),
-        false => Err("the name of an agent has 1 to 64 characters, its description and its url at most 2000, and none of them control characters".into()),
+fn check_agent(path: &Path, agent: &AgentInfo) -> Result<(), CommandError> {
+    if agent.is_printable() {
+        return Ok(());
     }
+    let path = path.display();
+    Err(format!(
+        "{path}: the name of an agent has 1 to 64 characters, its description and its url at most 2000, \
+         and none of them control characters"
+    )
+    .into())
 }
 
 fn read_json<T: for<'a> Deserialize<'a>>(path: &Path) -> Result<T, String> {

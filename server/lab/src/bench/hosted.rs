@@ -23,17 +23,19 @@ use tokio::time::{sleep, timeout};
 
 use super::folder::Folder;
 
-/// Display name of the agent, for commands that take one.
-const NAME: &str = "entrant";
 /// Lines of the agent's output that an error shows.
 const LAST_LINES: usize = 8;
 /// How long an agent may take to exit after its last game.
 const EXIT: Duration = Duration::from_secs(10);
 /// How long a game may take to end after the process of its agent has exited, and a call to clean up.
 const END: Duration = Duration::from_secs(5);
+/// The same, if the process says that it has failed.
+const FAILED: Duration = Duration::from_millis(500);
 /// How often a record is asked for that the server does not have yet, and how long to wait between.
 const ATTEMPTS: u32 = 20;
 const PAUSE: Duration = Duration::from_millis(250);
+/// How long no game may end until the person at the terminal is asked about the agent.
+const QUIET: Duration = Duration::from_secs(30);
 /// Failed games in a row after which there is no point in playing more.
 const FAILURES: usize = 5;
 
@@ -123,7 +125,17 @@ impl Games<'_> {
             stream::iter(deals).map(|deal| async move { (deal, self.game(deal, reads).await) });
         let mut games = pin!(games.buffer_unordered(parallel));
         let (mut failed, mut in_a_row) = (0, 0);
-        while let Some((deal, played)) = games.next().await {
+        loop {
+            let next = match timeout(QUIET, games.next()).await {
+                Ok(next) => next,
+                Err(_) => {
+                    let words =
+                        "no game has ended for half a minute; does the agent join and decide?";
+                    bar.suspend(|| anstream::eprintln!("{words}"));
+                    games.next().await
+                }
+            };
+            let Some((deal, played)) = next else { break };
             bar.inc(1);
             let Err(error) = played else {
                 in_a_row = 0;
@@ -132,7 +144,10 @@ impl Games<'_> {
             failed += 1;
             in_a_row += 1;
             if in_a_row == FAILURES || bar.length() == Some(failed) {
-                return Err(format!("the game of deal {deal}: {error}").into());
+                let games = counted(in_a_row as u64, "game");
+                return Err(
+                    format!("{games} failed in a row; that of deal {deal}: {error}").into(),
+                );
             }
             bar.suspend(|| anstream::eprintln!("the game of deal {deal}: {error}"));
         }
@@ -176,7 +191,7 @@ impl Games<'_> {
     ) -> Result<(), CommandError> {
         let over = self.until_ended(&room.room_id);
         if let Some(reads) = reads {
-            let line = format!("{} {code}\n", self.address);
+            let line = format!("{} {code} {}\n", self.address, self.folder.name());
             let written = reads.lock().await.write_all(line.as_bytes()).await;
             written.map_err(|error| format!("the agent reads no more games: {error}"))?;
             return over.await;
@@ -187,7 +202,8 @@ impl Games<'_> {
             ended = &mut over => ended,
             status = process.ended() => {
                 let status = status?;
-                timeout(END, over).await.unwrap_or_else(|_| Err(exited(status)))
+                let patience = if status.success() { END } else { FAILED };
+                timeout(patience, over).await.unwrap_or_else(|_| Err(exited(status)))
             }
         };
         if let Err(error) = ended {
@@ -201,7 +217,7 @@ impl Games<'_> {
         let places = Placeholders {
             address: self.address.to_owned(),
             code,
-            name: NAME.to_owned(),
+            name: self.folder.name().to_owned(),
         };
         let started = AgentProcess::start(self.command, &places, None).await;
         let program = self.command.words().first();

@@ -60,7 +60,7 @@ pub(super) fn result(
 
 /// The result of a built-in agent with which others are compared.
 pub(super) fn reference(task: &Task, name: &str) -> Result<TaskResult, CommandError> {
-    let entrant = Entrant::of(name).map_err(|error| format!("--versus: {error}"))?;
+    let entrant = Entrant::of(name)?;
     check_fits(task, &entrant)?;
     result(task, &entrant, task.deals)
 }

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use chefshat_benchmark::{BENCHMARK, MeanWithInterval, PairedDifference, TaskResult, tasks};
 use chefshat_cli::error::{CommandError, say};
-use chefshat_cli::numbers::{counted, signed};
+use chefshat_cli::numbers::{counted, grouped, signed};
 use chefshat_cli::output::{heading, line, percent, table};
 use serde_json::{Value, json};
 
@@ -46,7 +46,8 @@ fn text(result: &TaskResult) -> String {
     line(
         &mut text,
         &format!(
-            "{decisions}, {}, {}",
+            "{decisions}, {}, {}, {}",
+            counted(result.choices, "choice"),
             counted(result.fallback_decisions, "fallback decision"),
             counted(result.invalid_attempts, "invalid attempt")
         ),
@@ -74,9 +75,10 @@ fn text(result: &TaskResult) -> String {
 
 fn of_figure(figure: &MeanWithInterval) -> [String; 2] {
     let [low, high] = figure.interval95;
+    let number = |number: f64| format!("{number:.3}").replace('-', "−");
     [
-        format!("{:.3}", figure.mean),
-        format!("{low:.3} … {high:.3}"),
+        number(figure.mean),
+        format!("{} … {}", number(low), number(high)),
     ]
 }
 
@@ -121,19 +123,22 @@ pub(super) fn table_text(results: &[TaskResult], versus: &[TaskResult]) -> Strin
         let against = format!("against {}\nin its place", versus.agent.name);
         let header = [
             "",
+            "Deals",
             "Points\na Shift",
             "95 % interval",
             "Games\nwon",
             &against,
             "95 % interval",
         ];
+        let invalid: Vec<&TaskResult> = rows.iter().copied().filter(|it| !it.is_valid()).collect();
         let rows = rows.into_iter().map(|row| {
             let [mean, interval] = of_figure(&row.points_per_shift);
             let mut name = row.agent.name.clone();
             if !row.is_valid() {
                 name.push_str(" *");
             }
-            let mut cells = vec![name, mean, interval, percent(row.games_won.mean)];
+            let won = percent(row.games_won.mean);
+            let mut cells = vec![name, grouped(row.deals as u64), mean, interval, won];
             match difference(row, versus) {
                 None => cells.extend(["".to_owned(), "".to_owned()]),
                 Some(difference) => {
@@ -145,10 +150,11 @@ pub(super) fn table_text(results: &[TaskResult], versus: &[TaskResult]) -> Strin
             cells
         });
         table(&mut text, &header, &[0], rows);
+        for result in invalid {
+            let (name, problems) = (&result.agent.name, result.problems.join("; "));
+            line(&mut text, &format!("* {name} is not valid: {problems}"));
+        }
         text.push('\n');
-    }
-    if results.iter().any(|result| !result.is_valid()) {
-        line(&mut text, "* not valid: --json says why");
     }
     text
 }

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use chefshat_benchmark::{AgentInfo, BENCHMARK, Task, tasks};
 use chefshat_cli::error::CommandError;
+use chefshat_cli::numbers::counted;
 use chefshat_cli::progress;
 use chefshat_cli::stops::Stops;
 use chefshat_examiner::AgentCommand;
@@ -17,9 +18,9 @@ use super::{hosted, offline, report};
 use crate::compare::Entrant;
 
 const HELP: &str = "\
-A command without {code} is started once. It reads a line for each game from its standard input, the server's address and a join code, \
-separated by a space, plays it, and may play several at a time; in Python, chefshat.benchmark.play does that. A command with {code} is started \
-for each game; {address} stands for host:port, {url} for http://host:port.
+A command without {code} is started once. It reads a line for each game from its standard input: the server's address, a join code and the \
+name of the agent, separated by spaces; in Python, chefshat.benchmark.play does that. A command with {code} is started for each game; {address} \
+stands for host:port, {url} for http://host:port, {name} for the name.
 
 A run that was interrupted continues: games with a record are not played again.";
 
@@ -34,10 +35,10 @@ pub(super) struct Run {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// A built-in agent or a network file, which plays in this process.
-    #[arg(long, conflicts_with_all = ["command", "server"], required_unless_present = "command")]
+    #[arg(long, conflicts_with_all = ["command", "server"])]
     agent: Option<String>,
-    /// Name of the agent in tables. Default with --agent: that agent.
-    #[arg(long, required_unless_present = "agent")]
+    /// Name of the agent in tables; required with a command. Default with --agent: that agent.
+    #[arg(long)]
     name: Option<String>,
     /// How the agent plays and was trained, in a sentence.
     #[arg(long, default_value = "")]
@@ -48,8 +49,9 @@ pub(super) struct Run {
     /// Play only this many of the deals. The result is not valid then.
     #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
     deals: Option<u64>,
-    /// Games at a time, of a command.
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=256))]
+    /// Games that are open at a time, for a command. The time of a decision runs while the agent is
+    /// busy with another game.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     parallel: u16,
     /// A server to play on, which signs the records if it has a key; CHEFSHAT_TOKEN and CHEFSHAT_CA
     /// are for it and for the agent. Default: one in this process.
@@ -65,6 +67,12 @@ pub(super) struct Run {
 
 impl Run {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
+        if self.agent.is_none() && self.command.is_empty() {
+            return Err("who plays? Give --agent, or a command after --".into());
+        }
+        if self.agent.is_none() && self.name.is_none() {
+            return Err("name the agent of the command with --name".into());
+        }
         if self.agent.is_some() {
             return self.finish(self.play_offline()?);
         }
@@ -72,12 +80,26 @@ impl Run {
         let folder = tokio::select! {
             folder = self.play_hosted() => folder?,
             // Returning ends the agent's processes, which are in a process group of their own.
-            stop = stops.next() => return Ok(stop.exit_code()),
+            stop = stops.next() => {
+                self.say_what_is_kept();
+                return Ok(stop.exit_code());
+            }
         };
         let checking = tokio::task::spawn_blocking(move || self.finish(folder));
         tokio::select! {
             finished = checking => finished?,
             stop = stops.next() => Ok(stop.exit_code()),
+        }
+    }
+
+    /// Says that a run that has ended early can be resumed.
+    fn say_what_is_kept(&self) {
+        let played = Folder::open(&self.out).map_or(0, |folder| folder.played());
+        if played > 0 {
+            let games = counted(played as u64, "game");
+            anstream::eprintln!(
+                "the records of {games} are kept; the same command plays the others"
+            );
         }
     }
 
@@ -123,8 +145,11 @@ impl Run {
         let folder = self.folder(&self.command.join(" "), "")?;
         let parallel = usize::from(self.parallel);
         let server = self.server.as_deref();
-        hosted::play(&folder, &command, deals, parallel, server).await?;
-        Ok(folder)
+        let played = hosted::play(&folder, &command, deals, parallel, server).await;
+        if played.is_err() {
+            self.say_what_is_kept();
+        }
+        played.map(|()| folder)
     }
 
     fn folder(&self, command: &str, label: &str) -> Result<Folder, CommandError> {
@@ -138,7 +163,15 @@ impl Run {
             },
             command: command.to_owned(),
         };
-        Folder::create(&self.out, manifest)
+        let folder = Folder::create(&self.out, manifest)?;
+        let (played, missing) = (folder.played(), folder.missing(self.deals()?).len());
+        if played > 0 {
+            let (path, games) = (self.out.display(), counted(played as u64, "game"));
+            anstream::eprintln!(
+                "{path} has the records of {games}, {missing} are played now; for a changed agent use another --out"
+            );
+        }
+        Ok(folder)
     }
 }
 

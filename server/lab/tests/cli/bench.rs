@@ -49,7 +49,7 @@ fn an_agent_has_the_same_result_wherever_it_plays() {
     ];
     let each_game = run("game", &each, &each_game);
     let loops = format!(
-        "while read address code; do {PROGRAM} agent greedy --server http://$address --code $code; done"
+        "while read address code name; do {PROGRAM} agent greedy --server http://$address --code $code; done"
     );
     let one_process = run("game", &one, &["--name", "one", "--", "sh", "-c", &loops]);
     assert_eq!(figures(&each_game), figures(&offline));
@@ -65,6 +65,7 @@ fn an_agent_has_the_same_result_wherever_it_plays() {
         each.display()
     ));
     let table = table.well();
+    table.assert_says(&["each is not valid: 4 of 2500 deals"]);
     table.assert_table_fits(3);
     assert!(table.stdout.contains("+0.000"), "{}", table.stdout);
 }
@@ -92,7 +93,12 @@ fn a_run_resumes_and_records_that_do_not_count_are_named() {
     let whole = run("shift", &folder, &["--agent", "greedy"]);
     let record = |deal: usize| folder.join("records").join(format!("{deal:04}.jsonl"));
     fs::remove_file(record(2)).unwrap();
-    assert_eq!(run("shift", &folder, &["--agent", "greedy"]), whole);
+    let again = run("shift", &folder, &["--agent", "greedy"]);
+    assert_eq!(again.stdout, whole.stdout);
+    assert!(
+        again.stderr.contains("3 games, 1 are played now"),
+        "{again:?}"
+    );
     fs::copy(record(0), record(1)).unwrap();
     fs::write(record(2), "no record").unwrap();
     let submitted = typed(&format!("bench submit {} --json", folder.display())).json();
@@ -105,6 +111,25 @@ fn a_run_resumes_and_records_that_do_not_count_are_named() {
     ] {
         assert!(problems.contains(expected), "{problems}");
     }
+    let others_key = format!("ed25519:58{}", "66".repeat(31));
+    let keys = typed(&format!(
+        "bench submit {} --json --key {others_key}",
+        folder.display()
+    ));
+    assert!(
+        keys.json()["problems"].to_string().contains("unsigned"),
+        "{keys:?}"
+    );
+    let result = folder.join("result.json");
+    let table = typed(&format!(
+        "bench table nowhere {} {}",
+        folder.display(),
+        result.display()
+    ));
+    assert!(table.stderr.contains("left out: nowhere"), "{table:?}");
+    table
+        .well()
+        .assert_says(&["not checked", "2 of 2500 deals"]);
     assert_eq!(submitted["by_deal"][1], Value::Null);
     assert_eq!(submitted["by_deal"][3], whole.json()["by_deal"][3]);
 }
@@ -114,7 +139,8 @@ fn errors_say_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     run("chess", &out, &["--agent", "greedy"]).assert_refused("use one of shift, game");
-    run("shift", &out, &[]).assert_refused("--agent");
+    run("shift", &out, &[]).assert_failed("a command after --");
+    run("shift", &out, &["--", "true"]).assert_failed("with --name");
     run("shift", &out, &["--agent", "nobody"]).assert_failed("neither a built-in agent");
     let small = fixture("network/small-table.safetensors");
     let small = run("shift", &out, &["--agent", small.to_str().unwrap()]);
@@ -136,7 +162,12 @@ fn errors_say_what_to_do() {
     ];
     let other = folder.path().join("other");
     run("shift", &other, &exits).assert_failed("the agent exited before the end");
-    run("game", &other, &exits).assert_failed("name another folder with --out");
+    // Nothing was played there.
+    assert_eq!(
+        run("game", &other, &["--agent", "greedy"]).json()["deals"],
+        4
+    );
+    run("shift", &other, &["--agent", "greedy"]).assert_failed("name another folder with --out");
     typed("bench submit nowhere").assert_failed("a folder that `chefshat bench run` wrote");
     typed("bench table nowhere").assert_failed("nowhere");
 }
