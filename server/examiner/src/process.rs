@@ -1,5 +1,6 @@
 //! The agent's process: started from a command with placeholders, in its own process group, so that
-//! all of it ends with its case or its games. Its output is logged, and the last lines are kept in memory.
+//! all of it ends with its case or its games. Its output is logged, and the last lines are kept in
+//! memory.
 
 use std::collections::VecDeque;
 use std::ffi::OsString;
@@ -58,7 +59,7 @@ impl AgentCommand {
 
     /// A command that plays many games, given as words. If it mentions `{code}`, it is started for
     /// each; otherwise it is started once and reads a line for each game from its standard input: the
-    /// address of the server and the join code, separated by a space.
+    /// address of the server, the join code and the display name, separated by spaces.
     ///
     /// # Errors
     /// The missing placeholder.
