@@ -3,6 +3,7 @@
 import base64
 import hashlib
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -14,15 +15,7 @@ from chefshat import Agent, Decision, benchmark
 
 pytestmark = pytest.mark.server
 
-AGENT = """
-from chefshat import Agent, benchmark
-
-class First(Agent):
-    def decide(self, decision):
-        return decision.legal_actions[FIRST]
-
-print(benchmark.play(First), "games")
-"""
+PAGE = Path(__file__).parents[3] / "docs" / "benchmark.md"
 # Time limit in seconds.
 WAIT_S = 120
 DEALS = 6
@@ -35,8 +28,15 @@ def run(real_binary: Path, folder: Path, program: str) -> "subprocess.CompletedP
     return subprocess.run(command, capture_output=True, text=True, timeout=WAIT_S)
 
 
-def test_one_process_plays_all_games(real_binary: Path, tmp_path: Path) -> None:
-    done = run(real_binary, tmp_path, AGENT.replace("FIRST", "0"))
+@pytest.fixture(scope="module")
+def agent() -> str:
+    """The program of the page."""
+    (program,) = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    return str(program)
+
+
+def test_one_process_plays_all_games(agent: str, real_binary: Path, tmp_path: Path) -> None:
+    done = run(real_binary, tmp_path, agent)
     assert done.returncode == 1, "six deals are not a valid result"
     result = json.loads(done.stdout)
     assert result["deals"] == DEALS, done.stderr
@@ -50,8 +50,8 @@ def test_one_process_plays_all_games(real_binary: Path, tmp_path: Path) -> None:
         assert base64.b64decode(ended["reveal"]["gameSeed"]) == seed
 
 
-def test_what_the_agent_raises_is_shown(real_binary: Path, tmp_path: Path) -> None:
-    done = run(real_binary, tmp_path, AGENT.replace("FIRST", "10_000"))
+def test_what_the_agent_raises_is_shown(agent: str, real_binary: Path, tmp_path: Path) -> None:
+    done = run(real_binary, tmp_path, agent.replace("legal_actions[0]", "legal_actions[10_000]"))
     assert done.returncode == 1
     assert "IndexError" in done.stderr
 

@@ -43,6 +43,8 @@ NOT_RUN = {
     r"npx @modelcontextprotocol/inspector ": "fetches the inspector; tests/tests/system/mcp_http.rs has another client",
     r"chefshat (agent|tournament join --agent) llm ": "needs a server of language models; tests/tests/system/llm.rs scripts one",
     r"chefshat check-agent ": "agent.py is the reader's; tests/tests/system/examiner.rs examines agents",
+    r"chefshat bench (submit|run .* --name )": "agents of the reader; clients/python/tests/test_benchmark.py runs the page's",
+    r"chefshat bench pool ": "twelve minutes; server/lab/tests/cli/bench.rs has a short one",
     r"chefshat (play|watch) |cargo run -- play": "needs a terminal; tests/tests/system/terminal.rs has one",
     r"chefshat table --ticket TICKET$": "needs a person who types; tests/tests/system/attendant.rs",
     r"chefshat-robot (calibrate|bridge|perceive 0)": "needs a camera",
