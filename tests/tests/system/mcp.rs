@@ -4,7 +4,7 @@
 
 use std::process::Stdio;
 
-use chefshat_client::{Client, v1};
+use chefshat_client::{Client, count_in, v1};
 use chefshat_proto::v1::record_line::Line;
 use chefshat_record::replay;
 use chefshat_tests::{TestServer, patiently, set_up};
@@ -312,4 +312,61 @@ async fn a_scripted_client_plays_whole_games_with_and_without_a_handshake() {
         );
         player.stop().await;
     }
+}
+
+#[tokio::test]
+async fn a_model_begins_a_game_of_its_own_and_decides_only_where_it_can() {
+    let server = TestServer::start().await;
+    let child = program(&server, &[], None);
+    let mut player = Player::start(child, ClientLifecycleMode::Initialize).await;
+    let refused = player
+        .call("create_room", json!({"opponents": "nobody"}))
+        .await;
+    assert_eq!(refused.is_error, Some(true));
+    assert!(text_of(&refused).contains("nobody"), "{refused:?}");
+    let created = json!({"opponents": "random", "name": "Ada"});
+    let joined = player.say("create_room", created).await;
+    assert!(joined.starts_with("table 1\n"), "{joined}");
+    let mut text = player
+        .say("wait_for_turn", json!({"skip_forced": true}))
+        .await;
+    while !text.contains("The game is over.") {
+        let Some(number) = decision(&text) else {
+            text = player
+                .say("wait_for_turn", json!({"skip_forced": true}))
+                .await;
+            continue;
+        };
+        let legal = options(&text);
+        assert!(legal.len() > 1, "{text}");
+        // As models write numbers.
+        let (decision, action) = (number.to_string(), f64::from(legal[0].0));
+        let answer =
+            json!({"decision": decision, "action": action, "wait": true, "skip_forced": true});
+        text = player.say("play", answer).await;
+    }
+    let wrong = player
+        .call("play", json!({"decision": "1.5", "action": 199}))
+        .await;
+    assert!(text_of(&wrong).contains("not a whole number"), "{wrong:?}");
+    let game_id = record_of(&text).trim_start_matches("chefshat://records/");
+    let record = server.client().await.record(game_id).await;
+    let record = record.expect("a finished game");
+    let own = record.iter().filter_map(|line| match &line.line {
+        Some(Line::Decision(decision)) if decision.seat == 0 => Some(decision),
+        _ => None,
+    });
+    let sources: Vec<_> = own
+        .map(|it| (it.source(), count_in(&it.action_mask)))
+        .collect();
+    let is_own = |source: &v1::DecisionSource| *source == v1::DecisionSource::Agent;
+    assert!(
+        sources.iter().all(|(source, _)| is_own(source)),
+        "{sources:?}"
+    );
+    assert!(
+        sources.iter().any(|(_, legal)| *legal == 1),
+        "some were forced"
+    );
+    player.stop().await;
 }

@@ -153,7 +153,7 @@ async fn pages_and_foreign_names_are_refused() {
             if allowed {
                 assert_eq!(status, StatusCode::OK, "{headers:?} {answer}");
                 let tools = answer["result"]["tools"].as_array().map(Vec::len);
-                assert_eq!(tools, Some(7), "{answer}");
+                assert_eq!(tools, Some(8), "{answer}");
             } else {
                 assert_eq!(status, StatusCode::FORBIDDEN, "{headers:?} {answer}");
             }

@@ -98,7 +98,7 @@ async fn clients_of_all_revisions_are_understood() {
         let mut raw = Raw::start(program(&server, &[], None));
         assert_eq!(raw.initialize(version).await, version);
         let tools = raw.call("tools/list", json!({})).await;
-        assert_eq!(tools["result"]["tools"].as_array().map(Vec::len), Some(7));
+        assert_eq!(tools["result"]["tools"].as_array().map(Vec::len), Some(8));
         let (rooms, error) = raw.tool("list_rooms", json!({})).await;
         assert_eq!((rooms.as_str(), error), ("No rooms.", false));
         raw.stop().await;
@@ -122,7 +122,7 @@ async fn clients_of_all_revisions_are_understood() {
         .expect("revisions");
     assert!(versions.contains(&json!("2026-07-28")), "{discovered}");
     let tools = raw.call("tools/list", json!({"_meta": meta})).await;
-    assert_eq!(tools["result"]["tools"].as_array().map(Vec::len), Some(7));
+    assert_eq!(tools["result"]["tools"].as_array().map(Vec::len), Some(8));
     raw.stop().await;
 }
 
@@ -175,7 +175,7 @@ async fn a_resumed_seat_is_played_and_its_ticket_is_never_shown() {
         (
             "play",
             json!({"decision": 1, "action": "pass"}),
-            "invalid type",
+            "\"pass\" is not a whole number",
         ),
         ("get_table", json!({"table": "7"}), "no such table"),
         ("join_room", json!({}), "join_code"),

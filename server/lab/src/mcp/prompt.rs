@@ -43,7 +43,7 @@ pub(super) fn get(request: &GetPromptRequestParams) -> Result<GetPromptResult, E
         .filter_map(argument)
         .collect();
     let join = match given.is_empty() {
-        true => "First call join_room.".to_owned(),
+        true => "First call join_room, or create_room for a game of your own.".to_owned(),
         false => format!("First call join_room with {}.", given.join(" and ")),
     };
     let text = format!("{ABOUT} {join}\n\n{RULES}\n\n{LOOP}");

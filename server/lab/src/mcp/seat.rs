@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use chefshat_client::{Client, Error, PlayError, v1};
+use chefshat_client::{Client, Error, PlayError, legal_count, nth_legal, v1};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout};
@@ -103,22 +103,43 @@ impl Seat {
     }
 
     /// What has happened since an event (by default the last one that was shown), once it is the
-    /// seat's turn, the game is over or the time has passed. Takes the seat back from a substitute.
-    pub(super) async fn wait(&self, after: Option<u64>, longest: Duration) -> String {
+    /// seat's turn, the game is over or the time has passed. Takes the seat back from a substitute;
+    /// if `skip_forced`, takes also decisions with only one legal action.
+    pub(super) async fn wait(
+        &self,
+        after: Option<u64>,
+        longest: Duration,
+        skip_forced: bool,
+    ) -> String {
         let turn = async {
-            let mut changes = self.live.subscribe();
-            let concerns = |live: &Live| live.concerns_me() || live.is_substituted();
-            let _ = changes.wait_for(concerns).await;
-            if self.read(Live::is_substituted) {
-                if let Err(error) = self.client.resume_seat(&*self.ticket).await {
-                    tracing::warn!("the seat was not taken back from its substitute: {error}");
+            loop {
+                self.turn().await;
+                let forced = self.read(forced).filter(|_| skip_forced);
+                let Some((decision, action)) = forced else {
+                    return;
+                };
+                // What was refused is shown, and left to the model.
+                if self.play(decision, action, None).await.is_err() {
+                    return;
                 }
-                let _ = changes.wait_for(Live::concerns_me).await;
             }
         };
         // When the time has passed, the state is shown as it is.
         let _ = timeout(longest, turn).await;
         self.since(after)
+    }
+
+    /// Waits until it is the seat's turn or the game is over.
+    async fn turn(&self) {
+        let mut changes = self.live.subscribe();
+        let concerns = |live: &Live| live.concerns_me() || live.is_substituted();
+        let _ = changes.wait_for(concerns).await;
+        if self.read(Live::is_substituted) {
+            if let Err(error) = self.client.resume_seat(&*self.ticket).await {
+                tracing::warn!("the seat was not taken back from its substitute: {error}");
+            }
+            let _ = changes.wait_for(Live::concerns_me).await;
+        }
     }
 
     /// What has happened since an event, by default the last one that was shown.
@@ -241,6 +262,13 @@ impl Seat {
             left => left.map(drop),
         }
     }
+}
+
+/// The open decision and its action, if only one is legal.
+fn forced(live: &Live) -> Option<(u64, u32)> {
+    let request = &live.open.as_ref()?.request;
+    let only = nth_legal(request, 0).filter(|_| legal_count(request) == 1)?;
+    Some((request.decision_id, only.0))
 }
 
 fn elapsed_ms(began: Instant) -> u64 {

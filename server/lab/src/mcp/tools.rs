@@ -3,7 +3,16 @@
 
 use rmcp::model::{JsonObject, Tool, ToolAnnotations};
 use serde::Deserialize;
+use serde::de::{Deserializer, Error as _};
 use serde_json::{Value, json};
+
+/// Arguments of `create_room`.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct Create {
+    pub(super) opponents: Option<String>,
+    pub(super) name: Option<String>,
+}
 
 /// Arguments of `join_room`.
 #[derive(Debug, Default, Deserialize)]
@@ -11,6 +20,7 @@ use serde_json::{Value, json};
 pub(super) struct Join {
     pub(super) join_code: Option<String>,
     pub(super) name: Option<String>,
+    #[serde(deserialize_with = "whole")]
     pub(super) seat: Option<u32>,
 }
 
@@ -25,7 +35,9 @@ pub(super) struct AtTable {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct Wait {
+    #[serde(deserialize_with = "whole")]
     pub(super) after_sequence: Option<u64>,
+    pub(super) skip_forced: bool,
     pub(super) table: Option<String>,
 }
 
@@ -33,12 +45,16 @@ pub(super) struct Wait {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Play {
+    #[serde(deserialize_with = "whole")]
     pub(super) decision: u64,
+    #[serde(deserialize_with = "whole")]
     pub(super) action: u32,
     #[serde(default)]
     pub(super) reason: Option<String>,
     #[serde(default)]
     pub(super) wait: bool,
+    #[serde(default)]
+    pub(super) skip_forced: bool,
     #[serde(default)]
     pub(super) table: Option<String>,
 }
@@ -54,6 +70,27 @@ pub(super) struct Express {
     pub(super) table: Option<String>,
 }
 
+/// Reads a whole number as models write it: 199, 199.0 or "199"; or null, where it may be left out.
+fn whole<'de, D, N>(deserializer: D) -> Result<N, D::Error>
+where
+    D: Deserializer<'de>,
+    N: for<'v> Deserialize<'v>,
+{
+    let mut value = Value::deserialize(deserializer)?;
+    if let Value::String(text) = &value
+        && let Ok(number) = serde_json::from_str::<serde_json::Number>(text.trim())
+    {
+        value = Value::Number(number);
+    }
+    if let Some(number) = value.as_f64().filter(|number| number.fract() == 0.0)
+        && !value.is_u64()
+        && (0.0..=u32::MAX.into()).contains(&number)
+    {
+        value = Value::from(number as u64);
+    }
+    N::deserialize(&value).map_err(|_| D::Error::custom(format!("{value} is not a whole number")))
+}
+
 /// All tools. `must_name_table`: several clients may share the server.
 pub(super) fn all(must_name_table: bool) -> Vec<Tool> {
     let table = json!({"type": "string", "description": match must_name_table {
@@ -67,7 +104,7 @@ pub(super) fn all(must_name_table: bool) -> Vec<Tool> {
                   fields: Value| {
         let mut fields = fields;
         let mut required: Vec<&str> = required.to_vec();
-        if name != "list_rooms" && name != "join_room" {
+        if !["list_rooms", "create_room", "join_room"].contains(&name) {
             fields["table"] = table.clone();
             if must_name_table {
                 required.push("table");
@@ -83,7 +120,21 @@ pub(super) fn all(must_name_table: bool) -> Vec<Tool> {
             .destructive(name == "leave");
         Tool::new(name, about, object(schema)).with_annotations(hints)
     };
+    let skip_forced = json!({
+        "type": "boolean",
+        "description": "play for you where only one action is legal",
+    });
     vec![
+        define(
+            "create_room",
+            "Begin a game of your own against three built-in agents. Takes a seat, as join_room.",
+            true,
+            &[],
+            json!({
+                "opponents": {"type": "string", "description": "random, greedy (default) or trained"},
+                "name": {"type": "string", "description": "your display name"},
+            }),
+        ),
         define(
             "list_rooms",
             "Rooms of the server with their state and free seats.",
@@ -107,7 +158,7 @@ pub(super) fn all(must_name_table: bool) -> Vec<Tool> {
             "Wait up to 25 s for your turn. Returns what happened after event after_sequence (default: after what you were last shown), and your legal actions if it is your turn. Call again until the game is over.",
             false,
             &[],
-            json!({"after_sequence": {"type": "integer"}}),
+            json!({"after_sequence": {"type": "integer"}, "skip_forced": skip_forced}),
         ),
         define(
             "get_table",
@@ -126,6 +177,7 @@ pub(super) fn all(must_name_table: bool) -> Vec<Tool> {
                 "action": {"type": "integer", "description": "id of a legal action"},
                 "reason": {"type": "string", "description": "recorded with the decision, hidden from others until the game is over"},
                 "wait": {"type": "boolean", "description": "then do as wait_for_turn"},
+                "skip_forced": skip_forced,
             }),
         ),
         define(
