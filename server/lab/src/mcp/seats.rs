@@ -3,10 +3,11 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use chefshat_client::{Client, v1};
 use tokio::sync::{OnceCell, OwnedSemaphorePermit, Semaphore, oneshot};
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 use tokio_util::task::TaskTracker;
 
 use super::seat::{ATTACH_TIMEOUT, Seat};
@@ -17,6 +18,9 @@ use chefshat_cli::narration::view::GameView;
 
 /// Maximum number of seats at a time, those of games that are over included.
 const MAX_SEATS: usize = 64;
+/// How long a new seat can still be given back because its client has gone. The end of a connection is
+/// noticed a moment later than it happens, and nobody but its client ever hears of the seat.
+const NOTICE: Duration = Duration::from_millis(100);
 /// Bytes of a random handle.
 const HANDLE_BYTES: usize = 8;
 
@@ -128,6 +132,7 @@ impl Seats {
             let _ = sender.send(unclaimed);
         });
         let joined = joined.await.map_err(|_| "joining failed")?;
+        sleep(NOTICE).await;
         joined.map(Unclaimed::claim)
     }
 
