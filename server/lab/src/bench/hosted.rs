@@ -36,7 +36,7 @@ const ATTEMPTS: u32 = 20;
 const PAUSE: Duration = Duration::from_millis(250);
 /// How long no game may end until the person at the terminal is asked about the agent.
 const QUIET: Duration = Duration::from_secs(30);
-/// Failed games in a row after which there is no point in playing more.
+/// Failed games in a row that end a run.
 const FAILURES: usize = 5;
 
 /// Plays the games that are missing in the folder. Games that fail are named and leave the others
