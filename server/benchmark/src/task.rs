@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use chefshat_agents::NamedAgent;
 use chefshat_engine::{RuleSet, Seat, Seed, SeedPlan};
 use chefshat_proto::v1;
-use chefshat_record::convert::rules_to_proto;
+use chefshat_record::convert::{plain_policy, rules_to_proto};
 use chefshat_simulation::RulesForm;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -57,6 +57,10 @@ impl Task {
         self.rules.rule_set().expect("the tasks are tested")
     }
 
+    fn players(&self) -> usize {
+        self.rules.players.into()
+    }
+
     /// The game seed of a deal, by its index from 0: SHA-256 of the text "ChefsHat-v1 TASK INDEX",
     /// for example "ChefsHat-v1 shift 0".
     pub fn seed(&self, deal: usize) -> Seed {
@@ -65,12 +69,12 @@ impl Task {
 
     /// The seat of the agent in the game of a deal: it rotates by one with each deal.
     pub fn seat(&self, deal: usize) -> Seat {
-        Seat::new(deal % self.rule_set().players())
+        Seat::new(deal % self.players())
     }
 
     /// The opponents in the game of a deal, by seat; `None` at the seat of the agent.
     pub fn opponents(&self, deal: usize) -> Vec<Option<NamedAgent>> {
-        let players = self.rule_set().players();
+        let players = self.players();
         let own = self.seat(deal).index();
         let of_seat = |seat: usize| {
             let to_the_left = (seat + players - own) % players;
@@ -95,19 +99,8 @@ impl Task {
             max_timeouts: Some(TIMEOUTS),
             substitute: "random".to_owned(),
             abort: v1::AbortPolicy::Never.into(),
-            reward_scheme: v1::RewardScheme::Unspecified.into(),
-            pace_ms: Some(0),
             waiting_time_ms: Some(WAITING_MS),
-            spectators: Some(true),
-            spectator_delay_decisions: Some(0),
-            spectators_see_hands: Some(false),
-            durability: v1::Durability::Durable.into(),
-            clocks: Vec::new(),
-            one_seat_per_client: false,
-            visibility: v1::Visibility::Unspecified.into(),
-            hints: false,
-            chat: false,
-            absence_time_ms: None,
+            ..plain_policy()
         }
     }
 

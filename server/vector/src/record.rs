@@ -3,7 +3,7 @@
 use chefshat_agents::AgentKind;
 use chefshat_engine::{BySeat, RewardScheme};
 use chefshat_proto::v1;
-use chefshat_record::convert::{Played, reward_scheme_to_proto};
+use chefshat_record::convert::{Played, plain_policy, reward_scheme_to_proto};
 use chefshat_simulation::vector::{InvalidActions, Opponent, PlayedGame, VectorSetup};
 use prost::Message as _;
 
@@ -24,18 +24,8 @@ pub fn simulation_policy(
         substitute: AgentKind::Random.name().into(),
         abort: v1::AbortPolicy::AllLost.into(),
         reward_scheme: reward_scheme_to_proto(reward_scheme).into(),
-        pace_ms: Some(0),
         waiting_time_ms: Some(3_600_000),
-        spectators: Some(true),
-        spectator_delay_decisions: Some(0),
-        spectators_see_hands: Some(false),
-        durability: v1::Durability::Durable.into(),
-        clocks: Vec::new(),
-        one_seat_per_client: false,
-        visibility: v1::Visibility::Unspecified.into(),
-        hints: false,
-        chat: false,
-        absence_time_ms: None,
+        ..plain_policy()
     }
 }
 

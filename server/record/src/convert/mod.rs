@@ -23,7 +23,7 @@ pub use numbers::{cards_from_numbers, seat_cards, seat_from_number, seat_number}
 pub use observation::{
     decision_kind, observation_from_proto, observation_to_proto, put_requirement,
 };
-pub use played::{MAX_RECORDED_ATTEMPTS, Played};
+pub use played::{MAX_RECORDED_ATTEMPTS, Played, plain_policy};
 pub use rewards::{invalid_reward, with_rewards};
 pub use rules::{
     FieldProblem, action_space, reward_scheme_from_proto, reward_scheme_to_proto, role_from_number,

@@ -16,6 +16,32 @@ use super::decision_kind;
 /// The most invalid attempts before a default decision that a record can state.
 pub const MAX_RECORDED_ATTEMPTS: u32 = 1000;
 
+/// The policy of a record without clocks of kinds, pauses, hints and chat. The caller sets its times
+/// and limits.
+pub fn plain_policy() -> v1::RoomPolicy {
+    v1::RoomPolicy {
+        decision_time_ms: None,
+        bank_ms: None,
+        max_invalid_attempts: None,
+        max_timeouts: None,
+        substitute: String::new(),
+        abort: v1::AbortPolicy::Unspecified.into(),
+        reward_scheme: v1::RewardScheme::Unspecified.into(),
+        pace_ms: Some(0),
+        waiting_time_ms: None,
+        spectators: Some(true),
+        spectator_delay_decisions: Some(0),
+        spectators_see_hands: Some(false),
+        durability: v1::Durability::Durable.into(),
+        clocks: Vec::new(),
+        one_seat_per_client: false,
+        visibility: v1::Visibility::Unspecified.into(),
+        hints: false,
+        chat: false,
+        absence_time_ms: None,
+    }
+}
+
 /// A complete game: dealt from a seed, with all decisions.
 #[derive(Debug, Clone, Copy)]
 pub struct Played<'a> {

@@ -22,7 +22,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::convert::{
     By, action_id, action_space, decision_kind, event_kind, final_table, invalid_reward,
-    reward_scheme_from_proto, rules_to_proto, seat_number, with_rewards,
+    plain_policy, reward_scheme_from_proto, rules_to_proto, seat_number, with_rewards,
 };
 use crate::jsonl::FORMAT_VERSION;
 use crate::replay::{game_started, replay};
@@ -458,17 +458,7 @@ fn policy(scheme: v1::RewardScheme) -> v1::RoomPolicy {
         substitute: "random".into(),
         abort: v1::AbortPolicy::Never.into(),
         reward_scheme: scheme.into(),
-        pace_ms: Some(0),
         waiting_time_ms: Some(DAY_MS),
-        spectators: Some(true),
-        spectator_delay_decisions: Some(0),
-        spectators_see_hands: Some(false),
-        durability: v1::Durability::Durable.into(),
-        clocks: Vec::new(),
-        one_seat_per_client: false,
-        visibility: v1::Visibility::Unspecified.into(),
-        hints: false,
-        chat: false,
-        absence_time_ms: None,
+        ..plain_policy()
     }
 }
