@@ -3241,8 +3241,8 @@ pub struct ServerRestarted {}
 /// A built-in agent plays for a seat from here on, until Returned. Follows the default decision with
 /// which the seat reached its limit of timeouts, or its absence time was over
 /// (RoomPolicy.absence_time_ms); never a special action: nobody else may learn that one ran out. If its
-/// participant has left the tournament (`for_good`), it comes at any time, and the built-in agent plays
-/// until the end of the game.
+/// participant has left the tournament or study (`for_good`), it comes at any time, and the built-in
+/// agent plays until the end of the game.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct Substituted {
     /// The seat.
@@ -3251,7 +3251,8 @@ pub struct Substituted {
     /// Name of the built-in agent.
     #[prost(string, tag = "2")]
     pub built_in_agent: ::prost::alloc::string::String,
-    /// Whether the participant has left the tournament, or was replaced there. It never returns.
+    /// Whether the participant has left the tournament, was replaced there, or has left the group of a
+    /// study. It never returns.
     #[prost(bool, tag = "3")]
     pub for_good: bool,
 }
@@ -4237,7 +4238,7 @@ pub struct StudyRecord {
     /// The condition's level of each factor, by name of the factor.
     #[prost(message, repeated, tag = "4")]
     pub levels: ::prost::alloc::vec::Vec<StudyLevel>,
-    /// Number of the participant, from 1.
+    /// Number of the participant, from 1; of a group, of its first who plays in this game.
     #[prost(uint32, tag = "5")]
     pub number: u32,
     /// Pseudonym of the participant.
@@ -4262,6 +4263,28 @@ pub struct StudyRecord {
     /// Attempt at this game, from 1.
     #[prost(uint32, tag = "12")]
     pub attempt: u32,
+    /// Number of the group that plays it (StudyGroups), from 1; 0: the participant plays it alone.
+    #[prost(uint32, tag = "13")]
+    pub group: u32,
+    /// The other participants of the group who play in it, in the order of their numbers.
+    #[prost(message, repeated, tag = "14")]
+    pub others: ::prost::alloc::vec::Vec<StudyRecordMember>,
+}
+/// Another participant of a group who plays in a recorded game.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct StudyRecordMember {
+    /// Number of the participant, from 1.
+    #[prost(uint32, tag = "1")]
+    pub number: u32,
+    /// Pseudonym of the participant.
+    #[prost(string, tag = "2")]
+    pub participant: ::prost::alloc::string::String,
+    /// Number of the session in which the participant began the game, from 1.
+    #[prost(uint32, tag = "3")]
+    pub session: u32,
+    /// The participant's seat.
+    #[prost(uint32, tag = "4")]
+    pub seat: u32,
 }
 /// How a game began, other than with a deal.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -8637,11 +8660,13 @@ pub struct StudyCondition {
     /// the server, whatever is set here. By default `abort` is NEVER.
     #[prost(message, optional, tag = "4")]
     pub policy: ::core::option::Option<RoomPolicy>,
-    /// The participant's seat; unset: it rotates by one with each game.
+    /// The participant's seat; unset: it rotates by one with each game. With StudyGroups, of the first of
+    /// the group; the others sit around the table from there, as far apart as possible.
     #[prost(uint32, optional, tag = "5")]
     pub participant_seat: ::core::option::Option<u32>,
-    /// How the other seats are filled, in their order, one for each player but the participant. Open
-    /// seats are joined by programs of the researcher, with the join code that StudyGame has.
+    /// How the other seats are filled, in their order, one for each player but the participant, or the
+    /// participants of a group. Open seats are joined by programs of the researcher, with the join code
+    /// that StudyGame has.
     #[prost(message, repeated, tag = "6")]
     pub seats: ::prost::alloc::vec::Vec<SeatConfig>,
     /// Text for programs of the researcher that play or move a robot in its games, at most 2000
@@ -8899,12 +8924,12 @@ pub struct StudyBlock {
 /// A stage of a study.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StudyStage {
-    /// Participants pass over it unless all of these hold, at most 4. Not for consent, games and
+    /// Participants pass over it unless all of these hold, at most 4. Not for consent, arrival, games and
     /// `per_condition`.
     #[prost(message, repeated, tag = "8")]
     pub shown_if: ::prost::alloc::vec::Vec<StudyShownIf>,
     /// What the participant does.
-    #[prost(oneof = "study_stage::Stage", tags = "1, 2, 3, 4, 5, 6, 7, 9")]
+    #[prost(oneof = "study_stage::Stage", tags = "1, 2, 3, 4, 5, 6, 7, 9, 10")]
     pub stage: ::core::option::Option<study_stage::Stage>,
 }
 /// Nested message and enum types in `StudyStage`.
@@ -8936,6 +8961,9 @@ pub mod study_stage {
         /// Ends the participation; only with `shown_if`.
         #[prost(message, tag = "9")]
         ScreenOut(super::StudyScreenOut),
+        /// Waits for its group: once, with `groups` alone, before games and `per_condition`.
+        #[prost(message, tag = "10")]
+        Arrival(super::StudyArrival),
     }
 }
 /// Ends the participation of those whose answers show that the study is not for them: they are
@@ -8944,6 +8972,31 @@ pub mod study_stage {
 pub struct StudyScreenOut {
     /// What they read, in Markdown (StudyText), at most 2000 characters. Empty: that the study is meant
     /// for other people.
+    #[prost(string, tag = "1")]
+    pub text: ::prost::alloc::string::String,
+}
+/// Participants who play their games together. They wait for each other at the stage `arrival`, which
+/// makes them a group, and before each game. In place of one who leaves, the `substitute` of the
+/// condition's policy plays on.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct StudyGroups {
+    /// Number of participants of a group, 2..=6, at most the players of each condition. `participants` is
+    /// a multiple of it, and a slot of `block_size` one of a group.
+    #[prost(uint32, tag = "1")]
+    pub size: u32,
+    /// How long participants wait for others, in milliseconds, 10000..=3600000; by default 600000. Those
+    /// for whom the others of a group wait so long before a game have dropped out.
+    #[prost(uint64, tag = "2")]
+    pub wait_ms: u64,
+    /// What becomes of those whose group is not complete in this time.
+    #[prost(enumeration = "StudyLeftOver", tag = "3")]
+    pub left_over: i32,
+}
+/// A stage at which participants wait until their group is complete: with those who arrive, or with
+/// those with whom they were added (`together` of AddStudyParticipantsRequest). Reaches participants.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct StudyArrival {
+    /// What they read meanwhile in Markdown (StudyText), at most 2000 characters.
     #[prost(string, tag = "1")]
     pub text: ::prost::alloc::string::String,
 }
@@ -8975,6 +9028,10 @@ pub struct StudyRecruiting {
     /// As `completed_url`, for those who are screened out (StudyScreenOut); empty: as `left_url`.
     #[prost(string, tag = "6")]
     pub screened_out_url: ::prost::alloc::string::String,
+    /// As `completed_url`, for those whose group was not complete in time (StudyLeftOver); empty: as
+    /// `completed_url`.
+    #[prost(string, tag = "7")]
+    pub left_over_url: ::prost::alloc::string::String,
 }
 /// The settings of a study. In a request an unset field means its default; in a response every field
 /// is set that the server knew when the study was created.
@@ -9038,6 +9095,9 @@ pub struct StudySettings {
     /// Participants are told this date with what they consent to.
     #[prost(uint64, tag = "16")]
     pub deletes_at_ms: u64,
+    /// Participants who play together; unset: everybody plays its own games.
+    #[prost(message, optional, tag = "17")]
+    pub groups: ::core::option::Option<StudyGroups>,
 }
 /// A participant's device, as its page describes it. Sent by participants; exported data have it.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -9165,6 +9225,9 @@ pub struct StudyParticipant {
     /// Whether it is a test participant (AddStudyParticipantsRequest).
     #[prost(bool, tag = "15")]
     pub test: bool,
+    /// Number of its group, from 1; 0: it has none.
+    #[prost(uint32, tag = "16")]
+    pub group: u32,
 }
 /// The link of a participant.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -9225,7 +9288,7 @@ pub struct Study {
     /// Number of participants who have completed it, also if their data were deleted since.
     #[prost(uint32, tag = "12")]
     pub completed: u32,
-    /// Number of participants who have withdrawn, dropped out, or were removed or screened out.
+    /// Number of participants who have withdrawn, dropped out, or were removed, screened out or left over.
     #[prost(uint32, tag = "13")]
     pub left: u32,
     /// The open link, if the settings have one: 30 characters that need no escaping. The page's address
@@ -9265,7 +9328,7 @@ pub struct StudyView {
     #[prost(uint64, tag = "14")]
     pub deletes_at_ms: u64,
     /// What is shown.
-    #[prost(oneof = "study_view::Content", tags = "7, 8, 9, 10, 11, 12")]
+    #[prost(oneof = "study_view::Content", tags = "7, 8, 9, 10, 11, 12, 15")]
     pub content: ::core::option::Option<study_view::Content>,
 }
 /// Nested message and enum types in `StudyView`.
@@ -9291,6 +9354,10 @@ pub mod study_view {
         /// Nothing more.
         #[prost(message, tag = "12")]
         End(super::StudyEnd),
+        /// Others to wait for: the next view comes by itself. A test participant may go on alone by
+        /// ContinueStudy, with agents in place of the others.
+        #[prost(message, tag = "15")]
+        Arrival(super::StudyShownArrival),
     }
 }
 /// A questionnaire, as a participant sees it.
@@ -9394,6 +9461,25 @@ pub struct StudyShownGame {
     /// them in its language.
     #[prost(bool, tag = "9")]
     pub labelled: bool,
+    /// Number of others of its group for whom the game waits; 0: it waits for nobody.
+    #[prost(uint32, tag = "10")]
+    pub waits_for: u32,
+}
+/// A group that is not complete yet, as a participant sees it.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct StudyShownArrival {
+    /// What to read meanwhile, in Markdown (StudyText), or empty.
+    #[prost(string, tag = "1")]
+    pub text: ::prost::alloc::string::String,
+    /// Number of participants of the group.
+    #[prost(uint32, tag = "2")]
+    pub size: u32,
+    /// Number of those who are here, with this one.
+    #[prost(uint32, tag = "3")]
+    pub here: u32,
+    /// How long the wait takes at most, in milliseconds, while the page is open.
+    #[prost(uint64, tag = "4")]
+    pub wait_ms: u64,
 }
 /// The end of a participation.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -9466,7 +9552,8 @@ pub struct StudyTrace {
 }
 /// How conditions are assigned. Assignment is by permuted blocks of slots, whose order follows from
 /// the assignment seed. A participant gets the first free slot by consenting; when its link is first
-/// opened, if it is not asked for consent before a game or a condition.
+/// opened, if it is not asked for consent before a game or a condition. With StudyGroups, a group gets
+/// the first slots that no other has when it is formed, and all of it one order of conditions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
 pub enum StudyOrder {
@@ -9583,6 +9670,40 @@ impl StudyLabels {
         }
     }
 }
+/// What becomes of participants whose group is not complete in time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum StudyLeftOver {
+    /// As DISMISS.
+    Unspecified = 0,
+    /// Their participation ends; the page thanks them.
+    Dismiss = 1,
+    /// They are a group of fewer. The `substitute` of the condition's policy plays in place of those who
+    /// are missing.
+    Agents = 2,
+}
+impl StudyLeftOver {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "STUDY_LEFT_OVER_UNSPECIFIED",
+            Self::Dismiss => "STUDY_LEFT_OVER_DISMISS",
+            Self::Agents => "STUDY_LEFT_OVER_AGENTS",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "STUDY_LEFT_OVER_UNSPECIFIED" => Some(Self::Unspecified),
+            "STUDY_LEFT_OVER_DISMISS" => Some(Self::Dismiss),
+            "STUDY_LEFT_OVER_AGENTS" => Some(Self::Agents),
+            _ => None,
+        }
+    }
+}
 /// The most exact pointer of a device, as the media features of CSS have it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
@@ -9640,6 +9761,8 @@ pub enum StudyParticipantState {
     Removed = 6,
     /// It was screened out (StudyScreenOut).
     ScreenedOut = 7,
+    /// Its group was not complete in time (StudyLeftOver).
+    LeftOver = 8,
 }
 impl StudyParticipantState {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -9656,6 +9779,7 @@ impl StudyParticipantState {
             Self::DroppedOut => "STUDY_PARTICIPANT_STATE_DROPPED_OUT",
             Self::Removed => "STUDY_PARTICIPANT_STATE_REMOVED",
             Self::ScreenedOut => "STUDY_PARTICIPANT_STATE_SCREENED_OUT",
+            Self::LeftOver => "STUDY_PARTICIPANT_STATE_LEFT_OVER",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -9669,6 +9793,7 @@ impl StudyParticipantState {
             "STUDY_PARTICIPANT_STATE_DROPPED_OUT" => Some(Self::DroppedOut),
             "STUDY_PARTICIPANT_STATE_REMOVED" => Some(Self::Removed),
             "STUDY_PARTICIPANT_STATE_SCREENED_OUT" => Some(Self::ScreenedOut),
+            "STUDY_PARTICIPANT_STATE_LEFT_OVER" => Some(Self::LeftOver),
             _ => None,
         }
     }
@@ -9691,6 +9816,8 @@ pub enum StudyEndReason {
     Removed = 5,
     /// Its answers showed that the study is not for it (StudyScreenOut).
     ScreenedOut = 6,
+    /// Its group was not complete in time.
+    LeftOver = 7,
 }
 impl StudyEndReason {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -9706,6 +9833,7 @@ impl StudyEndReason {
             Self::DroppedOut => "STUDY_END_REASON_DROPPED_OUT",
             Self::Removed => "STUDY_END_REASON_REMOVED",
             Self::ScreenedOut => "STUDY_END_REASON_SCREENED_OUT",
+            Self::LeftOver => "STUDY_END_REASON_LEFT_OVER",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -9718,6 +9846,7 @@ impl StudyEndReason {
             "STUDY_END_REASON_DROPPED_OUT" => Some(Self::DroppedOut),
             "STUDY_END_REASON_REMOVED" => Some(Self::Removed),
             "STUDY_END_REASON_SCREENED_OUT" => Some(Self::ScreenedOut),
+            "STUDY_END_REASON_LEFT_OVER" => Some(Self::LeftOver),
             _ => None,
         }
     }
@@ -9859,6 +9988,11 @@ pub struct AddStudyParticipantsRequest {
     /// by number are called "T01" and so on. A study has at most 1000 of them.
     #[prost(bool, tag = "5")]
     pub test: bool,
+    /// Whether those of this request play together (StudyGroups): the first `size` of them as a group, then
+    /// the next, in their order. Their number is a multiple of `size`. Otherwise they play with whom they
+    /// arrive.
+    #[prost(bool, tag = "6")]
+    pub together: bool,
 }
 /// The added participants.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -10527,9 +10661,10 @@ pub mod study_service_client {
             self.inner.server_streaming(req, path, codec).await
         }
         /// Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
-        /// traces, and its games with their records. What stays is that a participant with this number took
-        /// part, when, in which conditions, and that it consented. It counts as withdrawn from then on.
-        /// Returns when the data are deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
+        /// traces, and its games with their records, also those that it played with others of its group. What
+        /// stays is that a participant with this number took part, when, in which conditions, and that it
+        /// consented. It counts as withdrawn from then on. Returns when the data are deleted; at once, if
+        /// others still play its game: the data are deleted when that is over. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
         /// (SHUTTING_DOWN, STORE_FAILED).
         pub async fn delete_study_participant(
             &mut self,
@@ -10704,9 +10839,10 @@ pub mod study_service_server {
             tonic::Status,
         >;
         /// Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
-        /// traces, and its games with their records. What stays is that a participant with this number took
-        /// part, when, in which conditions, and that it consented. It counts as withdrawn from then on.
-        /// Returns when the data are deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
+        /// traces, and its games with their records, also those that it played with others of its group. What
+        /// stays is that a participant with this number took part, when, in which conditions, and that it
+        /// consented. It counts as withdrawn from then on. Returns when the data are deleted; at once, if
+        /// others still play its game: the data are deleted when that is over. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
         /// (SHUTTING_DOWN, STORE_FAILED).
         async fn delete_study_participant(
             &self,

@@ -1390,6 +1390,9 @@ impl serde::Serialize for AddStudyParticipantsRequest {
         if self.test {
             len += 1;
         }
+        if self.together {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.AddStudyParticipantsRequest", len)?;
         if !self.study_id.is_empty() {
             struct_ser.serialize_field("studyId", &self.study_id)?;
@@ -1405,6 +1408,9 @@ impl serde::Serialize for AddStudyParticipantsRequest {
         }
         if self.test {
             struct_ser.serialize_field("test", &self.test)?;
+        }
+        if self.together {
+            struct_ser.serialize_field("together", &self.together)?;
         }
         struct_ser.end()
     }
@@ -1423,6 +1429,7 @@ impl<'de> serde::Deserialize<'de> for AddStudyParticipantsRequest {
             "pseudonyms",
             "count",
             "test",
+            "together",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -1432,6 +1439,7 @@ impl<'de> serde::Deserialize<'de> for AddStudyParticipantsRequest {
             Pseudonyms,
             Count,
             Test,
+            Together,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -1458,6 +1466,7 @@ impl<'de> serde::Deserialize<'de> for AddStudyParticipantsRequest {
                             "pseudonyms" => Ok(GeneratedField::Pseudonyms),
                             "count" => Ok(GeneratedField::Count),
                             "test" => Ok(GeneratedField::Test),
+                            "together" => Ok(GeneratedField::Together),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -1482,6 +1491,7 @@ impl<'de> serde::Deserialize<'de> for AddStudyParticipantsRequest {
                 let mut pseudonyms__ = None;
                 let mut count__ = None;
                 let mut test__ = None;
+                let mut together__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::StudyId => {
@@ -1516,6 +1526,12 @@ impl<'de> serde::Deserialize<'de> for AddStudyParticipantsRequest {
                             }
                             test__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::Together => {
+                            if together__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("together"));
+                            }
+                            together__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(AddStudyParticipantsRequest {
@@ -1524,6 +1540,7 @@ impl<'de> serde::Deserialize<'de> for AddStudyParticipantsRequest {
                     pseudonyms: pseudonyms__.unwrap_or_default(),
                     count: count__.unwrap_or_default(),
                     test: test__.unwrap_or_default(),
+                    together: together__.unwrap_or_default(),
                 })
             }
         }
@@ -36035,6 +36052,97 @@ impl<'de> serde::Deserialize<'de> for StudyAnswerSet {
         deserializer.deserialize_struct("chefshat.v1.StudyAnswerSet", FIELDS, GeneratedVisitor)
     }
 }
+impl serde::Serialize for StudyArrival {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if !self.text.is_empty() {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyArrival", len)?;
+        if !self.text.is_empty() {
+            struct_ser.serialize_field("text", &self.text)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyArrival {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "text",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Text,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "text" => Ok(GeneratedField::Text),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = StudyArrival;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.StudyArrival")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<StudyArrival, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut text__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Text => {
+                            if text__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("text"));
+                            }
+                            text__ = Some(map_.next_value()?);
+                        }
+                    }
+                }
+                Ok(StudyArrival {
+                    text: text__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.StudyArrival", FIELDS, GeneratedVisitor)
+    }
+}
 impl serde::Serialize for StudyBlock {
     #[allow(deprecated)]
     fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
@@ -37156,6 +37264,7 @@ impl serde::Serialize for StudyEndReason {
             Self::DroppedOut => "STUDY_END_REASON_DROPPED_OUT",
             Self::Removed => "STUDY_END_REASON_REMOVED",
             Self::ScreenedOut => "STUDY_END_REASON_SCREENED_OUT",
+            Self::LeftOver => "STUDY_END_REASON_LEFT_OVER",
         };
         serializer.serialize_str(variant)
     }
@@ -37174,6 +37283,7 @@ impl<'de> serde::Deserialize<'de> for StudyEndReason {
             "STUDY_END_REASON_DROPPED_OUT",
             "STUDY_END_REASON_REMOVED",
             "STUDY_END_REASON_SCREENED_OUT",
+            "STUDY_END_REASON_LEFT_OVER",
         ];
 
         struct GeneratedVisitor;
@@ -37221,6 +37331,7 @@ impl<'de> serde::Deserialize<'de> for StudyEndReason {
                     "STUDY_END_REASON_DROPPED_OUT" => Ok(StudyEndReason::DroppedOut),
                     "STUDY_END_REASON_REMOVED" => Ok(StudyEndReason::Removed),
                     "STUDY_END_REASON_SCREENED_OUT" => Ok(StudyEndReason::ScreenedOut),
+                    "STUDY_END_REASON_LEFT_OVER" => Ok(StudyEndReason::LeftOver),
                     _ => Err(serde::de::Error::unknown_variant(value, FIELDS)),
                 }
             }
@@ -37929,6 +38040,141 @@ impl<'de> serde::Deserialize<'de> for StudyGames {
         deserializer.deserialize_struct("chefshat.v1.StudyGames", FIELDS, GeneratedVisitor)
     }
 }
+impl serde::Serialize for StudyGroups {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if self.size != 0 {
+            len += 1;
+        }
+        if self.wait_ms != 0 {
+            len += 1;
+        }
+        if self.left_over != 0 {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyGroups", len)?;
+        if self.size != 0 {
+            struct_ser.serialize_field("size", &self.size)?;
+        }
+        if self.wait_ms != 0 {
+            #[allow(clippy::needless_borrow)]
+            #[allow(clippy::needless_borrows_for_generic_args)]
+            struct_ser.serialize_field("waitMs", ToString::to_string(&self.wait_ms).as_str())?;
+        }
+        if self.left_over != 0 {
+            let v = StudyLeftOver::try_from(self.left_over)
+                .map_err(|_| serde::ser::Error::custom(format!("Invalid variant {}", self.left_over)))?;
+            struct_ser.serialize_field("leftOver", &v)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyGroups {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "size",
+            "wait_ms",
+            "waitMs",
+            "left_over",
+            "leftOver",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Size,
+            WaitMs,
+            LeftOver,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "size" => Ok(GeneratedField::Size),
+                            "waitMs" | "wait_ms" => Ok(GeneratedField::WaitMs),
+                            "leftOver" | "left_over" => Ok(GeneratedField::LeftOver),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = StudyGroups;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.StudyGroups")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<StudyGroups, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut size__ = None;
+                let mut wait_ms__ = None;
+                let mut left_over__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Size => {
+                            if size__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("size"));
+                            }
+                            size__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::WaitMs => {
+                            if wait_ms__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("waitMs"));
+                            }
+                            wait_ms__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::LeftOver => {
+                            if left_over__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("leftOver"));
+                            }
+                            left_over__ = Some(map_.next_value::<StudyLeftOver>()? as i32);
+                        }
+                    }
+                }
+                Ok(StudyGroups {
+                    size: size__.unwrap_or_default(),
+                    wait_ms: wait_ms__.unwrap_or_default(),
+                    left_over: left_over__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.StudyGroups", FIELDS, GeneratedVisitor)
+    }
+}
 impl serde::Serialize for StudyHide {
     #[allow(deprecated)]
     fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
@@ -38508,6 +38754,80 @@ impl<'de> serde::Deserialize<'de> for StudyLabels {
                     "STUDY_LABELS_AS_THEY_ARE" => Ok(StudyLabels::AsTheyAre),
                     "STUDY_LABELS_KINDS" => Ok(StudyLabels::Kinds),
                     "STUDY_LABELS_PLAYERS" => Ok(StudyLabels::Players),
+                    _ => Err(serde::de::Error::unknown_variant(value, FIELDS)),
+                }
+            }
+        }
+        deserializer.deserialize_any(GeneratedVisitor)
+    }
+}
+impl serde::Serialize for StudyLeftOver {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        let variant = match self {
+            Self::Unspecified => "STUDY_LEFT_OVER_UNSPECIFIED",
+            Self::Dismiss => "STUDY_LEFT_OVER_DISMISS",
+            Self::Agents => "STUDY_LEFT_OVER_AGENTS",
+        };
+        serializer.serialize_str(variant)
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyLeftOver {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "STUDY_LEFT_OVER_UNSPECIFIED",
+            "STUDY_LEFT_OVER_DISMISS",
+            "STUDY_LEFT_OVER_AGENTS",
+        ];
+
+        struct GeneratedVisitor;
+
+        impl serde::de::Visitor<'_> for GeneratedVisitor {
+            type Value = StudyLeftOver;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                write!(formatter, "expected one of: {:?}", &FIELDS)
+            }
+
+            fn visit_i64<E>(self, v: i64) -> std::result::Result<Self::Value, E>
+            where
+                E: serde::de::Error,
+            {
+                i32::try_from(v)
+                    .ok()
+                    .and_then(|x| x.try_into().ok())
+                    .ok_or_else(|| {
+                        serde::de::Error::invalid_value(serde::de::Unexpected::Signed(v), &self)
+                    })
+            }
+
+            fn visit_u64<E>(self, v: u64) -> std::result::Result<Self::Value, E>
+            where
+                E: serde::de::Error,
+            {
+                i32::try_from(v)
+                    .ok()
+                    .and_then(|x| x.try_into().ok())
+                    .ok_or_else(|| {
+                        serde::de::Error::invalid_value(serde::de::Unexpected::Unsigned(v), &self)
+                    })
+            }
+
+            fn visit_str<E>(self, value: &str) -> std::result::Result<Self::Value, E>
+            where
+                E: serde::de::Error,
+            {
+                match value {
+                    "STUDY_LEFT_OVER_UNSPECIFIED" => Ok(StudyLeftOver::Unspecified),
+                    "STUDY_LEFT_OVER_DISMISS" => Ok(StudyLeftOver::Dismiss),
+                    "STUDY_LEFT_OVER_AGENTS" => Ok(StudyLeftOver::Agents),
                     _ => Err(serde::de::Error::unknown_variant(value, FIELDS)),
                 }
             }
@@ -39150,6 +39470,9 @@ impl serde::Serialize for StudyParticipant {
         if self.test {
             len += 1;
         }
+        if self.group != 0 {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyParticipant", len)?;
         if self.number != 0 {
             struct_ser.serialize_field("number", &self.number)?;
@@ -39202,6 +39525,9 @@ impl serde::Serialize for StudyParticipant {
         if self.test {
             struct_ser.serialize_field("test", &self.test)?;
         }
+        if self.group != 0 {
+            struct_ser.serialize_field("group", &self.group)?;
+        }
         struct_ser.end()
     }
 }
@@ -39231,6 +39557,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
             "panel_id",
             "panelId",
             "test",
+            "group",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -39250,6 +39577,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
             DataDeleted,
             PanelId,
             Test,
+            Group,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -39286,6 +39614,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                             "dataDeleted" | "data_deleted" => Ok(GeneratedField::DataDeleted),
                             "panelId" | "panel_id" => Ok(GeneratedField::PanelId),
                             "test" => Ok(GeneratedField::Test),
+                            "group" => Ok(GeneratedField::Group),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -39320,6 +39649,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                 let mut data_deleted__ = None;
                 let mut panel_id__ = None;
                 let mut test__ = None;
+                let mut group__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Number => {
@@ -39424,6 +39754,14 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                             }
                             test__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::Group => {
+                            if group__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("group"));
+                            }
+                            group__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
                     }
                 }
                 Ok(StudyParticipant {
@@ -39442,6 +39780,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                     data_deleted: data_deleted__.unwrap_or_default(),
                     panel_id: panel_id__.unwrap_or_default(),
                     test: test__.unwrap_or_default(),
+                    group: group__.unwrap_or_default(),
                 })
             }
         }
@@ -39463,6 +39802,7 @@ impl serde::Serialize for StudyParticipantState {
             Self::DroppedOut => "STUDY_PARTICIPANT_STATE_DROPPED_OUT",
             Self::Removed => "STUDY_PARTICIPANT_STATE_REMOVED",
             Self::ScreenedOut => "STUDY_PARTICIPANT_STATE_SCREENED_OUT",
+            Self::LeftOver => "STUDY_PARTICIPANT_STATE_LEFT_OVER",
         };
         serializer.serialize_str(variant)
     }
@@ -39482,6 +39822,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipantState {
             "STUDY_PARTICIPANT_STATE_DROPPED_OUT",
             "STUDY_PARTICIPANT_STATE_REMOVED",
             "STUDY_PARTICIPANT_STATE_SCREENED_OUT",
+            "STUDY_PARTICIPANT_STATE_LEFT_OVER",
         ];
 
         struct GeneratedVisitor;
@@ -39530,6 +39871,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipantState {
                     "STUDY_PARTICIPANT_STATE_DROPPED_OUT" => Ok(StudyParticipantState::DroppedOut),
                     "STUDY_PARTICIPANT_STATE_REMOVED" => Ok(StudyParticipantState::Removed),
                     "STUDY_PARTICIPANT_STATE_SCREENED_OUT" => Ok(StudyParticipantState::ScreenedOut),
+                    "STUDY_PARTICIPANT_STATE_LEFT_OVER" => Ok(StudyParticipantState::LeftOver),
                     _ => Err(serde::de::Error::unknown_variant(value, FIELDS)),
                 }
             }
@@ -39926,6 +40268,12 @@ impl serde::Serialize for StudyRecord {
         if self.attempt != 0 {
             len += 1;
         }
+        if self.group != 0 {
+            len += 1;
+        }
+        if !self.others.is_empty() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyRecord", len)?;
         if !self.study_id.is_empty() {
             struct_ser.serialize_field("studyId", &self.study_id)?;
@@ -39963,6 +40311,12 @@ impl serde::Serialize for StudyRecord {
         if self.attempt != 0 {
             struct_ser.serialize_field("attempt", &self.attempt)?;
         }
+        if self.group != 0 {
+            struct_ser.serialize_field("group", &self.group)?;
+        }
+        if !self.others.is_empty() {
+            struct_ser.serialize_field("others", &self.others)?;
+        }
         struct_ser.end()
     }
 }
@@ -39987,6 +40341,8 @@ impl<'de> serde::Deserialize<'de> for StudyRecord {
             "seedIndex",
             "seat",
             "attempt",
+            "group",
+            "others",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -40003,6 +40359,8 @@ impl<'de> serde::Deserialize<'de> for StudyRecord {
             SeedIndex,
             Seat,
             Attempt,
+            Group,
+            Others,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -40036,6 +40394,8 @@ impl<'de> serde::Deserialize<'de> for StudyRecord {
                             "seedIndex" | "seed_index" => Ok(GeneratedField::SeedIndex),
                             "seat" => Ok(GeneratedField::Seat),
                             "attempt" => Ok(GeneratedField::Attempt),
+                            "group" => Ok(GeneratedField::Group),
+                            "others" => Ok(GeneratedField::Others),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -40067,6 +40427,8 @@ impl<'de> serde::Deserialize<'de> for StudyRecord {
                 let mut seed_index__ = None;
                 let mut seat__ = None;
                 let mut attempt__ = None;
+                let mut group__ = None;
+                let mut others__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::StudyId => {
@@ -40153,6 +40515,20 @@ impl<'de> serde::Deserialize<'de> for StudyRecord {
                                 Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
                             ;
                         }
+                        GeneratedField::Group => {
+                            if group__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("group"));
+                            }
+                            group__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::Others => {
+                            if others__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("others"));
+                            }
+                            others__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(StudyRecord {
@@ -40168,10 +40544,160 @@ impl<'de> serde::Deserialize<'de> for StudyRecord {
                     seed_index: seed_index__,
                     seat: seat__.unwrap_or_default(),
                     attempt: attempt__.unwrap_or_default(),
+                    group: group__.unwrap_or_default(),
+                    others: others__.unwrap_or_default(),
                 })
             }
         }
         deserializer.deserialize_struct("chefshat.v1.StudyRecord", FIELDS, GeneratedVisitor)
+    }
+}
+impl serde::Serialize for StudyRecordMember {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if self.number != 0 {
+            len += 1;
+        }
+        if !self.participant.is_empty() {
+            len += 1;
+        }
+        if self.session != 0 {
+            len += 1;
+        }
+        if self.seat != 0 {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyRecordMember", len)?;
+        if self.number != 0 {
+            struct_ser.serialize_field("number", &self.number)?;
+        }
+        if !self.participant.is_empty() {
+            struct_ser.serialize_field("participant", &self.participant)?;
+        }
+        if self.session != 0 {
+            struct_ser.serialize_field("session", &self.session)?;
+        }
+        if self.seat != 0 {
+            struct_ser.serialize_field("seat", &self.seat)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyRecordMember {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "number",
+            "participant",
+            "session",
+            "seat",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Number,
+            Participant,
+            Session,
+            Seat,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "number" => Ok(GeneratedField::Number),
+                            "participant" => Ok(GeneratedField::Participant),
+                            "session" => Ok(GeneratedField::Session),
+                            "seat" => Ok(GeneratedField::Seat),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = StudyRecordMember;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.StudyRecordMember")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<StudyRecordMember, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut number__ = None;
+                let mut participant__ = None;
+                let mut session__ = None;
+                let mut seat__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Number => {
+                            if number__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("number"));
+                            }
+                            number__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::Participant => {
+                            if participant__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("participant"));
+                            }
+                            participant__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::Session => {
+                            if session__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("session"));
+                            }
+                            session__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::Seat => {
+                            if seat__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("seat"));
+                            }
+                            seat__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                    }
+                }
+                Ok(StudyRecordMember {
+                    number: number__.unwrap_or_default(),
+                    participant: participant__.unwrap_or_default(),
+                    session: session__.unwrap_or_default(),
+                    seat: seat__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.StudyRecordMember", FIELDS, GeneratedVisitor)
     }
 }
 impl serde::Serialize for StudyRecruiting {
@@ -40200,6 +40726,9 @@ impl serde::Serialize for StudyRecruiting {
         if !self.screened_out_url.is_empty() {
             len += 1;
         }
+        if !self.left_over_url.is_empty() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyRecruiting", len)?;
         if self.open_link {
             struct_ser.serialize_field("openLink", &self.open_link)?;
@@ -40218,6 +40747,9 @@ impl serde::Serialize for StudyRecruiting {
         }
         if !self.screened_out_url.is_empty() {
             struct_ser.serialize_field("screenedOutUrl", &self.screened_out_url)?;
+        }
+        if !self.left_over_url.is_empty() {
+            struct_ser.serialize_field("leftOverUrl", &self.left_over_url)?;
         }
         struct_ser.end()
     }
@@ -40241,6 +40773,8 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
             "fullUrl",
             "screened_out_url",
             "screenedOutUrl",
+            "left_over_url",
+            "leftOverUrl",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -40251,6 +40785,7 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
             LeftUrl,
             FullUrl,
             ScreenedOutUrl,
+            LeftOverUrl,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -40278,6 +40813,7 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
                             "leftUrl" | "left_url" => Ok(GeneratedField::LeftUrl),
                             "fullUrl" | "full_url" => Ok(GeneratedField::FullUrl),
                             "screenedOutUrl" | "screened_out_url" => Ok(GeneratedField::ScreenedOutUrl),
+                            "leftOverUrl" | "left_over_url" => Ok(GeneratedField::LeftOverUrl),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -40303,6 +40839,7 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
                 let mut left_url__ = None;
                 let mut full_url__ = None;
                 let mut screened_out_url__ = None;
+                let mut left_over_url__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::OpenLink => {
@@ -40341,6 +40878,12 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
                             }
                             screened_out_url__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::LeftOverUrl => {
+                            if left_over_url__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("leftOverUrl"));
+                            }
+                            left_over_url__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(StudyRecruiting {
@@ -40350,6 +40893,7 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
                     left_url: left_url__.unwrap_or_default(),
                     full_url: full_url__.unwrap_or_default(),
                     screened_out_url: screened_out_url__.unwrap_or_default(),
+                    left_over_url: left_over_url__.unwrap_or_default(),
                 })
             }
         }
@@ -40630,6 +41174,9 @@ impl serde::Serialize for StudySettings {
         if self.deletes_at_ms != 0 {
             len += 1;
         }
+        if self.groups.is_some() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudySettings", len)?;
         if !self.name.is_empty() {
             struct_ser.serialize_field("name", &self.name)?;
@@ -40689,6 +41236,9 @@ impl serde::Serialize for StudySettings {
             #[allow(clippy::needless_borrows_for_generic_args)]
             struct_ser.serialize_field("deletesAtMs", ToString::to_string(&self.deletes_at_ms).as_str())?;
         }
+        if let Some(v) = self.groups.as_ref() {
+            struct_ser.serialize_field("groups", v)?;
+        }
         struct_ser.end()
     }
 }
@@ -40720,6 +41270,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
             "recruiting",
             "deletes_at_ms",
             "deletesAtMs",
+            "groups",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -40740,6 +41291,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
             ClosesAtMs,
             Recruiting,
             DeletesAtMs,
+            Groups,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -40777,6 +41329,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                             "closesAtMs" | "closes_at_ms" => Ok(GeneratedField::ClosesAtMs),
                             "recruiting" => Ok(GeneratedField::Recruiting),
                             "deletesAtMs" | "deletes_at_ms" => Ok(GeneratedField::DeletesAtMs),
+                            "groups" => Ok(GeneratedField::Groups),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -40812,6 +41365,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                 let mut closes_at_ms__ = None;
                 let mut recruiting__ = None;
                 let mut deletes_at_ms__ = None;
+                let mut groups__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Name => {
@@ -40925,6 +41479,12 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                                 Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
                             ;
                         }
+                        GeneratedField::Groups => {
+                            if groups__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("groups"));
+                            }
+                            groups__ = map_.next_value()?;
+                        }
                     }
                 }
                 Ok(StudySettings {
@@ -40944,10 +41504,162 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                     closes_at_ms: closes_at_ms__.unwrap_or_default(),
                     recruiting: recruiting__,
                     deletes_at_ms: deletes_at_ms__.unwrap_or_default(),
+                    groups: groups__,
                 })
             }
         }
         deserializer.deserialize_struct("chefshat.v1.StudySettings", FIELDS, GeneratedVisitor)
+    }
+}
+impl serde::Serialize for StudyShownArrival {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if !self.text.is_empty() {
+            len += 1;
+        }
+        if self.size != 0 {
+            len += 1;
+        }
+        if self.here != 0 {
+            len += 1;
+        }
+        if self.wait_ms != 0 {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyShownArrival", len)?;
+        if !self.text.is_empty() {
+            struct_ser.serialize_field("text", &self.text)?;
+        }
+        if self.size != 0 {
+            struct_ser.serialize_field("size", &self.size)?;
+        }
+        if self.here != 0 {
+            struct_ser.serialize_field("here", &self.here)?;
+        }
+        if self.wait_ms != 0 {
+            #[allow(clippy::needless_borrow)]
+            #[allow(clippy::needless_borrows_for_generic_args)]
+            struct_ser.serialize_field("waitMs", ToString::to_string(&self.wait_ms).as_str())?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyShownArrival {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "text",
+            "size",
+            "here",
+            "wait_ms",
+            "waitMs",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Text,
+            Size,
+            Here,
+            WaitMs,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "text" => Ok(GeneratedField::Text),
+                            "size" => Ok(GeneratedField::Size),
+                            "here" => Ok(GeneratedField::Here),
+                            "waitMs" | "wait_ms" => Ok(GeneratedField::WaitMs),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = StudyShownArrival;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.StudyShownArrival")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<StudyShownArrival, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut text__ = None;
+                let mut size__ = None;
+                let mut here__ = None;
+                let mut wait_ms__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Text => {
+                            if text__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("text"));
+                            }
+                            text__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::Size => {
+                            if size__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("size"));
+                            }
+                            size__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::Here => {
+                            if here__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("here"));
+                            }
+                            here__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                        GeneratedField::WaitMs => {
+                            if wait_ms__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("waitMs"));
+                            }
+                            wait_ms__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                    }
+                }
+                Ok(StudyShownArrival {
+                    text: text__.unwrap_or_default(),
+                    size: size__.unwrap_or_default(),
+                    here: here__.unwrap_or_default(),
+                    wait_ms: wait_ms__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.StudyShownArrival", FIELDS, GeneratedVisitor)
     }
 }
 impl serde::Serialize for StudyShownGame {
@@ -40985,6 +41697,9 @@ impl serde::Serialize for StudyShownGame {
         if self.labelled {
             len += 1;
         }
+        if self.waits_for != 0 {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyShownGame", len)?;
         if self.practice {
             struct_ser.serialize_field("practice", &self.practice)?;
@@ -41017,6 +41732,9 @@ impl serde::Serialize for StudyShownGame {
         if self.labelled {
             struct_ser.serialize_field("labelled", &self.labelled)?;
         }
+        if self.waits_for != 0 {
+            struct_ser.serialize_field("waitsFor", &self.waits_for)?;
+        }
         struct_ser.end()
     }
 }
@@ -41038,6 +41756,8 @@ impl<'de> serde::Deserialize<'de> for StudyShownGame {
             "ticket",
             "ended",
             "labelled",
+            "waits_for",
+            "waitsFor",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -41051,6 +41771,7 @@ impl<'de> serde::Deserialize<'de> for StudyShownGame {
             Ticket,
             Ended,
             Labelled,
+            WaitsFor,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -41081,6 +41802,7 @@ impl<'de> serde::Deserialize<'de> for StudyShownGame {
                             "ticket" => Ok(GeneratedField::Ticket),
                             "ended" => Ok(GeneratedField::Ended),
                             "labelled" => Ok(GeneratedField::Labelled),
+                            "waitsFor" | "waits_for" => Ok(GeneratedField::WaitsFor),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -41109,6 +41831,7 @@ impl<'de> serde::Deserialize<'de> for StudyShownGame {
                 let mut ticket__ = None;
                 let mut ended__ = None;
                 let mut labelled__ = None;
+                let mut waits_for__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Practice => {
@@ -41169,6 +41892,14 @@ impl<'de> serde::Deserialize<'de> for StudyShownGame {
                             }
                             labelled__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::WaitsFor => {
+                            if waits_for__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("waitsFor"));
+                            }
+                            waits_for__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
                     }
                 }
                 Ok(StudyShownGame {
@@ -41181,6 +41912,7 @@ impl<'de> serde::Deserialize<'de> for StudyShownGame {
                     ticket: ticket__.unwrap_or_default(),
                     ended: ended__.unwrap_or_default(),
                     labelled: labelled__.unwrap_or_default(),
+                    waits_for: waits_for__.unwrap_or_default(),
                 })
             }
         }
@@ -42024,6 +42756,9 @@ impl serde::Serialize for StudyStage {
                 study_stage::Stage::ScreenOut(v) => {
                     struct_ser.serialize_field("screenOut", v)?;
                 }
+                study_stage::Stage::Arrival(v) => {
+                    struct_ser.serialize_field("arrival", v)?;
+                }
             }
         }
         struct_ser.end()
@@ -42049,6 +42784,7 @@ impl<'de> serde::Deserialize<'de> for StudyStage {
             "perCondition",
             "screen_out",
             "screenOut",
+            "arrival",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -42062,6 +42798,7 @@ impl<'de> serde::Deserialize<'de> for StudyStage {
             Text,
             PerCondition,
             ScreenOut,
+            Arrival,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -42092,6 +42829,7 @@ impl<'de> serde::Deserialize<'de> for StudyStage {
                             "text" => Ok(GeneratedField::Text),
                             "perCondition" | "per_condition" => Ok(GeneratedField::PerCondition),
                             "screenOut" | "screen_out" => Ok(GeneratedField::ScreenOut),
+                            "arrival" => Ok(GeneratedField::Arrival),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -42175,6 +42913,13 @@ impl<'de> serde::Deserialize<'de> for StudyStage {
                                 return Err(serde::de::Error::duplicate_field("screenOut"));
                             }
                             stage__ = map_.next_value::<::std::option::Option<_>>()?.map(study_stage::Stage::ScreenOut)
+;
+                        }
+                        GeneratedField::Arrival => {
+                            if stage__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("arrival"));
+                            }
+                            stage__ = map_.next_value::<::std::option::Option<_>>()?.map(study_stage::Stage::Arrival)
 ;
                         }
                     }
@@ -42644,6 +43389,9 @@ impl serde::Serialize for StudyView {
                 study_view::Content::End(v) => {
                     struct_ser.serialize_field("end", v)?;
                 }
+                study_view::Content::Arrival(v) => {
+                    struct_ser.serialize_field("arrival", v)?;
+                }
             }
         }
         struct_ser.end()
@@ -42672,6 +43420,7 @@ impl<'de> serde::Deserialize<'de> for StudyView {
             "text",
             "game",
             "end",
+            "arrival",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -42690,6 +43439,7 @@ impl<'de> serde::Deserialize<'de> for StudyView {
             Text,
             Game,
             End,
+            Arrival,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -42725,6 +43475,7 @@ impl<'de> serde::Deserialize<'de> for StudyView {
                             "text" => Ok(GeneratedField::Text),
                             "game" => Ok(GeneratedField::Game),
                             "end" => Ok(GeneratedField::End),
+                            "arrival" => Ok(GeneratedField::Arrival),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -42849,6 +43600,13 @@ impl<'de> serde::Deserialize<'de> for StudyView {
                                 return Err(serde::de::Error::duplicate_field("end"));
                             }
                             content__ = map_.next_value::<::std::option::Option<_>>()?.map(study_view::Content::End)
+;
+                        }
+                        GeneratedField::Arrival => {
+                            if content__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("arrival"));
+                            }
+                            content__ = map_.next_value::<::std::option::Option<_>>()?.map(study_view::Content::Arrival)
 ;
                         }
                     }

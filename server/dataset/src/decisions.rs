@@ -158,8 +158,16 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "participant",
         Type::Text,
-        "Pseudonym of the participant of the study who played the game, at whatever seat the row is; null for a game outside of studies.",
-        |row| row.game.study.as_ref().map(|it| &it.participant).into(),
+        "Pseudonym of the participant of the study who played the game, at whatever seat the row is; of several who play together, of the one at the seat of the row, and at other seats of the first; null for a game outside of studies.",
+        |row| {
+            let study = row.game.study.as_ref();
+            let participant = study.map(|study| {
+                let mut others = study.others.iter();
+                let at_seat = others.find(|other| usize::try_from(other.seat) == Ok(row.seat));
+                at_seat.map_or(&study.participant, |other| &other.participant)
+            });
+            participant.into()
+        },
     ),
     Column::new(
         "number",

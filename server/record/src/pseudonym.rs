@@ -48,7 +48,10 @@ impl Named {
     /// name are meant.
     fn may_be_in(&self, lines: &[v1::RecordLine]) -> bool {
         let in_header = |header: &v1::RecordHeader| {
-            let of_study = |study: &v1::StudyRecord| self.is(&study.participant, "");
+            let of_study = |study: &v1::StudyRecord| {
+                let mut others = study.others.iter().map(|other| &other.participant);
+                self.is(&study.participant, "") || others.any(|name| self.is(name, ""))
+            };
             header.seats.iter().any(|seat| self.is_at(seat))
                 || header.study.as_ref().is_some_and(of_study)
         };
@@ -178,10 +181,13 @@ impl Pseudonym {
         lines.retain_mut(|line| match &mut line.line {
             Some(Line::Header(header)) => {
                 out.names += self.in_seats(&mut header.seats);
-                let study = header.study.as_mut();
-                if let Some(study) = study.filter(|it| self.of.is(&it.participant, "")) {
-                    study.participant.clone_from(&self.pseudonym);
-                    out.names += 1;
+                if let Some(study) = &mut header.study {
+                    let others = study.others.iter_mut().map(|other| &mut other.participant);
+                    let names = std::iter::once(&mut study.participant).chain(others);
+                    for name in names.filter(|name| self.of.is(name, "")) {
+                        name.clone_from(&self.pseudonym);
+                        out.names += 1;
+                    }
                 }
                 true
             }

@@ -127,7 +127,7 @@ impl Core {
         let open = self
             .all_seats()
             .filter(|seat| matches!(self.seats[seat.index()].fill, Fill::Open { .. }));
-        let hides = self.header.only_shown_seat().is_some();
+        let hides = self.header.hides_seats();
         let pace = self.pace();
         if pace < MIN_PACE_OF_PHASE || !(hides || open.count() >= 2) {
             return None;
@@ -203,7 +203,7 @@ impl Core {
     fn holds_others_up(&self, seat: Seat) -> bool {
         let mut others = self.all_seats().filter(|other| *other != seat);
         self.header.tournament.is_some()
-            || self.header.only_shown_seat() == Some(seat)
+            || (self.header.hides_seats() && self.header.is_of_study(seat))
             || others.any(|other| {
                 let state = &self.seats[other.index()];
                 match state.fill {

@@ -1,7 +1,6 @@
 //! The passing of time: deadlines and banks, default decisions, substitution, the decisions of
 //! built-in agents, and seats that are not attached in time.
 
-use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_agents::BuiltInAgent;
@@ -11,7 +10,7 @@ use super::{
     BUILT_IN_BUDGET, CONFIRMATION_TIME, Core, JOIN_HOLD, MAX_ANNOTATION_BYTES_PER_GAME,
     MAX_HANDOVER, MAX_IDLE, OpenDecision, RECALL_TIME, RECHECK_INTERVAL, REPLAY_COST, State,
 };
-use crate::journal::{AbortReason, Change, Fill, ParticipantKind, Source, StudyGame};
+use crate::journal::{AbortReason, Change, Fill, ParticipantKind, Source};
 use crate::policy::AbortPolicy;
 
 impl Core {
@@ -206,11 +205,12 @@ impl Core {
     }
 
     /// The longest decision time of a seat that participants can take and that is not hidden: its
-    /// time would tell whether and which participants have the hidden ones.
+    /// time would tell whether and which participants have the hidden ones. Those of a study have the
+    /// same time.
     pub(super) fn longest_decision_time(&self) -> Option<Duration> {
         (self.all_seats())
             .filter(|seat| matches!(self.seats[seat.index()].fill, Fill::Open { .. }))
-            .filter(|seat| !self.header.is_hidden(*seat))
+            .filter(|seat| !self.header.is_hidden(*seat) || self.header.is_of_study(*seat))
             .map(|seat| self.usual_decision_time(seat))
             .max()
     }
@@ -322,9 +322,8 @@ impl Core {
         self.all_seats().filter_map(|seat| {
             let state = &self.seats[seat.index()];
             // A participant of a tournament or study keeps its seat, whenever it arrives.
-            let of_study = |game: &Arc<StudyGame>| game.seat == seat;
             let held = self.header.tournament.is_none()
-                && !self.header.study.as_ref().is_some_and(of_study)
+                && !self.header.is_of_study(seat)
                 && !state.ever_attached
                 && matches!(state.fill, Fill::Open { .. });
             (state.participant.is_some() && held).then_some((seat, state.joined_at + JOIN_HOLD))
@@ -432,10 +431,11 @@ impl Core {
     }
 
     /// Substitutes a seat that is away or has been late too often, or aborts the game. Whether all
-    /// are lost does not depend on who has hidden seats.
+    /// are lost does not depend on who has hidden seats, but on the participants of a study.
     fn lose(&mut self, now: Duration, seat: Seat) {
         let others_lost = (self.all_seats())
-            .filter(|other| *other != seat && !self.header.is_hidden(*other))
+            .filter(|other| *other != seat)
+            .filter(|other| !self.header.is_hidden(*other) || self.header.is_of_study(*other))
             .map(|other| &self.seats[other.index()])
             .filter(|state| matches!(state.fill, Fill::Open { .. }))
             .all(|state| state.substituted);

@@ -69,7 +69,8 @@ impl Core {
                 state.retired = true;
                 state.substituted = true;
                 state.ever_substituted = true;
-                self.log.push(at, RoomEvent::Retired(*seat));
+                // Nobody comes back, so nobody must be told of whom the seat is hidden.
+                self.log_presence(at, *seat, RoomEvent::Retired(*seat));
             }
             Change::Attempted { .. } => {
                 if let Some(open) = &mut self.open {

@@ -87,8 +87,7 @@ impl Core {
             State::Playing => return Err(LeaveError::GameStarted),
             State::Finished | State::Aborted(_) => return Err(LeaveError::GameOver),
         }
-        let study = self.header.study.as_ref();
-        if study.is_some_and(|game| game.seat == seat) {
+        if self.header.is_of_study(seat) {
             return Err(LeaveError::Assigned);
         }
         self.commit(now, Change::Vacated(seat));
@@ -208,7 +207,7 @@ impl Core {
         }
     }
 
-    /// Gives up a seat whose participant has left the tournament. Its ticket ends, and a substitute
+    /// Gives up a seat whose participant has left the tournament or study. Its ticket ends, and a substitute
     /// plays from now on; while somebody decides about a special action, from then on, because the
     /// time of that decision would reveal whose it is. Its connection is lost. A game that has not
     /// started is aborted. Does nothing if nobody can join the seat. `handed`: as for

@@ -89,24 +89,40 @@ pub struct StudyGame {
     pub condition: String,
     /// The condition's level of each factor.
     pub levels: BTreeMap<String, String>,
-    /// Number of the participant, from 1.
-    pub number: u32,
-    /// Pseudonym of the participant.
-    pub participant: String,
-    /// Number of the session in which the participant began the game, from 1.
-    pub session: u32,
+    /// Its participants, in the order of their numbers: one, or those of a group.
+    pub members: Vec<StudyMember>,
+    /// Number of the group that plays it, from 1; `None`: somebody plays it alone.
+    pub group: Option<u32>,
     /// The step in which it is played, from 0.
     pub step: u32,
     /// Whether it is practice.
     pub practice: bool,
     /// Index of its seed in the preregistered list; `None` for practice.
     pub seed_index: Option<u32>,
-    /// The participant's seat.
-    pub seat: Seat,
     /// Attempt at this game, from 1.
     pub attempt: u32,
     /// What everybody but the study's owner learns about the seats.
     pub labels: SeatLabels,
+}
+
+impl StudyGame {
+    /// Whether one of its participants has this seat.
+    pub fn has(&self, seat: Seat) -> bool {
+        self.members.iter().any(|member| member.seat == seat)
+    }
+}
+
+/// A participant of a study in a game.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StudyMember {
+    /// Number of the participant, from 1.
+    pub number: u32,
+    /// Pseudonym of the participant.
+    pub participant: String,
+    /// Number of the session in which the participant began the game, from 1.
+    pub session: u32,
+    /// The participant's seat.
+    pub seat: Seat,
 }
 
 /// What is shown of the participants of a room.
@@ -173,18 +189,22 @@ impl GameHeader {
         (self.study.as_ref()).map_or(SeatLabels::AsTheyAre, |game| game.labels)
     }
 
-    /// Whether a seat's participant is hidden: in a study that shows labels, every seat but that of
-    /// the study's participant. What is shown of such a seat, and when, does not depend on what
-    /// fills it.
-    pub fn is_hidden(&self, seat: Seat) -> bool {
-        self.only_shown_seat().is_some_and(|shown| shown != seat)
+    /// Whether the participants of seats are hidden: in a study that shows labels.
+    pub fn hides_seats(&self) -> bool {
+        self.labels() != SeatLabels::AsTheyAre
     }
 
-    /// The seat of the study's participant, if all others are hidden.
-    pub fn only_shown_seat(&self) -> Option<Seat> {
+    /// Whether a seat's participant is hidden: in a study that shows labels, every seat but that of
+    /// the study's participant, and of a group every seat, because nobody may know which are of
+    /// people. What is shown of such a seat, and when, does not depend on what fills it.
+    pub fn is_hidden(&self, seat: Seat) -> bool {
         let study = self.study.as_ref();
-        let hiding = study.filter(|game| game.labels != SeatLabels::AsTheyAre);
-        hiding.map(|game| game.seat)
+        self.hides_seats() && study.is_some_and(|game| game.group.is_some() || !game.has(seat))
+    }
+
+    /// Whether a participant of a study has the seat.
+    pub fn is_of_study(&self, seat: Seat) -> bool {
+        self.study.as_ref().is_some_and(|game| game.has(seat))
     }
 
     /// The series of games with the same deals.

@@ -496,7 +496,8 @@ impl Core {
             fill: state.fill,
             participant: state.participant.as_deref(),
             connected: state.connection.is_some(),
-            substituted: state.substituted,
+            // That somebody left for good is not shown of a hidden seat.
+            substituted: state.substituted && !(state.retired && self.header.is_hidden(seat)),
         }
     }
 

@@ -297,7 +297,10 @@ fn key_of_rows<'w>(
 /// Neither has a key.
 fn is_in_header(header: &GameHeader, who: &Named) -> bool {
     let mut names = header.display_names.iter();
-    let of_study = |study: &Arc<StudyGame>| who.is(&study.participant, "");
+    let of_study = |study: &Arc<StudyGame>| {
+        let mut members = study.members.iter();
+        members.any(|member| who.is(&member.participant, ""))
+    };
     names.any(|(seat, name)| is_at_table(&header.fills, *seat) && who.is(name, ""))
         || header.study.as_ref().is_some_and(of_study)
 }
@@ -338,9 +341,13 @@ fn forget_header(header: &mut GameHeader, who: &Pseudonym) -> u64 {
             names += 1;
         }
     }
-    if let Some(study) = (header.study.as_mut()).filter(|it| who.of.is(&it.participant, "")) {
-        Arc::make_mut(study).participant.clone_from(&who.pseudonym);
-        names += 1;
+    if let Some(study) = &mut header.study {
+        for member in &mut Arc::make_mut(study).members {
+            if who.of.is(&member.participant, "") {
+                member.participant.clone_from(&who.pseudonym);
+                names += 1;
+            }
+        }
     }
     names
 }

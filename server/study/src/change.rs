@@ -19,6 +19,9 @@ pub enum Change {
         joined: Option<Joined>,
         /// Whether it is a test participant.
         test: bool,
+        /// The first of those with whom it is to play, if that is planned; otherwise it plays with whom
+        /// it arrives.
+        planned: Option<u32>,
     },
     /// A participant opened a session, which supersedes its earlier ones.
     Opened {
@@ -85,7 +88,28 @@ pub enum Change {
         /// When, in milliseconds since the Unix epoch.
         at_ms: u64,
     },
-    /// A participant had no session open for too long.
+    /// A participant belongs to a group, and is at its next step. The changes of all participants of
+    /// a group follow each other.
+    Grouped {
+        /// The participant.
+        number: u32,
+        /// Number of the group, from 1.
+        group: u32,
+        /// The slot that it gets.
+        slot: u32,
+        /// Number of steps that it passes over then.
+        passed_over: u32,
+        /// When, in milliseconds since the Unix epoch.
+        at_ms: u64,
+    },
+    /// The group of a participant was not complete in time.
+    LeftOver {
+        /// The participant.
+        number: u32,
+        /// When, in milliseconds since the Unix epoch.
+        at_ms: u64,
+    },
+    /// A participant had no session open for too long, or others waited for it for too long.
     DroppedOut {
         /// The participant.
         number: u32,
@@ -131,6 +155,8 @@ impl Change {
             | Self::Placed { number, .. }
             | Self::GameEnded { number, .. }
             | Self::Continued { number, .. }
+            | Self::Grouped { number, .. }
+            | Self::LeftOver { number, .. }
             | Self::DroppedOut { number, .. }
             | Self::ScreenedOut { number, .. }
             | Self::Withdrew { number, .. }

@@ -68,9 +68,42 @@ pub enum Refusal {
     /// Too many participants, with those who left.
     #[error("a study has at most {MAX_PARTICIPANTS} participants, with those who left")]
     TooManyParticipants,
+    /// Those who are to play together make no whole groups of this size.
+    #[error("{}", no_whole_groups(*.0))]
+    NoWholeGroups(u32),
     /// Too many test participants.
     #[error("a study has at most {MAX_TESTS} test participants, with those who are done")]
     TooManyTests,
+}
+
+fn no_whole_groups(size: u32) -> String {
+    match size {
+        1 => "nobody plays together in this study: its settings have no groups".to_owned(),
+        _ => {
+            format!("those who play together are added in a multiple of {size}, the size of groups")
+        }
+    }
+}
+
+/// Participants to add.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct NewParticipants {
+    /// Their pseudonyms. An empty one stands for a name by number, such as "P01", or "T01" in a test.
+    pub pseudonyms: Vec<String>,
+    /// Whether they are test participants.
+    pub test: bool,
+    /// Whether they play with each other, in their order.
+    pub together: bool,
+}
+
+impl NewParticipants {
+    /// This number of participants who are named by number.
+    pub fn numbered(count: usize) -> Self {
+        Self {
+            pseudonyms: vec![String::new(); count],
+            ..Self::default()
+        }
+    }
 }
 
 /// Where a participant's command comes from.
@@ -85,14 +118,19 @@ pub struct At {
 }
 
 impl Study {
-    /// The changes that add participants, or test participants, with these pseudonyms; an empty one
-    /// stands for a name by number, such as "P01", or "T01" in a test.
+    /// The changes that add participants.
     ///
     /// # Errors
-    /// If the study is closed or has too many participants, or if a pseudonym is taken.
-    pub fn add(&self, pseudonyms: &[String], test: bool) -> Result<Vec<Change>, Refusal> {
+    /// If the study is closed or has too many participants, if a pseudonym is taken, or if those who
+    /// play together make no whole groups.
+    pub fn add(&self, new: &NewParticipants) -> Result<Vec<Change>, Refusal> {
         if self.is_closed() {
             return Err(Refusal::Closed);
+        }
+        let (pseudonyms, test, together) = (&new.pseudonyms, new.test, new.together);
+        let size = self.settings().group_size();
+        if together && (size == 1 || !pseudonyms.len().is_multiple_of(size as usize)) {
+            return Err(Refusal::NoWholeGroups(size));
         }
         let first = self.next_number();
         let alike = self.participants().values().filter(|it| it.test == test);
@@ -127,7 +165,26 @@ impl Study {
                 pseudonym,
                 joined: None,
                 test,
+                planned: together.then(|| number - (number - first) % size),
             });
+        }
+        Ok(changes)
+    }
+
+    /// The changes that add somebody in the place of a participant: in its planned group, too.
+    ///
+    /// # Errors
+    /// As [`Study::add`].
+    pub fn replacement(&self, number: u32) -> Result<Vec<Change>, Refusal> {
+        let participant = self.participant(number);
+        let mut changes = self.add(&NewParticipants {
+            test: participant.is_some_and(|it| it.test),
+            ..NewParticipants::numbered(1)
+        })?;
+        for change in &mut changes {
+            if let Change::Added { planned, .. } = change {
+                *planned = participant.and_then(|it| it.planned);
+            }
         }
         Ok(changes)
     }
@@ -168,8 +225,10 @@ impl Study {
         if has_id && others.any(|other| other.panel_id() == joined.panel_id) {
             return Err(Refusal::PanelIdTaken);
         }
-        let mut change = self.add(&[String::new()], false)?.pop();
-        self.free_slot(false).ok_or(Refusal::Full)?;
+        let mut change = self.add(&NewParticipants::numbered(1))?.pop();
+        if !self.has_place(false) {
+            return Err(Refusal::Full);
+        }
         if let Some(Change::Added { joined: how, .. }) = &mut change {
             *how = Some(joined);
         }
@@ -191,9 +250,11 @@ impl Study {
         let participant = self.known(number)?;
         let slot = match participant.status {
             Status::Invited if self.is_closed() => return Err(Refusal::Closed),
+            Status::Invited if !self.has_place(participant.test) => return Err(Refusal::Full),
             Status::Invited => {
-                let slot = self.free_slot(participant.test).ok_or(Refusal::Full)?;
-                (!self.settings().assigns_by_consent()).then_some(slot)
+                let settings = self.settings();
+                let assigns = settings.groups.is_none() && !settings.assigns_by_consent();
+                assigns.then(|| self.free_slot(participant.test)).flatten()
             }
             Status::Active => None,
             Status::DroppedOut if !self.is_replaced(participant) => None,
@@ -222,7 +283,9 @@ impl Study {
         };
         let slot = match participant.slot {
             Some(_) => None,
-            None => Some(self.free_slot(participant.test).ok_or(Refusal::Full)?),
+            None if !self.has_place(participant.test) => return Err(Refusal::Full),
+            None if self.settings().groups.is_some() => None,
+            None => self.free_slot(participant.test),
         };
         Ok(Change::Consented {
             number: at.number,
@@ -282,7 +345,8 @@ impl Study {
     }
 
     /// The change by which a participant continues from a text, an external questionnaire or a game
-    /// that has ended; in a test also from a questionnaire, without answers.
+    /// that has ended; in a test also from a questionnaire, without answers, and from its arrival, as a
+    /// group of its own.
     ///
     /// # Errors
     /// If the participant is not at this step in this session, or the step is not over.
@@ -291,9 +355,13 @@ impl Study {
         let count = match step.task {
             Task::Text(_) | Task::External(_) => 0,
             Task::Questionnaire(_) if participant.test => 0,
+            Task::Arrival(_) if participant.test => {
+                let alone = self.grouped(&[at.number], now_ms).pop();
+                return alone.ok_or(Refusal::Full);
+            }
             Task::Practice { .. } => 1,
             Task::Games { count } => *count,
-            Task::Consent(_) | Task::Questionnaire(_) | Task::ScreenOut(_) => {
+            Task::Consent(_) | Task::Questionnaire(_) | Task::ScreenOut(_) | Task::Arrival(_) => {
                 return Err(Refusal::StepMismatch);
             }
         };

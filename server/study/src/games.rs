@@ -59,6 +59,11 @@ impl Phase<'_> {
     }
 }
 
+/// How many seats after the first of a group the one with this index sits: as far apart as possible.
+fn seats_apart(index: u32, size: u32, players: usize) -> usize {
+    index as usize * players / size as usize
+}
+
 impl Participant {
     /// Number of games of its step that it has continued from.
     pub(crate) fn games_done(&self) -> u32 {
@@ -112,13 +117,38 @@ impl Study {
                 (Some((index, seeds[index])), before % condition.players)
             }
         };
+        let seat = condition.participant_seat.unwrap_or(rotated);
+        let offset = match practice {
+            true => 0,
+            false => self.offset_in_group(participant, condition.players),
+        };
         Some(DueGame {
             condition: index,
             practice,
             seed,
-            seat: condition.participant_seat.unwrap_or(rotated),
+            seat: (seat + offset) % condition.players,
             attempt,
         })
+    }
+
+    /// How many seats after the first of its group a participant sits.
+    fn offset_in_group(&self, participant: &Participant, players: usize) -> usize {
+        let size = self.settings().group_size();
+        seats_apart(participant.slot.unwrap_or(0) % size, size, players)
+    }
+
+    /// The seats of all members of a group, also of those who are missing, in a game that one of them
+    /// plays.
+    pub fn seats_of_group(&self, participant: &Participant, game: &PlacedGame) -> Vec<usize> {
+        let players = self.settings().conditions[game.condition].players;
+        if game.practice || participant.group.is_none() {
+            return vec![game.seat];
+        }
+        let own = self.offset_in_group(participant, players);
+        let first = (game.seat + players - own) % players;
+        let size = self.settings().group_size();
+        let seats = (0..size).map(|index| (first + seats_apart(index, size, players)) % players);
+        seats.collect()
     }
 
     /// The room of the game that a test participant is playing.
@@ -130,8 +160,19 @@ impl Study {
         }
     }
 
-    /// The change by which a participant's due game gets a room; `None` if no game is due.
-    pub fn place(&self, number: u32, room: [u8; 16], game: [u8; 16]) -> Option<Change> {
+    /// The changes by which the due game of a participant, and of all of its group, gets a room; none
+    /// if no game is due, or it waits for somebody.
+    pub fn place(&self, number: u32, room: [u8; 16], game: [u8; 16]) -> Vec<Change> {
+        if self.due(number).is_none() || !self.late_for(number).is_empty() {
+            return Vec::new();
+        }
+        let players = self.players_with(number).into_iter();
+        players
+            .filter_map(|number| self.placed(number, room, game))
+            .collect()
+    }
+
+    fn placed(&self, number: u32, room: [u8; 16], game: [u8; 16]) -> Option<Change> {
         let due = self.due(number)?;
         let game = PlacedGame {
             step: self.participant(number)?.step(),

@@ -4,27 +4,29 @@
 //! clock, IO or thread here; rooms, connections and storage belong to the server.
 //!
 //! ```
-//! use chefshat_study::{At, Content, Outcome, Study, testing};
+//! use chefshat_study::{At, Content, NewParticipants, Outcome, Study, testing};
 //!
 //! // Two conditions between participants; consent, a game, a debriefing.
 //! let mut study = Study::new(testing::settings())?;
-//! for change in study.add(&["Ada".to_owned()], false)? {
+//! for change in study.add(&NewParticipants::numbered(1))? {
 //!     study.fold(&change);
 //! }
-//! let opened = study.open(1, None, 1000)?.expect("Ada has not begun");
+//! let opened = study.open(1, None, 1000)?.expect("nobody has begun");
 //! study.fold(&opened);
 //! let at = |step| At { number: 1, session: 1, step };
 //! study.fold(&study.consent(at(0), 2000)?);
 //!
 //! let due = study.due(1).expect("a game comes next");
 //! assert_eq!((due.seat, due.attempt), (0, 1));
-//! study.fold(&study.place(1, [1; 16], [2; 16]).expect("it is due"));
+//! for placed in study.place(1, [1; 16], [2; 16]) {
+//!     study.fold(&placed);
+//! }
 //! // Here the game would be played.
 //! let ended = study.game_ended(1, [2; 16], Outcome::Finished, 9000);
 //! study.fold(&ended.expect("it is running"));
 //! study.fold(&study.proceed(at(1), 10_000)?);
 //!
-//! let view = study.view(1).expect("Ada has begun");
+//! let view = study.view(1).expect("P01 has begun");
 //! assert!(matches!(view.content, Content::Text(_)));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -38,6 +40,7 @@ mod commands;
 mod device;
 mod earlier;
 mod games;
+mod groups;
 mod item_kind;
 mod link;
 mod presence;
@@ -57,7 +60,7 @@ use std::sync::Arc;
 pub use assignment::Order;
 pub use change::{Change, ConsentGiven, Joined, Outcome, PlacedGame};
 pub use checks::SettingsProblem;
-pub use commands::{At, MAX_SAVES, MAX_SESSIONS, Refusal};
+pub use commands::{At, MAX_SAVES, MAX_SESSIONS, NewParticipants, Refusal};
 pub use device::{Device, DeviceSession, Pointer};
 pub use games::{DueGame, MAX_ATTEMPTS};
 pub use item_kind::{Answer, AnswerSet, ItemKind, MAX_OPTIONS};
@@ -67,16 +70,16 @@ pub use questionnaire::{
 };
 pub use recruiting::Recruiting;
 pub use settings::{
-    Condition, Factor, Hide, Labels, MAX_FACTORS, MAX_GAMES, MAX_LEVELS, MAX_PARTICIPANTS,
-    MAX_SEEDS, MAX_STEPS, MAX_TESTS, Settings,
+    Condition, Factor, Groups, Hide, Labels, LeftOver, MAX_FACTORS, MAX_GAMES, MAX_LEVELS,
+    MAX_PARTICIPANTS, MAX_SEEDS, MAX_STEPS, MAX_TESTS, Settings,
 };
 pub use stage::{
-    Consent, ExternalQuestionnaire, MAX_BLOCK, MAX_STAGE_GAMES, MAX_STAGES, Part, ScreenOut, Stage,
-    Step, Task, Text,
+    Arrival, Consent, ExternalQuestionnaire, MAX_BLOCK, MAX_STAGE_GAMES, MAX_STAGES, Part,
+    ScreenOut, Stage, Step, Task, Text,
 };
 pub use state::{Participant, PlayedGame, Status};
 pub use templates::{Language, Template};
-pub use view::{Content, End, ShownGame, ShownItem, ShownQuestionnaire, View};
+pub use view::{Content, End, ShownArrival, ShownGame, ShownItem, ShownQuestionnaire, View};
 
 use assignment::Assignment;
 use earlier::EarlierAnswers;
@@ -150,9 +153,9 @@ impl Study {
         self.step_count
     }
 
-    /// The sequence of conditions of a slot, from 0.
+    /// The sequence of conditions of a slot, from 0: all slots of a group have the same.
     pub fn sequence(&self, slot: u32) -> &[usize] {
-        self.assignment.sequence(slot)
+        self.assignment.sequence(slot / self.settings.group_size())
     }
 
     /// The order in which a participant meets the items of the questionnaire at a step, from 0;
@@ -276,48 +279,80 @@ impl Study {
         self.presence.is_connected(number)
     }
 
-    /// The change that follows by itself at this time, if any: the study closes, or a participant
-    /// drops out. To be folded before the next is asked for.
-    pub fn next(&mut self, now_ms: u64) -> Option<Change> {
+    /// The changes that follow by themselves at this time, if any: the study closes, a group is formed,
+    /// or a participant drops out or is left over. To be folded before the next are asked for.
+    pub fn next(&mut self, now_ms: u64) -> Vec<Change> {
         let closes_at = self.settings.end_ms();
         if closes_at.is_some_and(|at_ms| at_ms <= now_ms) && !self.is_closed() {
-            return Some(Change::Closed);
+            return vec![Change::Closed];
+        }
+        let grouped = self.next_of_groups(now_ms);
+        if !grouped.is_empty() {
+            return grouped;
         }
         let participants = self.state.participants.iter();
         let active = participants.filter(|(_, it)| it.status == Status::Active);
         let active = active.map(|(number, _)| *number);
         let limit_ms = self.settings.drop_out_after_ms;
-        let number = self.presence.drop_out(active, limit_ms, now_ms)?;
-        Some(Change::DroppedOut {
+        let number = self.presence.drop_out(active, limit_ms, now_ms);
+        let dropped_out = number.map(|number| Change::DroppedOut {
             number,
             at_ms: now_ms,
-        })
+        });
+        Vec::from_iter(dropped_out)
     }
 
     /// When [`Study::next`] is to be asked again if nothing else happens, in milliseconds since the
-    /// Unix epoch. Valid after it returned `None`.
+    /// Unix epoch. Valid after it returned nothing.
     pub fn wake_at(&self) -> Option<u64> {
         let limit_ms = self.settings.drop_out_after_ms;
         let drop_out = self.presence.next_drop_out_ms(limit_ms);
         let close = self.settings.end_ms().filter(|_| !self.is_closed());
-        drop_out.into_iter().chain(close).min()
+        let groups = self.settings.groups;
+        let waited = groups.and_then(|it| self.presence.next_waited_ms(it.wait_ms));
+        drop_out.into_iter().chain(close).chain(waited).min()
     }
 
-    /// Whether somebody keeps the slot that a participant had.
+    /// Whether somebody keeps the slot that a participant had, or plays for it in its group.
     fn is_replaced(&self, participant: &Participant) -> bool {
+        if participant.group.is_some() {
+            return true;
+        }
         let slots = self.kept_slots(participant.test);
         participant.slot.is_some_and(|slot| slots.contains(&slot))
     }
 
-    /// The first slot that nobody keeps. A slot that is given again comes before new ones, so that
-    /// blocks fill up in order.
+    /// The first slot that nobody keeps, or that nobody of its group keeps. A slot that is given again
+    /// comes before new ones, so that blocks fill up in order.
     fn free_slot(&self, test: bool) -> Option<u32> {
+        self.free_slots(test).next()
+    }
+
+    /// The slots that nobody keeps, in order: of groups the first of each.
+    fn free_slots(&self, test: bool) -> impl Iterator<Item = u32> {
+        let size = self.settings.group_size();
         let kept = self.kept_slots(test);
         let slots = match test {
-            true => MAX_TESTS,
+            true => MAX_TESTS - MAX_TESTS % size,
             false => self.settings.participants,
         };
-        (0..slots).find(|slot| !kept.contains(slot))
+        let firsts = (0..slots).step_by(size as usize);
+        firsts.filter(move |first| kept.range(*first..first + size).next().is_none())
+    }
+
+    /// Whether one more may begin, who gets a slot now or in a group.
+    fn has_place(&self, test: bool) -> bool {
+        let free = self.free_slots(test);
+        if self.settings.groups.is_none() {
+            return free.take(1).count() > 0;
+        }
+        let asks = self.settings.asks_for_consent();
+        let expects = |it: &&Participant| {
+            let has_begun = it.status == Status::Active && (!asks || it.consent.is_some());
+            it.test == test && has_begun && it.group.is_none()
+        };
+        let expecting = self.state.participants.values().filter(expects).count();
+        free.count() * self.settings.group_size() as usize > expecting
     }
 
     /// The slots that participants keep. Test participants have slots of their own.

@@ -9,6 +9,9 @@ pub(crate) struct Presence {
     /// Active participants without a session, with the time since when, in milliseconds since the
     /// Unix epoch.
     away: BTreeMap<u32, u64>,
+    /// Participants who wait for others, with the time since when, in milliseconds since the Unix
+    /// epoch.
+    waiting: BTreeMap<u32, u64>,
 }
 
 impl Presence {
@@ -41,6 +44,27 @@ impl Presence {
         let mut away = self.away.iter();
         let first = away.find(|(_, since)| now_ms.saturating_sub(**since) >= limit_ms);
         first.map(|(number, _)| *number)
+    }
+
+    /// Notes who waits for others now. One who did not before, as after a restart, waits from now.
+    pub(crate) fn note_waiting(&mut self, waiting: &BTreeSet<u32>, now_ms: u64) {
+        self.waiting.retain(|number, _| waiting.contains(number));
+        for number in waiting {
+            self.waiting.entry(*number).or_insert(now_ms);
+        }
+    }
+
+    /// Those who have waited for others for `limit_ms`.
+    pub(crate) fn waited(&self, limit_ms: u64, now_ms: u64) -> BTreeSet<u32> {
+        let waiting = self.waiting.iter();
+        let long = waiting.filter(|(_, since)| now_ms.saturating_sub(**since) >= limit_ms);
+        long.map(|(number, _)| *number).collect()
+    }
+
+    /// When the next participant has waited for `limit_ms`, in milliseconds since the Unix epoch.
+    pub(crate) fn next_waited_ms(&self, limit_ms: u64) -> Option<u64> {
+        let since = self.waiting.values().min();
+        since.map(|since| since.saturating_add(limit_ms))
     }
 
     /// When the next participant drops out, in milliseconds since the Unix epoch.

@@ -24,6 +24,8 @@ pub struct Recruiting {
     pub full_url: String,
     /// Where it sends those who are screened out; empty: as those who leave.
     pub screened_out_url: String,
+    /// Where it sends those who are left over; empty: as those who complete the study.
+    pub left_over_url: String,
 }
 
 impl Recruiting {
@@ -41,6 +43,7 @@ impl Recruiting {
             ("left_url", &self.left_url),
             ("full_url", &self.full_url),
             ("screened_out_url", &self.screened_out_url),
+            ("left_over_url", &self.left_over_url),
         ] {
             let field = format!("{field}.{name}");
             if url.is_empty() {
@@ -94,6 +97,14 @@ impl Recruiting {
         match self.screened_out_url.is_empty() {
             true => &self.left_url,
             false => &self.screened_out_url,
+        }
+    }
+
+    /// Where those are sent who are left over; empty: nowhere.
+    pub(crate) fn left_over_url(&self) -> &str {
+        match self.left_over_url.is_empty() {
+            true => &self.completed_url,
+            false => &self.left_over_url,
         }
     }
 

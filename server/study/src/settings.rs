@@ -63,6 +63,28 @@ pub struct Settings {
     pub deletes_at_ms: Option<u64>,
     /// How people without a link of their own take part.
     pub recruiting: Recruiting,
+    /// Participants who play together, if any do.
+    pub groups: Option<Groups>,
+}
+
+/// How participants play together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Groups {
+    /// Number of participants of a group, 2..=6.
+    pub size: u32,
+    /// How long participants wait for others, in milliseconds, 10000..=3600000.
+    pub wait_ms: u64,
+    /// What becomes of those whose group is not complete in time.
+    pub left_over: LeftOver,
+}
+
+/// What becomes of participants whose group is not complete in time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LeftOver {
+    /// Their participation ends.
+    Dismiss,
+    /// They are a group of fewer.
+    Agents,
 }
 
 /// The last date that is written with four digits of the year, in milliseconds since the Unix epoch.
@@ -145,9 +167,18 @@ impl Settings {
         self.stages.first().is_some_and(Stage::is_consent)
     }
 
+    /// Number of participants who play together.
+    pub fn group_size(&self) -> u32 {
+        self.groups.map_or(1, |groups| groups.size)
+    }
+
     /// Whether participants get their slots by their consent, so that nobody who declines takes one:
-    /// they are asked for it before they play or meet a condition.
+    /// they are asked for it before they play or meet a condition. Groups get theirs when they are
+    /// formed.
     pub fn assigns_by_consent(&self) -> bool {
+        if self.groups.is_some() {
+            return false;
+        }
         let plays = |stage: &&Stage| match stage {
             Stage::Once(part) => matches!(part.task, Task::Practice { .. } | Task::Games { .. }),
             Stage::PerCondition(_) => true,
@@ -181,6 +212,7 @@ impl Settings {
         within("participants", self.participants, 1..=MAX_PARTICIPANTS)?;
         self.check_design()?;
         self.check_stages()?;
+        self.check_groups()?;
         self.recruiting.check("recruiting")?;
         let away = self.drop_out_after_ms;
         within("drop_out_after_ms", away, 60_000..=604_800_000)?;
@@ -235,6 +267,57 @@ impl Settings {
         let has_own = |condition: &Condition| !condition.seeds.is_empty();
         if self.seeds.is_empty() && !self.conditions.iter().all(has_own) {
             return refuse("seeds", "empty, and a condition has no seeds of its own");
+        }
+        Ok(())
+    }
+
+    fn check_groups(&self) -> Checked {
+        let parts = self.stages.iter().enumerate();
+        let mut arrivals = parts.filter(|(_, stage)| {
+            let mut parts = stage.parts().iter();
+            parts.any(|part| matches!(part.task, Task::Arrival(_)))
+        });
+        let first = arrivals.next();
+        let field = |index: usize| format!("stages[{index}]");
+        let Some(groups) = &self.groups else {
+            return match first {
+                Some((index, _)) => refuse(field(index), "only groups arrive: set groups"),
+                None => Ok(()),
+            };
+        };
+        within("groups.size", groups.size, 2..=6)?;
+        within("groups.wait_ms", groups.wait_ms, 10_000..=3_600_000)?;
+        for (index, condition) in self.conditions.iter().enumerate() {
+            let players = condition.players as u32;
+            within(
+                &format!("conditions[{index}].rules.players"),
+                players,
+                groups.size..=6,
+            )?;
+        }
+        if !self.participants.is_multiple_of(groups.size) {
+            let problem = format!(
+                "it is not a multiple of the size of groups, {}",
+                groups.size
+            );
+            return refuse("participants", problem);
+        }
+        let Some((index, stage)) = first else {
+            return refuse(
+                "stages",
+                "a stage arrival is missing, at which groups are formed",
+            );
+        };
+        if let Some((second, _)) = arrivals.next() {
+            return refuse(field(second), "there is an arrival before");
+        }
+        let has_games = |stage: &Stage| match stage {
+            Stage::Once(part) => matches!(part.task, Task::Games { .. }),
+            Stage::PerCondition(_) => true,
+        };
+        if matches!(stage, Stage::PerCondition(_)) || self.stages[..index].iter().any(has_games) {
+            let problem = "arrival must come before games and `per_condition`";
+            return refuse(field(index), problem);
         }
         Ok(())
     }

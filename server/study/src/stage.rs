@@ -59,6 +59,8 @@ pub enum Task {
     Text(Text),
     /// Ends the participation.
     ScreenOut(ScreenOut),
+    /// Waits for its group.
+    Arrival(Arrival),
 }
 
 /// A text to agree to.
@@ -83,6 +85,13 @@ pub struct ExternalQuestionnaire {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ScreenOut {
     /// What the participant reads, at most 2000 characters.
+    pub text: String,
+}
+
+/// A wait for a group.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Arrival {
+    /// What the participant reads meanwhile, at most 2000 characters.
     pub text: String,
 }
 
@@ -176,9 +185,15 @@ impl Part {
     pub(crate) fn check(&self, field: &str, earlier: &[&Questionnaire]) -> Checked {
         self.task.check(field)?;
         let shown_if = format!("{field}.shown_if");
-        let is_for_all = matches!(self.task, Task::Consent(_) | Task::Games { .. });
+        let is_for_all = matches!(
+            self.task,
+            Task::Consent(_) | Task::Games { .. } | Task::Arrival(_)
+        );
         if is_for_all && !self.shown_if.is_empty() {
-            return refuse(shown_if, "consent and games are for all participants");
+            return refuse(
+                shown_if,
+                "consent, arrival and games are for all participants",
+            );
         }
         if matches!(self.task, Task::ScreenOut(_)) && self.shown_if.is_empty() {
             return refuse(
@@ -226,6 +241,10 @@ impl Task {
             Self::Text(text) => {
                 characters(&format!("{field}.text.title"), &text.title, 0..=128)?;
                 characters(&format!("{field}.text.text"), &text.text, 1..=MAX_TEXT)
+            }
+            Self::Arrival(arrival) => {
+                let field = format!("{field}.arrival.text");
+                characters(&field, &arrival.text, 0..=MAX_TEXT_ABOVE)
             }
             Self::ScreenOut(out) => {
                 let field = format!("{field}.screen_out.text");

@@ -26,6 +26,8 @@ pub enum Status {
     Removed,
     /// Was screened out by its answers.
     ScreenedOut,
+    /// Its group was not complete in time.
+    LeftOver,
 }
 
 /// A participant.
@@ -38,10 +40,15 @@ pub struct Participant {
     pub joined: Option<Joined>,
     /// Whether it is a test participant, who takes no slot from others.
     pub test: bool,
+    /// The first of those with whom it is to play, if that is planned.
+    pub planned: Option<u32>,
     /// Its state.
     pub status: Status,
-    /// Its slot, or after it has left the one it had; `None` until it begins, or until its consent.
+    /// Its slot, or after it has left the one it had; `None` until it begins, until its consent, or
+    /// until it has a group.
     pub slot: Option<u32>,
+    /// Number of its group, from 1.
+    pub group: Option<u32>,
     /// Number of sessions it opened, which is the number of the newest.
     pub session: u32,
     /// Those on a device that is known, by number.
@@ -105,7 +112,9 @@ impl Participant {
     pub(crate) fn ends_by_withdrawing(&self, delete_data: bool) -> bool {
         match self.status {
             Status::Withdrawn => false,
-            Status::Completed | Status::Removed | Status::ScreenedOut => !delete_data,
+            Status::Completed | Status::Removed | Status::ScreenedOut | Status::LeftOver => {
+                !delete_data
+            }
             Status::Invited | Status::Active | Status::DroppedOut => true,
         }
     }
@@ -166,13 +175,16 @@ impl StudyState {
                 pseudonym,
                 joined,
                 test,
+                planned,
             } => {
                 let added = || Participant {
                     pseudonym: pseudonym.clone(),
                     joined: joined.clone(),
                     test: *test,
+                    planned: *planned,
                     status: Status::Invited,
                     slot: None,
+                    group: None,
                     session: 0,
                     devices: BTreeMap::new(),
                     reached_at_ms: Vec::new(),
@@ -255,6 +267,24 @@ impl StudyState {
                     if *step_over {
                         participant.advance(steps, *passed_over, *at_ms);
                     }
+                }
+            }
+            Change::Grouped {
+                number,
+                group,
+                slot,
+                passed_over,
+                at_ms,
+            } => {
+                if let Some(participant) = self.active(*number) {
+                    participant.group = Some(*group);
+                    participant.slot = Some(*slot);
+                    participant.advance(steps, *passed_over, *at_ms);
+                }
+            }
+            Change::LeftOver { number, at_ms } => {
+                if let Some(participant) = self.active(*number) {
+                    participant.end(Status::LeftOver, *at_ms);
                 }
             }
             Change::DroppedOut { number, at_ms } => {

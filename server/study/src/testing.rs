@@ -4,8 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::{
-    Condition, Consent, Factor, Labels, Language, Order, Recruiting, Settings, Stage, Task,
-    Template, Text,
+    Arrival, Condition, Consent, Factor, Groups, Labels, Language, LeftOver, Order, Recruiting,
+    Settings, Stage, Task, Template, Text,
 };
 
 /// A study between participants in two conditions: consent, a game, a text.
@@ -36,6 +36,29 @@ pub fn settings() -> Settings {
         closes_at_ms: None,
         deletes_at_ms: None,
         recruiting: Recruiting::default(),
+        groups: None,
+    }
+}
+
+/// A study between participants in two conditions who play in groups of this size: consent, arrival,
+/// two games, a text.
+pub fn in_groups(size: u32) -> Settings {
+    Settings {
+        participants: 6 * size,
+        stages: vec![
+            Stage::once(consent()),
+            Stage::once(Task::Arrival(Arrival {
+                text: "Please wait.".to_owned(),
+            })),
+            Stage::once(Task::Games { count: 2 }),
+            Stage::once(text()),
+        ],
+        groups: Some(Groups {
+            size,
+            wait_ms: 60_000,
+            left_over: LeftOver::Dismiss,
+        }),
+        ..settings()
     }
 }
 

@@ -50,6 +50,8 @@ pub enum Content {
     Text(Text),
     /// A game, or practice.
     Game(ShownGame),
+    /// A group that is not complete yet.
+    Arrival(ShownArrival),
     /// Nothing more.
     End {
         /// Why.
@@ -104,6 +106,21 @@ pub struct ShownGame {
     pub ended: bool,
     /// Whether the other seats have names in place of their own; `false` until there is a room.
     pub labelled: bool,
+    /// Number of others of its group for whom the game waits.
+    pub waits_for: u32,
+}
+
+/// A group that is not complete yet, as a participant sees it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ShownArrival {
+    /// What to read meanwhile, or empty.
+    pub text: String,
+    /// Number of participants of the group.
+    pub size: u32,
+    /// Number of those who are here, with this one.
+    pub here: u32,
+    /// How long the wait takes at most, in milliseconds.
+    pub wait_ms: u64,
 }
 
 /// Why nothing more is shown.
@@ -121,6 +138,8 @@ pub enum End {
     Removed,
     /// It was screened out by its answers.
     ScreenedOut,
+    /// Its group was not complete in time.
+    LeftOver,
 }
 
 impl Study {
@@ -136,6 +155,7 @@ impl Study {
             Status::DroppedOut => self.end(participant, End::DroppedOut),
             Status::Removed => self.end(participant, End::Removed),
             Status::ScreenedOut => self.end(participant, End::ScreenedOut),
+            Status::LeftOver => self.end(participant, End::LeftOver),
         };
         let settings = self.settings();
         Some(View {
@@ -157,6 +177,7 @@ impl Study {
             Status::Completed => &recruiting.completed_url,
             Status::Withdrawn | Status::DroppedOut | Status::Removed => &recruiting.left_url,
             Status::ScreenedOut => recruiting.screened_out_url(),
+            Status::LeftOver => recruiting.left_over_url(),
             Status::Invited | Status::Active => "",
         };
         // What a panel pays for was not done in a test.
@@ -183,12 +204,21 @@ impl Study {
             Task::External(it) => Content::External(it.filled_in(&participant.pseudonym)),
             Task::Text(text) => Content::Text(text.clone()),
             Task::ScreenOut(_) => self.end(participant, End::ScreenedOut),
-            Task::Practice { .. } => Content::Game(self.shown_game(participant, true, 1)),
-            Task::Games { count } => Content::Game(self.shown_game(participant, false, *count)),
+            Task::Arrival(arrival) => Content::Arrival(self.shown_arrival(number, arrival)),
+            Task::Practice { .. } => Content::Game(self.shown_game(number, participant, true, 1)),
+            Task::Games { count } => {
+                Content::Game(self.shown_game(number, participant, false, *count))
+            }
         })
     }
 
-    fn shown_game(&self, participant: &Participant, practice: bool, games: u32) -> ShownGame {
+    fn shown_game(
+        &self,
+        number: u32,
+        participant: &Participant,
+        practice: bool,
+        games: u32,
+    ) -> ShownGame {
         let (game, ended) = match Phase::of(participant) {
             Phase::Due { .. } => (None, false),
             Phase::Playing(game) => (Some(&game.placed), false),
@@ -203,6 +233,10 @@ impl Study {
             place: game.map(|it| (it.room, it.game)),
             ended,
             labelled: game.is_some_and(|it| conditions[it.condition].labels != Labels::AsTheyAre),
+            waits_for: match game {
+                None => self.late_for(number).len() as u32,
+                Some(_) => 0,
+            },
         }
     }
 }

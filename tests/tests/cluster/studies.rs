@@ -239,9 +239,8 @@ async fn a_study_whose_owner_is_killed_goes_on_at_another_node() {
     let request = v1::AddStudyParticipantsRequest {
         study_id: study_id.clone(),
         owner_token: owner_token.clone(),
-        pseudonyms: Vec::new(),
         count: PARTICIPANTS - 1,
-        test: false,
+        ..v1::AddStudyParticipantsRequest::default()
     };
     let added = service.add_study_participants(request).await;
     let links = added.expect("its owner").into_inner().links;

@@ -43,6 +43,7 @@ mod stops;
 mod stranger;
 mod studies;
 mod study_calls;
+mod study_groups;
 mod study_joining;
 mod table_bridge;
 mod terminal;

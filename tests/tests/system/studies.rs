@@ -34,7 +34,7 @@ use tonic_types::StatusExt as _;
 
 /// What no participant may receive: all that names the study for researchers, a factor, a level, a
 /// condition, an agent or a robot's behaviour.
-const SECRETS: [&str; 12] = [
+pub(crate) const SECRETS: [&str; 12] = [
     "warmth-study-2031",
     "temperament",
     "level-warm",
@@ -60,7 +60,7 @@ pub(crate) struct Tap {
     address: SocketAddr,
     pub(crate) target: Arc<Mutex<SocketAddr>>,
     /// The bytes of each connection.
-    received: Received,
+    pub(crate) received: Received,
 }
 
 type Received = Arc<Mutex<Vec<Vec<u8>>>>;
@@ -136,7 +136,7 @@ pub(crate) fn address(host: &Host) -> SocketAddr {
     address.expect("an address")
 }
 
-fn stage(stage: Stage) -> v1::StudyStage {
+pub(crate) fn stage(stage: Stage) -> v1::StudyStage {
     v1::StudyStage {
         stage: Some(stage),
         ..v1::StudyStage::default()
@@ -203,9 +203,9 @@ pub(crate) fn settings() -> v1::StudySettings {
 
 /// A participant with a device of its own.
 pub(crate) struct Person {
-    service: ParticipationServiceClient<Channel>,
-    client: Client,
-    link: String,
+    pub(crate) service: ParticipationServiceClient<Channel>,
+    pub(crate) client: Client,
+    pub(crate) link: String,
     session: String,
 }
 
@@ -292,6 +292,10 @@ impl Person {
                 (self.proceed(view.step).await, Some(ticket))
             }
             Content::Text(_) => (self.proceed(step).await, None),
+            Content::Arrival(_) => {
+                let over = |content: &Content| !matches!(content, Content::Arrival(_));
+                (self.until(over).await, None)
+            }
             other => panic!("unexpected: {other:?}"),
         }
     }
@@ -444,8 +448,7 @@ impl Lab {
             study_id: self.study_id.clone(),
             owner_token: self.owner_token.clone(),
             pseudonyms,
-            count: 0,
-            test: false,
+            ..v1::AddStudyParticipantsRequest::default()
         };
         let added = self.service.add_study_participants(request).await;
         let links = added.expect("the study is open").into_inner().links;
@@ -495,19 +498,19 @@ impl Lab {
 }
 
 /// Rows of a table without its header.
-fn rows(file: &[u8]) -> Vec<String> {
+pub(crate) fn rows(file: &[u8]) -> Vec<String> {
     let text = std::str::from_utf8(file).expect("UTF-8");
     text.lines().skip(1).map(str::to_owned).collect()
 }
 
-fn contains(bytes: &[u8], word: &str) -> bool {
+pub(crate) fn contains(bytes: &[u8], word: &str) -> bool {
     bytes
         .windows(word.len())
         .any(|window| window == word.as_bytes())
 }
 
 /// Asserts that every cell of the exported tables is what their descriptor says.
-fn assert_as_described(files: &BTreeMap<String, Vec<u8>>) {
+pub(crate) fn assert_as_described(files: &BTreeMap<String, Vec<u8>>) {
     let descriptor: serde_json::Value =
         serde_json::from_slice(&files["datapackage.json"]).expect("JSON");
     let list = |value: &serde_json::Value| value.as_array().expect("a list").clone();

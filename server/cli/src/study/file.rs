@@ -15,7 +15,8 @@ use toml::de::{DeTable, DeValue};
 use crate::CommandError;
 
 /// Fields with values of enums, and the prefixes of their values.
-const ENUMS: [(&str, &str); 10] = [
+const ENUMS: [(&str, &str); 11] = [
+    ("left_over", "STUDY_LEFT_OVER_"),
     ("order", "STUDY_ORDER_"),
     ("labels", "STUDY_LABELS_"),
     ("hide", "STUDY_HIDE_"),
@@ -143,6 +144,7 @@ mod tests {
             seeds = ["0000000000000000000000000000000000000000000000000000000000000001"]
             drop_out_after_ms = 60_000
             closes_at_ms = 2031-05-01T18:00:00.5+02:00
+            groups = { size = 2, left_over = "agents" }
             [[conditions]]
             id = "a"
             labels = "players"
@@ -164,6 +166,8 @@ mod tests {
         assert_eq!(settings.order(), v1::StudyOrder::Within);
         assert_eq!(settings.seeds[0][31], 1);
         assert_eq!(settings.drop_out_after_ms, 60_000);
+        let groups = settings.groups.as_ref().expect("they are set");
+        assert_eq!(groups.left_over(), v1::StudyLeftOver::Agents);
         assert_eq!(settings.closes_at_ms, 1_935_417_600_500);
         let minutes = parse("closes_at_ms = 2031-05-01T18:00+02:00", Path::new(""));
         assert_eq!(minutes.expect("valid").closes_at_ms, 1_935_417_600_000);

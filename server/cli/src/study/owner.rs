@@ -64,6 +64,10 @@ pub(super) struct Links {
     /// test participants, who take no place.
     #[arg(long)]
     test: bool,
+    /// With --add or --pseudonym, in a study with groups: those who are added play with each other, in
+    /// their order, and not with whom they arrive.
+    #[arg(long)]
+    together: bool,
 }
 
 /// Follow the progress of a study until it is closed and nobody but test participants is active.
@@ -207,6 +211,7 @@ impl Links {
                 pseudonyms: self.pseudonyms,
                 count: self.add,
                 test: self.test,
+                together: self.together,
             };
             let added = service.add_study_participants(request).await;
             added.map_err(refused)?.into_inner().links
@@ -431,12 +436,16 @@ pub(super) fn line(participant: &v1::StudyParticipant) -> String {
         ""
     };
     let test = if participant.test { " (test)" } else { "" };
+    let group = match participant.group {
+        0 => String::new(),
+        group => format!("group {group}\t"),
+    };
     let id = match participant.panel_id.as_str() {
         "" => String::new(),
         id => format!(" ({id})"),
     };
     format!(
-        "{}\t{}{test}{id}\t{state}{present}\tstep {}\t{}",
+        "{}\t{}{test}{id}\t{state}{present}\tstep {}\t{group}{}",
         participant.number,
         participant.pseudonym,
         participant.step,

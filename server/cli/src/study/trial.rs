@@ -55,6 +55,20 @@ impl Test {
         let owned = &self.owned;
         let mut researcher = service(&owned.server).await?;
         let (study_id, owner_token) = (owned.study_id.clone(), owned.owner.token()?);
+        let request = v1::GetStudyRequest {
+            study_id: study_id.clone(),
+            owner_token: owner_token.clone(),
+        };
+        let shown = researcher.get_study(request).await.map_err(refused)?;
+        let settings = shown.into_inner().study.and_then(|it| it.settings);
+        let size = (settings.and_then(|it| it.groups)).map_or(1, |groups| groups.size.max(1));
+        if !self.participants.is_multiple_of(size) {
+            return Err(format!(
+                "--participants: {} make no whole groups; give a multiple of {size}",
+                self.participants
+            )
+            .into());
+        }
         let request = v1::AddStudyParticipantsRequest {
             study_id: study_id.clone(),
             owner_token: owner_token.clone(),
@@ -66,7 +80,9 @@ impl Test {
         let links = added.map_err(refused)?.into_inner().links;
         let numbers: Vec<u32> = links.iter().map(|link| link.number).collect();
 
-        let problems = self.take_part(links).await?;
+        // Those of a group wait for each other.
+        let at_once = self.at_once.next_multiple_of(size) as usize;
+        let problems = self.take_part(links, at_once).await?;
         let request = v1::GetStudyRequest {
             study_id,
             owner_token,
@@ -114,6 +130,7 @@ impl Test {
     async fn take_part(
         &self,
         links: Vec<v1::StudyLink>,
+        at_once: usize,
     ) -> Result<BTreeMap<String, String>, CommandError> {
         let client = self.owned.server.connect().await?;
         let bar = progress::of_items(self.participants.into(), "test participants");
@@ -141,7 +158,7 @@ impl Test {
                 Some((link.pseudonym, problem.to_string()))
             }
         });
-        let taking_part = stream::iter(taking_part).buffer_unordered(self.at_once as usize);
+        let taking_part = stream::iter(taking_part).buffer_unordered(at_once);
         let problems = taking_part.filter_map(future::ready).collect().await;
         bar.finish_and_clear();
         Ok(problems)
@@ -187,6 +204,7 @@ impl Tester {
                     // Its room, or its end, comes on the stream.
                     views.next(step).await
                 }
+                Some(Content::Arrival(_)) => views.next(step).await,
                 Some(_) => self.proceed(step).await,
                 None => views.next(step).await,
             };

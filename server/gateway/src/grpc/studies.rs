@@ -11,7 +11,7 @@ use chefshat_proto::v1::{
     self, study_service_client::StudyServiceClient, study_service_server::StudyService,
 };
 use chefshat_record::convert::FieldProblem;
-use chefshat_study::{Refusal as StudyRefusal, SettingsProblem};
+use chefshat_study::{NewParticipants, Refusal as StudyRefusal, SettingsProblem};
 use futures::Stream;
 use prost::Message as _;
 use tokio::sync::mpsc;
@@ -222,10 +222,12 @@ impl StudyService for StudyCalls {
             return Err(field("COUNT_REFUSED", &FieldProblem::new("count", words)));
         }
         pseudonyms.resize(count, String::new());
-        let added = handle
-            .add(key, pseudonyms, request.test)
-            .await
-            .map_err(stopped)?;
+        let new = NewParticipants {
+            pseudonyms,
+            test: request.test,
+            together: request.together,
+        };
+        let added = handle.add(key, new).await.map_err(stopped)?;
         let first = added.map_err(not_added)?;
         Ok(Response::new(v1::AddStudyParticipantsResponse {
             links: self.links(&handle, first, count),
@@ -533,6 +535,7 @@ fn code_of(refusal: &StudyRefusal) -> (Code, &'static str) {
         StudyRefusal::TooManyParticipants | StudyRefusal::TooManyTests => {
             (Code::ResourceExhausted, "TOO_MANY_PARTICIPANTS")
         }
+        StudyRefusal::NoWholeGroups(_) => (Code::InvalidArgument, "COUNT_REFUSED"),
         StudyRefusal::PanelIdTaken => (Code::AlreadyExists, "PANEL_ID_TAKEN"),
         StudyRefusal::PanelId(_) => (Code::InvalidArgument, "PANEL_ID_REFUSED"),
         StudyRefusal::Answers(_) => (Code::InvalidArgument, "ANSWER_REFUSED"),

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use chefshat_engine::Seat;
-use chefshat_study::{Outcome, PlayedGame};
+use chefshat_study::{Outcome, Participant, PlacedGame, PlayedGame, Status};
 use tokio::time::Instant;
 use tracing::warn;
 
@@ -15,7 +15,7 @@ use crate::config::TOURNAMENT_RETRY;
 use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::Id;
-use chefshat_room::journal::{Change, Fill, GameStart, SeatedParticipant, StudyGame};
+use chefshat_room::journal::{Change, Fill, GameStart, SeatedParticipant, StudyGame, StudyMember};
 use chefshat_store::{StoreError, StoredGame};
 use chefshat_wire::convert::PARTICIPANT_KIND;
 
@@ -27,7 +27,7 @@ impl StudyTask {
                 continue;
             }
             let (room, game) = (Id::random(), Id::random());
-            if let Some(change) = self.unit.state.place(number, room.0, game.0) {
+            for change in self.unit.state.place(number, room.0, game.0) {
                 self.fold(change);
             }
         }
@@ -44,7 +44,7 @@ impl StudyTask {
                 continue;
             };
             if self.without_room.contains(&number) {
-                if !self.is_active(number) {
+                if !self.is_played(number) {
                     self.end_game(number, &game, Outcome::Aborted);
                 }
                 continue;
@@ -56,7 +56,7 @@ impl StudyTask {
             match self.outcome(&game).await? {
                 Some(outcome) => self.end_game(number, &game, outcome),
                 // The server ended before the room was created.
-                None if self.is_active(number) => drop(self.without_room.insert(number)),
+                None if self.is_played(number) => drop(self.without_room.insert(number)),
                 None => self.end_game(number, &game, Outcome::Aborted),
             }
         }
@@ -68,7 +68,9 @@ impl StudyTask {
         if let Some(change) = (self.unit.state).game_ended(number, id, outcome, (self.now)()) {
             self.fold(change);
         }
-        self.closing.remove(&Id(game.placed.room));
+        let room = Id(game.placed.room);
+        self.closing.remove(&room);
+        self.retired.remove(&(room, number));
     }
 
     /// The outcome of a game whose room is over or gone; `None` if it has no room yet.
@@ -132,23 +134,46 @@ impl StudyTask {
         Ok(())
     }
 
-    /// Closes the rooms of participants who have left.
+    /// Closes the rooms of participants who have left, or gives up their seats where others play on.
     pub(super) fn close_rooms(&mut self) {
         for number in &self.playing {
             let participant = self.unit.state.participant(*number);
             let Some(game) = participant.and_then(|it| it.games.last()) else {
                 continue;
             };
-            let room = Id(game.placed.room);
-            if !self.is_active(*number)
-                && let Some(handle) = self.unit.rooms.get(room)
-                && self.closing.insert(room)
-            {
-                tokio::spawn(short("one message", async move {
-                    handle.close_without_token().await
-                }));
+            let (room, seat) = (Id(game.placed.room), Seat::new(game.placed.seat));
+            let Some(handle) = self
+                .unit
+                .rooms
+                .get(room)
+                .filter(|_| !self.is_active(*number))
+            else {
+                continue;
+            };
+            if self.is_played(*number) {
+                if self.retired.insert((room, *number)) {
+                    let retiring = async move { handle.retire(seat).await };
+                    tokio::spawn(short("one message", retiring));
+                }
+            } else if self.closing.insert(room) {
+                let closing = async move { handle.close_without_token().await };
+                tokio::spawn(short("one message", closing));
             }
         }
+    }
+
+    /// Those who play a game, by number.
+    fn players_of(&self, game: &PlacedGame) -> Vec<(u32, &Participant)> {
+        let participants = self.unit.state.participants().iter();
+        let plays = |it: &Participant| {
+            let last = it
+                .games
+                .last()
+                .filter(|played| played.placed.game == game.game);
+            it.status == Status::Active && last.is_some()
+        };
+        let players = participants.filter(|(_, it)| plays(it));
+        players.map(|(number, it)| (*number, it)).collect()
     }
 
     /// The settings of the room of a participant's game.
@@ -160,24 +185,45 @@ impl StudyTask {
         let plan = &self.unit.handle.plan.conditions[placed.condition];
         let small = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         let room = Id(placed.room);
-        let seat = placed.seat;
-        let mut fills = plan.fills.clone();
-        fills.insert(
-            seat.min(fills.len()),
-            Fill::Open {
-                reserved_for: Some(PARTICIPANT_KIND),
-            },
-        );
-        // The other seats make room for that of the participant.
-        let place = |index: usize| index + usize::from(index >= seat);
+        let players = self.players_of(placed);
+        let seat_of = |player: &Participant| player.games.last().map_or(0, |it| it.placed.seat);
+        let seats_of_group = self.unit.state.seats_of_group(participant, placed);
+        // The other seats make room for those of the participants.
+        let (mut fills, mut others) = (Vec::new(), Vec::new());
+        let mut fills_of_others = plan.fills.iter();
+        for seat in 0..condition.players {
+            fills.push(if players.iter().any(|(_, it)| seat_of(it) == seat) {
+                Fill::Open {
+                    reserved_for: Some(PARTICIPANT_KIND),
+                }
+            } else if !seats_of_group.contains(&seat)
+                && let Some(fill) = fills_of_others.next()
+            {
+                others.push(seat);
+                *fill
+            } else {
+                // Somebody of the group is missing.
+                Fill::BuiltIn(plan.policy.substitute)
+            });
+        }
         let names = plan.names.iter();
-        let display_names = names.map(|(index, name)| (place(*index), name.clone()));
-        let seated = SeatedParticipant {
-            name: participant.pseudonym.clone(),
-            name_fingerprint: String::new(),
-            kind: PARTICIPANT_KIND,
-            ticket: self.unit.handle.ticket_of(room).hash(),
-        };
+        let display_names =
+            names.filter_map(|(index, name)| Some((*others.get(*index)?, name.clone())));
+        let seated = players.iter().map(|(number, it)| {
+            let participant = SeatedParticipant {
+                name: it.pseudonym.clone(),
+                name_fingerprint: String::new(),
+                kind: PARTICIPANT_KIND,
+                ticket: self.unit.handle.ticket_of(room, *number).hash(),
+            };
+            (seat_of(it), participant)
+        });
+        let members = players.iter().map(|(number, it)| StudyMember {
+            number: *number,
+            participant: it.pseudonym.clone(),
+            session: it.session,
+            seat: Seat::new(seat_of(it)),
+        });
         let seeds = match condition.seeds.is_empty() {
             true => &settings.seeds,
             false => &condition.seeds,
@@ -197,7 +243,9 @@ impl StudyTask {
             fills,
             display_names: display_names.collect(),
             recorded: BTreeMap::new(),
-            wizards: plan.wizards.iter().map(|index| place(*index)).collect(),
+            wizards: (plan.wizards.iter())
+                .filter_map(|index| others.get(*index).copied())
+                .collect(),
             start: GameStart::default(),
             game_seed: placed.seed_index.map(|index| seeds[index]),
             physical: false,
@@ -210,19 +258,17 @@ impl StudyTask {
                     name: self.unit.handle.plan.name.clone(),
                     condition: condition.id.clone(),
                     levels: condition.levels.clone(),
-                    number,
-                    participant: participant.pseudonym.clone(),
-                    session: participant.session,
+                    members: members.collect(),
+                    group: participant.group.filter(|_| !placed.practice),
                     step: small(placed.step),
                     practice: placed.practice,
                     seed_index: placed.seed_index.map(small),
-                    seat: Seat::new(seat),
                     attempt: placed.attempt,
                     labels: plan.labels,
                 })),
                 owner: self.unit.handle.room_owner(room),
                 game_id: Id(placed.game),
-                participants: BTreeMap::from([(seat, seated)]),
+                participants: seated.collect(),
                 server_seed: None,
             }),
         })

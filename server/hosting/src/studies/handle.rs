@@ -6,8 +6,8 @@ use std::sync::{Arc, MutexGuard};
 
 use chefshat_proto::v1;
 use chefshat_study::{
-    At, Change, Content, Device, ItemAnswer, Joined, Participant, ParticipantLink, Recruiting,
-    Refusal, SessionSecret, Study,
+    At, Change, Content, Device, ItemAnswer, Joined, NewParticipants, Participant, ParticipantLink,
+    Recruiting, Refusal, SessionSecret, Study,
 };
 use tokio::sync::watch;
 
@@ -183,7 +183,7 @@ impl StudyHandle {
                 .filter(|(room, _)| rooms.get(Id(*room)).is_some());
         }
         Some(convert::study_view(view, |room| {
-            self.ticket_of(room).to_text()
+            self.ticket_of(room, number).to_text()
         }))
     }
 
@@ -195,30 +195,37 @@ impl StudyHandle {
             .is_some_and(|it| it.session == session)
     }
 
-    /// The ticket of the participant's seat in a room.
-    pub(super) fn ticket_of(&self, room: Id) -> Token {
-        Token::of_request(room, &SecretHash::from_bytes(self.header.key), &[0; 32])
+    /// The ticket of a participant's seat in a room. One who has no group has the room alone.
+    pub(super) fn ticket_of(&self, room: Id, number: u32) -> Token {
+        let has_group = |study: &Study| {
+            study
+                .participant(number)
+                .is_some_and(|it| it.group.is_some())
+        };
+        let mut member = [0; 32];
+        if self.read(has_group) {
+            member[..4].copy_from_slice(&number.to_be_bytes());
+        }
+        Token::of_request(room, &SecretHash::from_bytes(self.header.key), &member)
     }
 
-    /// Adds participants, or test participants, with these pseudonyms, empty ones by number, and charges
-    /// a caller for their memory. Returns the number of the first.
+    /// Adds participants, and charges a caller for their memory. Returns the number of the first.
     ///
     /// # Errors
     /// The server ends, or (inner result) the request is refused.
     pub async fn add(
         &self,
         key: Key,
-        pseudonyms: Vec<String>,
-        test: bool,
+        new: NewParticipants,
     ) -> Result<Result<u32, NotAdded>, Stopped> {
-        let memory = match self.shared.data.for_participants(key, &pseudonyms) {
+        let memory = match self.shared.data.for_participants(key, &new.pseudonyms) {
             Ok(memory) => memory,
             Err(refused) => return Ok(Err(refused.into())),
         };
         let data = Arc::clone(&self.shared.data);
         let added = self.command(move |study, _| {
             let first = study.next_number();
-            let changes = study.add(&pseudonyms, test)?;
+            let changes = study.add(&new)?;
             // Here, because the caller may go before it gets its answer.
             data.keep_participants(memory);
             Ok((changes, first))
@@ -384,7 +391,8 @@ impl StudyHandle {
         Ok(proceeded)
     }
 
-    /// Withdraws a participant. If its data are to be deleted, returns when they are.
+    /// Withdraws a participant. If its data are to be deleted, returns when they are; at once, if others
+    /// play on in its game, which is over first.
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
@@ -399,6 +407,9 @@ impl StudyHandle {
         });
         if let Err(refusal) = withdrawn.await? {
             return Ok(Err(refusal));
+        }
+        if self.read(|study| study.plays_with_others(number)) {
+            return Ok(Ok(()));
         }
         let mut changes = self.changes();
         while delete_data && self.lock_deleting().contains(&number) {
@@ -433,8 +444,7 @@ impl StudyHandle {
                 return Ok((changes, 0));
             };
             let next = study.next_number();
-            let test = study.participant(number).is_some_and(|it| it.test);
-            changes.extend(study.add(&[String::new()], test)?);
+            changes.extend(study.replacement(number)?);
             data.keep_participants(memory);
             Ok((changes, next))
         });

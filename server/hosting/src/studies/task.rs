@@ -51,6 +51,8 @@ pub struct StudyTask {
     pub(super) without_room: BTreeSet<u32>,
     /// Rooms that were asked to close.
     pub(super) closing: BTreeSet<Id>,
+    /// Rooms that were asked to give up the seat of a participant.
+    pub(super) retired: BTreeSet<(Id, u32)>,
     /// When rooms whose creation failed are tried again.
     pub(super) retry: Option<Instant>,
     /// Those who wait for the deletion of the study, once that is requested.
@@ -137,6 +139,7 @@ impl Journaled for StudyTask {
             playing,
             without_room: BTreeSet::new(),
             closing: BTreeSet::new(),
+            retired: BTreeSet::new(),
             retry: None,
             deletion: Vec::new(),
         }
@@ -201,15 +204,23 @@ impl Journaled for StudyTask {
     async fn follow(&mut self) -> Result<(), StoreError> {
         self.read_ended_games().await?;
         let now_ms = (self.now)();
-        while let Some(change) = self.unit.state.next(now_ms) {
-            self.fold(change);
+        loop {
+            let changes = self.unit.state.next(now_ms);
+            if changes.is_empty() {
+                break;
+            }
+            self.fold_all(changes, now_ms);
         }
         self.place_due_games();
         Ok(())
     }
 
     fn announce(&mut self, changes: &[Change]) {
-        for number in changes.iter().filter_map(Change::number) {
+        let numbers: BTreeSet<u32> = changes.iter().filter_map(Change::number).collect();
+        let others = numbers.iter();
+        let others = others.flat_map(|number| self.unit.state.affected_with(*number));
+        let affected: BTreeSet<u32> = numbers.iter().copied().chain(others).collect();
+        for number in affected {
             self.unit.handle.notify_participant(number);
         }
     }
@@ -325,13 +336,18 @@ impl StudyTask {
         }
         let now_ms = (self.now)();
         let (changes, number) = command(&self.unit.state, now_ms)?;
-        for change in changes {
-            let participant = change.number();
-            self.fold(change);
-            let ended = participant.and_then(|it| self.unit.state.screen_out(it, now_ms));
+        self.fold_all(changes, now_ms);
+        Ok(number)
+    }
+
+    /// Applies changes, and the ends of participants whom they screen out.
+    fn fold_all(&mut self, changes: Vec<Change>, now_ms: u64) {
+        let participants: Vec<u32> = changes.iter().filter_map(Change::number).collect();
+        changes.into_iter().for_each(|change| self.fold(change));
+        for number in participants {
+            let ended = self.unit.state.screen_out(number, now_ms);
             ended.into_iter().for_each(|change| self.fold(change));
         }
-        Ok(number)
     }
 
     fn set_connected(&mut self, number: u32, connected: bool) {
@@ -339,13 +355,19 @@ impl StudyTask {
         self.unit.state.set_connected(number, connected, now_ms);
         (self.unit.handle.committed()).set_connected(number, connected, now_ms);
         self.touched.insert(number);
+        for other in self.unit.state.affected_with(number) {
+            self.unit.handle.notify_participant(other);
+        }
         self.unit.has_changed = true;
     }
 
     /// Applies a change and adds it to the next commit.
     pub(super) fn fold(&mut self, change: Change) {
         self.unit.push(change.clone());
-        self.touched.extend(change.number());
+        if let Some(number) = change.number() {
+            self.touched.insert(number);
+            self.touched.extend(self.unit.state.affected_with(number));
+        }
         match &change {
             Change::Placed { number, .. } => {
                 self.playing.insert(*number);
@@ -377,6 +399,12 @@ impl StudyTask {
     pub(super) fn is_active(&self, number: u32) -> bool {
         let participant = self.unit.state.participant(number);
         participant.is_some_and(|it| it.status == Status::Active)
+    }
+
+    /// Whether the running game of a participant goes on: it, or others of its group, are in the middle
+    /// of the study.
+    pub(super) fn is_played(&self, number: u32) -> bool {
+        self.is_active(number) || self.unit.state.plays_with_others(number)
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use chefshat_study::{Answer, At, ItemAnswer, ParticipantLink, Refusal, Status};
+use chefshat_study::{Answer, At, ItemAnswer, NewParticipants, ParticipantLink, Refusal, Status};
 use tokio::sync::mpsc;
 use tokio::time::advance;
 
@@ -73,6 +73,20 @@ fn at(number: u32, step: usize) -> At {
     }
 }
 
+fn named(pseudonym: &str) -> NewParticipants {
+    NewParticipants {
+        pseudonyms: vec![pseudonym.to_owned()],
+        ..NewParticipants::default()
+    }
+}
+
+fn tests(count: usize) -> NewParticipants {
+    NewParticipants {
+        test: true,
+        ..NewParticipants::numbered(count)
+    }
+}
+
 struct Lab {
     store: Arc<dyn Store>,
     studies: Arc<Studies>,
@@ -107,7 +121,7 @@ impl Lab {
         let created = studies.create(settings, None, Key::Local).await;
         let (study, _) = created.expect("valid settings");
         let added = study
-            .add(Key::Local, vec![String::new(); participants], false)
+            .add(Key::Local, NewParticipants::numbered(participants))
             .await;
         assert_eq!(added.expect("it runs"), Ok(1));
         Self {
@@ -413,7 +427,7 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
         assert_eq!(withdrawn.expect("it runs"), Ok(()));
     }
     assert_eq!(rows().await, 1, "rewritten");
-    let added = lab.study.add(Key::Local, vec!["Ada".into()], false).await;
+    let added = lab.study.add(Key::Local, named("Ada")).await;
     assert_eq!(added.expect("it runs"), Ok(3));
     assert_eq!(rows().await, 2);
     lab.studies.end();
@@ -426,7 +440,7 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
     assert_eq!(rows().await, 2, "nothing is left to delete");
 
     // A server that ended right after the withdrawals.
-    let added = study.add(Key::Local, vec!["Bo".into()], false).await;
+    let added = study.add(Key::Local, named("Bo")).await;
     assert_eq!(added.expect("it runs"), Ok(4));
     studies.end();
     let withdrew = |number| chefshat_study::Change::Withdrew {
@@ -502,7 +516,7 @@ fn tables(files: &BTreeMap<String, Vec<u8>>) -> Tables {
 async fn a_test_participant_ends_its_game_and_goes_on_and_nobody_waits_for_it() {
     let lab = Lab::new().await;
     let (study, rooms) = (&lab.study, lab.studies.rooms());
-    let added = study.add(Key::Local, vec![String::new(); 2], true).await;
+    let added = study.add(Key::Local, tests(2)).await;
     let number = added.expect("it runs").expect("there is space");
     // Another one is in the middle of the study to its end.
     assert_eq!(lab.open(number + 1).await, Ok(1));
@@ -654,7 +668,7 @@ async fn the_data_have_a_row_of_every_item_shown_and_a_codebook() {
         answered.expect("it runs").expect("they are valid");
     }
 
-    let tested = lab.study.add(Key::Local, vec![String::new()], true).await;
+    let tested = lab.study.add(Key::Local, tests(1)).await;
     assert_eq!(tested.expect("it runs"), Ok(5));
     let files = exported(&lab, false).await;
     let tables = tables(&files);
@@ -892,7 +906,7 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
     let (studies, store) = (&lab.studies, &lab.store);
     let created = studies.create(long_answers(49), None, Key::Local).await;
     let (study, _) = created.expect("valid settings");
-    let added = study.add(Key::Local, vec![String::new(); 2], false).await;
+    let added = study.add(Key::Local, NewParticipants::numbered(2)).await;
     assert_eq!(added.expect("it runs"), Ok(1));
     assert_eq!(
         study.open(Key::Local, 1, None).await.expect("it runs"),
@@ -967,14 +981,14 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
     assert!(resumed.common.data.taken() <= MAX_STUDY_DATA);
     let free = MAX_STUDY_DATA - resumed.common.data.taken();
     let others = resumed.common.data.take_many_anyway(Key::Local, free);
-    let one_more = study.add(address(200), vec![String::new()], false).await;
+    let one_more = study.add(address(200), NewParticipants::numbered(1)).await;
     assert!(
         matches!(&one_more, Ok(Err(NotAdded::Memory(it))) if it.reason == "TOO_MANY_PARTICIPANTS"),
         "{one_more:?}"
     );
 
     drop(others);
-    let added = study.add(address(200), vec![String::new()], false).await;
+    let added = study.add(address(200), NewParticipants::numbered(1)).await;
     assert_eq!(added.expect("it runs"), Ok(3));
 
     // What is deleted is free again.
@@ -990,4 +1004,58 @@ async fn answers_and_participants_take_a_bounded_memory_that_callers_share() {
     let left = resumed.common.data.taken();
     let participants = 2 * 2 * size_of::<chefshat_study::Participant>() + 4 * "P01".len();
     assert_eq!(left, participants, "those of the other study");
+}
+
+/// The settings of a study with pairs.
+fn in_pairs() -> v1::StudySettings {
+    use v1::study_stage::Stage;
+    let mut settings = settings();
+    settings.participants = 4;
+    settings.conditions[0].seats.truncate(2);
+    settings.groups = Some(v1::StudyGroups {
+        size: 2,
+        wait_ms: 30_000,
+        left_over: v1::StudyLeftOver::Dismiss.into(),
+    });
+    let arrival = v1::StudyStage {
+        stage: Some(Stage::Arrival(v1::StudyArrival::default())),
+        ..v1::StudyStage::default()
+    };
+    settings.stages.insert(1, arrival);
+    settings
+}
+
+#[tokio::test(start_paused = true)]
+async fn pairs_are_formed_and_who_waits_too_long_is_left_over() {
+    let lab = Lab::with(&ServerConfig::default(), in_pairs(), 3).await;
+    let mut present = Vec::new();
+    for number in [3, 1, 2] {
+        assert_eq!(lab.open(number).await, Ok(1));
+        present.push(lab.study.present(number, 1).await);
+        let consented = lab.study.consent(at(number, 0)).await;
+        assert_eq!(consented.expect("it runs"), Ok(0));
+        lab.settled().await;
+    }
+    let groups = |study: &Study| [1, 2, 3].map(|number| study.participants()[&number].group);
+    assert_eq!(lab.study.read(groups), [Some(1), None, Some(1)]);
+    let rooms = |study: &Study| {
+        let games = |number| &study.participants()[&number].games;
+        [1, 3].map(|number| {
+            games(number)
+                .iter()
+                .map(|it| it.placed.room)
+                .collect::<Vec<_>>()
+        })
+    };
+    let [one, other] = lab.study.read(rooms);
+    assert_eq!((one.len(), &one), (1, &other));
+    // Nothing is due before the time is up.
+    lab.settled().await;
+    let before = polls()[&LongTask::Study];
+    tokio::time::sleep(Duration::from_millis(29_000)).await;
+    assert!(polls()[&LongTask::Study] <= before + 1);
+    assert_eq!(lab.status(2), Status::Active);
+    tokio::time::sleep(Duration::from_millis(1_001)).await;
+    lab.until(2, Status::LeftOver).await;
+    drop(present);
 }

@@ -159,9 +159,9 @@ impl Seats {
                 let seat = self.of_an_agent("substituted", substituted.seat)?;
                 let policy = header.policy.as_ref().map(|policy| &policy.substitute);
                 let for_good = substituted.for_good;
-                if for_good && header.tournament_id.is_empty() {
+                if for_good && !may_leave_for_good(header, substituted.seat) {
                     return Err(format!(
-                        "seat {seat} is substituted for good, which only happens in a tournament"
+                        "seat {seat} is substituted for good, which only happens in a tournament, or in the group of a study"
                     ));
                 }
                 let already = match for_good {
@@ -391,6 +391,16 @@ pub(crate) fn game_started(header: &v1::RecordHeader, rules: &RuleSet) -> v1::Ga
         hand_size: rules.hand_size().into(),
         seed_commitment: header.seed_commitment.clone(),
     }
+}
+
+/// Whether the participant of a seat can leave a game that goes on without it: in a tournament, and in
+/// the group of a study.
+fn may_leave_for_good(header: &v1::RecordHeader, seat: u32) -> bool {
+    let study = header.study.as_ref().filter(|study| study.group > 0);
+    let is_of_group = study.is_some_and(|study| {
+        study.seat == seat || study.others.iter().any(|other| other.seat == seat)
+    });
+    !header.tournament_id.is_empty() || is_of_group
 }
 
 #[cfg(test)]

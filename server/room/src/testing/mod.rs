@@ -15,7 +15,7 @@ use chefshat_engine::{
 use crate::ids::{Id, SecretHash};
 use crate::journal::{
     Change, Decided, Entry, Fill, GameHeader, GameStart, ParticipantKind, Report, ReportSource,
-    Reported, SeatLabels, SeatedParticipant, StudyGame,
+    Reported, SeatLabels, SeatedParticipant, StudyGame, StudyMember,
 };
 use crate::log::RoomEvent;
 use crate::policy::Policy;
@@ -323,15 +323,23 @@ pub fn study_game(labels: SeatLabels) -> StudyGame {
         name: "study".into(),
         condition: "condition".into(),
         levels: [("factor".to_owned(), "level".to_owned())].into(),
-        number: 1,
-        participant: "Ana".into(),
-        session: 1,
+        members: vec![study_member(1, "Ana", 0)],
+        group: None,
         step: 0,
         practice: false,
         seed_index: Some(0),
-        seat: Seat::new(0),
         attempt: 1,
         labels,
+    }
+}
+
+/// A participant of a study.
+pub fn study_member(number: u32, participant: &str, seat: usize) -> StudyMember {
+    StudyMember {
+        number,
+        participant: participant.into(),
+        session: 1,
+        seat: Seat::new(seat),
     }
 }
 

@@ -11,7 +11,7 @@ use prost::Message;
 use super::entry::{number_of, value_of};
 use super::{Unreadable, action, array, check_form};
 use chefshat_room::ids::{Id, SecretHash};
-use chefshat_room::journal::{GameHeader, SeatLabels, StudyGame, TournamentGame};
+use chefshat_room::journal::{GameHeader, SeatLabels, StudyGame, StudyMember, TournamentGame};
 use chefshat_wire::convert;
 
 #[derive(Clone, PartialEq, Message)]
@@ -93,6 +93,24 @@ struct StudyForm {
     attempt: u32,
     #[prost(uint32, tag = "13")]
     labels: u32,
+    /// 0: none.
+    #[prost(uint32, tag = "14")]
+    group: u32,
+    /// Its participants but the first.
+    #[prost(message, repeated, tag = "15")]
+    others: Vec<MemberForm>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct MemberForm {
+    #[prost(uint32, tag = "1")]
+    number: u32,
+    #[prost(string, tag = "2")]
+    participant: String,
+    #[prost(uint32, tag = "3")]
+    session: u32,
+    #[prost(uint32, tag = "4")]
+    seat: u32,
 }
 
 /// The labels of seats, with their numbers.
@@ -141,41 +159,62 @@ pub(crate) fn header_to_bytes(header: &GameHeader) -> Vec<u8> {
 }
 
 fn study_to_form(game: &StudyGame) -> StudyForm {
+    let mut members = game.members.iter().map(|member| MemberForm {
+        number: member.number,
+        participant: member.participant.clone(),
+        session: member.session,
+        seat: seat_number(member.seat),
+    });
+    let first = members.next().unwrap_or_default();
     StudyForm {
         study: game.study.0.to_vec(),
         name: game.name.clone(),
         condition: game.condition.clone(),
         levels: game.levels.clone(),
-        number: game.number,
-        participant: game.participant.clone(),
-        session: game.session,
+        number: first.number,
+        participant: first.participant,
+        session: first.session,
         step: game.step,
         practice: game.practice,
         seed_index: game.seed_index,
-        seat: seat_number(game.seat),
+        seat: first.seat,
         attempt: game.attempt,
         labels: number_of(&LABELS, &game.labels),
+        group: game.group.unwrap_or(0),
+        others: members.collect(),
     }
 }
 
+fn member_from_form(form: MemberForm) -> Result<StudyMember, Unreadable> {
+    let seat = usize::try_from(form.seat).ok();
+    let seat = seat.filter(|seat| *seat < MAX_SEATS);
+    let seat = seat.ok_or_else(|| Unreadable::new("the participant's seat does not exist"))?;
+    Ok(StudyMember {
+        number: form.number,
+        participant: form.participant,
+        session: form.session,
+        seat: Seat::new(seat),
+    })
+}
+
 fn study_from_form(form: StudyForm) -> Result<StudyGame, Unreadable> {
-    let seat = usize::try_from(form.seat)
-        .ok()
-        .filter(|seat| *seat < MAX_SEATS);
+    let first = MemberForm {
+        number: form.number,
+        participant: form.participant,
+        session: form.session,
+        seat: form.seat,
+    };
+    let members = std::iter::once(first).chain(form.others);
     Ok(StudyGame {
         study: Id(array(&form.study, "the study's id")?),
         name: form.name,
         condition: form.condition,
         levels: form.levels,
-        number: form.number,
-        participant: form.participant,
-        session: form.session,
+        members: members.map(member_from_form).collect::<Result<_, _>>()?,
+        group: Some(form.group).filter(|group| *group > 0),
         step: form.step,
         practice: form.practice,
         seed_index: form.seed_index,
-        seat: seat
-            .map(Seat::new)
-            .ok_or_else(|| Unreadable::new("the participant's seat does not exist"))?,
         attempt: form.attempt,
         labels: value_of(&LABELS, form.labels, "labels of seats")?,
     })

@@ -31,7 +31,10 @@ struct HeaderForm {
 
 #[derive(Clone, PartialEq, Message)]
 struct ChangeForm {
-    #[prost(oneof = "KindForm", tags = "1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13")]
+    #[prost(
+        oneof = "KindForm",
+        tags = "1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15"
+    )]
     kind: Option<KindForm>,
 }
 
@@ -63,6 +66,10 @@ enum KindForm {
     Saved(AnsweredForm),
     #[prost(message, tag = "13")]
     ScreenedOut(MarkForm),
+    #[prost(message, tag = "14")]
+    Grouped(GroupedForm),
+    #[prost(message, tag = "15")]
+    LeftOver(MarkForm),
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -75,6 +82,22 @@ struct AddedForm {
     joined: Option<JoinedForm>,
     #[prost(bool, tag = "4")]
     test: bool,
+    #[prost(uint32, optional, tag = "5")]
+    planned: Option<u32>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct GroupedForm {
+    #[prost(uint32, tag = "1")]
+    number: u32,
+    #[prost(uint32, tag = "2")]
+    group: u32,
+    #[prost(uint32, tag = "3")]
+    slot: u32,
+    #[prost(uint32, tag = "4")]
+    passed_over: u32,
+    #[prost(uint64, tag = "5")]
+    at_ms: u64,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -376,6 +399,7 @@ fn kind_of(change: &Change) -> KindForm {
             pseudonym,
             joined,
             test,
+            planned,
         } => KindForm::Added(AddedForm {
             number: *number,
             pseudonym: pseudonym.clone(),
@@ -384,6 +408,7 @@ fn kind_of(change: &Change) -> KindForm {
                 panel_id: joined.panel_id.clone(),
             }),
             test: *test,
+            planned: *planned,
         }),
         Change::Opened {
             number,
@@ -449,6 +474,20 @@ fn kind_of(change: &Change) -> KindForm {
             passed_over: *passed_over,
             ..mark(number, at_ms, *step_over)
         }),
+        Change::Grouped {
+            number,
+            group,
+            slot,
+            passed_over,
+            at_ms,
+        } => KindForm::Grouped(GroupedForm {
+            number: *number,
+            group: *group,
+            slot: *slot,
+            passed_over: *passed_over,
+            at_ms: *at_ms,
+        }),
+        Change::LeftOver { number, at_ms } => KindForm::LeftOver(mark(number, at_ms, false)),
         Change::DroppedOut { number, at_ms } => KindForm::DroppedOut(mark(number, at_ms, false)),
         Change::ScreenedOut { number, at_ms } => KindForm::ScreenedOut(mark(number, at_ms, false)),
         Change::Withdrew {
@@ -474,6 +513,7 @@ fn change_of(kind: KindForm) -> Result<Change, Unreadable> {
                 }),
             },
             test: form.test,
+            planned: form.planned,
         },
         KindForm::Opened(form) => Change::Opened {
             number: form.number,
@@ -529,6 +569,17 @@ fn change_of(kind: KindForm) -> Result<Change, Unreadable> {
             at_ms: form.at_ms,
         },
         KindForm::DroppedOut(form) => Change::DroppedOut {
+            number: form.number,
+            at_ms: form.at_ms,
+        },
+        KindForm::Grouped(form) => Change::Grouped {
+            number: form.number,
+            group: form.group,
+            slot: form.slot,
+            passed_over: form.passed_over,
+            at_ms: form.at_ms,
+        },
+        KindForm::LeftOver(form) => Change::LeftOver {
             number: form.number,
             at_ms: form.at_ms,
         },

@@ -26,9 +26,10 @@ use crate::{Keep, Part, Store, StoredGame};
 use chefshat_room::ids::{Id, SecretHash};
 use chefshat_room::journal::{
     AbortReason, Branch, Change, Decided, Entry, Fill, GameHeader, GameStart, Marked,
-    ParticipantKind, RecordedSeat, SeatedParticipant, Source, TakenOver,
+    ParticipantKind, RecordedSeat, SeatLabels, SeatedParticipant, Source, StudyGame, TakenOver,
 };
 use chefshat_room::policy::{Durability, Policy};
+use chefshat_room::testing::{study_game, study_member};
 
 fn header(game: u8, durability: Durability) -> GameHeader {
     GameHeader {
@@ -629,6 +630,11 @@ fn fields_added_later_are_read_back() {
     let header = GameHeader {
         display_names: BTreeMap::from([(2, "Greta".to_owned())]),
         policy: Policy::default(),
+        study: Some(Arc::new(StudyGame {
+            members: vec![study_member(3, "P03", 1), study_member(5, "P05", 3)],
+            group: Some(2),
+            ..study_game(SeatLabels::Players)
+        })),
         ..header(1, Durability::Durable)
     };
     let read = form::header_from_bytes(&form::header_to_bytes(&header)).expect("readable");

@@ -1,6 +1,7 @@
 //! What retention leaves alone, in each store.
 
 use chefshat_room::journal::{GameHeader, StudyGame, TournamentGame};
+use chefshat_room::testing::study_member;
 use chefshat_tournament::Change as TournamentChange;
 
 use super::*;
@@ -24,13 +25,11 @@ fn header_of(game: u8, of: Of, durability: Durability) -> Arc<GameHeader> {
         name: "a study".into(),
         condition: "slow".into(),
         levels: Default::default(),
-        number: 1,
-        participant: "P1".into(),
-        session: 1,
+        members: vec![study_member(1, "P1", 0)],
+        group: None,
         step: 0,
         practice: false,
         seed_index: None,
-        seat: chefshat_engine::Seat::new(0),
         attempt: 1,
         labels: Default::default(),
     };

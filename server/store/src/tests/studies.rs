@@ -26,6 +26,7 @@ fn added(number: u32) -> Change {
         pseudonym: format!("Pseudonym {number}"),
         joined: None,
         test: false,
+        planned: None,
     }
 }
 
@@ -56,7 +57,16 @@ fn every_change() -> Vec<Change> {
                 panel_id: "5f2".to_owned(),
             }),
             test: true,
+            planned: Some(1),
         },
+        Change::Grouped {
+            number,
+            group: 3,
+            slot: 7,
+            passed_over: 1,
+            at_ms,
+        },
+        Change::LeftOver { number, at_ms },
         Change::Opened {
             number,
             slot: Some(0),

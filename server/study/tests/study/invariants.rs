@@ -50,7 +50,7 @@ fn happen(lab: &mut Lab, (kind, who): Event) {
             lab.act(number);
         }
         10 if is_active && lab.study.due(number).is_some() => {
-            lab.fold(lab.place(number));
+            lab.place(number).into_iter().for_each(|it| lab.fold(it));
             let aborted = lab.ended(number, Outcome::Aborted);
             lab.fold(aborted);
         }

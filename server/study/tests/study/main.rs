@@ -6,6 +6,7 @@
 )]
 
 mod games;
+mod groups;
 mod invariants;
 mod participants;
 mod questionnaires;

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use chefshat_study::testing::{settings, within};
-use chefshat_study::{At, Content, End, Refusal, Settings, Status, Study};
+use chefshat_study::{At, Content, End, NewParticipants, Refusal, Settings, Status, Study};
 
-use super::support::Lab;
+use super::support::{Lab, tests};
 
 fn status(lab: &Lab, number: u32) -> Status {
     lab.study.participant(number).unwrap().status
@@ -13,6 +13,13 @@ fn status(lab: &Lab, number: u32) -> Status {
 
 fn slot(lab: &Lab, number: u32) -> Option<u32> {
     lab.study.participant(number).unwrap().slot
+}
+
+fn named(names: &[String]) -> NewParticipants {
+    NewParticipants {
+        pseudonyms: names.to_vec(),
+        ..NewParticipants::default()
+    }
 }
 
 /// The end of a participation without an address to go on to.
@@ -252,7 +259,10 @@ fn a_full_or_closed_study_accepts_nobody() {
     lab.wait(1_000_000);
     assert!(lab.study.is_closed() && lab.study.close().is_none());
     assert_eq!(lab.open(2), Err(Refusal::Closed));
-    assert_eq!(lab.study.add(&[String::new()], false), Err(Refusal::Closed));
+    assert_eq!(
+        lab.study.add(&NewParticipants::numbered(1)),
+        Err(Refusal::Closed)
+    );
     // Who has begun continues, also in a new session.
     lab.complete(1);
     assert_eq!(status(&lab, 1), Status::Completed);
@@ -281,7 +291,7 @@ fn a_study_closes_when_its_data_are_deleted_and_not_after_that() {
 fn pseudonyms_are_unique_and_follow_from_numbers() {
     let mut lab = Lab::new(settings(), 1);
     let names = ["p04", "", "", "Ada"].map(str::to_owned);
-    for change in lab.study.add(&names, false).unwrap() {
+    for change in lab.study.add(&named(&names)).unwrap() {
         lab.fold(change);
     }
     let participants = lab.study.participants().values();
@@ -289,12 +299,12 @@ fn pseudonyms_are_unique_and_follow_from_numbers() {
     assert_eq!(pseudonyms, ["P01", "p04", "P03", "P05", "Ada"]);
     for taken in [&["ada".to_owned()][..], &["Bo".to_owned(), "BO".to_owned()]] {
         assert!(matches!(
-            lab.study.add(taken, false),
+            lab.study.add(&named(taken)),
             Err(Refusal::NameTaken(_))
         ));
     }
     let most = chefshat_study::MAX_PARTICIPANTS as usize;
-    let too_many = lab.study.add(&vec![String::new(); most], false);
+    let too_many = lab.study.add(&NewParticipants::numbered(most));
     assert_eq!(too_many, Err(Refusal::TooManyParticipants));
 }
 
@@ -303,7 +313,7 @@ fn test_participants_take_no_slot_from_others_and_may_go_on_without_answers() {
     let mut settings = within(2);
     settings.participants = 2;
     let mut lab = Lab::new(settings, 1);
-    for change in lab.study.add(&vec![String::new(); 3], true).unwrap() {
+    for change in lab.study.add(&tests(3)).unwrap() {
         lab.fold(change);
     }
     lab.add(2);
@@ -340,7 +350,7 @@ fn test_participants_take_no_slot_from_others_and_may_go_on_without_answers() {
     assert_eq!(lab.folded_again(), lab.study);
 
     // A questionnaire is passed over in a test alone.
-    for change in lab.study.add(&[String::new()], true).unwrap() {
+    for change in lab.study.add(&tests(1)).unwrap() {
         lab.fold(change);
     }
     let mut skipped = Vec::new();

@@ -18,6 +18,7 @@ fn recruited() -> Settings {
             left_url: "https://panel.example/left".to_owned(),
             full_url: "https://panel.example/full?id={id}".to_owned(),
             screened_out_url: String::new(),
+            left_over_url: String::new(),
         },
         ..settings()
     }

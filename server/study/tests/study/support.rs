@@ -1,14 +1,22 @@
 //! A study that tests move on, with the changes it has folded.
 
 use chefshat_study::{
-    Answer, At, Change, Content, Device, DueGame, ItemAnswer, ItemKind, Outcome, Pointer, Refusal,
-    Settings, Study,
+    Answer, At, Change, Content, Device, DueGame, ItemAnswer, ItemKind, NewParticipants, Outcome,
+    Pointer, Refusal, Settings, Study,
 };
 
 pub(crate) struct Lab {
     pub(crate) study: Study,
     pub(crate) changes: Vec<Change>,
     pub(crate) now_ms: u64,
+}
+
+/// Test participants.
+pub(crate) fn tests(count: usize) -> NewParticipants {
+    NewParticipants {
+        test: true,
+        ..NewParticipants::numbered(count)
+    }
 }
 
 /// Everybody's device.
@@ -46,7 +54,7 @@ impl Lab {
     }
 
     pub(crate) fn add(&mut self, count: usize) {
-        let added = self.study.add(&vec![String::new(); count], false).unwrap();
+        let added = self.study.add(&NewParticipants::numbered(count)).unwrap();
         added.into_iter().for_each(|change| self.fold(change));
     }
 
@@ -67,8 +75,12 @@ impl Lab {
     /// Folds what follows by itself.
     pub(crate) fn wait(&mut self, ms: u64) {
         self.now_ms += ms;
-        while let Some(change) = self.study.next(self.now_ms) {
-            self.fold(change);
+        loop {
+            let changes = self.study.next(self.now_ms);
+            if changes.is_empty() {
+                return;
+            }
+            changes.into_iter().for_each(|change| self.fold(change));
         }
     }
 
@@ -96,7 +108,12 @@ impl Lab {
                 let answers = answers.map(|it| answer(it.item, valid(&it.kind))).collect();
                 self.study.answer(at, answers, now_ms).unwrap()
             }
-            Content::Game(game) if game.place.is_none() => self.place(number),
+            Content::Game(game) if game.place.is_none() => {
+                self.place(number).into_iter().for_each(|it| self.fold(it));
+                return due;
+            }
+            // Its group comes by itself.
+            Content::Arrival(_) => return None,
             Content::Game(game) if !game.ended => self.ended(number, Outcome::Finished),
             Content::Game(_) | Content::External(_) | Content::Text(_) => {
                 self.study.proceed(at, now_ms).unwrap()
@@ -107,12 +124,12 @@ impl Lab {
         due
     }
 
-    /// The change by which a participant's due game begins.
-    pub(crate) fn place(&self, number: u32) -> Change {
+    /// The changes by which the due game of a participant, and of its group, begins.
+    pub(crate) fn place(&self, number: u32) -> Vec<Change> {
         // Every game has its own id: there are fewer than 256 changes of a participant in a test.
         let games = self.study.participant(number).unwrap().games.len() as u8;
         let game = [games, number as u8].repeat(8).try_into().unwrap();
-        self.study.place(number, [9; 16], game).unwrap()
+        self.study.place(number, [9; 16], game)
     }
 
     /// The change by which a participant's running game ends.

@@ -1,7 +1,9 @@
 //! What participants see.
 
 use chefshat_study::testing::settings;
-use chefshat_study::{Content, ExternalQuestionnaire, Hide, Language, Stage, Task, Template, View};
+use chefshat_study::{
+    Content, ExternalQuestionnaire, Hide, Language, NewParticipants, Stage, Task, Template, View,
+};
 
 use super::support::Lab;
 
@@ -77,7 +79,10 @@ fn a_pseudonym_cannot_add_to_the_address_of_an_external_questionnaire() {
     let mut lab = Lab::new(settings, 0);
     for change in lab
         .study
-        .add(&["a&x=2 è{participant}".to_owned()], false)
+        .add(&NewParticipants {
+            pseudonyms: vec!["a&x=2 è{participant}".to_owned()],
+            ..NewParticipants::default()
+        })
         .unwrap()
     {
         lab.fold(change);

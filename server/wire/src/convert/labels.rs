@@ -58,7 +58,7 @@ pub(super) fn shown_substitute(core: &Core) -> String {
 }
 
 /// The name and kind of the participant of a seat, as they are shown. The participant of the study
-/// keeps its own.
+/// keeps its own; those of a group do not, because all see the same.
 pub(super) fn shown_name(
     core: &Core,
     seat: Seat,
@@ -66,10 +66,9 @@ pub(super) fn shown_name(
     kind: Option<ParticipantKind>,
 ) -> (String, Option<ParticipantKind>) {
     let number = seat.index() + 1;
-    let is_own = (core.header().study.as_ref()).is_some_and(|game| game.seat == seat);
     match (core.header().labels(), kind) {
+        (_, kind) if !core.header().is_hidden(seat) => (name.to_owned(), kind),
         (SeatLabels::AsTheyAre, _) => (name.to_owned(), kind),
-        (_, kind) if is_own => (name.to_owned(), kind),
         (SeatLabels::Players, _) => (format!("Player {number}"), None),
         // The seat is free.
         (SeatLabels::Kinds, None) => (String::new(), None),

@@ -11,10 +11,10 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::{Fill, ParticipantKind, SeatLabels};
 use chefshat_room::policy::{Durability, Policy, Visibility};
 use chefshat_study::{
-    AnswerSet, Condition, Consent, Device, ExternalQuestionnaire, Factor, Hide, Item, ItemKind,
-    Labels, Language, Order, Outcome, Part, Participant, PlayedGame, Pointer, Questionnaire,
-    Recruiting, ScreenOut, Settings, SettingsProblem, ShownIf, Stage, Status, Study, Task,
-    Template, Text,
+    AnswerSet, Arrival, Condition, Consent, Device, ExternalQuestionnaire, Factor, Groups, Hide,
+    Item, ItemKind, Labels, Language, LeftOver, Order, Outcome, Part, Participant, PlayedGame,
+    Pointer, Questionnaire, Recruiting, ScreenOut, Settings, SettingsProblem, ShownIf, Stage,
+    Status, Study, Task, Template, Text,
 };
 
 use super::agent::check_budget;
@@ -28,6 +28,8 @@ pub const MAX_HOSTED_SHIFTS: u32 = chefshat_vector::Limits::OF_SERVER.recorded_s
 
 /// How long a participant may be away by default, milliseconds.
 const DEFAULT_DROP_OUT_MS: u64 = 1_800_000;
+/// How long participants wait for others by default, milliseconds.
+const DEFAULT_WAIT_MS: u64 = 600_000;
 /// Longest text for programs of the researcher, characters.
 const MAX_ROBOT_BEHAVIOUR: usize = 2000;
 
@@ -95,6 +97,14 @@ pub fn complete_settings(
         message.drop_out_after_ms = DEFAULT_DROP_OUT_MS;
     }
     message.recruiting.get_or_insert_default();
+    if let Some(groups) = &mut message.groups {
+        if groups.wait_ms == 0 {
+            groups.wait_ms = DEFAULT_WAIT_MS;
+        }
+        if groups.left_over() == v1::StudyLeftOver::Unspecified {
+            groups.left_over = v1::StudyLeftOver::Dismiss.into();
+        }
+    }
     for (index, condition) in message.conditions.iter_mut().enumerate() {
         complete_condition(&format!("conditions[{index}]"), condition, durable)?;
     }
@@ -208,10 +218,13 @@ fn complete_questionnaire(
 /// # Errors
 /// The first invalid field.
 pub fn study_plan(message: &v1::StudySettings) -> Result<StudyPlan, SettingsProblem> {
+    let groups = message.groups.as_ref().map(groups).transpose()?;
+    let group_size = groups.map_or(1, |groups| groups.size as usize);
     let mut plans = Vec::new();
     let mut conditions = Vec::new();
     for (index, condition) in message.conditions.iter().enumerate() {
-        let (condition, plan) = condition_of(&format!("conditions[{index}]"), condition)?;
+        let field = format!("conditions[{index}]");
+        let (condition, plan) = condition_of(&field, condition, group_size)?;
         conditions.push(condition);
         plans.push(plan);
     }
@@ -247,6 +260,7 @@ pub fn study_plan(message: &v1::StudySettings) -> Result<StudyPlan, SettingsProb
             closes_at_ms: Some(message.closes_at_ms).filter(|at_ms| *at_ms > 0),
             deletes_at_ms: Some(message.deletes_at_ms).filter(|at_ms| *at_ms > 0),
             recruiting: recruiting(message.recruiting.clone().unwrap_or_default()),
+            groups,
         }),
         name: message.name.clone(),
         conditions: plans,
@@ -295,12 +309,27 @@ fn recruiting(message: v1::StudyRecruiting) -> Recruiting {
         left_url: message.left_url,
         full_url: message.full_url,
         screened_out_url: message.screened_out_url,
+        left_over_url: message.left_over_url,
     }
+}
+
+fn groups(message: &v1::StudyGroups) -> Result<Groups, SettingsProblem> {
+    let left_over = match v1::StudyLeftOver::try_from(message.left_over) {
+        Ok(v1::StudyLeftOver::Unspecified | v1::StudyLeftOver::Dismiss) => LeftOver::Dismiss,
+        Ok(v1::StudyLeftOver::Agents) => LeftOver::Agents,
+        Err(_) => return Err(problem("groups.left_over", "choose DISMISS or AGENTS")),
+    };
+    Ok(Groups {
+        size: message.size,
+        wait_ms: message.wait_ms,
+        left_over,
+    })
 }
 
 fn condition_of(
     field: &str,
     message: &v1::StudyCondition,
+    group_size: usize,
 ) -> Result<(Condition, ConditionPlan), SettingsProblem> {
     let rules_message = message.rules.clone().unwrap_or_default();
     let rules =
@@ -314,20 +343,25 @@ fn condition_of(
         .map_err(|it| inner(&format!("{field}.policy."), &it))?;
     let players = rules.players();
     let seats_field = format!("{field}.seats");
-    if message.seats.len() + 1 != players {
-        let words = format!(
-            "{} other seats are described, but the rule set has {players} players, of whom one is the participant",
-            message.seats.len()
-        );
+    if message.seats.len().saturating_add(group_size) != players {
+        let others = message.seats.len();
+        let words = match group_size {
+            1 => format!(
+                "{others} other seats are described, but the rule set has {players} players, of whom one is the participant"
+            ),
+            _ => format!(
+                "{others} other seats are described, but the rule set has {players} players, of whom {group_size} are a group of participants"
+            ),
+        };
         return Err(problem(seats_field, words));
     }
     let of_seats = |it: FieldProblem| problem(seats_field.clone(), it.message);
     let mut seats = message.seats.clone();
     // Only the number of seats counts here.
-    seats.push(v1::SeatConfig::default());
+    seats.resize_with(players, v1::SeatConfig::default);
     let mut fills = fills_from_proto(&seats, &rules).map_err(of_seats)?;
     let names = display_names_from_proto(&seats).map_err(of_seats)?;
-    fills.pop();
+    fills.truncate(message.seats.len());
     for fill in &fills {
         match fill {
             Fill::Open { .. } => {}
@@ -486,6 +520,9 @@ fn task_of(field: &str, message: &v1::StudyStage) -> Result<Task, SettingsProble
             title: text.title.clone(),
             text: text.text.clone(),
         }),
+        Some(Message::Arrival(arrival)) => Task::Arrival(Arrival {
+            text: arrival.text.clone(),
+        }),
         Some(Message::ScreenOut(out)) => Task::ScreenOut(ScreenOut {
             text: out.text.clone(),
         }),
@@ -635,7 +672,11 @@ pub fn study_to_proto(
             Status::Invited => 0,
             Status::Active => 1,
             Status::Completed => 2,
-            Status::Withdrawn | Status::DroppedOut | Status::Removed | Status::ScreenedOut => 3,
+            Status::Withdrawn
+            | Status::DroppedOut
+            | Status::Removed
+            | Status::ScreenedOut
+            | Status::LeftOver => 3,
         }] += 1;
     }
     let [invited, active, completed, left] = counts;
@@ -696,6 +737,7 @@ pub fn study_participant(
         data_deleted: participant.data_deleted,
         panel_id: participant.panel_id().to_owned(),
         test: participant.test,
+        group: participant.group.unwrap_or(0),
     })
 }
 
@@ -747,6 +789,7 @@ pub fn participant_state(status: Status) -> v1::StudyParticipantState {
         Status::DroppedOut => v1::StudyParticipantState::DroppedOut,
         Status::Removed => v1::StudyParticipantState::Removed,
         Status::ScreenedOut => v1::StudyParticipantState::ScreenedOut,
+        Status::LeftOver => v1::StudyParticipantState::LeftOver,
     }
 }
 

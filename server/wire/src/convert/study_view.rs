@@ -40,6 +40,12 @@ pub fn study_view(view: View, ticket_of: impl FnOnce(Id) -> String) -> v1::Study
                 text: text.text,
             }),
             Content::Game(game) => Message::Game(shown_game(&game, ticket_of)),
+            Content::Arrival(arrival) => Message::Arrival(v1::StudyShownArrival {
+                text: arrival.text,
+                size: arrival.size,
+                here: arrival.here,
+                wait_ms: arrival.wait_ms,
+            }),
             Content::End { reason, url, text } => Message::End(v1::StudyEnd {
                 reason: end_reason(reason).into(),
                 url: url.unwrap_or_default(),
@@ -109,6 +115,7 @@ fn shown_game(game: &ShownGame, ticket_of: impl FnOnce(Id) -> String) -> v1::Stu
         ticket,
         ended: game.ended,
         labelled: game.labelled,
+        waits_for: game.waits_for,
     }
 }
 
@@ -120,6 +127,7 @@ fn end_reason(end: End) -> v1::StudyEndReason {
         End::DroppedOut => v1::StudyEndReason::DroppedOut,
         End::Removed => v1::StudyEndReason::Removed,
         End::ScreenedOut => v1::StudyEndReason::ScreenedOut,
+        End::LeftOver => v1::StudyEndReason::LeftOver,
     }
 }
 

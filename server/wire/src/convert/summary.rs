@@ -39,6 +39,13 @@ pub(super) fn record_header(core: &Core) -> v1::RecordHeader {
 }
 
 fn study_record(game: &StudyGame) -> v1::StudyRecord {
+    let mut members = game.members.iter().map(|member| v1::StudyRecordMember {
+        number: member.number,
+        participant: member.participant.clone(),
+        session: member.session,
+        seat: seat_number(member.seat),
+    });
+    let first = members.next().unwrap_or_default();
     v1::StudyRecord {
         study_id: game.study.to_string(),
         name: game.name.clone(),
@@ -49,14 +56,16 @@ fn study_record(game: &StudyGame) -> v1::StudyRecord {
                 level: level.clone(),
             })
             .collect(),
-        number: game.number,
-        participant: game.participant.clone(),
-        session: game.session,
+        number: first.number,
+        participant: first.participant,
+        session: first.session,
         step: game.step,
         practice: game.practice,
         seed_index: game.seed_index,
-        seat: seat_number(game.seat),
+        seat: first.seat,
         attempt: game.attempt,
+        group: game.group.unwrap_or(0),
+        others: members.collect(),
     }
 }
 

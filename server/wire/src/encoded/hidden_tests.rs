@@ -17,7 +17,7 @@ use chefshat_referee::{Report, SeenCards};
 use chefshat_room::journal::{Change, Fill, GameHeader, ParticipantKind, SeatLabels};
 use chefshat_room::policy::{AbortPolicy, KindClock, Policy};
 use chefshat_room::testing::real_table::{PERSON, policy, shifts};
-use chefshat_room::testing::{OPEN, Table, dealt, ms, second_shift, study_game};
+use chefshat_room::testing::{OPEN, Table, dealt, ms, second_shift, study_game, study_member};
 use chefshat_room::{Core, OpenDecision, ReportVerdict, Verdict};
 use prost::Message as _;
 
@@ -191,7 +191,13 @@ struct Hidden {
     policy: Policy,
     /// Whether the participant loses its connection at some of its decisions.
     leaves: bool,
+    /// Whether participants play in groups: a second one has seat 2, unless a built-in agent plays in
+    /// its place.
+    grouped: bool,
 }
+
+/// The seat of the second participant of a group.
+const SECOND: usize = 2;
 
 impl Hidden {
     fn new(labels: SeatLabels) -> Self {
@@ -214,12 +220,31 @@ impl Hidden {
                 ..Policy::default()
             },
             leaves: false,
+            grouped: false,
+        }
+    }
+
+    /// The kind of the participant who has a seat but that of the first participant.
+    fn kind_of(&self, seat: usize) -> ParticipantKind {
+        match self.grouped && seat == SECOND {
+            true => ParticipantKind::Human,
+            false => ParticipantKind::Agent,
         }
     }
 
     /// Its room, with these in the seats that are not the participant's.
     fn room(&self, others: Fill) -> Table {
-        let fills = vec![OPEN, others, others, others];
+        let mut fills = vec![OPEN, others, others, others];
+        let mut study = study_game(self.labels);
+        if self.grouped {
+            study.group = Some(1);
+            if !others.is_built_in() {
+                study.members.push(study_member(2, "Bo", SECOND));
+                fills[SECOND] = Fill::Open {
+                    reserved_for: Some(ParticipantKind::Human),
+                };
+            }
+        }
         let rules = RuleSetSpec {
             stop: Stop::Shifts(2),
             ..RuleSetSpec::default()
@@ -227,7 +252,7 @@ impl Hidden {
         let valid = rules.validate().expect("a valid rule set");
         let mut table = Table::with_rules(self.policy.clone(), fills, rules);
         let mut header = GameHeader::clone(table.core.header());
-        header.study = Some(Arc::new(study_game(self.labels)));
+        header.study = Some(Arc::new(study));
         header.start.script = self.jokers.map(|jokers| {
             let hands = dealt(&valid, 3, jokers.map(Seat::new));
             second_shift(hands.expect("every seat has cards to swap"))
@@ -284,7 +309,8 @@ fn with_both_fills(hidden: &Hidden) -> [(Table, Shown); 2] {
     // Before and after the programs have come.
     note(&mut both);
     for seat in 1..4 {
-        assert_eq!(both[1].0.join(ParticipantKind::Agent), Ok(Seat::new(seat)));
+        let kind = hidden.kind_of(seat);
+        assert_eq!(both[1].0.join(kind), Ok(Seat::new(seat)));
         both[1].0.attach(Seat::new(seat));
         note(&mut both);
     }
@@ -441,6 +467,57 @@ fn what_fills_a_hidden_seat_of_a_study_does_not_change_when_it_is_shown() {
         }
     }
     assert!(decided.iter().all(|count| *count >= 8), "{decided:?}");
+}
+
+/// Nobody of a group can tell who plays with it: another participant, or an agent in its place.
+#[test]
+fn who_else_of_a_group_plays_does_not_change_what_is_shown() {
+    for jokers in [None, Some([1, 2]), Some([2, 2])] {
+        for (leaves, pace) in [(false, 300), (true, 0)] {
+            let mut hidden = Hidden::new(SeatLabels::Players);
+            (hidden.jokers, hidden.leaves, hidden.grouped) = (jokers, leaves, true);
+            hidden.policy.pace = Some(ms(pace));
+            let both = with_both_fills(&hidden);
+            let compared =
+                first_difference(&both).unwrap_or_else(|what| panic!("{what} differs: {hidden:?}"));
+            assert!(compared > 200, "only {compared} messages: {hidden:?}");
+            for (table, _) in &both {
+                table.assert_replays();
+                let lines = convert::record_lines(table.core.header(), &table.journal);
+                replay(&lines).unwrap_or_else(|error| panic!("{error}: {hidden:?}"));
+            }
+        }
+    }
+}
+
+/// That somebody of a group has left for good is in the record alone.
+#[test]
+fn nobody_is_told_of_a_hidden_seat_that_its_participant_has_left() {
+    let mut hidden = Hidden::new(SeatLabels::Players);
+    hidden.grouped = true;
+    let mut table = hidden.room(Fill::Open {
+        reserved_for: Some(ParticipantKind::Agent),
+    });
+    for seat in [1, SECOND, 3] {
+        assert_eq!(table.join(hidden.kind_of(seat)), Ok(Seat::new(seat)));
+        table.attach(Seat::new(seat));
+    }
+    assert_eq!(table.join(ParticipantKind::Human), Ok(Seat::new(0)));
+    table.attach(Seat::new(0));
+    let told = table.core.log().len();
+    table.core.retire(table.now, Seat::new(SECOND), None);
+    let is_retired = |change: &Change| matches!(change, Change::Retired(_));
+    while !table.core.pending().iter().any(|it| is_retired(&it.change)) {
+        table.pass_time(ms(50));
+    }
+    let events = (told..table.core.log().len()).filter_map(|position| {
+        convert::event_to_proto(&table.core, position, Viewer::Everything)?.kind
+    });
+    let substituted =
+        |kind: &v1::game_event::Kind| matches!(kind, v1::game_event::Kind::Substituted(_));
+    assert!(!events.into_iter().any(|kind| substituted(&kind)));
+    let room = convert::describe_at(&table.core, table.now);
+    assert!(room.seats.iter().all(|seat| !seat.substituted));
 }
 
 #[test]

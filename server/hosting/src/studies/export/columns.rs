@@ -5,6 +5,7 @@ use chefshat_proto::v1::{self, StudyTraceKind, game_event::Kind as EventKind, re
 use chefshat_record::outcome;
 use chefshat_study::{
     Condition, DeviceSession, Outcome, Participant, PlayedGame, Pointer, Settings, Status, Study,
+    Task,
 };
 
 use super::table::{Code, Column, Kind, Sheet, Table};
@@ -24,8 +25,11 @@ pub(super) const CONDITION: &str = "condition";
 const SESSION: &str = "number of the session of the participant, from 1";
 pub(super) const STEP: &str = "step of the study, from 0";
 const DELETED: &str = "its data were deleted";
-const NO_RECORD: &str = "the game has not ended, or its record cannot be read";
-const NO_RESULT: &str = "the game was not finished, or its record cannot be read";
+const NO_RECORD: &str = "the game has not ended, its record cannot be read, or it was deleted with \
+    the data of another participant";
+const NO_RESULT: &str = "the game was not finished, its record cannot be read, or it was deleted \
+    with the data of another participant";
+const GROUP: &str = "number of the group, from 1";
 
 pub(super) fn text(value: impl ToString) -> String {
     value.to_string()
@@ -83,6 +87,91 @@ pub(super) struct ParticipantRow<'s> {
     pub(super) participant: &'s Participant,
 }
 
+/// A group, with those of its members whose data are exported, by number.
+pub(super) struct GroupRow<'s> {
+    pub(super) study: &'s Study,
+    pub(super) group: u32,
+    pub(super) members: Vec<(u32, &'s Participant)>,
+}
+
+impl GroupRow<'_> {
+    /// When its members became a group: when they reached the step after their arrival.
+    fn formed_at_ms(&self) -> Option<u64> {
+        let (_, first) = self.members.first()?;
+        let steps = self.study.settings().steps(self.study.sequence_of(first)?);
+        let mut steps = steps.iter();
+        let arrival = steps.position(|step| matches!(step.task, Task::Arrival(_)))?;
+        first.reached_at_ms.get(arrival + 1).copied()
+    }
+}
+
+/// `what` of each condition of a participant, in order, separated by spaces.
+fn of_each_condition(
+    study: &Study,
+    participant: &Participant,
+    what: impl Fn(&Condition) -> String,
+) -> String {
+    let sequence = study.sequence_of(participant).unwrap_or_default();
+    let conditions = &study.settings().conditions;
+    let words: Vec<String> = sequence.iter().map(|it| what(&conditions[*it])).collect();
+    words.join(" ")
+}
+
+pub(super) fn groups<'s>(settings: &Settings) -> Table<GroupRow<'s>> {
+    type Row<'s> = GroupRow<'s>;
+    let conditions = Kind::Codes {
+        codes: conditions(settings),
+        several: true,
+    };
+    let of_each = |row: &Row<'_>, what: &dyn Fn(&Condition) -> String| {
+        let first = row.members.first();
+        first.map_or_else(String::new, |(_, it)| {
+            of_each_condition(row.study, it, what)
+        })
+    };
+    let table = Table::new("groups.csv", "a group of participants", &["group"])
+        .with("group", COUNT, GROUP, |row: &Row<'s>| text(row.group))
+        .with(
+            "conditions",
+            conditions,
+            "its conditions in order",
+            move |row| of_each(row, &|condition| condition.id.clone()),
+        );
+    with_factors(table, settings, true, None, move |row, factor| {
+        of_each(row, &|condition| level(condition, factor))
+    })
+    .with(
+        "formed_at_ms",
+        SINCE_EPOCH,
+        "when its participants became a group",
+        |row| optional(row.formed_at_ms()),
+    )
+    .with(
+        "participants",
+        COUNT,
+        "number of participants who became this group; agents played in place of those missing",
+        |row| text(row.members.len()),
+    )
+    .with(
+        "numbers",
+        Kind::Text,
+        "their numbers in the study, separated by spaces",
+        |row| {
+            let numbers = row.members.iter().map(|(number, _)| text(number));
+            numbers.collect::<Vec<_>>().join(" ")
+        },
+    )
+    .with(
+        "completed",
+        COUNT,
+        "number of them who completed the study",
+        |row| {
+            let completed = |(_, it): &&(u32, &Participant)| it.status == Status::Completed;
+            text(row.members.iter().filter(completed).count())
+        },
+    )
+}
+
 impl ParticipantRow<'_> {
     /// Number of attention checks that it has answered, and of those that it passed.
     fn attention_checks(&self) -> Option<(usize, usize)> {
@@ -92,10 +181,7 @@ impl ParticipantRow<'_> {
 
     /// `what` of each of its conditions, in order, separated by spaces.
     fn of_each(&self, what: impl Fn(&Condition) -> String) -> String {
-        let sequence = self.study.sequence_of(self.participant).unwrap_or_default();
-        let conditions = &self.study.settings().conditions;
-        let words: Vec<String> = sequence.iter().map(|it| what(&conditions[*it])).collect();
-        words.join(" ")
+        of_each_condition(self.study, self.participant, what)
     }
 }
 
@@ -108,6 +194,7 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
         "step it is at, from 0; the number of steps once it has completed the study";
     const PANEL_ID: &str = "its id at the panel that recruited it";
     const NO_CONSENT: &str = "it has not consented";
+    const NO_GROUP: &str = "it plays with no other participant";
     let states = STATES.map(|(status, label)| Code::new(state_name(status), label));
     let conditions = Kind::Codes {
         codes: conditions(settings),
@@ -137,6 +224,8 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
         )
         .with("slot", COUNT, SLOT, |row| optional(row.participant.slot))
         .empty(NO_SLOT)
+        .with("group", COUNT, GROUP, |row| optional(row.participant.group))
+        .empty(NO_GROUP)
         .with("conditions", conditions, "its conditions in order", |row| {
             row.of_each(|condition| condition.id.clone())
         })
@@ -222,7 +311,7 @@ fn state_name(status: Status) -> String {
 }
 
 /// What participants can be, as in `StudyParticipantState`.
-const STATES: [(Status, &str); 7] = [
+const STATES: [(Status, &str); 8] = [
     (Status::Invited, "has not opened its link"),
     (Status::Active, "has begun"),
     (Status::Completed, "has completed all steps"),
@@ -230,13 +319,14 @@ const STATES: [(Status, &str); 7] = [
     (Status::DroppedOut, "had no page open for too long"),
     (Status::Removed, "was removed by the study's owner"),
     (Status::ScreenedOut, "was screened out by its answers"),
+    (Status::LeftOver, "its group was not complete in time"),
 ];
 
 /// A game of a participant.
 pub(super) struct GameRow<'s> {
-    pub(super) settings: &'s Settings,
+    pub(super) study: &'s Study,
     /// Name of the study.
-    pub(super) study: &'s str,
+    pub(super) name: &'s str,
     pub(super) number: u32,
     pub(super) participant: &'s Participant,
     pub(super) game: &'s PlayedGame,
@@ -281,13 +371,34 @@ impl GameResult {
 
 impl GameRow<'_> {
     fn condition(&self) -> &Condition {
-        &self.settings.conditions[self.game.placed.condition]
+        &self.study.settings().conditions[self.game.placed.condition]
+    }
+
+    /// Number of participants who began the game.
+    fn players(&self) -> usize {
+        let group = self
+            .participant
+            .group
+            .filter(|_| !self.game.placed.practice);
+        if group.is_none() {
+            return 1;
+        }
+        let others = self
+            .study
+            .participants()
+            .values()
+            .filter(|it| it.group == group);
+        let has_game = |it: &&Participant| {
+            let mut games = it.games.iter();
+            games.any(|played| played.placed.game == self.game.placed.game)
+        };
+        others.filter(has_game).count()
     }
 
     fn seed(&self) -> Option<String> {
         let own = &self.condition().seeds;
         let seeds = match own.is_empty() {
-            true => &self.settings.seeds,
+            true => &self.study.settings().seeds,
             false => own,
         };
         self.game
@@ -317,6 +428,7 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
     const SEED_INDEX: &str =
         "index of its seed in the list of the condition, or else of the study, from 0";
     const GAME: &str = "identifies the game; records/<game_id>.jsonl is its record, if it has one";
+    const PLAYERS: &str = "number of participants of the study who began it together";
     const DECISIONS: &str =
         "decisions of the participant, with those that timed out, without those of a substitute";
     const TIME: &str = "sum of the times of timed_decisions, measured by the server";
@@ -326,9 +438,10 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
         Code::new("aborted", "ended without a result"),
     ];
     let condition = Kind::one_of(conditions(settings));
-    let table = Table::new("games.csv", "a game of a participant", &["game_id"])
+    let keys = &["number", "game_id"];
+    let table = Table::new("games.csv", "a game of a participant", keys)
         .with("study", Kind::Text, "name of the study", |row: &Row<'s>| {
-            row.study.to_owned()
+            row.name.to_owned()
         })
         .with("number", COUNT, NUMBER, |row| text(row.number))
         .with("participant", Kind::Text, PSEUDONYM, |row| {
@@ -364,6 +477,7 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
     .with("game_id", Kind::Text, GAME, |row| {
         text(Id(row.game.placed.game))
     })
+    .with("participants", COUNT, PLAYERS, |row| text(row.players()))
     .with("outcome", Kind::one_of(outcomes), "how it ended", |row| {
         let outcome = match row.game.ended {
             None => "playing",

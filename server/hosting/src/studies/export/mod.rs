@@ -6,7 +6,7 @@ mod columns;
 mod questionnaires;
 mod table;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use chefshat_proto::v1;
@@ -22,7 +22,7 @@ use crate::config::STUDY_EXPORT_CHUNK;
 use crate::rooms::Rooms;
 use chefshat_room::ids::Id;
 use chefshat_store::{StoreError, StoredGame};
-use columns::{CodebookRow, GameResult, GameRow, ParticipantRow, SessionRow, TraceRow};
+use columns::{CodebookRow, GameResult, GameRow, GroupRow, ParticipantRow, SessionRow, TraceRow};
 use questionnaires::{AnswerRow, ItemRow};
 use table::{Sheet, Table};
 
@@ -149,6 +149,7 @@ impl StudyHandle {
             recruiting.left_url.clear();
             recruiting.full_url.clear();
             recruiting.screened_out_url.clear();
+            recruiting.left_over_url.clear();
         }
         study
     }
@@ -170,6 +171,9 @@ impl StudyHandle {
         json_file("study.json", &self.publishable(), sender).await?;
         let mut sheets = vec![participants(study, &people, sender).await?];
         sheets.push(sessions(study, &people, sender).await?);
+        if study.settings().groups.is_some() {
+            sheets.push(groups(study, &people, sender).await?);
+        }
         sheets.extend(games(self, study, &people, rooms, sender).await?);
         sheets.push(items(study, sender).await?);
         sheets.push(answers(study, &people, sender).await?);
@@ -238,6 +242,30 @@ async fn sessions(
     file.end().await
 }
 
+/// Sends the groups, in the order in which they were formed.
+async fn groups(
+    study: &Study,
+    people: &People<'_>,
+    sender: &mpsc::Sender<ExportedFile>,
+) -> Result<Sheet, ExportError> {
+    let mut groups: BTreeMap<u32, Vec<(u32, &Participant)>> = BTreeMap::new();
+    for &(number, participant) in people {
+        if let Some(group) = participant.group {
+            groups.entry(group).or_default().push((number, participant));
+        }
+    }
+    let mut file = TableFile::new(columns::groups(study.settings()), sender).await?;
+    for (group, members) in groups {
+        let row = GroupRow {
+            study,
+            group,
+            members,
+        };
+        file.row(&row).await?;
+    }
+    file.end().await
+}
+
 /// Whether exported data include a game.
 fn is_in_data(study: &Study, participant: &Participant, game: &PlayedGame) -> bool {
     if participant.data_deleted {
@@ -262,6 +290,8 @@ async fn games(
     let settings = study.settings();
     let mut file = TableFile::new(columns::games(settings), sender).await?;
     let (mut records, mut unreadable) = (Vec::new(), Vec::new());
+    // Those of a group have one game.
+    let mut exported = BTreeSet::new();
     for &(number, participant) in people {
         for game in &participant.games {
             if !is_in_data(study, participant, game) {
@@ -279,15 +309,17 @@ async fn games(
             };
             let result = lines.as_ref();
             let row = GameRow {
-                settings,
-                study: &handle.plan.name,
+                study,
+                name: &handle.plan.name,
                 number,
                 participant,
                 game,
                 result: result.map(|lines| GameResult::of(lines, game.placed.seat)),
             };
             file.row(&row).await?;
-            records.extend(lines.map(|_| id));
+            if lines.is_some() && exported.insert(id) {
+                records.push(id);
+            }
         }
     }
     let mut sheets = vec![file.end().await?];

@@ -396,8 +396,8 @@ class Substituted(_message.Message):
     """A built-in agent plays for a seat from here on, until Returned. Follows the default decision with
     which the seat reached its limit of timeouts, or its absence time was over
     (RoomPolicy.absence_time_ms); never a special action: nobody else may learn that one ran out. If its
-    participant has left the tournament (`for_good`), it comes at any time, and the built-in agent plays
-    until the end of the game.
+    participant has left the tournament or study (`for_good`), it comes at any time, and the built-in
+    agent plays until the end of the game.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -410,7 +410,9 @@ class Substituted(_message.Message):
     built_in_agent: _builtins.str
     """Name of the built-in agent."""
     for_good: _builtins.bool
-    """Whether the participant has left the tournament, or was replaced there. It never returns."""
+    """Whether the participant has left the tournament, was replaced there, or has left the group of a
+    study. It never returns.
+    """
     def __init__(
         self,
         *,

@@ -224,6 +224,8 @@ class StudyRecord(_message.Message):
     SEED_INDEX_FIELD_NUMBER: _builtins.int
     SEAT_FIELD_NUMBER: _builtins.int
     ATTEMPT_FIELD_NUMBER: _builtins.int
+    GROUP_FIELD_NUMBER: _builtins.int
+    OTHERS_FIELD_NUMBER: _builtins.int
     study_id: _builtins.str
     """The study."""
     name: _builtins.str
@@ -231,7 +233,7 @@ class StudyRecord(_message.Message):
     condition: _builtins.str
     """Id of the condition."""
     number: _builtins.int
-    """Number of the participant, from 1."""
+    """Number of the participant, from 1; of a group, of its first who plays in this game."""
     participant: _builtins.str
     """Pseudonym of the participant."""
     session: _builtins.int
@@ -248,9 +250,15 @@ class StudyRecord(_message.Message):
     """The participant's seat."""
     attempt: _builtins.int
     """Attempt at this game, from 1."""
+    group: _builtins.int
+    """Number of the group that plays it (StudyGroups), from 1; 0: the participant plays it alone."""
     @_builtins.property
     def levels(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyLevel]:
         """The condition's level of each factor, by name of the factor."""
+
+    @_builtins.property
+    def others(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyRecordMember]:
+        """The other participants of the group who play in it, in the order of their numbers."""
 
     def __init__(
         self,
@@ -267,16 +275,52 @@ class StudyRecord(_message.Message):
         seed_index: _builtins.int | None = ...,
         seat: _builtins.int = ...,
         attempt: _builtins.int = ...,
+        group: _builtins.int = ...,
+        others: _abc.Iterable[Global___StudyRecordMember] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_seed_index", b"_seed_index", "seed_index", b"seed_index"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_seed_index", b"_seed_index", "attempt", b"attempt", "condition", b"condition", "levels", b"levels", "name", b"name", "number", b"number", "participant", b"participant", "practice", b"practice", "seat", b"seat", "seed_index", b"seed_index", "session", b"session", "step", b"step", "study_id", b"study_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_seed_index", b"_seed_index", "attempt", b"attempt", "condition", b"condition", "group", b"group", "levels", b"levels", "name", b"name", "number", b"number", "others", b"others", "participant", b"participant", "practice", b"practice", "seat", b"seat", "seed_index", b"seed_index", "session", b"session", "step", b"step", "study_id", b"study_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__seed_index: _TypeAlias = _typing.Literal["seed_index"]  # noqa: Y015
     _WhichOneofArgType__seed_index: _TypeAlias = _typing.Literal["_seed_index", b"_seed_index"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType__seed_index) -> _WhichOneofReturnType__seed_index | None: ...
 
 Global___StudyRecord: _TypeAlias = StudyRecord  # noqa: Y015
+
+@_typing.final
+class StudyRecordMember(_message.Message):
+    """Another participant of a group who plays in a recorded game."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    NUMBER_FIELD_NUMBER: _builtins.int
+    PARTICIPANT_FIELD_NUMBER: _builtins.int
+    SESSION_FIELD_NUMBER: _builtins.int
+    SEAT_FIELD_NUMBER: _builtins.int
+    number: _builtins.int
+    """Number of the participant, from 1."""
+    participant: _builtins.str
+    """Pseudonym of the participant."""
+    session: _builtins.int
+    """Number of the session in which the participant began the game, from 1."""
+    seat: _builtins.int
+    """The participant's seat."""
+    def __init__(
+        self,
+        *,
+        number: _builtins.int = ...,
+        participant: _builtins.str = ...,
+        session: _builtins.int = ...,
+        seat: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["number", b"number", "participant", b"participant", "seat", b"seat", "session", b"session"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___StudyRecordMember: _TypeAlias = StudyRecordMember  # noqa: Y015
 
 @_typing.final
 class GameStart(_message.Message):

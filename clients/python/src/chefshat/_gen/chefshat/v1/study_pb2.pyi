@@ -40,7 +40,8 @@ class _StudyOrderEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_StudyOrder
 class StudyOrder(_StudyOrder, metaclass=_StudyOrderEnumTypeWrapper):
     """How conditions are assigned. Assignment is by permuted blocks of slots, whose order follows from
     the assignment seed. A participant gets the first free slot by consenting; when its link is first
-    opened, if it is not asked for consent before a game or a condition.
+    opened, if it is not asked for consent before a game or a condition. With StudyGroups, a group gets
+    the first slots that no other has when it is formed, and all of it one order of conditions.
     """
 
 STUDY_ORDER_UNSPECIFIED: StudyOrder.ValueType  # 0
@@ -121,6 +122,34 @@ STUDY_LABELS_PLAYERS: StudyLabels.ValueType  # 3
 """Neither: seats are named "Player 1" and so on, and their kind is UNSPECIFIED."""
 Global___StudyLabels: _TypeAlias = StudyLabels  # noqa: Y015
 
+class _StudyLeftOver:
+    ValueType = _typing.NewType("ValueType", _builtins.int)
+    V: _TypeAlias = ValueType  # noqa: Y015
+
+class _StudyLeftOverEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_StudyLeftOver.ValueType], _builtins.type):
+    DESCRIPTOR: _descriptor.EnumDescriptor
+    STUDY_LEFT_OVER_UNSPECIFIED: _StudyLeftOver.ValueType  # 0
+    """As DISMISS."""
+    STUDY_LEFT_OVER_DISMISS: _StudyLeftOver.ValueType  # 1
+    """Their participation ends; the page thanks them."""
+    STUDY_LEFT_OVER_AGENTS: _StudyLeftOver.ValueType  # 2
+    """They are a group of fewer. The `substitute` of the condition's policy plays in place of those who
+    are missing.
+    """
+
+class StudyLeftOver(_StudyLeftOver, metaclass=_StudyLeftOverEnumTypeWrapper):
+    """What becomes of participants whose group is not complete in time."""
+
+STUDY_LEFT_OVER_UNSPECIFIED: StudyLeftOver.ValueType  # 0
+"""As DISMISS."""
+STUDY_LEFT_OVER_DISMISS: StudyLeftOver.ValueType  # 1
+"""Their participation ends; the page thanks them."""
+STUDY_LEFT_OVER_AGENTS: StudyLeftOver.ValueType  # 2
+"""They are a group of fewer. The `substitute` of the condition's policy plays in place of those who
+are missing.
+"""
+Global___StudyLeftOver: _TypeAlias = StudyLeftOver  # noqa: Y015
+
 class _StudyPointer:
     ValueType = _typing.NewType("ValueType", _builtins.int)
     V: _TypeAlias = ValueType  # noqa: Y015
@@ -171,6 +200,8 @@ class _StudyParticipantStateEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[
     """It was removed by the study's owner."""
     STUDY_PARTICIPANT_STATE_SCREENED_OUT: _StudyParticipantState.ValueType  # 7
     """It was screened out (StudyScreenOut)."""
+    STUDY_PARTICIPANT_STATE_LEFT_OVER: _StudyParticipantState.ValueType  # 8
+    """Its group was not complete in time (StudyLeftOver)."""
 
 class StudyParticipantState(_StudyParticipantState, metaclass=_StudyParticipantStateEnumTypeWrapper):
     """The state of a participant."""
@@ -191,6 +222,8 @@ STUDY_PARTICIPANT_STATE_REMOVED: StudyParticipantState.ValueType  # 6
 """It was removed by the study's owner."""
 STUDY_PARTICIPANT_STATE_SCREENED_OUT: StudyParticipantState.ValueType  # 7
 """It was screened out (StudyScreenOut)."""
+STUDY_PARTICIPANT_STATE_LEFT_OVER: StudyParticipantState.ValueType  # 8
+"""Its group was not complete in time (StudyLeftOver)."""
 Global___StudyParticipantState: _TypeAlias = StudyParticipantState  # noqa: Y015
 
 class _StudyEndReason:
@@ -213,6 +246,8 @@ class _StudyEndReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_StudyE
     """It was removed by the researchers."""
     STUDY_END_REASON_SCREENED_OUT: _StudyEndReason.ValueType  # 6
     """Its answers showed that the study is not for it (StudyScreenOut)."""
+    STUDY_END_REASON_LEFT_OVER: _StudyEndReason.ValueType  # 7
+    """Its group was not complete in time."""
 
 class StudyEndReason(_StudyEndReason, metaclass=_StudyEndReasonEnumTypeWrapper):
     """Why nothing more is shown."""
@@ -231,6 +266,8 @@ STUDY_END_REASON_REMOVED: StudyEndReason.ValueType  # 5
 """It was removed by the researchers."""
 STUDY_END_REASON_SCREENED_OUT: StudyEndReason.ValueType  # 6
 """Its answers showed that the study is not for it (StudyScreenOut)."""
+STUDY_END_REASON_LEFT_OVER: StudyEndReason.ValueType  # 7
+"""Its group was not complete in time."""
 Global___StudyEndReason: _TypeAlias = StudyEndReason  # noqa: Y015
 
 class _StudyTraceKind:
@@ -348,7 +385,9 @@ class StudyCondition(_message.Message):
     id: _builtins.str
     """Identifies it in the study, 1..=64 letters, digits, `_`, `-` or `.`."""
     participant_seat: _builtins.int
-    """The participant's seat; unset: it rotates by one with each game."""
+    """The participant's seat; unset: it rotates by one with each game. With StudyGroups, of the first of
+    the group; the others sit around the table from there, as far apart as possible.
+    """
     robot_behaviour: _builtins.str
     """Text for programs of the researcher that play or move a robot in its games, at most 2000
     characters, in any form. StudyGame repeats it.
@@ -371,8 +410,9 @@ class StudyCondition(_message.Message):
 
     @_builtins.property
     def seats(self) -> _containers.RepeatedCompositeFieldContainer[_room_pb2.SeatConfig]:
-        """How the other seats are filled, in their order, one for each player but the participant. Open
-        seats are joined by programs of the researcher, with the join code that StudyGame has.
+        """How the other seats are filled, in their order, one for each player but the participant, or the
+        participants of a group. Open seats are joined by programs of the researcher, with the join code
+        that StudyGame has.
         """
 
     @_builtins.property
@@ -968,6 +1008,7 @@ class StudyStage(_message.Message):
     TEXT_FIELD_NUMBER: _builtins.int
     PER_CONDITION_FIELD_NUMBER: _builtins.int
     SCREEN_OUT_FIELD_NUMBER: _builtins.int
+    ARRIVAL_FIELD_NUMBER: _builtins.int
     SHOWN_IF_FIELD_NUMBER: _builtins.int
     @_builtins.property
     def consent(self) -> Global___StudyConsent:
@@ -1002,8 +1043,12 @@ class StudyStage(_message.Message):
         """Ends the participation; only with `shown_if`."""
 
     @_builtins.property
+    def arrival(self) -> Global___StudyArrival:
+        """Waits for its group: once, with `groups` alone, before games and `per_condition`."""
+
+    @_builtins.property
     def shown_if(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyShownIf]:
-        """Participants pass over it unless all of these hold, at most 4. Not for consent, games and
+        """Participants pass over it unless all of these hold, at most 4. Not for consent, arrival, games and
         `per_condition`.
         """
 
@@ -1018,13 +1063,14 @@ class StudyStage(_message.Message):
         text: Global___StudyText | None = ...,
         per_condition: Global___StudyBlock | None = ...,
         screen_out: Global___StudyScreenOut | None = ...,
+        arrival: Global___StudyArrival | None = ...,
         shown_if: _abc.Iterable[Global___StudyShownIf] | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "external_questionnaire", b"external_questionnaire", "games", b"games", "per_condition", b"per_condition", "practice", b"practice", "questionnaire", b"questionnaire", "screen_out", b"screen_out", "stage", b"stage", "text", b"text"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["arrival", b"arrival", "consent", b"consent", "external_questionnaire", b"external_questionnaire", "games", b"games", "per_condition", b"per_condition", "practice", b"practice", "questionnaire", b"questionnaire", "screen_out", b"screen_out", "stage", b"stage", "text", b"text"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "external_questionnaire", b"external_questionnaire", "games", b"games", "per_condition", b"per_condition", "practice", b"practice", "questionnaire", b"questionnaire", "screen_out", b"screen_out", "shown_if", b"shown_if", "stage", b"stage", "text", b"text"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["arrival", b"arrival", "consent", b"consent", "external_questionnaire", b"external_questionnaire", "games", b"games", "per_condition", b"per_condition", "practice", b"practice", "questionnaire", b"questionnaire", "screen_out", b"screen_out", "shown_if", b"shown_if", "stage", b"stage", "text", b"text"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_stage: _TypeAlias = _typing.Literal["consent", "questionnaire", "external_questionnaire", "practice", "games", "text", "per_condition", "screen_out"]  # noqa: Y015
+    _WhichOneofReturnType_stage: _TypeAlias = _typing.Literal["consent", "questionnaire", "external_questionnaire", "practice", "games", "text", "per_condition", "screen_out", "arrival"]  # noqa: Y015
     _WhichOneofArgType_stage: _TypeAlias = _typing.Literal["stage", b"stage"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_stage) -> _WhichOneofReturnType_stage | None: ...
 
@@ -1057,6 +1103,67 @@ class StudyScreenOut(_message.Message):
 Global___StudyScreenOut: _TypeAlias = StudyScreenOut  # noqa: Y015
 
 @_typing.final
+class StudyGroups(_message.Message):
+    """Participants who play their games together. They wait for each other at the stage `arrival`, which
+    makes them a group, and before each game. In place of one who leaves, the `substitute` of the
+    condition's policy plays on.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    SIZE_FIELD_NUMBER: _builtins.int
+    WAIT_MS_FIELD_NUMBER: _builtins.int
+    LEFT_OVER_FIELD_NUMBER: _builtins.int
+    size: _builtins.int
+    """Number of participants of a group, 2..=6, at most the players of each condition. `participants` is
+    a multiple of it, and a slot of `block_size` one of a group.
+    """
+    wait_ms: _builtins.int
+    """How long participants wait for others, in milliseconds, 10000..=3600000; by default 600000. Those
+    for whom the others of a group wait so long before a game have dropped out.
+    """
+    left_over: Global___StudyLeftOver.ValueType
+    """What becomes of those whose group is not complete in this time."""
+    def __init__(
+        self,
+        *,
+        size: _builtins.int = ...,
+        wait_ms: _builtins.int = ...,
+        left_over: Global___StudyLeftOver.ValueType = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["left_over", b"left_over", "size", b"size", "wait_ms", b"wait_ms"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___StudyGroups: _TypeAlias = StudyGroups  # noqa: Y015
+
+@_typing.final
+class StudyArrival(_message.Message):
+    """A stage at which participants wait until their group is complete: with those who arrive, or with
+    those with whom they were added (`together` of AddStudyParticipantsRequest). Reaches participants.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TEXT_FIELD_NUMBER: _builtins.int
+    text: _builtins.str
+    """What they read meanwhile in Markdown (StudyText), at most 2000 characters."""
+    def __init__(
+        self,
+        *,
+        text: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["text", b"text"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___StudyArrival: _TypeAlias = StudyArrival  # noqa: Y015
+
+@_typing.final
 class StudyRecruiting(_message.Message):
     """How people take part who were not given a link of their own, for example from a panel such as
     Prolific, SONA or MTurk.
@@ -1070,6 +1177,7 @@ class StudyRecruiting(_message.Message):
     LEFT_URL_FIELD_NUMBER: _builtins.int
     FULL_URL_FIELD_NUMBER: _builtins.int
     SCREENED_OUT_URL_FIELD_NUMBER: _builtins.int
+    LEFT_OVER_URL_FIELD_NUMBER: _builtins.int
     open_link: _builtins.bool
     """Whether the study has an open link (`open_link` of Study): everyone who opens it takes part."""
     id_parameter: _builtins.str
@@ -1091,6 +1199,10 @@ class StudyRecruiting(_message.Message):
     """As `completed_url`, for those who cannot begin because the study is closed or full."""
     screened_out_url: _builtins.str
     """As `completed_url`, for those who are screened out (StudyScreenOut); empty: as `left_url`."""
+    left_over_url: _builtins.str
+    """As `completed_url`, for those whose group was not complete in time (StudyLeftOver); empty: as
+    `completed_url`.
+    """
     def __init__(
         self,
         *,
@@ -1100,10 +1212,11 @@ class StudyRecruiting(_message.Message):
         left_url: _builtins.str = ...,
         full_url: _builtins.str = ...,
         screened_out_url: _builtins.str = ...,
+        left_over_url: _builtins.str = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["completed_url", b"completed_url", "full_url", b"full_url", "id_parameter", b"id_parameter", "left_url", b"left_url", "open_link", b"open_link", "screened_out_url", b"screened_out_url"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["completed_url", b"completed_url", "full_url", b"full_url", "id_parameter", b"id_parameter", "left_over_url", b"left_over_url", "left_url", b"left_url", "open_link", b"open_link", "screened_out_url", b"screened_out_url"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -1133,6 +1246,7 @@ class StudySettings(_message.Message):
     CLOSES_AT_MS_FIELD_NUMBER: _builtins.int
     RECRUITING_FIELD_NUMBER: _builtins.int
     DELETES_AT_MS_FIELD_NUMBER: _builtins.int
+    GROUPS_FIELD_NUMBER: _builtins.int
     name: _builtins.str
     """Name for researchers, 1..=64 characters. Participants never see it."""
     title: _builtins.str
@@ -1190,6 +1304,10 @@ class StudySettings(_message.Message):
     def recruiting(self) -> Global___StudyRecruiting:
         """How people without a link of their own take part; by default nobody does."""
 
+    @_builtins.property
+    def groups(self) -> Global___StudyGroups:
+        """Participants who play together; unset: everybody plays its own games."""
+
     def __init__(
         self,
         *,
@@ -1209,10 +1327,11 @@ class StudySettings(_message.Message):
         closes_at_ms: _builtins.int = ...,
         recruiting: Global___StudyRecruiting | None = ...,
         deletes_at_ms: _builtins.int = ...,
+        groups: Global___StudyGroups | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["recruiting", b"recruiting"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["groups", b"groups", "recruiting", b"recruiting"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["assignment_seed", b"assignment_seed", "block_size", b"block_size", "closes_at_ms", b"closes_at_ms", "conditions", b"conditions", "deletes_at_ms", b"deletes_at_ms", "drop_out_after_ms", b"drop_out_after_ms", "factors", b"factors", "language", b"language", "name", b"name", "order", b"order", "participants", b"participants", "recruiting", b"recruiting", "seeds", b"seeds", "stages", b"stages", "title", b"title", "traces", b"traces"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["assignment_seed", b"assignment_seed", "block_size", b"block_size", "closes_at_ms", b"closes_at_ms", "conditions", b"conditions", "deletes_at_ms", b"deletes_at_ms", "drop_out_after_ms", b"drop_out_after_ms", "factors", b"factors", "groups", b"groups", "language", b"language", "name", b"name", "order", b"order", "participants", b"participants", "recruiting", b"recruiting", "seeds", b"seeds", "stages", b"stages", "title", b"title", "traces", b"traces"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -1383,6 +1502,7 @@ class StudyParticipant(_message.Message):
     DATA_DELETED_FIELD_NUMBER: _builtins.int
     PANEL_ID_FIELD_NUMBER: _builtins.int
     TEST_FIELD_NUMBER: _builtins.int
+    GROUP_FIELD_NUMBER: _builtins.int
     number: _builtins.int
     """Number, from 1."""
     pseudonym: _builtins.str
@@ -1409,6 +1529,8 @@ class StudyParticipant(_message.Message):
     """Its id at the panel (StudyRecruiting); empty if there is none, and after its data were deleted."""
     test: _builtins.bool
     """Whether it is a test participant (AddStudyParticipantsRequest)."""
+    group: _builtins.int
+    """Number of its group, from 1; 0: it has none."""
     @_builtins.property
     def conditions(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
         """Ids of its conditions in their order; empty until it begins."""
@@ -1439,10 +1561,11 @@ class StudyParticipant(_message.Message):
         data_deleted: _builtins.bool = ...,
         panel_id: _builtins.str = ...,
         test: _builtins.bool = ...,
+        group: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_slot", b"_slot", "consent", b"consent", "slot", b"slot"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_slot", b"_slot", "began_at_ms", b"began_at_ms", "conditions", b"conditions", "connected", b"connected", "consent", b"consent", "data_deleted", b"data_deleted", "ended_at_ms", b"ended_at_ms", "games", b"games", "number", b"number", "panel_id", b"panel_id", "pseudonym", b"pseudonym", "sessions", b"sessions", "slot", b"slot", "state", b"state", "step", b"step", "test", b"test"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_slot", b"_slot", "began_at_ms", b"began_at_ms", "conditions", b"conditions", "connected", b"connected", "consent", b"consent", "data_deleted", b"data_deleted", "ended_at_ms", b"ended_at_ms", "games", b"games", "group", b"group", "number", b"number", "panel_id", b"panel_id", "pseudonym", b"pseudonym", "sessions", b"sessions", "slot", b"slot", "state", b"state", "step", b"step", "test", b"test"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__slot: _TypeAlias = _typing.Literal["slot"]  # noqa: Y015
     _WhichOneofArgType__slot: _TypeAlias = _typing.Literal["_slot", b"_slot"]  # noqa: Y015
@@ -1534,7 +1657,7 @@ class Study(_message.Message):
     completed: _builtins.int
     """Number of participants who have completed it, also if their data were deleted since."""
     left: _builtins.int
-    """Number of participants who have withdrawn, dropped out, or were removed or screened out."""
+    """Number of participants who have withdrawn, dropped out, or were removed, screened out or left over."""
     open_link: _builtins.str
     """The open link, if the settings have one: 30 characters that need no escaping. The page's address
     for it is the path "/study/" and this text.
@@ -1590,6 +1713,7 @@ class StudyView(_message.Message):
     TEXT_FIELD_NUMBER: _builtins.int
     GAME_FIELD_NUMBER: _builtins.int
     END_FIELD_NUMBER: _builtins.int
+    ARRIVAL_FIELD_NUMBER: _builtins.int
     TEST_FIELD_NUMBER: _builtins.int
     DELETES_AT_MS_FIELD_NUMBER: _builtins.int
     title: _builtins.str
@@ -1634,6 +1758,12 @@ class StudyView(_message.Message):
     def end(self) -> Global___StudyEnd:
         """Nothing more."""
 
+    @_builtins.property
+    def arrival(self) -> Global___StudyShownArrival:
+        """Others to wait for: the next view comes by itself. A test participant may go on alone by
+        ContinueStudy, with agents in place of the others.
+        """
+
     def __init__(
         self,
         *,
@@ -1649,14 +1779,15 @@ class StudyView(_message.Message):
         text: Global___StudyText | None = ...,
         game: Global___StudyShownGame | None = ...,
         end: Global___StudyEnd | None = ...,
+        arrival: Global___StudyShownArrival | None = ...,
         test: _builtins.bool = ...,
         deletes_at_ms: _builtins.int = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "content", b"content", "end", b"end", "external_questionnaire", b"external_questionnaire", "game", b"game", "questionnaire", b"questionnaire", "text", b"text"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["arrival", b"arrival", "consent", b"consent", "content", b"content", "end", b"end", "external_questionnaire", b"external_questionnaire", "game", b"game", "questionnaire", b"questionnaire", "text", b"text"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["consent", b"consent", "content", b"content", "deletes_at_ms", b"deletes_at_ms", "end", b"end", "external_questionnaire", b"external_questionnaire", "game", b"game", "language", b"language", "pseudonym", b"pseudonym", "questionnaire", b"questionnaire", "step", b"step", "steps", b"steps", "test", b"test", "text", b"text", "title", b"title", "traces", b"traces"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["arrival", b"arrival", "consent", b"consent", "content", b"content", "deletes_at_ms", b"deletes_at_ms", "end", b"end", "external_questionnaire", b"external_questionnaire", "game", b"game", "language", b"language", "pseudonym", b"pseudonym", "questionnaire", b"questionnaire", "step", b"step", "steps", b"steps", "test", b"test", "text", b"text", "title", b"title", "traces", b"traces"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_content: _TypeAlias = _typing.Literal["consent", "questionnaire", "external_questionnaire", "text", "game", "end"]  # noqa: Y015
+    _WhichOneofReturnType_content: _TypeAlias = _typing.Literal["consent", "questionnaire", "external_questionnaire", "text", "game", "end", "arrival"]  # noqa: Y015
     _WhichOneofArgType_content: _TypeAlias = _typing.Literal["content", b"content"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_content) -> _WhichOneofReturnType_content | None: ...
 
@@ -1812,6 +1943,7 @@ class StudyShownGame(_message.Message):
     TICKET_FIELD_NUMBER: _builtins.int
     ENDED_FIELD_NUMBER: _builtins.int
     LABELLED_FIELD_NUMBER: _builtins.int
+    WAITS_FOR_FIELD_NUMBER: _builtins.int
     practice: _builtins.bool
     """Whether it is practice."""
     game: _builtins.int
@@ -1830,6 +1962,8 @@ class StudyShownGame(_message.Message):
     """Whether the other seats have names such as "Agent 2" in place of their own. A client may show
     them in its language.
     """
+    waits_for: _builtins.int
+    """Number of others of its group for whom the game waits; 0: it waits for nobody."""
     @_builtins.property
     def hide(self) -> _containers.RepeatedScalarFieldContainer[Global___StudyHide.ValueType]:
         """Parts of the page that are hidden; empty until there is a room."""
@@ -1846,14 +1980,49 @@ class StudyShownGame(_message.Message):
         ticket: _builtins.str = ...,
         ended: _builtins.bool = ...,
         labelled: _builtins.bool = ...,
+        waits_for: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["ended", b"ended", "game", b"game", "game_id", b"game_id", "games", b"games", "hide", b"hide", "labelled", b"labelled", "practice", b"practice", "room_id", b"room_id", "ticket", b"ticket"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["ended", b"ended", "game", b"game", "game_id", b"game_id", "games", b"games", "hide", b"hide", "labelled", b"labelled", "practice", b"practice", "room_id", b"room_id", "ticket", b"ticket", "waits_for", b"waits_for"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___StudyShownGame: _TypeAlias = StudyShownGame  # noqa: Y015
+
+@_typing.final
+class StudyShownArrival(_message.Message):
+    """A group that is not complete yet, as a participant sees it."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    TEXT_FIELD_NUMBER: _builtins.int
+    SIZE_FIELD_NUMBER: _builtins.int
+    HERE_FIELD_NUMBER: _builtins.int
+    WAIT_MS_FIELD_NUMBER: _builtins.int
+    text: _builtins.str
+    """What to read meanwhile, in Markdown (StudyText), or empty."""
+    size: _builtins.int
+    """Number of participants of the group."""
+    here: _builtins.int
+    """Number of those who are here, with this one."""
+    wait_ms: _builtins.int
+    """How long the wait takes at most, in milliseconds, while the page is open."""
+    def __init__(
+        self,
+        *,
+        text: _builtins.str = ...,
+        size: _builtins.int = ...,
+        here: _builtins.int = ...,
+        wait_ms: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["here", b"here", "size", b"size", "text", b"text", "wait_ms", b"wait_ms"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___StudyShownArrival: _TypeAlias = StudyShownArrival  # noqa: Y015
 
 @_typing.final
 class StudyEnd(_message.Message):

@@ -196,6 +196,7 @@ class AddStudyParticipantsRequest(_message.Message):
     PSEUDONYMS_FIELD_NUMBER: _builtins.int
     COUNT_FIELD_NUMBER: _builtins.int
     TEST_FIELD_NUMBER: _builtins.int
+    TOGETHER_FIELD_NUMBER: _builtins.int
     study_id: _builtins.str
     """Identifies the study."""
     owner_token: _builtins.str
@@ -207,6 +208,11 @@ class AddStudyParticipantsRequest(_message.Message):
     same order of slots, but take no slot from those, are not sent on at the end, and do not play a
     game again that has no result. No count and no exported data of others include them. Those named
     by number are called "T01" and so on. A study has at most 1000 of them.
+    """
+    together: _builtins.bool
+    """Whether those of this request play together (StudyGroups): the first `size` of them as a group, then
+    the next, in their order. Their number is a multiple of `size`. Otherwise they play with whom they
+    arrive.
     """
     @_builtins.property
     def pseudonyms(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
@@ -222,10 +228,11 @@ class AddStudyParticipantsRequest(_message.Message):
         pseudonyms: _abc.Iterable[_builtins.str] | None = ...,
         count: _builtins.int = ...,
         test: _builtins.bool = ...,
+        together: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["count", b"count", "owner_token", b"owner_token", "pseudonyms", b"pseudonyms", "study_id", b"study_id", "test", b"test"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["count", b"count", "owner_token", b"owner_token", "pseudonyms", b"pseudonyms", "study_id", b"study_id", "test", b"test", "together", b"together"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -80,9 +80,10 @@ class StudyServiceStub:
     """
     DeleteStudyParticipant: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]
     """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
-    traces, and its games with their records. What stays is that a participant with this number took
-    part, when, in which conditions, and that it consented. It counts as withdrawn from then on.
-    Returns when the data are deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
+    traces, and its games with their records, also those that it played with others of its group. What
+    stays is that a participant with this number took part, when, in which conditions, and that it
+    consented. It counts as withdrawn from then on. Returns when the data are deleted; at once, if
+    others still play its game: the data are deleted when that is over. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
     (SHUTTING_DOWN, STORE_FAILED).
     """
     DeleteStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyRequest, _study_service_pb2.DeleteStudyResponse]
@@ -144,9 +145,10 @@ class StudyServiceAsyncStub(StudyServiceStub):
     """
     DeleteStudyParticipant: _aio.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]  # type: ignore[assignment]
     """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
-    traces, and its games with their records. What stays is that a participant with this number took
-    part, when, in which conditions, and that it consented. It counts as withdrawn from then on.
-    Returns when the data are deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
+    traces, and its games with their records, also those that it played with others of its group. What
+    stays is that a participant with this number took part, when, in which conditions, and that it
+    consented. It counts as withdrawn from then on. Returns when the data are deleted; at once, if
+    others still play its game: the data are deleted when that is over. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
     (SHUTTING_DOWN, STORE_FAILED).
     """
     DeleteStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyRequest, _study_service_pb2.DeleteStudyResponse]  # type: ignore[assignment]
@@ -265,9 +267,10 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.DeleteStudyParticipantResponse, _abc.Awaitable[_study_service_pb2.DeleteStudyParticipantResponse]]:
         """Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
-        traces, and its games with their records. What stays is that a participant with this number took
-        part, when, in which conditions, and that it consented. It counts as withdrawn from then on.
-        Returns when the data are deleted. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
+        traces, and its games with their records, also those that it played with others of its group. What
+        stays is that a participant with this number took part, when, in which conditions, and that it
+        consented. It counts as withdrawn from then on. Returns when the data are deleted; at once, if
+        others still play its game: the data are deleted when that is over. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
         (SHUTTING_DOWN, STORE_FAILED).
         """
 

@@ -1,0 +1,445 @@
+//! Participants who play together.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use chefshat_study::testing::in_groups;
+use chefshat_study::{
+    Content, End, Labels, LeftOver, NewParticipants, Outcome, Refusal, Settings, Stage, Status,
+    Task, testing,
+};
+use proptest::prelude::*;
+
+use super::support::{Lab, tests};
+
+/// A group's next game is placed, if it waits for nobody.
+fn place(lab: &mut Lab, number: u32) {
+    let placed = lab.place(number);
+    placed.into_iter().for_each(|change| lab.fold(change));
+}
+
+fn end(lab: &mut Lab, number: u32, outcome: Outcome) {
+    let ended = lab.ended(number, outcome);
+    lab.fold(ended);
+}
+
+/// Groups: their members by number, with the slot of each.
+fn groups(lab: &Lab) -> BTreeMap<u32, Vec<(u32, u32)>> {
+    let mut groups: BTreeMap<u32, Vec<(u32, u32)>> = BTreeMap::new();
+    for (number, it) in lab.study.participants() {
+        if let Some(group) = it.group {
+            groups
+                .entry(group)
+                .or_default()
+                .push((*number, it.slot.unwrap()));
+        }
+    }
+    groups
+}
+
+fn here(lab: &Lab, number: u32) -> u32 {
+    match lab.study.view(number).unwrap().content {
+        Content::Arrival(shown) => shown.here,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn reason(lab: &Lab, number: u32) -> End {
+    match lab.study.view(number).unwrap().content {
+        Content::End { reason, .. } => reason,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn those_who_arrive_together_play_the_same_games_in_one_condition() {
+    let mut lab = Lab::new(in_groups(2), 5);
+    for number in [3, 1, 5] {
+        lab.begin(number);
+        lab.now_ms += 1;
+    }
+    assert_eq!(here(&lab, 3), 2);
+    lab.wait(0);
+    // Who came first: 3 with 1.
+    assert_eq!(groups(&lab), BTreeMap::from([(1, vec![(1, 1), (3, 0)])]));
+    assert_eq!(here(&lab, 5), 1);
+    let sequences = [0, 1].map(|slot| lab.study.sequence(slot).to_vec());
+    assert_eq!(sequences[0], sequences[1]);
+
+    for round in 0..2 {
+        let due = [3, 1].map(|number| lab.study.due(number).unwrap());
+        assert_eq!(due.each_ref().map(|it| it.seat), [round, round + 2]);
+        assert_eq!(due[0].seed, due[1].seed);
+        place(&mut lab, 1);
+        let placed =
+            [1, 3].map(|number| lab.study.participant(number).unwrap().games[round].clone());
+        assert_eq!(placed[0].placed.game, placed[1].placed.game);
+        let participant = lab.study.participant(1).unwrap();
+        let seats = lab.study.seats_of_group(participant, &placed[0].placed);
+        assert_eq!(seats, [round, round + 2]);
+        assert!(
+            [1, 3]
+                .iter()
+                .all(|number| lab.study.plays_with_others(*number))
+        );
+        for number in [1, 3] {
+            end(&mut lab, number, Outcome::Finished);
+        }
+        // The next game waits for both.
+        lab.act(1);
+        if round == 0 {
+            assert!(lab.place(1).is_empty());
+            let Content::Game(shown) = lab.study.view(1).unwrap().content else {
+                panic!("no game");
+            };
+            assert_eq!(shown.waits_for, 1);
+        }
+        lab.act(3);
+    }
+    for number in [1, 3] {
+        lab.act(number);
+        assert_eq!(
+            lab.study.participant(number).unwrap().status,
+            Status::Completed
+        );
+    }
+}
+
+#[test]
+fn a_plan_says_who_plays_with_whom() {
+    let mut lab = Lab::new(in_groups(2), 0);
+    let planned = NewParticipants {
+        together: true,
+        ..NewParticipants::numbered(4)
+    };
+    let added = lab.study.add(&planned).unwrap();
+    added.into_iter().for_each(|change| lab.fold(change));
+    lab.add(2);
+    for number in [1, 3, 5, 6, 4] {
+        lab.begin(number);
+        lab.wait(1);
+    }
+    let members = |lab: &Lab| -> Vec<Vec<u32>> {
+        let groups = groups(lab).into_values();
+        groups
+            .map(|it| it.into_iter().map(|(number, _)| number).collect())
+            .collect()
+    };
+    assert_eq!(members(&lab), [vec![5, 6], vec![3, 4]]);
+    // Somebody else comes in place of the one who was planned.
+    let removed = lab.study.remove(2, lab.now_ms).unwrap();
+    removed.into_iter().for_each(|change| lab.fold(change));
+    let replacement = lab.study.replacement(2).unwrap();
+    replacement.into_iter().for_each(|change| lab.fold(change));
+    lab.begin(7);
+    lab.wait(1);
+    assert_eq!(members(&lab)[2], [1, 7]);
+
+    let three = NewParticipants {
+        together: true,
+        ..NewParticipants::numbered(3)
+    };
+    assert_eq!(lab.study.add(&three), Err(Refusal::NoWholeGroups(2)));
+    let alone = Lab::new(testing::settings(), 0);
+    assert_eq!(alone.study.add(&planned), Err(Refusal::NoWholeGroups(1)));
+}
+
+#[test]
+fn those_left_over_are_thanked_or_play_with_agents() {
+    for left_over in [LeftOver::Dismiss, LeftOver::Agents] {
+        let mut settings = in_groups(3);
+        settings.groups.as_mut().unwrap().left_over = left_over;
+        settings.recruiting.completed_url = "https://panel.example/done".to_owned();
+        let mut lab = Lab::new(settings, 3);
+        lab.begin(1);
+        lab.begin(2);
+        lab.wait(0);
+        // Only time with an open page counts.
+        lab.wait(59_000);
+        lab.study.set_connected(2, false, lab.now_ms);
+        lab.wait(0);
+        lab.open(2).unwrap();
+        lab.wait(2_000);
+        match left_over {
+            LeftOver::Dismiss => {
+                assert_eq!(reason(&lab, 1), End::LeftOver);
+                let Content::End { url, .. } = lab.study.view(1).unwrap().content else {
+                    panic!("no end");
+                };
+                assert_eq!(url.as_deref(), Some("https://panel.example/done"));
+                assert_eq!(here(&lab, 2), 1);
+                // Its place is free.
+                assert!(lab.study.participant(1).unwrap().slot.is_none());
+            }
+            LeftOver::Agents => {
+                assert_eq!(groups(&lab)[&1], [(1, 0), (2, 1)]);
+                place(&mut lab, 2);
+                let participant = lab.study.participant(2).unwrap();
+                let game = participant.games[0].placed.clone();
+                assert_eq!(lab.study.seats_of_group(participant, &game), [0, 1, 2]);
+                assert_eq!(game.seat, 1);
+                // The third slot of the group is nobody's.
+                lab.begin(3);
+                lab.wait(0);
+                lab.wait(60_000);
+                assert_eq!(groups(&lab)[&2], [(3, 3)]);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_member_who_leaves_keeps_nobody_waiting() {
+    let mut lab = Lab::new(in_groups(2), 4);
+    lab.begin(1);
+    lab.begin(2);
+    lab.wait(0);
+    place(&mut lab, 1);
+    let withdrew = lab.study.withdraw(2, true, lab.now_ms).unwrap();
+    withdrew.into_iter().for_each(|change| lab.fold(change));
+    assert!(lab.study.plays_with_others(2) && !lab.study.plays_with_others(1));
+    for number in [1, 2] {
+        end(&mut lab, number, Outcome::Finished);
+    }
+    lab.act(1);
+    // The next game has one of them.
+    place(&mut lab, 1);
+    assert!(lab.study.due(1).is_none());
+    assert_eq!(lab.study.players_with(1), [1]);
+
+    // The slots of a group are given again only after all of it have left.
+    lab.begin(3);
+    lab.begin(4);
+    lab.wait(0);
+    assert_eq!(groups(&lab)[&2], [(3, 2), (4, 3)]);
+}
+
+#[test]
+fn a_member_for_whom_the_others_wait_too_long_has_dropped_out() {
+    let mut lab = Lab::new(in_groups(2), 2);
+    lab.begin(1);
+    lab.begin(2);
+    lab.wait(0);
+    place(&mut lab, 1);
+    for number in [1, 2] {
+        end(&mut lab, number, Outcome::Finished);
+    }
+    lab.act(1);
+    lab.wait(0);
+    let wake_at = lab.study.wake_at().unwrap();
+    assert_eq!(wake_at, lab.now_ms + 60_000);
+    lab.wait(59_999);
+    assert!(lab.place(1).is_empty());
+    lab.wait(1);
+    assert_eq!(reason(&lab, 2), End::DroppedOut);
+    assert_eq!(lab.place(1).len(), 1);
+    // Its seat is taken: it does not come back.
+    assert_eq!(lab.study.open(2, None, lab.now_ms), Ok(None));
+}
+
+#[test]
+fn nobody_begins_for_whom_there_is_no_place() {
+    let mut settings = in_groups(2);
+    settings.participants = 2;
+    let mut lab = Lab::new(settings, 4);
+    lab.begin(1);
+    lab.open(2).unwrap();
+    lab.open(3).unwrap();
+    lab.act(2);
+    assert_eq!(lab.study.consent(lab.at(3), lab.now_ms), Err(Refusal::Full));
+    assert_eq!(lab.open(4), Err(Refusal::Full));
+    lab.wait(0);
+    assert_eq!(groups(&lab)[&1], [(1, 0), (2, 1)]);
+    assert_eq!(lab.study.consent(lab.at(3), lab.now_ms), Err(Refusal::Full));
+    for number in [1, 2] {
+        let removed = lab.study.remove(number, lab.now_ms).unwrap();
+        removed.into_iter().for_each(|change| lab.fold(change));
+    }
+    lab.act(3);
+    assert_eq!(here(&lab, 3), 1);
+}
+
+#[test]
+fn a_test_participant_goes_on_alone() {
+    let mut lab = Lab::new(in_groups(2), 1);
+    let added = lab.study.add(&tests(3)).unwrap();
+    added.into_iter().for_each(|change| lab.fold(change));
+    for number in [1, 2] {
+        lab.begin(number);
+    }
+    lab.wait(0);
+    assert_eq!([1, 2].map(|number| here(&lab, number)), [1, 1]);
+    let at = lab.at(1);
+    assert_eq!(
+        lab.study.proceed(at, lab.now_ms),
+        Err(Refusal::StepMismatch)
+    );
+    let grouped = lab.study.proceed(lab.at(2), lab.now_ms).unwrap();
+    lab.fold(grouped);
+    assert_eq!(lab.study.players_with(2), [2]);
+    for number in [3, 4] {
+        lab.begin(number);
+    }
+    lab.wait(0);
+    assert_eq!(groups(&lab)[&2], [(3, 2), (4, 3)]);
+}
+
+#[test]
+fn practice_is_played_alone() {
+    let mut settings = in_groups(2);
+    settings
+        .stages
+        .insert(2, Stage::once(Task::Practice { in_data: false }));
+    let mut lab = Lab::new(settings, 2);
+    lab.begin(1);
+    lab.begin(2);
+    lab.wait(0);
+    place(&mut lab, 1);
+    assert!(lab.study.due(1).is_none() && lab.study.due(2).is_some());
+    let participant = lab.study.participant(1).unwrap();
+    let practice = participant.games[0].placed.clone();
+    assert_eq!(
+        lab.study.seats_of_group(participant, &practice),
+        [practice.seat]
+    );
+}
+
+#[test]
+fn settings_of_groups_that_cannot_be_played_are_refused() {
+    type Change = fn(&mut Settings);
+    let changes: [(Change, &str); 9] = [
+        (|it| it.groups.as_mut().unwrap().size = 1, "groups.size"),
+        (|it| it.groups.as_mut().unwrap().size = 7, "groups.size"),
+        (
+            |it| it.groups.as_mut().unwrap().wait_ms = 0,
+            "groups.wait_ms",
+        ),
+        (|it| it.participants = 7, "participants"),
+        (
+            |it| it.conditions[1].players = 2,
+            "conditions[1].rules.players",
+        ),
+        (|it| drop(it.stages.remove(1)), "stages"),
+        (|it| it.stages.swap(1, 2), "stages[2]"),
+        (|it| it.stages.insert(1, it.stages[1].clone()), "stages[2]"),
+        (|it| it.groups = None, "stages[1]"),
+    ];
+    for (change, field) in changes {
+        let mut settings = in_groups(3);
+        change(&mut settings);
+        let problem = chefshat_study::Study::new(settings).unwrap_err();
+        assert_eq!(problem.field, field, "{problem}");
+    }
+}
+
+/// Something happens: its kind, and a number that says to whom.
+fn happen(lab: &mut Lab, (kind, who): (u8, u32)) {
+    let number = who % (lab.study.participants().len() as u32 + 1) + 1;
+    let is_active = (lab.study.participant(number)).is_some_and(|it| it.status == Status::Active);
+    match kind {
+        0 => lab.add(1),
+        1..=4 => drop(lab.open(number)),
+        5..=11 if is_active => {
+            let running = lab.study.participant(number).unwrap().games.last();
+            let running = running
+                .filter(|it| it.ended.is_none())
+                .map(|it| it.placed.game);
+            match running {
+                // A game ends for all who play it, at once.
+                Some(game) => {
+                    let all = lab.study.participants().iter();
+                    let all = all.filter(|(_, it)| {
+                        it.games
+                            .last()
+                            .is_some_and(|it| it.placed.game == game && it.ended.is_none())
+                    });
+                    let all: Vec<u32> = all.map(|(number, _)| *number).collect();
+                    let outcome = match who % 4 {
+                        0 => Outcome::Aborted,
+                        _ => Outcome::Finished,
+                    };
+                    all.into_iter().for_each(|it| end(lab, it, outcome));
+                }
+                None => {
+                    lab.act(number);
+                }
+            }
+        }
+        12 => lab.study.set_connected(number, false, lab.now_ms),
+        13 => lab.wait(u64::from(who) * 100),
+        14 => {
+            if let Ok(Some(withdrew)) = lab.study.withdraw(number, who % 2 == 0, lab.now_ms) {
+                lab.fold(withdrew);
+            }
+        }
+        15 => lab.study = lab.folded_again(),
+        _ => lab.wait(1),
+    }
+}
+
+/// What holds of groups, whatever happens.
+fn check(lab: &Lab) {
+    let size = lab.study.settings().group_size();
+    let mut holders = BTreeSet::new();
+    for (group, members) in groups(lab) {
+        let slots: BTreeSet<u32> = members.iter().map(|(_, slot)| *slot).collect();
+        assert_eq!(slots.len(), members.len(), "two members have one slot");
+        let units: BTreeSet<u32> = slots.iter().map(|slot| slot / size).collect();
+        assert_eq!(units.len(), 1, "the slots of group {group} are apart");
+        let holds = |number: &u32| lab.study.participant(*number).unwrap().holds_slot();
+        if members.iter().any(|(number, _)| holds(number)) {
+            assert!(holders.insert(units), "two groups hold the same slots");
+        }
+        // Those who are in the middle of it play the same game, or wait for each other.
+        let active = members
+            .iter()
+            .map(|(number, _)| lab.study.participant(*number).unwrap());
+        let active: Vec<_> = active.filter(|it| it.status == Status::Active).collect();
+        let games: BTreeSet<_> = active
+            .iter()
+            .map(|it| it.games.last().map(|it| it.placed.game))
+            .collect();
+        assert!(games.len() <= 1, "group {group} is in several games");
+        let seats: BTreeSet<_> = active
+            .iter()
+            .map(|it| it.games.last().map(|it| it.placed.seat))
+            .collect();
+        assert!(
+            games.contains(&None) || seats.len() == active.len(),
+            "two share a seat"
+        );
+    }
+    for (number, participant) in lab.study.participants() {
+        if participant.status == Status::Active {
+            assert!(lab.study.view(*number).is_some());
+        }
+    }
+}
+
+fn plans() -> impl Strategy<Value = Settings> {
+    let left_over = prop::sample::select(vec![LeftOver::Dismiss, LeftOver::Agents]);
+    (2..=4u32, left_over, any::<[u8; 32]>()).prop_map(|(size, left_over, seed)| {
+        let mut settings = in_groups(size);
+        settings.assignment_seed = seed;
+        settings.participants = 2 * size;
+        settings.groups.as_mut().unwrap().left_over = left_over;
+        settings.conditions[0].labels = Labels::Players;
+        settings
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn groups_stay_together(
+        plan in plans(),
+        events in prop::collection::vec((0..=17u8, 0..1000u32), 0..250),
+    ) {
+        let mut lab = Lab::new(plan, 6);
+        for event in events {
+            happen(&mut lab, event);
+            check(&lab);
+        }
+        prop_assert!(lab.folded_again() == lab.study);
+    }
+}

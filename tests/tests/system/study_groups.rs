@@ -1,0 +1,255 @@
+//! Pairs of people who play a study together, over real sockets: one leaves in the middle of a game,
+//! the server is restarted in the middle of another, and nobody learns who else is a person.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use chefshat_client::{ActionId, Agent};
+use chefshat_proto::v1::study_service_client::StudyServiceClient;
+use chefshat_proto::v1::{self, record_line::Line, study_stage::Stage, study_view::Content};
+use chefshat_record::replay::replay;
+use chefshat_tests::patiently;
+use tokio::sync::oneshot;
+use tonic::transport::Channel;
+
+use crate::studies::{
+    Lab, Person, SECRETS, Tap, address, assert_as_described, contains, host, playable, rows,
+    settings, stage,
+};
+
+/// Steps: consent, arrival, games, text.
+const STEPS: u32 = 4;
+
+/// Two pairs, each in one of the conditions of [`settings`].
+fn pairs() -> v1::StudySettings {
+    let mut settings = settings();
+    settings.participants = 4;
+    settings.groups = Some(v1::StudyGroups {
+        size: 2,
+        ..v1::StudyGroups::default()
+    });
+    for condition in &mut settings.conditions {
+        condition.seats.truncate(2);
+    }
+    let is_kept = |stage: &v1::StudyStage| {
+        !matches!(
+            stage.stage,
+            Some(Stage::Questionnaire(_) | Stage::Practice(_))
+        )
+    };
+    settings.stages.retain(is_kept);
+    let arrival = v1::StudyArrival {
+        text: "Another player comes soon.".to_owned(),
+    };
+    settings.stages.insert(1, stage(Stage::Arrival(arrival)));
+    settings
+}
+
+/// Attaches to its seat, says when the game has begun, and never answers.
+struct Idle(Option<oneshot::Sender<()>>);
+
+impl Agent for Idle {
+    fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
+        unreachable!("{request:?}: it does not answer")
+    }
+
+    fn try_decide(&mut self, _: &v1::DecisionRequest) -> Option<ActionId> {
+        None
+    }
+
+    fn on_event(&mut self, _: &v1::GameEvent) {
+        if let Some(begun) = self.0.take() {
+            // The test may have gone on.
+            let _ = begun.send(());
+        }
+    }
+}
+
+/// Two people arrive, first this one, and become a pair.
+async fn arrive(
+    (one, first): (&mut Person, v1::StudyView),
+    (other, second): (&mut Person, v1::StudyView),
+) -> [v1::StudyView; 2] {
+    let (first, _) = one.go_on(first, 1).await;
+    let Some(Content::Arrival(shown)) = &first.content else {
+        panic!("it waits");
+    };
+    assert_eq!((shown.size, shown.here), (2, 1));
+    let (second, _) = other.go_on(second, 1).await;
+    let (first, second) = tokio::join!(one.go_on(first, 2), other.go_on(second, 2));
+    [first.0, second.0]
+}
+
+/// The game of a view, once it has a room.
+async fn game_of(person: &mut Person) -> v1::StudyShownGame {
+    let view = person.until(|content| playable(content).is_some()).await;
+    let game = view.content.as_ref().and_then(playable);
+    game.expect("a game").clone()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn pairs_of_people_play_together_and_a_partner_who_leaves_is_replaced() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let first_host = host(folder.path()).await;
+    let tap = Tap::new(address(&first_host)).await;
+    let channel = Channel::from_shared(first_host.url().to_owned()).expect("a URL");
+    let channel = channel.connect().await.expect("the server listens");
+    let request = v1::CreateStudyRequest {
+        settings: Some(pairs()),
+        request_id: Vec::new(),
+    };
+    let created = StudyServiceClient::new(channel).create_study(request).await;
+    let created = created.expect("valid").into_inner();
+    let owner = (
+        created.study.expect("a study").study_id,
+        created.owner_token,
+    );
+    let mut lab = Lab::connect(&first_host, owner.clone()).await;
+    let name = |number| format!("Pseudonym-{number}-of-all");
+    let links = lab.links((1..=4).map(name).collect()).await;
+    let mut people = Vec::new();
+    for link in &links {
+        people.push(Person::new(&tap, link).await);
+    }
+    let [(mut ada, a), (mut bo, b), (mut cy, c), (mut di, d)] =
+        <[_; 4]>::try_from(people).ok().expect("four");
+
+    // The first pair is in its game when the server is restarted, the second at its arrival.
+    let [_, _] = arrive((&mut ada, a), (&mut bo, b)).await;
+    let games = tokio::join!(game_of(&mut ada), game_of(&mut bo));
+    assert_eq!(games.0.game_id, games.1.game_id);
+    assert_ne!(games.0.ticket, games.1.ticket);
+    let (cy_waits, _) = cy.go_on(c, 1).await;
+    let (di_waits, _) = di.go_on(d, 1).await;
+    assert_eq!((cy_waits.step, di_waits.step), (1, 1));
+    let stopping = patiently("the server to stop", first_host.stop());
+    stopping.await.expect("a clean end");
+    let second_host = host(folder.path()).await;
+    *tap.target.lock().expect("not poisoned") = address(&second_host);
+    let mut lab = Lab::connect(&second_host, owner.clone()).await;
+
+    let (a, b, c, d) = (
+        ada.back().await,
+        bo.back().await,
+        cy.back().await,
+        di.back().await,
+    );
+    assert_eq!(a.content.as_ref().and_then(playable), Some(&games.0));
+    let first_pair = async {
+        let (a, b) = tokio::join!(ada.go_on(a, STEPS), bo.go_on(b, STEPS));
+        [a.0, b.0]
+    };
+    let second_pair = async {
+        let [c, _] = arrive((&mut cy, c), (&mut di, d)).await;
+        let ticket = game_of(&mut di).await.ticket;
+        let (begun, has_begun) = oneshot::channel();
+        let client = di.client.clone();
+        let idle = tokio::spawn(async move { client.play(ticket, Idle(Some(begun))).await });
+        let leaving = async {
+            patiently("the game to begin", has_begun)
+                .await
+                .expect("it begins");
+            let request = v1::WithdrawFromStudyRequest {
+                link: di.link.clone(),
+                delete_data: false,
+            };
+            let withdrawn = di.service.withdraw_from_study(request).await;
+            withdrawn.expect("always possible");
+        };
+        let (c, ()) = tokio::join!(cy.go_on(c, STEPS), leaving);
+        idle.abort();
+        c.0
+    };
+    let (first_pair, c) = tokio::join!(first_pair, second_pair);
+    for view in first_pair.into_iter().chain([c]) {
+        let Some(Content::End(end)) = view.content else {
+            panic!("it is the end");
+        };
+        assert_eq!(end.reason(), v1::StudyEndReason::Completed);
+    }
+
+    let participants = lab.participants().await;
+    let groups: Vec<u32> = participants.iter().map(|it| it.group).collect();
+    assert_eq!(groups, [1, 1, 2, 2]);
+    let conditions: Vec<&str> = participants
+        .iter()
+        .map(|it| it.conditions[0].as_str())
+        .collect();
+    assert_eq!(conditions[0], conditions[1]);
+    assert_eq!(conditions[2], conditions[3]);
+    assert_ne!(conditions[0], conditions[2]);
+    let played: Vec<usize> = participants.iter().map(|it| it.games.len()).collect();
+    assert_eq!(played, [2, 2, 2, 1]);
+
+    // The data have each game once, and say who played in it.
+    let files = lab.export().await;
+    assert_as_described(&files);
+    assert_eq!(rows(&files["games.csv"]).len(), 7);
+    let formed = rows(&files["groups.csv"]);
+    assert!(formed[0].ends_with(",2,1 2,2"), "{formed:?}");
+    assert!(formed[1].ends_with(",2,3 4,1"), "{formed:?}");
+    let mut recorded = BTreeMap::new();
+    for (_, bytes) in files
+        .iter()
+        .filter(|(file, _)| file.starts_with("records/"))
+    {
+        let lines = std::str::from_utf8(bytes).expect("UTF-8").lines();
+        let lines: Vec<v1::RecordLine> = lines
+            .map(|line| serde_json::from_str(line).expect("a line of a record"))
+            .collect();
+        replay(&lines).expect("the record is right");
+        let Some(Line::Header(header)) = &lines[0].line else {
+            panic!("a header comes first");
+        };
+        let study = header.study.clone().expect("it says where it belongs");
+        let others = study.others.iter().map(|other| (other.number, other.seat));
+        let members: Vec<(u32, u32)> = [(study.number, study.seat)]
+            .into_iter()
+            .chain(others)
+            .collect();
+        for (number, seat) in &members {
+            let own = participants[*number as usize - 1].games.iter();
+            let own = own.filter(|game| game.game_id == header.game_id);
+            assert_eq!(own.map(|game| game.seat).collect::<Vec<_>>(), [*seat]);
+            let seated = &header.seats[*seat as usize];
+            assert_eq!(seated.name, name(*number));
+        }
+        let numbers: Vec<u32> = members.into_iter().map(|(number, _)| number).collect();
+        *recorded.entry((study.group, numbers)).or_insert(0) += 1;
+    }
+    let expected = [
+        ((1, vec![1, 2]), 2),
+        ((2, vec![3, 4]), 1),
+        ((2, vec![3]), 1),
+    ];
+    assert_eq!(recorded, expected.into());
+
+    // A game is deleted with the data of one of its players.
+    let request = v1::DeleteStudyParticipantRequest {
+        study_id: owner.0.clone(),
+        owner_token: owner.1.clone(),
+        number: 1,
+    };
+    let deleted = lab.service.delete_study_participant(request).await;
+    assert_eq!(deleted.expect("it exists").into_inner().games, 2);
+    let files = lab.export().await;
+    assert_as_described(&files);
+    for (file, bytes) in &files {
+        assert!(!contains(bytes, &name(1)), "{file}");
+    }
+    let records = files.keys().filter(|file| file.starts_with("records/"));
+    assert_eq!(records.count(), 2);
+    assert_eq!(rows(&files["games.csv"]).len(), 5);
+    let stopping = patiently("the server to stop", second_host.stop());
+    stopping.await.expect("a clean end");
+
+    // Nobody has received the name of another, or what names a condition.
+    for bytes in tap.received.lock().expect("not poisoned").iter() {
+        let names: BTreeSet<u32> = (1..=4)
+            .filter(|number| contains(bytes, &name(*number)))
+            .collect();
+        assert!(names.len() <= 1, "{names:?} on one connection");
+        for secret in SECRETS {
+            assert!(!contains(bytes, secret), "participants received {secret:?}");
+        }
+    }
+}
