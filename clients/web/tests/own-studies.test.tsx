@@ -7,9 +7,12 @@ import { Code } from "@connectrpc/connect";
 import { render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeAll, expect, test, vi } from "vitest";
+import { AbortPolicy, ParticipantKind } from "../src/gen/chefshat/v1/room_pb";
+import { PassScope } from "../src/gen/chefshat/v1/rules_pb";
 import {
   StudyHide,
   StudyLabels,
+  StudyLeftOver,
   StudyOrder,
   type StudyParticipant,
   StudyParticipantSchema,
@@ -98,6 +101,19 @@ test("the form makes the settings of a study, and says what is missing", async (
   const tomorrow = new Date(Date.now() + 86_400_000).toISOString().slice(0, 16);
   const dated = await settingsOf({ ...filled, closesAt: tomorrow, deletesAt: tomorrow });
   expect([dated.closesAtMs, dated.deletesAtMs]).toEqual(Array(2).fill(BigInt(Date.parse(tomorrow))));
+  const pairs = await settingsOf({ ...filled, people: "2", fill: true, within: true });
+  expect(pairs.groups).toEqual({ size: 2, leftOver: StudyLeftOver.AGENTS });
+  expect(pairs.conditions?.map(({ seats, policy }) => [seats?.length, policy?.substitute])).toEqual([
+    [2, "greedy"],
+    [2, "random"],
+  ]);
+  expect(pairs.stages?.map(({ stage }) => stage?.case)).toEqual([
+    "consent",
+    "practice",
+    "arrival",
+    "perCondition",
+    "text",
+  ]);
   const within = await settingsOf({ ...filled, within: true });
   expect(within.stages?.map(({ stage }) => stage?.case)).toEqual(["consent", "practice", "perCondition", "text"]);
 });
@@ -115,6 +131,8 @@ test.each([
 test.each([
   [{ participants: "0" }, "participants"],
   [{ games: "many" }, "games"],
+  [{ people: "5" }, "people"],
+  [{ participants: "25", people: "2" }, "participants"],
   [{ external: "http://forms.example" }, "external"],
   [{ closesAt: "2020-05-01T18:00" }, "closesAt"],
   [{ closesAt: "2931-05-01T18:00", deletesAt: "2930-05-01T18:00" }, "deletesAt"],
@@ -151,6 +169,51 @@ test.each([
     [StudyHide.LOG],
   ]);
   expect(settings.seeds).toEqual([new Uint8Array(32).fill(10)]);
+});
+
+test("values of enums are written in short, as for the command", async () => {
+  const text = `
+    groups = { size = 2, left_over = "agents" }
+    [[conditions]]
+    id = "A"
+    policy = { abort = "never", reward_scheme = "paper", clocks = [{ kind = "human", decision_time_ms = 60_000 }] }
+    rules = { opening = "golden", pass_scope = "turn" }
+    seats = [{ reserved_for = "robot" }]`;
+  const { groups, conditions } = await settingsFrom(text, "study.toml");
+  expect(groups?.leftOver).toBe(StudyLeftOver.AGENTS);
+  expect(conditions[0]?.rules?.passScope).toBe(PassScope.TURN);
+  expect(conditions[0]?.policy?.abort).toBe(AbortPolicy.NEVER);
+  expect(conditions[0]?.policy?.clocks[0]?.kind).toBe(ParticipantKind.HUMAN);
+});
+
+test("those of a study with groups may be added together, in whole groups", async () => {
+  keepOwnerToken(ID, TOKEN);
+  const add = vi.spyOn(studyApi, "addStudyParticipants").mockResolvedValue(create(AddStudyParticipantsResponseSchema));
+  const settings = { participants: 8, conditions: [{ id: "A" }, { id: "B" }], groups: { size: 2 } };
+  const inPairs = create(StudySchema, { studyId: ID, settings, steps: 5 });
+  const paired = [
+    participant(1, StudyParticipantState.LEFT_OVER, []),
+    create(StudyParticipantSchema, { number: 2, pseudonym: "P02", state: StudyParticipantState.ACTIVE, group: 7 }),
+  ];
+  await act(() => render(<OwnStudy study={inPairs} participants={paired} />, root));
+  expect(root.querySelector('[data-part="conditions"]')?.textContent).toContain("left over");
+  expect(root.querySelector('[data-part="participants"]')?.textContent).toContain("group 7");
+  const form = root.querySelector('[data-part="add-participants"]');
+  const count = form?.querySelector<HTMLInputElement>('input[type="number"]');
+  const together = form?.querySelector<HTMLInputElement>('input[type="checkbox"]');
+  const enter = (number: string) =>
+    act(() => {
+      if (count) count.value = number;
+      count?.dispatchEvent(new Event("input", { bubbles: true }));
+    });
+  await act(() => together?.click());
+  await enter("3");
+  await press("Add");
+  expect(form?.textContent).toContain("Add a multiple of 2.");
+  expect(add).not.toHaveBeenCalled();
+  await enter("4");
+  await press("Add");
+  expect(add.mock.calls[0]?.[0]).toMatchObject({ count: 4, together: true });
 });
 
 test("a time of TOML may be a date with its zone", async () => {

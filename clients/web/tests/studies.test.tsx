@@ -3,7 +3,7 @@
 import { create } from "@bufbuild/protobuf";
 import { Code } from "@connectrpc/connect";
 import { signal } from "@preact/signals";
-import { render } from "preact";
+import { type JSX, render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { roomApi } from "../src/api/client";
@@ -17,6 +17,7 @@ import {
 } from "../src/gen/chefshat/v1/study_pb";
 import { ContinueStudyResponseSchema, type SaveAnswersRequest } from "../src/gen/chefshat/v1/study_service_pb";
 import { setLanguage } from "../src/i18n";
+import { useTab } from "../src/parts/tab";
 import { remembered } from "../src/store";
 import { answersOf, missingItems } from "../src/studies/answers";
 import { participationApi } from "../src/studies/client";
@@ -67,9 +68,15 @@ afterEach(async () => {
   localStorage.clear();
 });
 
-const show = () =>
+const show = (beside?: JSX.Element) =>
   act(async () => {
-    render(<StudyPage route={{ page: "study", link: LINK }} />, root);
+    render(
+      <>
+        {beside}
+        <StudyPage route={{ page: "study", link: LINK }} />
+      </>,
+      root,
+    );
   }).then(settled);
 const later = (ms: number) =>
   act(async () => {
@@ -207,6 +214,65 @@ test("who is screened out reads why, and can have the data deleted", async () =>
   fakeStudy([{ case: "end", value: { ...end, text: "" } }]);
   await show();
   expect(root.textContent).toContain("This study is meant for other people");
+});
+
+/** The title of the tab, which the layout sets. */
+function Tab() {
+  useTab("Study");
+  return null;
+}
+
+const waiting = (here: number) => ({
+  case: "arrival" as const,
+  value: { text: "Have *patience*.", size: 3, here, waitMs: 600_000n },
+});
+
+test("who waits for others sees how many are here, and goes on by itself", async () => {
+  const { streams, sent } = fakeStudy([waiting(1), TEXT]);
+  await show(<Tab />);
+  expect(title()).toBe("Waiting for the others");
+  expect(root.querySelector("em")?.textContent).toBe("patience");
+  expect(root.textContent).toContain("1 of 3 people are here");
+  expect(root.textContent).toContain("After 10 minutes at the latest");
+  streams[0]?.push(viewOf([waiting(2), TEXT], 0));
+  await settled();
+  expect(root.textContent).toContain("2 of 3 people are here");
+  expect(root.querySelectorAll('[data-taken="true"]')).toHaveLength(2);
+  expect(button("Go on without the others")).toBeUndefined();
+  // Nobody looks at the page when the last one comes: the tab says so.
+  const hidden = vi.spyOn(document, "hidden", "get").mockReturnValue(true);
+  streams[0]?.push(viewOf([waiting(2), TEXT], 1));
+  await settled();
+  expect(title()).toBe("Welcome");
+  expect(document.title).toBe("It goes on · Study");
+  hidden.mockReturnValue(false);
+  await act(() => void document.dispatchEvent(new Event("visibilitychange")));
+  expect(document.title).toBe("Study");
+  expect(sent.map(({ call }) => call)).toEqual(["open"]);
+});
+
+test("a test participant may go on without the others", async () => {
+  const { streams, sent } = fakeStudy([waiting(1), TEXT]);
+  await show();
+  streams[0]?.push(create(StudyViewSchema, { ...viewOf([waiting(1), TEXT], 0), test: true }));
+  await settled();
+  await press("Go on without the others");
+  expect(sent.at(-1)?.call).toBe("continue");
+  expect(title()).toBe("Welcome");
+});
+
+test("a game that waits for others of the group says for how many", async () => {
+  fakeStudy([{ case: "game", value: { game: 1, games: 2, waitsFor: 2 } }]);
+  await show();
+  expect(root.textContent).toContain("The game begins when 2 other people are ready.");
+});
+
+test("who is left over is thanked", async () => {
+  fakeStudy([{ case: "end", value: { reason: StudyEndReason.LEFT_OVER, url: "https://panel.example/done" } }]);
+  await show();
+  expect(title()).toBe("Thank you for taking part");
+  expect(root.textContent).toContain("There are not enough people for a game now.");
+  expect(root.querySelector<HTMLAnchorElement>('[data-part="go-on"]')?.href).toBe("https://panel.example/done");
 });
 
 test("another device that opens the study is said clearly, and can be answered", async () => {

@@ -554,8 +554,8 @@ pub(crate) fn assert_as_described(files: &BTreeMap<String, Vec<u8>>) {
     assert_eq!(described, tables.cloned().collect());
 }
 
-/// Asserts that the sample in Python reads the exported tables and summarises them by condition.
-async fn assert_analysed(files: &BTreeMap<String, Vec<u8>>) {
+/// What the sample in Python prints of the exported tables.
+pub(crate) async fn analysed(files: &BTreeMap<String, Vec<u8>>) -> String {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, bytes) in files.iter().filter(|(name, _)| !name.contains('/')) {
         std::fs::write(folder.path().join(name), bytes).expect("a file");
@@ -569,7 +569,12 @@ async fn assert_analysed(files: &BTreeMap<String, Vec<u8>>) {
     let analysed = patiently("the analysis", analysing).await.expect("Python");
     let problem = String::from_utf8_lossy(&analysed.stderr);
     assert!(analysed.status.success(), "{problem}");
-    let printed = String::from_utf8(analysed.stdout).expect("UTF-8");
+    String::from_utf8(analysed.stdout).expect("UTF-8")
+}
+
+/// Asserts that the sample in Python reads the exported tables and summarises them by condition.
+async fn assert_analysed(files: &BTreeMap<String, Vec<u8>>) {
+    let printed = analysed(files).await;
     let first = printed.lines().next().unwrap_or_default();
     assert!(
         first.contains(&format!("{PARTICIPANTS} completed")),

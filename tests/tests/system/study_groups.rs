@@ -12,8 +12,8 @@ use tokio::sync::oneshot;
 use tonic::transport::Channel;
 
 use crate::studies::{
-    Lab, Person, SECRETS, Tap, address, assert_as_described, contains, host, playable, rows,
-    settings, stage,
+    Lab, Person, SECRETS, Tap, address, analysed, assert_as_described, contains, host, playable,
+    rows, settings, stage,
 };
 
 /// Steps: consent, arrival, games, text.
@@ -222,6 +222,14 @@ async fn pairs_of_people_play_together_and_a_partner_who_leaves_is_replaced() {
         ((2, vec![3]), 1),
     ];
     assert_eq!(recorded, expected.into());
+
+    let printed = analysed(&files).await;
+    // In each condition, what its group scored counts once.
+    let points = printed.lines().filter(|line| line.contains(" points "));
+    let counts: Vec<&str> = points
+        .filter_map(|line| line.split_whitespace().nth(2))
+        .collect();
+    assert_eq!(counts, ["1", "1"], "{printed}");
 
     // A game is deleted with the data of one of its players.
     let request = v1::DeleteStudyParticipantRequest {

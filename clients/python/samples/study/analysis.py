@@ -3,7 +3,8 @@
 `chefshat study export STUDY-ID --out data` writes the data; then `python analysis.py data`. Needs pandas.
 
 The tables are read as `datapackage.json` describes them: codes become categories, empty cells missing values. A participant
-counts once in each condition: its games and items are averaged first.
+counts once in each condition: its games and items are averaged first. People who play together are not independent: then a
+group counts once, with the mean of its participants.
 """
 
 import argparse
@@ -68,12 +69,16 @@ def of_answers(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
 
 
 def summary(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """Summarises each measure by condition: number of participants, mean and standard deviation over them."""
+    """Summarises each measure by condition: number of participants or groups, mean and standard deviation over them."""
     values = pd.concat([of_games(tables), of_answers(tables)]).dropna(subset=["condition", "value"])
     values["value"] = values["value"].astype(float)
-    participants = values.groupby(["measure", "condition", "number"], observed=True)["value"].mean()
-    by_condition = participants.groupby(level=["measure", "condition"], observed=True)
-    figures = pd.DataFrame({"participants": by_condition.count(), "mean": by_condition.mean(), "sd": by_condition.std()})
+    unit = values.groupby(["measure", "condition", "number"], observed=True)["value"].mean()
+    if "groups" in tables:
+        groups = tables["participants"].set_index("number")["group"]
+        unit = unit.reset_index().join(groups, on="number").groupby(["measure", "condition", "group"], observed=True)["value"].mean()
+    by_condition = unit.groupby(level=["measure", "condition"], observed=True)
+    counted = "groups" if "groups" in tables else "participants"
+    figures = pd.DataFrame({counted: by_condition.count(), "mean": by_condition.mean(), "sd": by_condition.std()})
     return figures.reset_index()
 
 

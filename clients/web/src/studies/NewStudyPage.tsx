@@ -127,9 +127,10 @@ function FromForm() {
       autoComplete="off"
     />
   );
-  const number = (name: "participants" | "games" | "shifts", label: string) => (
+  const number = (name: "participants" | "people" | "games" | "shifts", label: string, hint?: string) => (
     <TextField
       label={label}
+      hint={hint}
       type="number"
       min={1}
       value={form[name]}
@@ -137,7 +138,7 @@ function FromForm() {
       fault={faults[name]}
     />
   );
-  const check = (name: "within" | "practice" | "traces" | "openLink", label: string) => (
+  const check = (name: "within" | "practice" | "traces" | "openLink" | "fill", label: string) => (
     <CheckField label={label} checked={form[name]} onCheck={(checked) => change({ [name]: checked })} />
   );
   const inLanguage = hasTemplates(form.language);
@@ -175,6 +176,7 @@ function FromForm() {
           onPick={(chosen) => change({ language: chosen })}
         />
         {number("participants", words.participants)}
+        {number("people", words.people, words.peopleHint)}
         {number("games", words.games)}
         {number("shifts", words.shifts)}
       </div>
@@ -222,6 +224,7 @@ function FromForm() {
           {words.addCondition}
         </Button>
       </div>
+      {Number(form.people) > 1 && check("fill", words.fill)}
       {check("within", words.within)}
       {check("practice", words.practice)}
       {long("consent", words.consent)}

@@ -14,11 +14,11 @@ import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { ConfirmButton } from "../parts/ConfirmButton";
 import { download, fileName } from "../parts/download";
-import { Field, TextField } from "../parts/Field";
+import { CheckField, Field, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { zipped } from "../parts/zip";
 import { navigate, type PageProps } from "../router";
-import { byCondition, STATES, stateName } from "./board";
+import { byCondition, stateName, statesOf } from "./board";
 import { studyApi } from "./client";
 import { LinkList } from "./LinkList";
 import css from "./Own.module.css";
@@ -133,7 +133,7 @@ export function OwnStudy({ study, participants }: FollowedStudy) {
       {deletesAtMs > 0n && <Notice kind="hint">{words.deletes(momentOf(deletesAtMs))}</Notice>}
       <Counts study={study} participants={participants} />
       {!closed && study.openLink && <OpenLink study={study} />}
-      {!closed && <Add studyId={studyId} />}
+      {!closed && <Add study={study} />}
       <Tests study={study} />
       <Links key={participants.length} studyId={studyId} />
       <Participants study={study} participants={participants} />
@@ -182,6 +182,7 @@ function Delete({ study }: { study: Study }) {
 function Counts({ study, participants }: FollowedStudy) {
   const words = t().studies.own;
   const rows = byCondition(study, participants);
+  const states = statesOf(study);
   return (
     <section class={`sheet ${css.part}`}>
       <h2>{words.board.title}</h2>
@@ -191,7 +192,7 @@ function Counts({ study, participants }: FollowedStudy) {
           <thead>
             <tr>
               <th scope="col">{words.board.condition}</th>
-              {STATES.map((state) => (
+              {states.map((state) => (
                 <th scope="col" key={state}>
                   {words.state[stateName(state)]}
                 </th>
@@ -203,7 +204,7 @@ function Counts({ study, participants }: FollowedStudy) {
               <tr key={condition ?? ""}>
                 <th scope="row">{condition ?? words.board.all}</th>
                 {counts.map((count, index) => (
-                  <td class="number" key={STATES[index]}>
+                  <td class="number" key={states[index]}>
                     {count}
                   </td>
                 ))}
@@ -240,10 +241,12 @@ function OpenLink({ study: { openLink, settings } }: { study: Study }) {
   );
 }
 
-function Add({ studyId }: { studyId: string }) {
+function Add({ study: { studyId, settings } }: { study: Study }) {
   const words = t().studies.own.add;
   const [count, setCount] = useState("");
   const [names, setNames] = useState("");
+  const [together, setTogether] = useState(false);
+  const size = settings?.groups?.size ?? 1;
   const [tried, setTried] = useState(false);
   const { busy, fault, run } = useAttempt();
   const pseudonyms = participantsIn(names);
@@ -251,12 +254,14 @@ function Add({ studyId }: { studyId: string }) {
   const fits = Number.isInteger(number) && number >= 0 && number <= MAX_ADDED;
   const valid =
     fits && number + pseudonyms.length > 0 && pseudonyms.every((name) => Array.from(name).length <= MAX_NAME);
+  const isUneven = together && (number + pseudonyms.length) % size !== 0;
+  const wrongGroups = tried && valid && isUneven;
   const add = (event: Event) => {
     event.preventDefault();
     setTried(true);
-    if (!valid) return;
+    if (!valid || isUneven) return;
     run(async () => {
-      await addParticipants(studyId, number, pseudonyms);
+      await addParticipants(studyId, number, pseudonyms, together && size > 1);
       setCount("");
       setNames("");
       setTried(false);
@@ -274,6 +279,15 @@ function Add({ studyId }: { studyId: string }) {
           )}
         </Field>
       </div>
+      {size > 1 && (
+        <CheckField
+          label={words.together}
+          hint={words.togetherHint(size)}
+          checked={together}
+          onCheck={setTogether}
+          fault={wrongGroups ? words.wholeGroups(size) : undefined}
+        />
+      )}
       {fault && <Notice kind="fault">{fault}</Notice>}
       <div>
         <Button type="submit" busy={busy}>
@@ -432,12 +446,13 @@ const LEFT = [
   StudyParticipantState.DROPPED_OUT,
   StudyParticipantState.REMOVED,
   StudyParticipantState.SCREENED_OUT,
+  StudyParticipantState.LEFT_OVER,
   StudyParticipantState.COMPLETED,
 ];
 
 function Row({ study, participant }: { study: Study; participant: StudyParticipant }) {
   const words = t().studies.own;
-  const { number, pseudonym, panelId, state, step, sessions, connected, conditions, dataDeleted } = participant;
+  const { number, pseudonym, panelId, state, step, sessions, connected, conditions, group, dataDeleted } = participant;
   const name = pseudonym || `${words.board.number} ${number}`;
   const over = LEFT.includes(state);
   const running = participant.games.find(({ joinCode }) => joinCode !== "");
@@ -450,7 +465,10 @@ function Row({ study, participant }: { study: Study; participant: StudyParticipa
         {participant.test && <span class="soft small"> {words.tests.mark}</span>}
         {panelId && <span class="soft small"> {panelId}</span>}
       </th>
-      <td>{conditions.join(", ")}</td>
+      <td>
+        {conditions.join(", ")}
+        {group > 0 && <span class="soft small"> {words.board.group(group)}</span>}
+      </td>
       <td>{words.state[stateName(state)]}</td>
       <td class="number">
         {Math.min(step, study.steps)}/{study.steps}

@@ -63,7 +63,7 @@ export function StudyGame({ game, title, traces, part }: StudyGameProps) {
         ) : fault ? (
           <Notice kind="fault">{wordsOf(fault)}</Notice>
         ) : (
-          <p class="soft">{words.preparing}</p>
+          <p class="soft">{game.waitsFor > 0 ? words.waitsFor(game.waitsFor) : words.preparing}</p>
         )}
       </section>
     );

@@ -9,6 +9,7 @@ import {
   type StudyEnd,
   StudyEndReason,
   type StudyExternalQuestionnaire,
+  type StudyShownArrival,
   type StudyText,
   type StudyView,
 } from "../gen/chefshat/v1/study_pb";
@@ -22,6 +23,7 @@ import { ConfirmButton } from "../parts/ConfirmButton";
 import { download } from "../parts/download";
 import { CheckField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
+import { useTabMark } from "../parts/tab";
 import type { PageProps } from "../router";
 import { Formatted } from "./Formatted";
 import { type Participating, startParticipating } from "./participating";
@@ -55,6 +57,7 @@ export function Taking({ part }: { part: Participating }) {
   useEffect(() => {
     if (view) void showLanguage(view.language);
   }, [view?.language]);
+  useWaitIsOver(view);
   if (presence === "superseded") {
     return (
       <section class={`sheet ${css.stage}`} data-part="study-elsewhere">
@@ -94,6 +97,24 @@ export function Taking({ part }: { part: Participating }) {
       <Withdraw view={view} part={part} />
     </div>
   );
+}
+
+/** Marks the tab when others have come for whom the participant waited, until somebody looks at it. */
+function useWaitIsOver(view: StudyView | undefined): void {
+  const content = view?.content;
+  const waits = content?.case === "arrival" || (content?.case === "game" && content.value.waitsFor > 0);
+  const [marked, setMarked] = useState(false);
+  useEffect(() => {
+    if (!waits) return;
+    return () => setMarked(document.hidden);
+  }, [waits]);
+  useEffect(() => {
+    if (!marked) return;
+    const look = () => setMarked(document.hidden);
+    document.addEventListener("visibilitychange", look);
+    return () => document.removeEventListener("visibilitychange", look);
+  }, [marked]);
+  useTabMark(marked && view?.content.case !== "end" ? t().studies.arrival.goOn : "");
 }
 
 /** A stage is rendered anew at each step; a game that is repeated, too. */
@@ -146,6 +167,11 @@ function TestNotice({ view: { content }, part }: StageProps) {
           {words.skip}
         </Button>
       )}
+      {!gone && content.case === "arrival" && (
+        <Button busy={busy} onClick={goOn}>
+          {words.alone}
+        </Button>
+      )}
       {!gone && game?.ticket && (
         <Button busy={busy} onClick={goOn}>
           {words.end}
@@ -178,6 +204,8 @@ function Stage({ view, part }: StageProps) {
       return <Text text={content.value} part={part} />;
     case "game":
       return <StudyGame game={content.value} {...{ title, traces, part }} />;
+    case "arrival":
+      return <Arrival arrival={content.value} />;
     case "end":
       return <End end={content.value} pseudonym={pseudonym} />;
     default:
@@ -242,6 +270,28 @@ function copyOf(consent: StudyConsent, view: StudyView): string {
   return `${[view.title, consent.text, ...aboutConsent(consent, view)].join("\n\n")}\n`;
 }
 
+/** Waits until the group is complete: the next view comes by itself. */
+function Arrival({ arrival: { text, size, here, waitMs } }: { arrival: StudyShownArrival }) {
+  const words = t().studies.arrival;
+  const said = words.here(here, size);
+  useEffect(() => announce(said), [said]);
+  return (
+    <section class={`sheet ${css.stage}`} data-part="study-arrival">
+      <StageTitle>{words.title}</StageTitle>
+      {text && <Formatted text={text} />}
+      <ul class={css.places} aria-hidden="true">
+        {Array.from({ length: size }, (_, place) => (
+          <li key={place} data-taken={place < here} />
+        ))}
+      </ul>
+      <p>
+        <b>{said}</b>
+      </p>
+      <p>{words.text(Math.max(1, Math.ceil(Number(waitMs) / 60_000)))}</p>
+    </section>
+  );
+}
+
 function Text({ text, part }: { text: StudyText; part: Participating }) {
   return (
     <section class={`sheet ${css.stage}`} data-part="study-text">
@@ -304,6 +354,7 @@ const ENDS: Partial<Record<StudyEndReason, keyof ReturnType<typeof t>["studies"]
   [StudyEndReason.DROPPED_OUT]: "droppedOut",
   [StudyEndReason.REMOVED]: "removed",
   [StudyEndReason.SCREENED_OUT]: "screenedOut",
+  [StudyEndReason.LEFT_OVER]: "leftOver",
 };
 
 /** A link to the site from which the participant came. */
@@ -322,9 +373,10 @@ function GoOn({ url }: { url: string }) {
 function End({ end: { reason, url, text }, pseudonym }: { end: StudyEnd; pseudonym: string }) {
   const words = t().studies.end;
   const which = ENDS[reason] ?? "completed";
+  const isThanked = reason === StudyEndReason.COMPLETED || reason === StudyEndReason.LEFT_OVER;
   return (
     <section class={`sheet ${css.stage}`} data-part="study-end">
-      <StageTitle>{reason === StudyEndReason.COMPLETED ? words.thanks : words.title}</StageTitle>
+      <StageTitle>{isThanked ? words.thanks : words.title}</StageTitle>
       {text ? <Formatted text={text} /> : <p>{words.texts[which]}</p>}
       {pseudonym && <p class="soft">{words.pseudonym(pseudonym)}</p>}
       {url ? <GoOn url={url} /> : <p>{words.close}</p>}

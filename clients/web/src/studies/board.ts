@@ -3,7 +3,7 @@
 import { type Study, type StudyParticipant, StudyParticipantState } from "../gen/chefshat/v1/study_pb";
 
 /** The states in the order of the columns. */
-export const STATES = [
+const STATES = [
   StudyParticipantState.INVITED,
   StudyParticipantState.ACTIVE,
   StudyParticipantState.COMPLETED,
@@ -11,6 +11,7 @@ export const STATES = [
   StudyParticipantState.DROPPED_OUT,
   StudyParticipantState.REMOVED,
   StudyParticipantState.SCREENED_OUT,
+  StudyParticipantState.LEFT_OVER,
 ] as const;
 
 /** A state's name in the texts. */
@@ -28,9 +29,16 @@ export function stateName(state: StudyParticipantState) {
       return "removed";
     case StudyParticipantState.SCREENED_OUT:
       return "screenedOut";
+    case StudyParticipantState.LEFT_OVER:
+      return "leftOver";
     default:
       return "invited";
   }
+}
+
+/** The states that participants of a study can have. */
+export function statesOf(study: Study): StudyParticipantState[] {
+  return STATES.filter((state) => state !== StudyParticipantState.LEFT_OVER || study.settings?.groups);
 }
 
 /**
@@ -43,7 +51,7 @@ export function byCondition(
 ): { condition: string | undefined; counts: number[] }[] {
   const participants = all.filter(({ test }) => !test);
   const count = (some: readonly StudyParticipant[]) =>
-    STATES.map((state) => some.filter((participant) => participant.state === state).length);
+    statesOf(study).map((state) => some.filter((participant) => participant.state === state).length);
   const rows: { condition: string | undefined; counts: number[] }[] = (study.settings?.conditions ?? []).map(
     ({ id }) => ({
       condition: id,

@@ -41,9 +41,17 @@ export async function createStudy(
 
 const call = { timeoutMs: CALL_LIMIT_MS };
 
-/** Adds participants by their codes, or as many as `count` with codes of the server. */
-export async function addParticipants(studyId: string, count: number, pseudonyms: string[]): Promise<StudyLink[]> {
-  return (await studyApi.addStudyParticipants({ ...ownership(studyId), count, pseudonyms }, call)).links;
+/**
+ * Adds participants by their codes, or as many as `count` with codes of the server. `together`: they play
+ * with each other, in this order.
+ */
+export async function addParticipants(
+  studyId: string,
+  count: number,
+  pseudonyms: string[],
+  together: boolean,
+): Promise<StudyLink[]> {
+  return (await studyApi.addStudyParticipants({ ...ownership(studyId), count, pseudonyms, together }, call)).links;
 }
 
 export async function addTestParticipants(studyId: string, count: number): Promise<StudyLink[]> {

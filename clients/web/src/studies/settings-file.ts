@@ -19,10 +19,17 @@ export async function settingsFrom(text: string, name: string): Promise<StudySet
 
 /** What the names of an enum's values begin with, by the field. */
 const ENUMS: Readonly<Record<string, string>> = {
+  left_over: "STUDY_LEFT_OVER_",
   order: "STUDY_ORDER_",
   labels: "STUDY_LABELS_",
   hide: "STUDY_HIDE_",
+  opening: "OPENING_",
+  pass_scope: "PASS_SCOPE_",
+  abort: "ABORT_POLICY_",
+  reward_scheme: "REWARD_SCHEME_",
   reserved_for: "PARTICIPANT_KIND_",
+  kind: "PARTICIPANT_KIND_",
+  durability: "DURABILITY_",
 };
 const SEEDS = ["assignment_seed", "seeds"];
 

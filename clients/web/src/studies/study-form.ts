@@ -2,13 +2,19 @@
 // them, one block of games, questionnaires after it. Everything else needs a file.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
-import { StudyLabels, StudyOrder, type StudySettingsSchema, type StudyStageSchema } from "../gen/chefshat/v1/study_pb";
+import {
+  StudyLabels,
+  StudyLeftOver,
+  StudyOrder,
+  type StudySettingsSchema,
+  type StudyStageSchema,
+} from "../gen/chefshat/v1/study_pb";
 import { type Language, t, textsIn } from "../i18n";
 
 /** A condition in the form. */
 export interface ConditionForm {
   readonly id: string;
-  /** The built-in agent in all other seats. */
+  /** The built-in agent in all other seats, and in place of a participant who is missing. */
   readonly agent: string;
   readonly labels: "asTheyAre" | "kinds" | "players";
 }
@@ -19,6 +25,10 @@ export interface StudyForm {
   readonly title: string;
   readonly language: Language;
   readonly participants: string;
+  /** Number of participants in a game. */
+  readonly people: string;
+  /** Whether agents play in place of those who do not come. */
+  readonly fill: boolean;
   readonly within: boolean;
   readonly conditions: readonly ConditionForm[];
   readonly games: string;
@@ -59,6 +69,8 @@ export function emptyForm(language: Language): StudyForm {
     title: "",
     language,
     participants: "24",
+    people: "1",
+    fill: false,
     within: false,
     conditions: [
       { id: "A", agent: "greedy", labels: "players" },
@@ -93,8 +105,8 @@ const MAX_PARTICIPANTS = 10_000;
 const MAX_GAMES = 100;
 const MAX_SHIFTS = 100;
 const ID = /^[A-Za-z0-9_.-]{1,64}$/;
-/** Players of a game; the participant has one of the seats. */
-const OTHER_SEATS = 3;
+/** Players of a game; participants have some of the seats. */
+const PLAYERS = 4;
 
 /** What is wrong, by field; that of a condition has its index. */
 export type StudyFaults = Readonly<Record<string, string>>;
@@ -105,11 +117,13 @@ export function faultsOf(form: StudyForm): StudyFaults {
   const faults: Record<string, string> = {};
   for (const field of ["name", "title", "consent", "version"] as const)
     if (form[field].trim() === "") faults[field] = words.missing;
-  const bounds = { participants: MAX_PARTICIPANTS, games: MAX_GAMES, shifts: MAX_SHIFTS };
+  const bounds = { participants: MAX_PARTICIPANTS, people: PLAYERS, games: MAX_GAMES, shifts: MAX_SHIFTS };
   for (const [field, most] of Object.entries(bounds)) {
     const typed = form[field as keyof typeof bounds];
     if (!/^\d{1,6}$/.test(typed) || Number(typed) < 1 || Number(typed) > most) faults[field] = words.number(1, most);
   }
+  if (!faults.participants && !faults.people && Number(form.participants) % Number(form.people) !== 0)
+    faults.participants = words.wholeGroups(Number(form.people));
   form.conditions.forEach(({ id }, index) => {
     if (!ID.test(id)) faults[`condition.${index}`] = words.id;
     else if (form.conditions.findIndex((other) => other.id === id) < index) faults[`condition.${index}`] = words.twice;
@@ -137,6 +151,8 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
     { stage: { case: "consent", value: { text: form.consent.trim(), version: form.version.trim() } } },
   ];
   if (form.practice) stages.push({ stage: { case: "practice", value: {} } });
+  const people = Number(form.people);
+  if (people > 1) stages.push({ stage: { case: "arrival", value: {} } });
   if (form.within) stages.push({ stage: { case: "perCondition", value: { stages: inBlock } } });
   else stages.push(...inBlock);
   if (form.external !== "")
@@ -157,15 +173,23 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
     conditions: form.conditions.map(({ id, agent, labels }) => ({
       id,
       rules: { preset: "paper", stop: { case: "targetShifts" as const, value: Number(form.shifts) } },
-      seats: Array.from({ length: OTHER_SEATS }, () => ({ filledBy: { case: "builtInAgent" as const, value: agent } })),
+      seats: Array.from({ length: PLAYERS - people }, () => ({
+        filledBy: { case: "builtInAgent" as const, value: agent },
+      })),
       labels: LABELS[labels],
+      ...(people > 1 && { policy: { substitute: agent } }),
     })),
     stages,
     traces: form.traces,
     closesAtMs: millisecondsOf(form.closesAt),
     deletesAtMs: millisecondsOf(form.deletesAt),
+    ...(people > 1 && { groups: groupsOf(form) }),
     ...(form.openLink && { recruiting: recruitingOf(form) }),
   };
+}
+
+function groupsOf({ people, fill }: StudyForm) {
+  return { size: Number(people), leftOver: fill ? StudyLeftOver.AGENTS : StudyLeftOver.DISMISS };
 }
 
 /** A date field in milliseconds since the Unix epoch; 0 if it is empty. */

@@ -180,13 +180,18 @@ mod tests {
     }
 
     #[test]
-    fn the_example_is_valid() {
-        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
-        let settings = settings(&docs.join("studies/example.toml")).expect("it is read");
-        let complete = chefshat_server::convert::complete_settings(settings, || [1; 32], true);
-        let complete = complete.expect("the server accepts it");
-        assert_eq!(complete.conditions.len(), 2);
-        assert_eq!(complete.block_size, 2);
+    fn the_examples_are_valid() {
+        let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/studies");
+        for (file, conditions) in [("example.toml", 2), ("pairs.toml", 4)] {
+            let settings = settings(&docs.join(file)).expect("it is read");
+            let complete = chefshat_server::convert::complete_settings(settings, || [1; 32], true);
+            let complete = complete.expect("the server accepts it");
+            assert_eq!(complete.conditions.len(), conditions);
+            assert_eq!(
+                complete.block_size,
+                2 * (complete.conditions.len() as u32 / 2)
+            );
+        }
     }
 
     #[test]

@@ -49,6 +49,13 @@ export const studies: Texts["studies"] = {
     open: "Fragebogen öffnen",
     done: "Ich habe ihn ausgefüllt",
   },
+  arrival: {
+    title: "Warten auf die anderen",
+    here: (here, size) => `${here} von ${size} Personen sind da`,
+    text: (minutes) =>
+      `Lassen Sie diese Seite geöffnet. Es geht hier von selbst weiter, sobald alle da sind. Nach spätestens ${plural(minutes, { one: "# Minute", other: "# Minuten" })} erfahren Sie, wie es weitergeht.`,
+    goOn: "Es geht weiter",
+  },
   labels: {
     agent: (seat) => `Agent ${seat}`,
     player: (seat) => `Spieler ${seat}`,
@@ -60,6 +67,11 @@ export const studies: Texts["studies"] = {
     game: "Partie",
     gameOf: (game, games) => `Partie ${game} von ${games}`,
     preparing: "Ihre Partie wird vorbereitet. Sie beginnt hier automatisch.",
+    waitsFor: (others) =>
+      plural(others, {
+        one: "Die Partie beginnt, sobald die andere Person bereit ist. Lassen Sie diese Seite geöffnet.",
+        other: "Die Partie beginnt, sobald # andere Personen bereit sind. Lassen Sie diese Seite geöffnet.",
+      }),
     ending: "Die Partie ist zu Ende. Gleich kommt der nächste Schritt.",
     over: "Die Partie ist zu Ende.",
   },
@@ -74,6 +86,7 @@ export const studies: Texts["studies"] = {
         "Sie waren zu lange weg, daher wurde Ihr Platz an jemand anderen vergeben. Wenn Sie weitermachen möchten, fragen Sie die Studienleitung.",
       removed: "Die Studienleitung hat Ihre Teilnahme beendet. Wenn Sie Fragen haben, wenden Sie sich an sie.",
       screenedOut: "Diese Studie ist für andere Personen gedacht. Danke für Ihre Zeit.",
+      leftOver: "Im Moment sind nicht genug Personen für eine Partie da. Danke fürs Warten: Ihr Teil ist erledigt.",
     },
     pseudonym: (pseudonym) =>
       `Ihr Code in der Studie ist ${pseudonym}. Nennen Sie ihn, wenn Sie Fragen zu Ihren Daten haben.`,
@@ -84,6 +97,7 @@ export const studies: Texts["studies"] = {
     title: "Testteilnahme",
     text: "Sie nehmen zum Testen teil: Was Sie hier tun, zählt nicht, und Sie können Fragen überspringen.",
     skip: "Fragen überspringen",
+    alone: "Ohne die anderen weitermachen",
     end: "Das Spiel beenden",
   },
   withdraw: {
@@ -118,6 +132,7 @@ export const studies: Texts["studies"] = {
       droppedOut: "ausgeblieben",
       removed: "entfernt",
       screenedOut: "nicht passend",
+      leftOver: "übrig geblieben",
     },
     board: {
       title: "Fortschritt",
@@ -127,6 +142,7 @@ export const studies: Texts["studies"] = {
       number: "Nr.",
       pseudonym: "Code",
       conditions: "Bedingungen",
+      group: (group) => `Gruppe ${group}`,
       stage: "Schritt",
       stateColumn: "Status",
       seen: "Seite",
@@ -145,6 +161,10 @@ export const studies: Texts["studies"] = {
       names: "oder ihre Codes, einer pro Zeile",
       namesHint: "Pseudonyme, keine Namen von Personen. Alle sehen ihr eigenes.",
       submit: "Hinzufügen",
+      together: "Sie spielen miteinander",
+      togetherHint: (size) =>
+        `Die ersten ${size} sind eine Gruppe, dann die nächsten. Sonst spielen sie mit denen, mit denen sie ankommen.`,
+      wholeGroups: (size) => `Füge ein Vielfaches von ${size} hinzu.`,
       problem: "Gib eine Zahl von 1 bis 1000 ein oder Codes mit höchstens 64 Zeichen.",
     },
     tests: {
@@ -217,6 +237,9 @@ export const studies: Texts["studies"] = {
     titleHint: "Er darf die Bedingungen nicht verraten.",
     language: "Sprache der Teilnehmer",
     participants: "Zahl der Teilnehmer",
+    people: "Teilnehmer, die eine Partie zusammen spielen",
+    peopleHint: "Auf den anderen Plätzen spielen Agenten.",
+    fill: "Agenten spielen für die, die nicht kommen; sonst wird den anderen nach zehn Minuten gedankt",
     games: "Partien pro Teilnehmer und Bedingung",
     practice: "Zuerst eine Übungspartie",
     conditions: "Bedingungen",
@@ -256,6 +279,7 @@ export const studies: Texts["studies"] = {
       number: (least, most) => `Gib eine Zahl von ${least} bis ${most} ein.`,
       id: "Verwende 1 bis 64 Buchstaben, Ziffern, „_“, „-“ oder „.“.",
       twice: "Zwei Bedingungen haben diesen Namen.",
+      wholeGroups: (size) => `Gib ein Vielfaches von ${size} ein, der Zahl derer, die zusammen spielen.`,
       unfinished: "Gib Tag und Uhrzeit ein, oder lass das Feld leer.",
       passed: "Gib eine Zeit ein, die noch nicht vorbei ist.",
       deletedFirst: "Gib eine Zeit ein, zu der die Studie schon geschlossen ist.",

@@ -46,6 +46,13 @@ export const studies = {
     open: "Open the questionnaire",
     done: "I have filled it in",
   },
+  arrival: {
+    title: "Waiting for the others",
+    here: (here: number, size: number) => `${here} of ${size} people are here`,
+    text: (minutes: number) =>
+      `Leave this page open: it goes on by itself as soon as everybody is here. After ${plural(minutes, { one: "# minute", other: "# minutes" })} at the latest you learn how it goes on.`,
+    goOn: "It goes on",
+  },
   labels: {
     agent: (seat: number) => `Agent ${seat}`,
     player: (seat: number) => `Player ${seat}`,
@@ -57,6 +64,11 @@ export const studies = {
     game: "Game",
     gameOf: (game: number, games: number) => `Game ${game} of ${games}`,
     preparing: "Your game is being prepared. It starts here automatically.",
+    waitsFor: (others: number) =>
+      plural(others, {
+        one: "The game begins when the other person is ready. Leave this page open.",
+        other: "The game begins when # other people are ready. Leave this page open.",
+      }),
     ending: "The game is over. The next step appears in a moment.",
     over: "The game is over.",
   },
@@ -71,6 +83,7 @@ export const studies = {
         "You were away for too long, so your place was given to someone else. If you want to continue, ask the researchers.",
       removed: "The researchers have ended your participation. If you have questions, ask them.",
       screenedOut: "This study is meant for other people. Thank you for your time.",
+      leftOver: "There are not enough people for a game now. Thank you for waiting: your part is done.",
     },
     pseudonym: (pseudonym: string) =>
       `Your code in the study is ${pseudonym}. Give it if you have questions about your data.`,
@@ -81,6 +94,7 @@ export const studies = {
     title: "Test participation",
     text: "You take part as a test: nothing that you do here counts, and you may skip questions.",
     skip: "Skip the questions",
+    alone: "Go on without the others",
     end: "End the game",
   },
   withdraw: {
@@ -114,6 +128,7 @@ export const studies = {
       droppedOut: "dropped out",
       removed: "removed",
       screenedOut: "screened out",
+      leftOver: "left over",
     },
     board: {
       title: "Progress",
@@ -123,6 +138,7 @@ export const studies = {
       number: "No.",
       pseudonym: "Code",
       conditions: "Conditions",
+      group: (group: number) => `group ${group}`,
       stage: "Step",
       stateColumn: "State",
       seen: "Page",
@@ -141,6 +157,10 @@ export const studies = {
       names: "or their codes, one per line",
       namesHint: "Pseudonyms, not names of people. They see their own.",
       submit: "Add",
+      together: "They play with each other",
+      togetherHint: (size: number) =>
+        `The first ${size} are a group, then the next. Otherwise they play with whom they arrive.`,
+      wholeGroups: (size: number) => `Add a multiple of ${size}.`,
       problem: "Enter a number from 1 to 1000, or codes of at most 64 characters.",
     },
     tests: {
@@ -213,6 +233,9 @@ export const studies = {
     titleHint: "It must not say what the conditions are.",
     language: "Language of the participants",
     participants: "Number of participants",
+    people: "Participants who play a game together",
+    peopleHint: "Agents have the other seats.",
+    fill: "Agents play in place of those who do not come; otherwise the others are thanked after ten minutes",
     games: "Games per participant and condition",
     practice: "A practice game first",
     conditions: "Conditions",
@@ -252,6 +275,7 @@ export const studies = {
       number: (least: number, most: number) => `Enter a number from ${least} to ${most}.`,
       id: "Use 1 to 64 letters, digits, “_”, “-” or “.”.",
       twice: "Two conditions have this name.",
+      wholeGroups: (size: number) => `Enter a multiple of ${size}, the number of those who play together.`,
       unfinished: "Enter the day and the time, or leave the field empty.",
       passed: "Enter a time that has not passed.",
       deletedFirst: "Enter a time after the study has closed.",

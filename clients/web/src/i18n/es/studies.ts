@@ -48,6 +48,13 @@ export const studies: Texts["studies"] = {
     open: "Abrir el cuestionario",
     done: "Lo he rellenado",
   },
+  arrival: {
+    title: "Esperando a los demás",
+    here: (here, size) => `Han llegado ${here} de ${size} personas`,
+    text: (minutes) =>
+      `Deje abierta esta página. El estudio continúa aquí por sí solo cuando estén todos. Como máximo en ${plural(minutes, { one: "# minuto", other: "# minutos" })} sabrá cómo continúa.`,
+    goOn: "Continúa",
+  },
   labels: {
     agent: (seat) => `Agente ${seat}`,
     player: (seat) => `Jugador ${seat}`,
@@ -59,6 +66,11 @@ export const studies: Texts["studies"] = {
     game: "Partida",
     gameOf: (game, games) => `Partida ${game} de ${games}`,
     preparing: "Su partida se está preparando. Empieza aquí automáticamente.",
+    waitsFor: (others) =>
+      plural(others, {
+        one: "La partida empieza cuando la otra persona esté lista. Deje abierta esta página.",
+        other: "La partida empieza cuando # personas más estén listas. Deje abierta esta página.",
+      }),
     ending: "La partida ha terminado. El siguiente paso aparece en un momento.",
     over: "La partida ha terminado.",
   },
@@ -73,6 +85,7 @@ export const studies: Texts["studies"] = {
         "Su ausencia fue demasiado larga y su plaza pasó a otra persona. Si quiere continuar, pregunte al equipo del estudio.",
       removed: "El equipo del estudio ha terminado su participación. Si tiene preguntas, diríjase a él.",
       screenedOut: "Este estudio es para otras personas. Gracias por su tiempo.",
+      leftOver: "Ahora no hay bastantes personas para una partida. Gracias por esperar: su parte está hecha.",
     },
     pseudonym: (pseudonym) => `Su código en el estudio es ${pseudonym}. Indíquelo si tiene preguntas sobre sus datos.`,
     close: "Puede cerrar esta página.",
@@ -82,6 +95,7 @@ export const studies: Texts["studies"] = {
     title: "Participación de prueba",
     text: "Usted participa como prueba: nada de lo que haga aquí cuenta, y puede omitir preguntas.",
     skip: "Omitir las preguntas",
+    alone: "Seguir sin los demás",
     end: "Terminar la partida",
   },
   withdraw: {
@@ -116,6 +130,7 @@ export const studies: Texts["studies"] = {
       droppedOut: "ausente",
       removed: "excluido",
       screenedOut: "no apto",
+      leftOver: "sin grupo",
     },
     board: {
       title: "Progreso",
@@ -125,6 +140,7 @@ export const studies: Texts["studies"] = {
       number: "N.º",
       pseudonym: "Código",
       conditions: "Condiciones",
+      group: (group) => `grupo ${group}`,
       stage: "Paso",
       stateColumn: "Estado",
       seen: "Página",
@@ -143,6 +159,10 @@ export const studies: Texts["studies"] = {
       names: "o sus códigos, uno por línea",
       namesHint: "Seudónimos, no nombres de personas. Cada cual ve el suyo.",
       submit: "Añadir",
+      together: "Juegan entre ellos",
+      togetherHint: (size) =>
+        `Los primeros ${size} son un grupo, después los siguientes. Si no, juegan con quienes lleguen a la vez.`,
+      wholeGroups: (size) => `Añade un múltiplo de ${size}.`,
       problem: "Escribe un número del 1 al 1000, o códigos de 64 caracteres como máximo.",
     },
     tests: {
@@ -215,6 +235,9 @@ export const studies: Texts["studies"] = {
     titleHint: "No debe revelar las condiciones.",
     language: "Idioma de los participantes",
     participants: "Número de participantes",
+    people: "Participantes que juegan juntos una partida",
+    peopleHint: "Los otros asientos son de agentes.",
+    fill: "Juegan agentes en lugar de quienes no vienen; si no, a los demás se les dan las gracias a los diez minutos",
     games: "Partidas por participante y condición",
     practice: "Primero una partida de práctica",
     conditions: "Condiciones",
@@ -254,6 +277,7 @@ export const studies: Texts["studies"] = {
       number: (least, most) => `Escribe un número del ${least} al ${most}.`,
       id: "Usa de 1 a 64 letras, cifras, «_», «-» o «.».",
       twice: "Dos condiciones tienen este nombre.",
+      wholeGroups: (size) => `Escribe un múltiplo de ${size}, el número de los que juegan juntos.`,
       unfinished: "Escribe el día y la hora, o deja el campo vacío.",
       passed: "Escribe una fecha que no haya pasado.",
       deletedFirst: "Escribe una fecha posterior al cierre del estudio.",

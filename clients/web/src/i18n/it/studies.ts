@@ -48,6 +48,13 @@ export const studies: Texts["studies"] = {
     open: "Aprire il questionario",
     done: "L’ho compilato",
   },
+  arrival: {
+    title: "In attesa degli altri",
+    here: (here, size) => `Persone presenti: ${here} su ${size}`,
+    text: (minutes) =>
+      `Lasci aperta questa pagina. Lo studio continua qui da solo quando ci sono tutti. Al più tardi fra ${plural(minutes, { one: "# minuto", other: "# minuti" })} saprà come si continua.`,
+    goOn: "Si continua",
+  },
   labels: {
     agent: (seat) => `Agente ${seat}`,
     player: (seat) => `Giocatore ${seat}`,
@@ -59,6 +66,11 @@ export const studies: Texts["studies"] = {
     game: "Partita",
     gameOf: (game, games) => `Partita ${game} di ${games}`,
     preparing: "La Sua partita è in preparazione. Inizia qui automaticamente.",
+    waitsFor: (others) =>
+      plural(others, {
+        one: "La partita inizia quando l’altra persona è pronta. Lasci aperta questa pagina.",
+        other: "La partita inizia quando altre # persone sono pronte. Lasci aperta questa pagina.",
+      }),
     ending: "La partita è finita. Il passo successivo appare fra un momento.",
     over: "La partita è finita.",
   },
@@ -73,6 +85,7 @@ export const studies: Texts["studies"] = {
         "La Sua assenza è stata troppo lunga e il Suo posto è passato a un’altra persona. Se vuole continuare, chieda a chi conduce lo studio.",
       removed: "Chi conduce lo studio ha concluso la Sua partecipazione. Se ha domande, chieda a chi lo conduce.",
       screenedOut: "Questo studio è pensato per altre persone. Grazie del Suo tempo.",
+      leftOver: "Ora non ci sono abbastanza persone per una partita. Grazie dell’attesa: la Sua parte è conclusa.",
     },
     pseudonym: (pseudonym) => `Il Suo codice nello studio è ${pseudonym}. Lo indichi se ha domande sui Suoi dati.`,
     close: "Può chiudere questa pagina.",
@@ -82,6 +95,7 @@ export const studies: Texts["studies"] = {
     title: "Partecipazione di prova",
     text: "Lei partecipa come prova: nulla di ciò che fa qui conta, e può saltare le domande.",
     skip: "Salta le domande",
+    alone: "Continua senza gli altri",
     end: "Termina la partita",
   },
   withdraw: {
@@ -116,6 +130,7 @@ export const studies: Texts["studies"] = {
       droppedOut: "assente",
       removed: "escluso",
       screenedOut: "non idoneo",
+      leftOver: "senza gruppo",
     },
     board: {
       title: "Avanzamento",
@@ -125,6 +140,7 @@ export const studies: Texts["studies"] = {
       number: "N.",
       pseudonym: "Codice",
       conditions: "Condizioni",
+      group: (group) => `gruppo ${group}`,
       stage: "Passo",
       stateColumn: "Stato",
       seen: "Pagina",
@@ -143,6 +159,10 @@ export const studies: Texts["studies"] = {
       names: "oppure i loro codici, uno per riga",
       namesHint: "Pseudonimi, non nomi di persone. Ognuno vede il proprio.",
       submit: "Aggiungi",
+      together: "Giocano fra loro",
+      togetherHint: (size) =>
+        `I primi ${size} sono un gruppo, poi i successivi. Altrimenti giocano con chi arriva insieme a loro.`,
+      wholeGroups: (size) => `Aggiungi un multiplo di ${size}.`,
       problem: "Inserisci un numero da 1 a 1000, o codici di al massimo 64 caratteri.",
     },
     tests: {
@@ -215,6 +235,9 @@ export const studies: Texts["studies"] = {
     titleHint: "Non deve rivelare le condizioni.",
     language: "Lingua dei partecipanti",
     participants: "Numero di partecipanti",
+    people: "Partecipanti che giocano insieme una partita",
+    peopleHint: "Agli altri posti giocano agenti.",
+    fill: "Agenti giocano al posto di chi non viene; altrimenti gli altri vengono ringraziati dopo dieci minuti",
     games: "Partite per partecipante e condizione",
     practice: "Prima una partita di prova",
     conditions: "Condizioni",
@@ -254,6 +277,7 @@ export const studies: Texts["studies"] = {
       number: (least, most) => `Inserisci un numero da ${least} a ${most}.`,
       id: "Usa da 1 a 64 lettere, cifre, «_», «-» o «.».",
       twice: "Due condizioni hanno questo nome.",
+      wholeGroups: (size) => `Inserisci un multiplo di ${size}, il numero di chi gioca insieme.`,
       unfinished: "Inserisci giorno e ora, o lascia il campo vuoto.",
       passed: "Inserisci una data non ancora passata.",
       deletedFirst: "Inserisci una data dopo la chiusura dello studio.",
