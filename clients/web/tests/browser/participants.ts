@@ -18,12 +18,13 @@ const AGENTS = ["greedy", "random"];
 /** A study with two conditions and all kinds of stages; `changed` replaces settings. */
 export async function newStudy(server: Server, changed: MessageInitShape<typeof StudySettingsSchema> = {}) {
   const { studies } = clientsOf(server);
+  const others = 4 - (changed.groups?.size ?? 1);
   const condition = (id: string, level: string, agent: string, name: string) => ({
     id,
     levels: { warmth: level },
     rules: { preset: "paper", faces: 8, stop: { case: "targetShifts" as const, value: 1 } },
     policy: { decisionTimeMs: 3_600_000, paceMs: 0 },
-    seats: Array.from({ length: 3 }, () => ({ filledBy: { case: "builtInAgent" as const, value: agent }, name })),
+    seats: Array.from({ length: others }, () => ({ filledBy: { case: "builtInAgent" as const, value: agent }, name })),
     robotBehaviour: `${level} nods`,
     labels: StudyLabels.PLAYERS,
   });
@@ -88,10 +89,15 @@ export async function expectNoSecretOn(page: Page): Promise<void> {
   expect([...SECRETS, ...AGENTS].filter((secret) => all.includes(secret))).toEqual([]);
 }
 
-/** Agrees, with the keyboard alone, and waits for the practice game. */
-export async function consent(page: Page): Promise<void> {
+/** Agrees, with the keyboard alone. */
+export async function agree(page: Page): Promise<void> {
   await page.getByLabel("I have read this text").press("Space");
   await page.getByRole("button", { name: "Agree and continue" }).press("Enter");
+}
+
+/** Agrees, and waits for the practice game. */
+export async function consent(page: Page): Promise<void> {
+  await agree(page);
   await page.locator("[data-decision]").waitFor();
 }
 

@@ -5,7 +5,7 @@ import { readFileSync } from "node:fs";
 import { expect, test } from "vitest";
 import { StudyHide } from "../../src/gen/chefshat/v1/study_pb";
 import { inaccessible, PHONE, tooWide } from "./checks";
-import { consent, expectNoSecretOn, expectNoSecretSent, newStudy, playGame } from "./participants";
+import { agree, consent, expectNoSecretOn, expectNoSecretSent, newStudy, playGame } from "./participants";
 import { clientsOf } from "./rooms";
 import { browser, person, server, until, useStage } from "./stage";
 import { Tap } from "./tap";
@@ -88,6 +88,51 @@ test("a participant goes through all stages, on two devices, without meeting a c
     expect(archive).toContain(file);
   expect(archive).toContain("cond-");
   expect(researcher.faults).toEqual([]);
+});
+
+test("two people wait for each other, play together, and one goes on with agents when the other leaves", async () => {
+  const stages = [
+    { stage: { case: "consent" as const, value: { text: "We record your games.", version: "1" } } },
+    { stage: { case: "arrival" as const, value: { text: "Your **partner** comes soon." } } },
+    { stage: { case: "games" as const, value: { count: 2 } } },
+    { stage: { case: "text" as const, value: { title: "About this study", text: "Thank you." } } },
+  ];
+  const { studyId, ownerToken } = await newStudy(server, { participants: 2, groups: { size: 2 }, stages });
+  const tap = await Tap.before(server);
+  const added = await clientsOf(server).studies.addStudyParticipants({ studyId, ownerToken, count: 2 });
+  const [first, second] = [await person(browser, { viewport: PHONE }), await person(browser)];
+  const links = added.links.map(({ link }) => `${tap.url}/study/${link}`);
+  await first.page.goto(links[0] ?? "");
+  await agree(first.page);
+  await first.page.getByRole("heading", { name: "Waiting for the others" }).waitFor();
+  await first.page.getByText("1 of 2 people are here").waitFor();
+  expect(await inaccessible(first.page)).toEqual([]);
+  expect(await tooWide(first.page)).toEqual([]);
+  // Whoever closes the page does not count until it is open again.
+  await first.page.reload();
+  await second.page.goto(links[1] ?? "");
+  await agree(second.page);
+  const leave = async () => {
+    await second.page.getByRole("button", { name: "Withdraw from the study…" }).click();
+    await second.page.getByRole("button", { name: "Withdraw now" }).click();
+    await second.page.getByText("You have withdrawn.").waitFor();
+  };
+  const [taken] = await Promise.all([playGame(first.page), playGame(second.page, 1).then(leave)]);
+  expect(taken).toBeGreaterThan(0);
+  // The next game has an agent in the place of the other.
+  expect(await playGame(first.page)).toBeGreaterThan(0);
+  await first.page.getByRole("heading", { name: "About this study" }).waitFor();
+  await first.page.getByRole("button", { name: "Continue" }).click();
+  await first.page.getByRole("heading", { name: "Thank you for taking part" }).waitFor();
+  for (const { page } of [first, second]) await expectNoSecretOn(page);
+  expectNoSecretSent(tap);
+  await tap.stop();
+  expect([...first.faults, ...second.faults]).toEqual([]);
+  const { participants } = await clientsOf(server).studies.getStudy({ studyId, ownerToken });
+  expect(participants.map(({ group, games }) => [group, games.length])).toEqual([
+    [1, 2],
+    [1, 1],
+  ]);
 });
 
 /** The parts of the table that a condition can hide. */
