@@ -5384,7 +5384,8 @@ impl EventDelivery {
 pub enum DetachReason {
     /// Not set.
     Unspecified = 0,
-    /// The client requested it, or gave the seat back; or the participant has left the tournament.
+    /// The client requested it, or gave the seat back; or the participant has left the tournament
+    /// or study.
     Requested = 1,
     /// A newer connection attached the seat.
     Superseded = 2,
@@ -8977,15 +8978,15 @@ pub struct StudyScreenOut {
 }
 /// Participants who play their games together. They wait for each other at the stage `arrival`, which
 /// makes them a group, and before each game. In place of one who leaves, the `substitute` of the
-/// condition's policy plays on.
+/// condition's policy plays on; the policy's `abort` is NEVER.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StudyGroups {
     /// Number of participants of a group, 2..=6, at most the players of each condition. `participants` is
     /// a multiple of it, and a slot of `block_size` one of a group.
     #[prost(uint32, tag = "1")]
     pub size: u32,
-    /// How long participants wait for others, in milliseconds, 10000..=3600000; by default 600000. Those
-    /// for whom the others of a group wait so long before a game have dropped out.
+    /// How long participants wait for others, in milliseconds, 10000..=3600000; by default 600000. One for
+    /// whom others of its group wait that long before a game has dropped out.
     #[prost(uint64, tag = "2")]
     pub wait_ms: u64,
     /// What becomes of those whose group is not complete in this time.
@@ -9169,7 +9170,8 @@ pub struct StudyGame {
     /// When it ended, milliseconds since the Unix epoch; 0 until then.
     #[prost(uint64, tag = "10")]
     pub ended_at_ms: u64,
-    /// While it runs and has open seats: the join code for the researcher's programs. Else empty.
+    /// While it runs and has open seats: the join code for the researcher's programs. Else empty; of a
+    /// group, set for the first alone.
     #[prost(string, tag = "11")]
     pub join_code: ::prost::alloc::string::String,
     /// While it runs: `robot_behaviour` of its condition.
@@ -9354,7 +9356,7 @@ pub mod study_view {
         /// Nothing more.
         #[prost(message, tag = "12")]
         End(super::StudyEnd),
-        /// Others to wait for: the next view comes by itself. A test participant may go on alone by
+        /// Others to wait for: the next view comes by itself. A test participant may continue alone by
         /// ContinueStudy, with agents in place of the others.
         #[prost(message, tag = "15")]
         Arrival(super::StudyShownArrival),
@@ -9678,8 +9680,8 @@ pub enum StudyLeftOver {
     Unspecified = 0,
     /// Their participation ends; the page thanks them.
     Dismiss = 1,
-    /// They are a group of fewer. The `substitute` of the condition's policy plays in place of those who
-    /// are missing.
+    /// They are a group of fewer, if slots are free. The `substitute` of the condition's policy plays in
+    /// place of those who are missing.
     Agents = 2,
 }
 impl StudyLeftOver {
@@ -9755,7 +9757,7 @@ pub enum StudyParticipantState {
     Completed = 3,
     /// It has withdrawn.
     Withdrawn = 4,
-    /// It had no page open for too long.
+    /// It had no page open for too long, or others of its group waited for it for too long.
     DroppedOut = 5,
     /// It was removed by the study's owner.
     Removed = 6,
@@ -9810,7 +9812,8 @@ pub enum StudyEndReason {
     Withdrawn = 2,
     /// Its data were deleted.
     DataDeleted = 3,
-    /// It was away for too long, and its place was given to somebody else.
+    /// It was away for too long, or others waited for it for too long; somebody else, or an agent, has its
+    /// place.
     DroppedOut = 4,
     /// It was removed by the researchers.
     Removed = 5,
@@ -10575,7 +10578,8 @@ pub mod study_service_client {
             self.inner.server_streaming(req, path, codec).await
         }
         /// Removes a participant, whose slot is free again, and adds another in its place if requested. Its
-        /// running game is closed; its data are kept. Repeating the call without `replace` changes nothing.
+        /// running game is closed; its data are kept. In a group, an agent plays on in its place, and the slots
+        /// are free again when all have left. Repeating the call without `replace` changes nothing.
         /// NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (PARTICIPATION_OVER if it
         /// has withdrawn, STUDY_CLOSED); UNAVAILABLE (SHUTTING_DOWN).
         pub async fn remove_study_participant(
@@ -10631,10 +10635,10 @@ pub mod study_service_client {
             self.inner.unary(req, path, codec).await
         }
         /// Streams the data of a study as files: `study.json`, the tables `participants.csv`,
-        /// `sessions.csv`, `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the
-        /// record of a game cannot be read, the records of its games under `records/` and samples under
-        /// `samples/`, and last what the columns of the tables mean, `codebook.csv` for people and
-        /// `datapackage.json` for programs.
+        /// `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
+        /// `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
+        /// under `records/` and samples under `samples/`, and last what the columns of the tables mean,
+        /// `codebook.csv` for people and `datapackage.json` for programs.
         /// NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         pub async fn export_study(
             &mut self,
@@ -10800,7 +10804,8 @@ pub mod study_service_server {
             tonic::Status,
         >;
         /// Removes a participant, whose slot is free again, and adds another in its place if requested. Its
-        /// running game is closed; its data are kept. Repeating the call without `replace` changes nothing.
+        /// running game is closed; its data are kept. In a group, an agent plays on in its place, and the slots
+        /// are free again when all have left. Repeating the call without `replace` changes nothing.
         /// NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (PARTICIPATION_OVER if it
         /// has withdrawn, STUDY_CLOSED); UNAVAILABLE (SHUTTING_DOWN).
         async fn remove_study_participant(
@@ -10826,10 +10831,10 @@ pub mod study_service_server {
             + std::marker::Send
             + 'static;
         /// Streams the data of a study as files: `study.json`, the tables `participants.csv`,
-        /// `sessions.csv`, `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the
-        /// record of a game cannot be read, the records of its games under `records/` and samples under
-        /// `samples/`, and last what the columns of the tables mean, `codebook.csv` for people and
-        /// `datapackage.json` for programs.
+        /// `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
+        /// `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
+        /// under `records/` and samples under `samples/`, and last what the columns of the tables mean,
+        /// `codebook.csv` for people and `datapackage.json` for programs.
         /// NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         async fn export_study(
             &self,
@@ -11770,8 +11775,9 @@ pub mod participation_service_client {
             self.inner.unary(req, path, codec).await
         }
         /// Continues from a text, a questionnaire on another site, or a game that has ended. A test participant
-        /// continues from a questionnaire, too, without answers; a game of its that runs is closed first, and
-        /// the view says when it has ended.
+        /// continues from a questionnaire, too, without answers, and from its arrival, as a group of its own; a
+        /// game of its that runs is closed first, and the view says when it has ended; those for whom its game
+        /// waits drop out.
         /// FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
         pub async fn continue_study(
             &mut self,
@@ -11831,7 +11837,7 @@ pub mod participation_service_client {
             self.inner.unary(req, path, codec).await
         }
         /// Withdraws, at any time, also after the end and from any device: the link is enough. A running
-        /// game is closed. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        /// game is closed, or played on by an agent for the others of a group. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         pub async fn withdraw_from_study(
             &mut self,
             request: impl tonic::IntoRequest<super::WithdrawFromStudyRequest>,
@@ -11953,8 +11959,9 @@ pub mod participation_service_server {
             tonic::Status,
         >;
         /// Continues from a text, a questionnaire on another site, or a game that has ended. A test participant
-        /// continues from a questionnaire, too, without answers; a game of its that runs is closed first, and
-        /// the view says when it has ended.
+        /// continues from a questionnaire, too, without answers, and from its arrival, as a group of its own; a
+        /// game of its that runs is closed first, and the view says when it has ended; those for whom its game
+        /// waits drop out.
         /// FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
         async fn continue_study(
             &self,
@@ -11976,7 +11983,7 @@ pub mod participation_service_server {
             tonic::Status,
         >;
         /// Withdraws, at any time, also after the end and from any device: the link is enough. A running
-        /// game is closed. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        /// game is closed, or played on by an agent for the others of a group. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         async fn withdraw_from_study(
             &self,
             request: tonic::Request<super::WithdrawFromStudyRequest>,

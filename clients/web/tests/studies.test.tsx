@@ -238,13 +238,13 @@ test("who waits for others sees how many are here, and goes on by itself", async
   await settled();
   expect(root.textContent).toContain("2 of 3 people are here");
   expect(root.querySelectorAll('[data-taken="true"]')).toHaveLength(2);
-  expect(button("Go on without the others")).toBeUndefined();
+  expect(button("Continue without the others")).toBeUndefined();
   // Nobody looks at the page when the last one comes: the tab says so.
   const hidden = vi.spyOn(document, "hidden", "get").mockReturnValue(true);
   streams[0]?.push(viewOf([waiting(2), TEXT], 1));
   await settled();
   expect(title()).toBe("Welcome");
-  expect(document.title).toBe("It goes on · Study");
+  expect(document.title).toBe("Everybody is here · Study");
   hidden.mockReturnValue(false);
   await act(() => void document.dispatchEvent(new Event("visibilitychange")));
   expect(document.title).toBe("Study");
@@ -256,7 +256,7 @@ test("a test participant may go on without the others", async () => {
   await show();
   streams[0]?.push(create(StudyViewSchema, { ...viewOf([waiting(1), TEXT], 0), test: true }));
   await settled();
-  await press("Go on without the others");
+  await press("Continue without the others");
   expect(sent.at(-1)?.call).toBe("continue");
   expect(title()).toBe("Welcome");
 });

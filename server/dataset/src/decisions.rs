@@ -158,13 +158,18 @@ pub(super) const COLUMNS: &[Column<DecisionRow>] = &[
     Column::new(
         "participant",
         Type::Text,
-        "Pseudonym of the participant of the study who played the game, at whatever seat the row is; of several who play together, of the one at the seat of the row, and at other seats of the first; null for a game outside of studies.",
+        "Pseudonym of the participant of the study who played the game, at whatever seat the row is; of several who play together, of the one at the seat of the row, and null at other seats; null for a game outside of studies.",
         |row| {
             let study = row.game.study.as_ref();
-            let participant = study.map(|study| {
+            let participant = study.and_then(|study| {
+                let is_at = |seat: u32| usize::try_from(seat) == Ok(row.seat);
                 let mut others = study.others.iter();
-                let at_seat = others.find(|other| usize::try_from(other.seat) == Ok(row.seat));
-                at_seat.map_or(&study.participant, |other| &other.participant)
+                let other = others
+                    .find(|other| is_at(other.seat))
+                    .map(|it| &it.participant);
+                // Of a group, nobody is whose seat an agent has.
+                let first = study.group == 0 || is_at(study.seat);
+                other.or(first.then_some(&study.participant))
             });
             participant.into()
         },

@@ -67,9 +67,10 @@ impl Core {
             Change::Retired(seat) => {
                 let state = &mut self.seats[seat.index()];
                 state.retired = true;
+                state.retired_unseen = self.header.is_hidden(*seat) && !state.substituted;
                 state.substituted = true;
                 state.ever_substituted = true;
-                // Nobody comes back, so nobody must be told of whom the seat is hidden.
+                // A hidden seat's retirement is not published: no client needs it.
                 self.log_presence(at, *seat, RoomEvent::Retired(*seat));
             }
             Change::Attempted { .. } => {

@@ -207,10 +207,10 @@ impl Core {
         }
     }
 
-    /// Gives up a seat whose participant has left the tournament or study. Its ticket ends, and a substitute
-    /// plays from now on; while somebody decides about a special action, from then on, because the
-    /// time of that decision would reveal whose it is. Its connection is lost. A game that has not
-    /// started is aborted. Does nothing if nobody can join the seat. `handed`: as for
+    /// Gives up a seat whose participant has left the tournament or study. Its ticket ends, and a
+    /// substitute plays from now on; while somebody decides about a special action, from then on,
+    /// because the time of that decision would reveal whose it is. Its connection is lost. A game that
+    /// has not started is aborted. Does nothing if nobody can join the seat. `handed`: as for
     /// [`Core::lost`].
     pub fn retire(&mut self, now: Duration, seat: Seat, handed: Option<Duration>) {
         let state = &self.seats[seat.index()];

@@ -296,7 +296,7 @@ pub enum Change {
     Returned(Seat),
     /// A built-in agent plays for a seat from now on.
     Substituted(Seat),
-    /// The participant of a seat has left the tournament: a built-in agent plays for it until the
+    /// The participant of a seat has left the tournament or study: a built-in agent plays for it until the
     /// end.
     Retired(Seat),
     /// A seat answered with an illegal action.

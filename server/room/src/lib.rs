@@ -149,6 +149,8 @@ struct SeatState {
     retiring: bool,
     /// Whether its participant has left for good.
     retired: bool,
+    /// Whether that was not published: nobody may know who has the seat.
+    retired_unseen: bool,
     ever_hinted: bool,
     /// Whose decisions those of its participant were.
     choices: OwnChoices,
@@ -307,6 +309,7 @@ impl Core {
                     ever_substituted: false,
                     retiring: false,
                     retired: false,
+                    retired_unseen: false,
                     ever_hinted: false,
                     choices: OwnChoices::default(),
                     decisions: 0,
@@ -496,8 +499,7 @@ impl Core {
             fill: state.fill,
             participant: state.participant.as_deref(),
             connected: state.connection.is_some(),
-            // That somebody left for good is not shown of a hidden seat.
-            substituted: state.substituted && !(state.retired && self.header.is_hidden(seat)),
+            substituted: state.substituted && !state.retired_unseen,
         }
     }
 

@@ -171,7 +171,8 @@ impl Study {
         Ok(changes)
     }
 
-    /// The changes that add somebody in the place of a participant: in its planned group, too.
+    /// The changes that add somebody in the place of a participant: in its planned group, too, while
+    /// that waits for it.
     ///
     /// # Errors
     /// As [`Study::add`].
@@ -181,9 +182,12 @@ impl Study {
             test: participant.is_some_and(|it| it.test),
             ..NewParticipants::numbered(1)
         })?;
+        let plan = participant.and_then(|it| it.planned);
+        let mut others = self.participants().values().filter(|it| it.planned == plan);
+        let is_formed = others.any(|it| it.group.is_some());
         for change in &mut changes {
             if let Change::Added { planned, .. } = change {
-                *planned = participant.and_then(|it| it.planned);
+                *planned = plan.filter(|_| !is_formed);
             }
         }
         Ok(changes)
@@ -226,7 +230,7 @@ impl Study {
             return Err(Refusal::PanelIdTaken);
         }
         let mut change = self.add(&NewParticipants::numbered(1))?.pop();
-        if !self.has_place(false) {
+        if !self.has_place(false, None) {
             return Err(Refusal::Full);
         }
         if let Some(Change::Added { joined: how, .. }) = &mut change {
@@ -248,16 +252,23 @@ impl Study {
         now_ms: u64,
     ) -> Result<Option<Change>, Refusal> {
         let participant = self.known(number)?;
+        let has_place = self.has_place(participant.test, participant.planned);
         let slot = match participant.status {
             Status::Invited if self.is_closed() => return Err(Refusal::Closed),
-            Status::Invited if !self.has_place(participant.test) => return Err(Refusal::Full),
+            Status::Invited if !has_place => return Err(Refusal::Full),
             Status::Invited => {
                 let settings = self.settings();
                 let assigns = settings.groups.is_none() && !settings.assigns_by_consent();
                 assigns.then(|| self.free_slot(participant.test)).flatten()
             }
             Status::Active => None,
-            Status::DroppedOut if !self.is_replaced(participant) => None,
+            Status::DroppedOut if self.is_replaced(participant) => return Ok(None),
+            Status::DroppedOut if self.settings().groups.is_some() => {
+                // Who has no group needs a place in one.
+                let returns = participant.group.is_some() || has_place;
+                returns.then_some(None).ok_or(Refusal::Full)?
+            }
+            Status::DroppedOut => None,
             _ => return Ok(None),
         };
         if participant.session >= MAX_SESSIONS {
@@ -283,7 +294,9 @@ impl Study {
         };
         let slot = match participant.slot {
             Some(_) => None,
-            None if !self.has_place(participant.test) => return Err(Refusal::Full),
+            None if !self.has_place(participant.test, participant.planned) => {
+                return Err(Refusal::Full);
+            }
             None if self.settings().groups.is_some() => None,
             None => self.free_slot(participant.test),
         };

@@ -137,8 +137,8 @@ impl Study {
         seats_apart(participant.slot.unwrap_or(0) % size, size, players)
     }
 
-    /// The seats of all members of a group, also of those who are missing, in a game that one of them
-    /// plays.
+    /// The seats of all participants of a group, also of those who are missing, in a game that one of
+    /// them plays; its own, if it plays alone.
     pub fn seats_of_group(&self, participant: &Participant, game: &PlacedGame) -> Vec<usize> {
         let players = self.settings().conditions[game.condition].players;
         if game.practice || participant.group.is_none() {

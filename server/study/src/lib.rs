@@ -70,7 +70,7 @@ pub use questionnaire::{
 };
 pub use recruiting::Recruiting;
 pub use settings::{
-    Condition, Factor, Groups, Hide, Labels, LeftOver, MAX_FACTORS, MAX_GAMES, MAX_LEVELS,
+    Condition, Factor, Groups, Hide, Labels, LeftOverPolicy, MAX_FACTORS, MAX_GAMES, MAX_LEVELS,
     MAX_PARTICIPANTS, MAX_SEEDS, MAX_STEPS, MAX_TESTS, Settings,
 };
 pub use stage::{
@@ -269,9 +269,9 @@ impl Study {
         has_begun.then(|| self.settings.steps(sequence))
     }
 
-    /// Sets whether a participant has a session open.
-    pub fn set_connected(&mut self, number: u32, connected: bool, now_ms: u64) {
-        self.presence.set(number, connected, now_ms);
+    /// Sets whether a participant has a session open. `elapsed_ms`: of a clock that never jumps.
+    pub fn set_connected(&mut self, number: u32, connected: bool, elapsed_ms: u64) {
+        self.presence.set(number, connected, elapsed_ms);
     }
 
     /// Whether a participant has a session open.
@@ -281,12 +281,13 @@ impl Study {
 
     /// The changes that follow by themselves at this time, if any: the study closes, a group is formed,
     /// or a participant drops out or is left over. To be folded before the next are asked for.
-    pub fn next(&mut self, now_ms: u64) -> Vec<Change> {
+    /// `elapsed_ms`: as for [`Study::set_connected`].
+    pub fn next(&mut self, now_ms: u64, elapsed_ms: u64) -> Vec<Change> {
         let closes_at = self.settings.end_ms();
         if closes_at.is_some_and(|at_ms| at_ms <= now_ms) && !self.is_closed() {
             return vec![Change::Closed];
         }
-        let grouped = self.next_of_groups(now_ms);
+        let grouped = self.next_of_groups(now_ms, elapsed_ms);
         if !grouped.is_empty() {
             return grouped;
         }
@@ -294,7 +295,7 @@ impl Study {
         let active = participants.filter(|(_, it)| it.status == Status::Active);
         let active = active.map(|(number, _)| *number);
         let limit_ms = self.settings.drop_out_after_ms;
-        let number = self.presence.drop_out(active, limit_ms, now_ms);
+        let number = self.presence.drop_out(active, limit_ms, elapsed_ms);
         let dropped_out = number.map(|number| Change::DroppedOut {
             number,
             at_ms: now_ms,
@@ -302,24 +303,39 @@ impl Study {
         Vec::from_iter(dropped_out)
     }
 
-    /// When [`Study::next`] is to be asked again if nothing else happens, in milliseconds since the
-    /// Unix epoch. Valid after it returned nothing.
-    pub fn wake_at(&self) -> Option<u64> {
+    /// In how many milliseconds [`Study::next`] is to be asked again if nothing else happens. Valid after
+    /// it returned nothing at these times.
+    pub fn wake_in(&self, now_ms: u64, elapsed_ms: u64) -> Option<u64> {
         let limit_ms = self.settings.drop_out_after_ms;
         let drop_out = self.presence.next_drop_out_ms(limit_ms);
-        let close = self.settings.end_ms().filter(|_| !self.is_closed());
         let groups = self.settings.groups;
         let waited = groups.and_then(|it| self.presence.next_waited_ms(it.wait_ms));
-        drop_out.into_iter().chain(close).chain(waited).min()
+        let by_presence = drop_out.into_iter().chain(waited).min();
+        let close = self.settings.end_ms().filter(|_| !self.is_closed());
+        let by_presence = by_presence.map(|at_ms| at_ms.saturating_sub(elapsed_ms));
+        let close = close.map(|at_ms| at_ms.saturating_sub(now_ms));
+        by_presence.into_iter().chain(close).min()
     }
 
-    /// Whether somebody keeps the slot that a participant had, or plays for it in its group.
+    /// Whether somebody keeps the slot that a participant had, or its group is in the middle of the
+    /// study without it.
     fn is_replaced(&self, participant: &Participant) -> bool {
-        if participant.group.is_some() {
-            return true;
-        }
-        let slots = self.kept_slots(participant.test);
-        participant.slot.is_some_and(|slot| slots.contains(&slot))
+        let Some(slot) = participant.slot else {
+            return false;
+        };
+        let size = self.settings.group_size();
+        let first = slot - slot % size;
+        let others = self.state.participants.values().filter(|it| {
+            let is_alike = it.test == participant.test && it.holds_slot();
+            is_alike
+                && it
+                    .slot
+                    .is_some_and(|slot| (first..first + size).contains(&slot))
+        });
+        let mut others = others.map(|it| (it.group, it.status));
+        others.any(|(group, status)| {
+            group.is_none() || group != participant.group || status == Status::Active
+        })
     }
 
     /// The first slot that nobody keeps, or that nobody of its group keeps. A slot that is given again
@@ -340,8 +356,9 @@ impl Study {
         firsts.filter(move |first| kept.range(*first..first + size).next().is_none())
     }
 
-    /// Whether one more may begin, who gets a slot now or in a group.
-    fn has_place(&self, test: bool) -> bool {
+    /// Whether one more may begin, who gets a slot now or in a group: as those of its plan, or with
+    /// anybody.
+    fn has_place(&self, test: bool, planned: Option<u32>) -> bool {
         let free = self.free_slots(test);
         if self.settings.groups.is_none() {
             return free.take(1).count() > 0;
@@ -351,8 +368,16 @@ impl Study {
             let has_begun = it.status == Status::Active && (!asks || it.consent.is_some());
             it.test == test && has_begun && it.group.is_none()
         };
-        let expecting = self.state.participants.values().filter(expects).count();
-        free.count() * self.settings.group_size() as usize > expecting
+        let expecting = self.state.participants.values().filter(expects);
+        let (mut plans, mut others) = (BTreeSet::new(), 0);
+        for plan in expecting.map(|it| it.planned).chain([planned]) {
+            match plan {
+                Some(plan) => drop(plans.insert(plan)),
+                None => others += 1,
+            }
+        }
+        let groups = plans.len() + usize::div_ceil(others, self.settings.group_size() as usize);
+        free.count() >= groups
     }
 
     /// The slots that participants keep. Test participants have slots of their own.

@@ -1,4 +1,5 @@
-//! Who has a session open, which is not part of the stored state, and who drops out.
+//! Who has a session open, which is not part of the stored state, and who drops out. Times are
+//! milliseconds of a clock that never jumps, because what they end cannot be undone.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,11 +7,9 @@ use std::collections::{BTreeMap, BTreeSet};
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Presence {
     connected: BTreeSet<u32>,
-    /// Active participants without a session, with the time since when, in milliseconds since the
-    /// Unix epoch.
+    /// Active participants without a session, with the time since when.
     away: BTreeMap<u32, u64>,
-    /// Participants who wait for others, with the time since when, in milliseconds since the Unix
-    /// epoch.
+    /// Those who wait for a group, and those for whom a group waits, with the time since when.
     waiting: BTreeMap<u32, u64>,
 }
 
@@ -46,7 +45,13 @@ impl Presence {
         first.map(|(number, _)| *number)
     }
 
-    /// Notes who waits for others now. One who did not before, as after a restart, waits from now.
+    /// Those who have a session open, by number.
+    pub(crate) fn connected(&self) -> impl Iterator<Item = u32> + '_ {
+        self.connected.iter().copied()
+    }
+
+    /// Notes who waits for a group, and for whom one waits. The time of one who was not noted before, as
+    /// after a restart, begins now.
     pub(crate) fn note_waiting(&mut self, waiting: &BTreeSet<u32>, now_ms: u64) {
         self.waiting.retain(|number, _| waiting.contains(number));
         for number in waiting {
@@ -54,20 +59,20 @@ impl Presence {
         }
     }
 
-    /// Those who have waited for others for `limit_ms`.
+    /// Those who have been noted for `limit_ms`.
     pub(crate) fn waited(&self, limit_ms: u64, now_ms: u64) -> BTreeSet<u32> {
         let waiting = self.waiting.iter();
         let long = waiting.filter(|(_, since)| now_ms.saturating_sub(**since) >= limit_ms);
         long.map(|(number, _)| *number).collect()
     }
 
-    /// When the next participant has waited for `limit_ms`, in milliseconds since the Unix epoch.
+    /// When the next participant has been noted for `limit_ms`.
     pub(crate) fn next_waited_ms(&self, limit_ms: u64) -> Option<u64> {
         let since = self.waiting.values().min();
         since.map(|since| since.saturating_add(limit_ms))
     }
 
-    /// When the next participant drops out, in milliseconds since the Unix epoch.
+    /// When the next participant drops out.
     pub(crate) fn next_drop_out_ms(&self, limit_ms: u64) -> Option<u64> {
         let since = self.away.values().min();
         since.map(|since| since.saturating_add(limit_ms))

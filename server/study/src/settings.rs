@@ -75,12 +75,12 @@ pub struct Groups {
     /// How long participants wait for others, in milliseconds, 10000..=3600000.
     pub wait_ms: u64,
     /// What becomes of those whose group is not complete in time.
-    pub left_over: LeftOver,
+    pub left_over: LeftOverPolicy,
 }
 
 /// What becomes of participants whose group is not complete in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LeftOver {
+pub enum LeftOverPolicy {
     /// Their participation ends.
     Dismiss,
     /// They are a group of fewer.

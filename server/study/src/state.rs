@@ -20,7 +20,7 @@ pub enum Status {
     Completed,
     /// Has withdrawn.
     Withdrawn,
-    /// Had no session open for too long.
+    /// Had no session open for too long, or others waited for it for too long.
     DroppedOut,
     /// Was removed by the study's owner.
     Removed,
@@ -150,6 +150,8 @@ pub(crate) struct StudyState {
     steps: usize,
     /// By number, from 1.
     pub(crate) participants: BTreeMap<u32, Participant>,
+    /// The participants of each group, with those who have left, by number of the group.
+    pub(crate) groups: BTreeMap<u32, Vec<u32>>,
     pub(crate) closed: bool,
 }
 
@@ -158,6 +160,7 @@ impl StudyState {
         Self {
             steps,
             participants: BTreeMap::new(),
+            groups: BTreeMap::new(),
             closed: false,
         }
     }
@@ -280,6 +283,7 @@ impl StudyState {
                     participant.group = Some(*group);
                     participant.slot = Some(*slot);
                     participant.advance(steps, *passed_over, *at_ms);
+                    self.groups.entry(*group).or_default().push(*number);
                 }
             }
             Change::LeftOver { number, at_ms } => {

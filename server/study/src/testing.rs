@@ -4,8 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::{
-    Arrival, Condition, Consent, Factor, Groups, Labels, Language, LeftOver, Order, Recruiting,
-    Settings, Stage, Task, Template, Text,
+    Arrival, Condition, Consent, Factor, Groups, Labels, Language, LeftOverPolicy, Order,
+    Recruiting, Settings, Stage, Task, Template, Text,
 };
 
 /// A study between participants in two conditions: consent, a game, a text.
@@ -56,7 +56,7 @@ pub fn in_groups(size: u32) -> Settings {
         groups: Some(Groups {
             size,
             wait_ms: 60_000,
-            left_over: LeftOver::Dismiss,
+            left_over: LeftOverPolicy::Dismiss,
         }),
         ..settings()
     }

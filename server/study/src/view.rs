@@ -204,7 +204,7 @@ impl Study {
             Task::External(it) => Content::External(it.filled_in(&participant.pseudonym)),
             Task::Text(text) => Content::Text(text.clone()),
             Task::ScreenOut(_) => self.end(participant, End::ScreenedOut),
-            Task::Arrival(arrival) => Content::Arrival(self.shown_arrival(number, arrival)),
+            Task::Arrival(arrival) => Content::Arrival(self.shown_arrival(participant, arrival)),
             Task::Practice { .. } => Content::Game(self.shown_game(number, participant, true, 1)),
             Task::Games { count } => {
                 Content::Game(self.shown_game(number, participant, false, *count))

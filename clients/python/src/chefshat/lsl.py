@@ -324,6 +324,7 @@ def next_game(client: Client, study_id: str, owner_token: str, number: int, know
         pb.STUDY_PARTICIPANT_STATE_WITHDRAWN,
         pb.STUDY_PARTICIPANT_STATE_REMOVED,
         pb.STUDY_PARTICIPANT_STATE_SCREENED_OUT,
+        pb.STUDY_PARTICIPANT_STATE_LEFT_OVER,
     )
     is_first = not known
     print(f"waiting for a game of participant {number}", file=sys.stderr, flush=True)

@@ -114,7 +114,7 @@ function useWaitIsOver(view: StudyView | undefined): void {
     document.addEventListener("visibilitychange", look);
     return () => document.removeEventListener("visibilitychange", look);
   }, [marked]);
-  useTabMark(marked && view?.content.case !== "end" ? t().studies.arrival.goOn : "");
+  useTabMark(marked && view?.content.case !== "end" ? t().studies.arrival.complete : "");
 }
 
 /** A stage is rendered anew at each step; a game that is repeated, too. */
@@ -167,7 +167,7 @@ function TestNotice({ view: { content }, part }: StageProps) {
           {words.skip}
         </Button>
       )}
-      {!gone && content.case === "arrival" && (
+      {!gone && (content.case === "arrival" || (game && game.waitsFor > 0)) && (
         <Button busy={busy} onClick={goOn}>
           {words.alone}
         </Button>

@@ -36,9 +36,9 @@ use crate::{CommandError, progress, say};
 pub(super) struct Test {
     #[command(flatten)]
     owned: Owned,
-    /// Number of test participants to add.
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1_000))]
-    participants: u32,
+    /// Number of test participants to add; by default 8, or as many more as make whole groups.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000))]
+    participants: Option<u32>,
     /// How many of them take part at the same time.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=32))]
     at_once: u32,
@@ -62,17 +62,16 @@ impl Test {
         let shown = researcher.get_study(request).await.map_err(refused)?;
         let settings = shown.into_inner().study.and_then(|it| it.settings);
         let size = (settings.and_then(|it| it.groups)).map_or(1, |groups| groups.size.max(1));
-        if !self.participants.is_multiple_of(size) {
-            return Err(format!(
-                "--participants: {} make no whole groups; give a multiple of {size}",
-                self.participants
-            )
-            .into());
+        let wanted = self.participants.unwrap_or(8);
+        let whole = wanted.next_multiple_of(size);
+        if self.participants.is_some() && wanted != whole {
+            let problem = format!("{wanted} make no whole groups; give a multiple of {size}");
+            return Err(format!("--participants: {problem}").into());
         }
         let request = v1::AddStudyParticipantsRequest {
             study_id: study_id.clone(),
             owner_token: owner_token.clone(),
-            count: self.participants,
+            count: whole,
             test: true,
             ..v1::AddStudyParticipantsRequest::default()
         };
@@ -93,12 +92,14 @@ impl Test {
         let count = |state| participants.iter().filter(|it| it.state() == state).count();
         let completed = count(v1::StudyParticipantState::Completed);
         let screened_out = count(v1::StudyParticipantState::ScreenedOut);
+        let left_over = count(v1::StudyParticipantState::LeftOver);
         let games = participants.iter().flat_map(|it| &it.games);
         let aborted = games.filter(|it| it.ended() == v1::RoomState::Aborted);
         let aborted = aborted.count();
         if owned.json {
             say(json!({
                 "event": "tested", "completed": completed, "screened_out": screened_out,
+                "left_over": left_over,
                 "games_without_result": aborted,
                 "participants": participants, "problems": problems,
             }))?;
@@ -107,11 +108,15 @@ impl Test {
             for (name, problem) in &problems {
                 say(format_args!("{name}: {problem}"))?;
             }
-            let all = counted(self.participants.into(), "test participant");
+            let all = counted(whole.into(), "test participant");
             say(format_args!("{completed} of {all} completed the study"))?;
             if screened_out > 0 {
                 let out = counted(screened_out.try_into()?, "test participant");
                 say(format_args!("{out} screened out"))?;
+            }
+            if left_over > 0 {
+                let left_over = counted(left_over.try_into()?, "test participant");
+                say(format_args!("{left_over} left over without a group"))?;
             }
             if aborted > 0 {
                 let games = counted(aborted.try_into()?, "game");
@@ -133,7 +138,9 @@ impl Test {
         at_once: usize,
     ) -> Result<BTreeMap<String, String>, CommandError> {
         let client = self.owned.server.connect().await?;
-        let bar = progress::of_items(self.participants.into(), "test participants");
+        let count = links.len();
+        let bar = progress::of_items(count.try_into()?, "test participants");
+        let (coming, _) = watch::channel(count);
         let taking_part = links.into_iter().enumerate().map(|(index, link)| {
             let seed = seed_for(&format!("test participant {index}"), self.seed);
             let tester = Tester {
@@ -142,6 +149,7 @@ impl Test {
                 agent: self.agent,
                 chance: StdRng::from_seed(seed),
                 session: String::new(),
+                coming: Some(Coming(coming.clone())),
             };
             let bar = &bar;
             async move {
@@ -172,6 +180,17 @@ struct Tester {
     agent: NamedAgent,
     chance: StdRng,
     session: String,
+    /// Until it has arrived.
+    coming: Option<Coming>,
+}
+
+/// One of those who have not arrived where people wait for their groups, which counts them.
+struct Coming(watch::Sender<usize>);
+
+impl Drop for Coming {
+    fn drop(&mut self) {
+        self.0.send_modify(|count| *count -= 1);
+    }
 }
 
 impl Tester {
@@ -204,11 +223,28 @@ impl Tester {
                     // Its room, or its end, comes on the stream.
                     views.next(step).await
                 }
-                Some(Content::Arrival(_)) => views.next(step).await,
+                Some(Content::Arrival(_)) => self.arrive(step, &mut views).await,
                 Some(_) => self.proceed(step).await,
                 None => views.next(step).await,
             };
             view = next.map_err(refused)?;
+        }
+    }
+
+    /// Waits for its group, unless nobody comes any more: then it continues alone.
+    async fn arrive(&mut self, step: u32, views: &mut Views) -> Result<v1::StudyView, Status> {
+        let Some(arrived) = self.coming.take() else {
+            return views.after(step).await;
+        };
+        let mut coming = arrived.0.subscribe();
+        drop(arrived);
+        tokio::select! {
+            view = views.after(step) => view,
+            _ = coming.wait_for(|count| *count == 0) => match self.proceed(step).await {
+                // Its group was formed meanwhile.
+                Err(_) => views.after(step).await,
+                continued => continued,
+            },
         }
     }
 
@@ -266,6 +302,11 @@ impl Views {
             newest,
             _reading: AbortOnDropHandle::new(reading),
         }
+    }
+
+    /// The next view of a later step.
+    async fn after(&mut self, step: u32) -> Result<v1::StudyView, Status> {
+        self.next(step + 1).await
     }
 
     /// The next view that is not of an earlier step.

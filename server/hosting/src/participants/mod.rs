@@ -87,7 +87,15 @@ impl Participants {
         let _deleting = self.deleting.lock().await;
         self.check(who).await?;
         let mut studies = 0;
-        for (stored, number) in self.data.in_studies(who).await? {
+        let found = self.data.in_studies(who).await?;
+        for (stored, number) in &found {
+            let study = self.studies.get(stored.header.id);
+            // What others still play cannot be deleted yet.
+            if study.is_some_and(|it| it.read(|study| study.plays_with_others(*number))) {
+                return Err(ForgetError::GameRunning(who.name.clone()).into());
+            }
+        }
+        for (stored, number) in found {
             let id = stored.header.id;
             match self.studies.get(id).filter(|study| !study.is_stopped()) {
                 Some(study) => {

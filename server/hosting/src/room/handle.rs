@@ -404,14 +404,14 @@ impl Handle {
             .await
     }
 
-    /// Gives up a seat whose participant has left the tournament: a substitute plays until the end. A
+    /// Gives up a seat whose participant has left the tournament or study: a substitute plays until the end. A
     /// game that has not started is aborted.
     pub async fn retire(&self, seat: Seat) {
         // If the room is gone, there is nothing to do.
         let _ = self.mailbox.send(Message::Retire(seat)).await;
     }
 
-    /// Closes the room because its tournament is closed, or for the server's operator; a running
+    /// Closes the room because its tournament is closed, its participant has left the study, or for the server's operator; a running
     /// game is aborted.
     pub async fn close_without_token(&self) {
         // If the room is gone, there is nothing to do.

@@ -269,7 +269,7 @@ pub(super) enum Message {
     Mark(Box<MarkRequest>, oneshot::Sender<Option<MarkOutcome>>),
     /// Follows the markers from this position on, with the secret of the owner's token.
     FollowMarkers([u8; 32], usize, oneshot::Sender<Option<Following>>),
-    /// The participant of a seat has left the tournament.
+    /// The participant of a seat has left the tournament or study.
     Retire(Seat),
     Abort(AbortReason),
     Suspend,

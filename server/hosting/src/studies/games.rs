@@ -4,9 +4,10 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::Duration;
 
 use chefshat_engine::Seat;
-use chefshat_study::{Outcome, Participant, PlacedGame, PlayedGame, Status};
+use chefshat_study::{Outcome, Participant, PlayedGame, Status};
 use tokio::time::Instant;
 use tracing::warn;
 
@@ -16,6 +17,7 @@ use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Fill, GameStart, SeatedParticipant, StudyGame, StudyMember};
+use chefshat_room::policy::Policy;
 use chefshat_store::{StoreError, StoredGame};
 use chefshat_wire::convert::PARTICIPANT_KIND;
 
@@ -35,17 +37,25 @@ impl StudyTask {
         self.touched.clear();
     }
 
-    /// Reads the outcomes of games that have ended.
+    /// Reads the outcomes of games that have ended. A game ends for all who play it at once.
     pub(super) async fn read_ended_games(&mut self) -> Result<(), StoreError> {
-        let playing: Vec<u32> = self.playing.iter().copied().collect();
-        for number in playing {
-            let participant = self.unit.state.participant(number);
-            let Some(game) = participant.and_then(|it| it.games.last()).cloned() else {
-                continue;
-            };
-            if self.without_room.contains(&number) {
-                if !self.is_played(number) {
-                    self.end_game(number, &game, Outcome::Aborted);
+        let mut games: BTreeMap<[u8; 16], (PlayedGame, Vec<u32>)> = BTreeMap::new();
+        for number in &self.playing {
+            let participant = self.unit.state.participant(*number);
+            if let Some(game) = participant.and_then(|it| it.games.last()) {
+                let entry = games.entry(game.placed.game);
+                let (_, players) = entry.or_insert_with(|| (game.clone(), Vec::new()));
+                players.push(*number);
+            }
+        }
+        for (game, players) in games.into_values() {
+            let is_played = players.iter().any(|number| self.is_active(*number));
+            if players
+                .iter()
+                .any(|number| self.without_room.contains(number))
+            {
+                if !is_played {
+                    self.end_games(&players, &game, Outcome::Aborted);
                 }
                 continue;
             }
@@ -54,13 +64,19 @@ impl StudyTask {
                 continue;
             }
             match self.outcome(&game).await? {
-                Some(outcome) => self.end_game(number, &game, outcome),
+                Some(outcome) => self.end_games(&players, &game, outcome),
                 // The server ended before the room was created.
-                None if self.is_played(number) => drop(self.without_room.insert(number)),
-                None => self.end_game(number, &game, Outcome::Aborted),
+                None if is_played => self.without_room.extend(players),
+                None => self.end_games(&players, &game, Outcome::Aborted),
             }
         }
         Ok(())
+    }
+
+    fn end_games(&mut self, players: &[u32], game: &PlayedGame, outcome: Outcome) {
+        for number in players {
+            self.end_game(*number, game, outcome);
+        }
     }
 
     fn end_game(&mut self, number: u32, game: &PlayedGame, outcome: Outcome) {
@@ -138,19 +154,15 @@ impl StudyTask {
     pub(super) fn close_rooms(&mut self) {
         for number in &self.playing {
             let participant = self.unit.state.participant(*number);
-            let Some(game) = participant.and_then(|it| it.games.last()) else {
+            let left = participant.filter(|it| it.status != Status::Active);
+            let Some(game) = left.and_then(|it| it.games.last()) else {
                 continue;
             };
             let (room, seat) = (Id(game.placed.room), Seat::new(game.placed.seat));
-            let Some(handle) = self
-                .unit
-                .rooms
-                .get(room)
-                .filter(|_| !self.is_active(*number))
-            else {
+            let Some(handle) = self.unit.rooms.get(room) else {
                 continue;
             };
-            if self.is_played(*number) {
+            if self.unit.state.plays_with_others(*number) {
                 if self.retired.insert((room, *number)) {
                     let retiring = async move { handle.retire(seat).await };
                     tokio::spawn(short("one message", retiring));
@@ -162,20 +174,6 @@ impl StudyTask {
         }
     }
 
-    /// Those who play a game, by number.
-    fn players_of(&self, game: &PlacedGame) -> Vec<(u32, &Participant)> {
-        let participants = self.unit.state.participants().iter();
-        let plays = |it: &Participant| {
-            let last = it
-                .games
-                .last()
-                .filter(|played| played.placed.game == game.game);
-            it.status == Status::Active && last.is_some()
-        };
-        let players = participants.filter(|(_, it)| plays(it));
-        players.map(|(number, it)| (*number, it)).collect()
-    }
-
     /// The settings of the room of a participant's game.
     fn new_room(&self, number: u32) -> Option<NewRoom> {
         let participant = self.unit.state.participant(number)?;
@@ -185,7 +183,9 @@ impl StudyTask {
         let plan = &self.unit.handle.plan.conditions[placed.condition];
         let small = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         let room = Id(placed.room);
-        let players = self.players_of(placed);
+        let players = self.unit.state.players_of(number).into_iter();
+        let players = players.filter_map(|it| Some((it, self.unit.state.participant(it)?)));
+        let players: Vec<_> = players.collect();
         let seat_of = |player: &Participant| player.games.last().map_or(0, |it| it.placed.seat);
         let seats_of_group = self.unit.state.seats_of_group(participant, placed);
         // The other seats make room for those of the participants.
@@ -239,7 +239,17 @@ impl StudyTask {
                 true => plan.practice_rules,
                 false => plan.rules,
             },
-            policy: plan.policy.clone(),
+            policy: match (settings.groups, placed.practice) {
+                // Others do not wait longer for one who does not come.
+                (Some(groups), false) => Policy {
+                    waiting_time: plan
+                        .policy
+                        .waiting_time
+                        .min(Duration::from_millis(groups.wait_ms)),
+                    ..plan.policy.clone()
+                },
+                _ => plan.policy.clone(),
+            },
             fills,
             display_names: display_names.collect(),
             recorded: BTreeMap::new(),

@@ -374,21 +374,30 @@ impl StudyHandle {
     }
 
     /// Continues with the next step of a participant. The running game of a test participant is closed
-    /// before it can continue.
+    /// before it can continue, and those drop out for whom its game waits.
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
     pub async fn proceed(&self, at: At, rooms: &Rooms) -> Result<Result<u32, Refusal>, Stopped> {
         let command = self.command(move |study, now_ms| Ok((vec![study.proceed(at, now_ms)?], 0)));
         let proceeded = command.await?;
-        if proceeded == Err(Refusal::GameNotOver)
-            && let Some(room) = self.read(|study| study.room_of_test(at.number))
+        if proceeded != Err(Refusal::GameNotOver) {
+            return Ok(proceeded);
+        }
+        if let Some(room) = self.read(|study| study.room_of_test(at.number))
             && let Some(room) = rooms.get(Id(room))
         {
             room.close_without_token().await;
             return Ok(Ok(0));
         }
-        Ok(proceeded)
+        self.command(move |study, now_ms| {
+            let late = study.without_late(at.number, now_ms);
+            match late.is_empty() {
+                true => Err(Refusal::GameNotOver),
+                false => Ok((late, 0)),
+            }
+        })
+        .await
     }
 
     /// Withdraws a participant. If its data are to be deleted, returns when they are; at once, if others
@@ -502,7 +511,7 @@ impl StudyHandle {
                 return Ok(Ok(()));
             }
         }
-        let count = counts.entry(game).or_default();
+        let count = counts.entry((number, game)).or_default();
         if *count + traces.len() > MAX_TRACES_OF_GAME {
             return Ok(Err(TraceRefusal::TooMany));
         }

@@ -32,9 +32,9 @@ pub struct StudyShared {
     pub(super) views: Mutex<BTreeMap<u32, watch::Sender<u64>>>,
     /// Participants whose data are being deleted.
     pub(super) deleting: Mutex<BTreeSet<u32>>,
-    /// Number of interface traces by game, since the server was started. Locked while traces are
-    /// added or deleted.
-    pub(super) traces: Arc<AsyncMutex<BTreeMap<Id, usize>>>,
+    /// Number of interface traces by participant and game, since the server was started. Locked while
+    /// traces are added or deleted.
+    pub(super) traces: Arc<AsyncMutex<BTreeMap<(u32, Id), usize>>>,
     pub(super) streams: AtomicU64,
 }
 

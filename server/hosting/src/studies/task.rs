@@ -49,6 +49,8 @@ pub struct StudyTask {
     pub(super) playing: BTreeSet<u32>,
     /// Those of them whose game has no room yet.
     pub(super) without_room: BTreeSet<u32>,
+    /// When the task began.
+    began: Instant,
     /// Rooms that were asked to close.
     pub(super) closing: BTreeSet<Id>,
     /// Rooms that were asked to give up the seat of a participant.
@@ -138,6 +140,7 @@ impl Journaled for StudyTask {
             touched: BTreeSet::new(),
             playing,
             without_room: BTreeSet::new(),
+            began: Instant::now(),
             closing: BTreeSet::new(),
             retired: BTreeSet::new(),
             retry: None,
@@ -205,7 +208,8 @@ impl Journaled for StudyTask {
         self.read_ended_games().await?;
         let now_ms = (self.now)();
         loop {
-            let changes = self.unit.state.next(now_ms);
+            let elapsed_ms = self.elapsed_ms();
+            let changes = self.unit.state.next(now_ms, elapsed_ms);
             if changes.is_empty() {
                 break;
             }
@@ -217,7 +221,12 @@ impl Journaled for StudyTask {
 
     fn announce(&mut self, changes: &[Change]) {
         let numbers: BTreeSet<u32> = changes.iter().filter_map(Change::number).collect();
-        let others = numbers.iter();
+        // What somebody has entered so far changes nothing for others.
+        let seen = changes
+            .iter()
+            .filter(|it| !matches!(it, Change::Saved { .. }));
+        let seen: BTreeSet<u32> = seen.filter_map(Change::number).collect();
+        let others = seen.iter();
         let others = others.flat_map(|number| self.unit.state.affected_with(*number));
         let affected: BTreeSet<u32> = numbers.iter().copied().chain(others).collect();
         for number in affected {
@@ -263,15 +272,16 @@ impl Journaled for StudyTask {
             .iter()
             .filter_map(|number| self.unit.state.participant(*number));
         let games: Vec<_> = played.flat_map(|it| &it.games).collect();
-        let ids: Vec<Id> = games.iter().map(|game| Id(game.placed.game)).collect();
-        for game in &ids {
-            counts.remove(game);
-        }
+        let ids: BTreeSet<Id> = games.iter().map(|game| Id(game.placed.game)).collect();
+        counts.retain(|(number, _), _| !due.contains(number));
         for game in &games {
             self.unit.rooms.forget(Id(game.placed.room));
         }
         let count = ids.len();
-        self.unit.rooms.delete_games(ids).await?;
+        self.unit
+            .rooms
+            .delete_games(ids.into_iter().collect())
+            .await?;
         for number in &due {
             handle.shared.data.forget_answers(*number);
         }
@@ -294,11 +304,12 @@ impl Journaled for StudyTask {
         for (_, game) in &played {
             self.unit.rooms.forget(Id(game.placed.room));
         }
-        let games: Vec<Id> = played
-            .iter()
-            .map(|(_, game)| Id(game.placed.game))
+        // Those of a group have one game.
+        let games: BTreeMap<Id, bool> = (played.iter())
+            .map(|(test, game)| (Id(game.placed.game), *test))
             .collect();
-        let count = played.iter().filter(|(test, _)| !test).count();
+        let count = games.values().filter(|test| !**test).count();
+        let games = games.into_keys().collect();
         let store = self.unit.rooms.store();
         // The games first: a repetition completes what was interrupted in between.
         self.unit.rooms.delete_games(games).await?;
@@ -321,10 +332,8 @@ impl Journaled for StudyTask {
     }
 
     fn wake_at(&self) -> Option<Instant> {
-        let by_core = self.unit.state.wake_at().map(|at_ms| {
-            let wait = at_ms.saturating_sub((self.now)());
-            Instant::now() + Duration::from_millis(wait)
-        });
+        let by_core = self.unit.state.wake_in((self.now)(), self.elapsed_ms());
+        let by_core = by_core.map(|wait_ms| Instant::now() + Duration::from_millis(wait_ms));
         by_core.into_iter().chain(self.retry).min()
     }
 }
@@ -350,10 +359,19 @@ impl StudyTask {
         }
     }
 
+    /// Since the task began, by a clock that never jumps.
+    fn elapsed_ms(&self) -> u64 {
+        u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
+    }
+
+    fn show_connected(&mut self, number: u32, connected: bool) {
+        let elapsed_ms = self.elapsed_ms();
+        self.unit.state.set_connected(number, connected, elapsed_ms);
+        (self.unit.handle.committed()).set_connected(number, connected, elapsed_ms);
+    }
+
     fn set_connected(&mut self, number: u32, connected: bool) {
-        let now_ms = (self.now)();
-        self.unit.state.set_connected(number, connected, now_ms);
-        (self.unit.handle.committed()).set_connected(number, connected, now_ms);
+        self.show_connected(number, connected);
         self.touched.insert(number);
         for other in self.unit.state.affected_with(number) {
             self.unit.handle.notify_participant(other);
@@ -380,9 +398,7 @@ impl StudyTask {
             Change::Opened { number, .. } => {
                 // The stream of the earlier session ends.
                 self.streams.remove(number);
-                let now_ms = (self.now)();
-                self.unit.state.set_connected(*number, false, now_ms);
-                (self.unit.handle.committed()).set_connected(*number, false, now_ms);
+                self.show_connected(*number, false);
             }
             Change::Withdrew {
                 number,
@@ -399,12 +415,6 @@ impl StudyTask {
     pub(super) fn is_active(&self, number: u32) -> bool {
         let participant = self.unit.state.participant(number);
         participant.is_some_and(|it| it.status == Status::Active)
-    }
-
-    /// Whether the running game of a participant goes on: it, or others of its group, are in the middle
-    /// of the study.
-    pub(super) fn is_played(&self, number: u32) -> bool {
-        self.is_active(number) || self.unit.state.plays_with_others(number)
     }
 }
 

@@ -1059,3 +1059,24 @@ async fn pairs_are_formed_and_who_waits_too_long_is_left_over() {
     lab.until(2, Status::LeftOver).await;
     drop(present);
 }
+
+#[tokio::test(start_paused = true)]
+async fn a_game_waits_for_a_partner_who_does_not_come_no_longer_than_for_one_who_is_late() {
+    let lab = Lab::with(&ServerConfig::default(), in_pairs(), 2).await;
+    let mut present = Vec::new();
+    for number in [1, 2] {
+        assert_eq!(lab.open(number).await, Ok(1));
+        present.push(lab.study.present(number, 1).await);
+        let consented = lab.study.consent(at(number, 0)).await;
+        assert_eq!(consented.expect("it runs"), Ok(0));
+        lab.settled().await;
+    }
+    let room = |study: &Study| Id(study.participants()[&1].games[0].placed.room);
+    let room = lab.study.read(room);
+    let header = lab.studies.rooms().header(room).expect("it has a room");
+    assert_eq!(header.policy.waiting_time, Duration::from_secs(30));
+    let study = header.study.as_ref().expect("it is of a study");
+    let seats: Vec<usize> = study.members.iter().map(|it| it.seat.index()).collect();
+    assert_eq!((study.group, seats), (Some(1), vec![0, 2]));
+    drop(present);
+}

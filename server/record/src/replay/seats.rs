@@ -393,7 +393,7 @@ pub(crate) fn game_started(header: &v1::RecordHeader, rules: &RuleSet) -> v1::Ga
     }
 }
 
-/// Whether the participant of a seat can leave a game that goes on without it: in a tournament, and in
+/// Whether the participant of a seat can leave a game that continues without it: in a tournament, and in
 /// the group of a study.
 fn may_leave_for_good(header: &v1::RecordHeader, seat: u32) -> bool {
     let study = header.study.as_ref().filter(|study| study.group > 0);

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chefshat_study::testing::in_groups;
 use chefshat_study::{
-    Content, End, Labels, LeftOver, NewParticipants, Outcome, Refusal, Settings, Stage, Status,
-    Task, testing,
+    Content, End, Labels, LeftOverPolicy, NewParticipants, Outcome, Refusal, Settings, Stage,
+    Status, Task, testing,
 };
 use proptest::prelude::*;
 
@@ -145,7 +145,7 @@ fn a_plan_says_who_plays_with_whom() {
 
 #[test]
 fn those_left_over_are_thanked_or_play_with_agents() {
-    for left_over in [LeftOver::Dismiss, LeftOver::Agents] {
+    for left_over in [LeftOverPolicy::Dismiss, LeftOverPolicy::Agents] {
         let mut settings = in_groups(3);
         settings.groups.as_mut().unwrap().left_over = left_over;
         settings.recruiting.completed_url = "https://panel.example/done".to_owned();
@@ -160,17 +160,18 @@ fn those_left_over_are_thanked_or_play_with_agents() {
         lab.open(2).unwrap();
         lab.wait(2_000);
         match left_over {
-            LeftOver::Dismiss => {
+            LeftOverPolicy::Dismiss => {
                 assert_eq!(reason(&lab, 1), End::LeftOver);
                 let Content::End { url, .. } = lab.study.view(1).unwrap().content else {
                     panic!("no end");
                 };
                 assert_eq!(url.as_deref(), Some("https://panel.example/done"));
                 assert_eq!(here(&lab, 2), 1);
-                // Its place is free.
+                // Its place is free: two more may begin with the second.
+                assert_eq!(lab.open(3), Ok(()));
                 assert!(lab.study.participant(1).unwrap().slot.is_none());
             }
-            LeftOver::Agents => {
+            LeftOverPolicy::Agents => {
                 assert_eq!(groups(&lab)[&1], [(1, 0), (2, 1)]);
                 place(&mut lab, 2);
                 let participant = lab.study.participant(2).unwrap();
@@ -204,13 +205,118 @@ fn a_member_who_leaves_keeps_nobody_waiting() {
     // The next game has one of them.
     place(&mut lab, 1);
     assert!(lab.study.due(1).is_none());
-    assert_eq!(lab.study.players_with(1), [1]);
+    assert_eq!(lab.study.players_of(1), [1]);
 
     // The slots of a group are given again only after all of it have left.
     lab.begin(3);
     lab.begin(4);
     lab.wait(0);
     assert_eq!(groups(&lab)[&2], [(3, 2), (4, 3)]);
+    let removed = lab.study.remove(1, lab.now_ms).unwrap();
+    removed.into_iter().for_each(|change| lab.fold(change));
+    lab.add(2);
+    lab.begin(5);
+    lab.begin(6);
+    lab.wait(0);
+    assert_eq!(groups(&lab)[&3], [(5, 0), (6, 1)]);
+}
+
+#[test]
+fn of_a_group_of_three_only_the_late_one_drops_out() {
+    let mut lab = Lab::new(in_groups(3), 3);
+    for number in 1..=3 {
+        lab.begin(number);
+    }
+    lab.wait(0);
+    place(&mut lab, 1);
+    for number in 1..=3 {
+        end(&mut lab, number, Outcome::Finished);
+    }
+    lab.act(1);
+    lab.act(3);
+    lab.wait(0);
+    lab.wait(30_000);
+    // One who waits loses its connection for a moment: that prolongs nothing, and costs it nothing.
+    lab.study.set_connected(1, false, lab.now_ms);
+    lab.wait(0);
+    lab.study.set_connected(1, true, lab.now_ms);
+    lab.wait(29_000);
+    lab.study.set_connected(3, false, lab.now_ms);
+    lab.wait(1_000);
+    assert_eq!(reason(&lab, 2), End::DroppedOut);
+    lab.study.set_connected(3, true, lab.now_ms);
+    lab.wait(0);
+    assert_eq!(lab.place(1).len(), 2);
+}
+
+#[test]
+fn who_is_alone_in_its_group_may_return() {
+    let mut settings = in_groups(2);
+    settings.groups.as_mut().unwrap().left_over = LeftOverPolicy::Agents;
+    let mut lab = Lab::new(settings, 1);
+    lab.begin(1);
+    lab.wait(0);
+    lab.wait(60_000);
+    assert_eq!(groups(&lab)[&1], [(1, 0)]);
+    lab.study.set_connected(1, false, lab.now_ms);
+    lab.wait(60_000);
+    assert_eq!(reason(&lab, 1), End::DroppedOut);
+    assert_eq!(lab.open(1), Ok(()));
+    assert_eq!(lab.study.participant(1).unwrap().status, Status::Active);
+}
+
+#[test]
+fn plans_do_not_take_each_others_places() {
+    let mut settings = in_groups(2);
+    settings.participants = 4;
+    let mut lab = Lab::new(settings, 0);
+    let planned = NewParticipants {
+        together: true,
+        ..NewParticipants::numbered(6)
+    };
+    let added = lab.study.add(&planned).unwrap();
+    added.into_iter().for_each(|change| lab.fold(change));
+    lab.begin(1);
+    lab.begin(3);
+    // Two pairs are expected: there is a place for their others, and for nobody else.
+    assert_eq!(lab.open(5), Err(Refusal::Full));
+    lab.begin(2);
+    lab.begin(4);
+    lab.wait(0);
+    assert_eq!(groups(&lab).len(), 2);
+    // In place of one whose group is formed comes somebody who may play with anybody.
+    let replacement = lab.study.replacement(2).unwrap();
+    replacement.into_iter().for_each(|change| lab.fold(change));
+    assert_eq!(lab.study.participant(7).unwrap().planned, None);
+}
+
+#[test]
+fn nobody_waits_where_no_slots_are_left() {
+    let mut settings = in_groups(2);
+    settings.participants = 4;
+    settings.groups.as_mut().unwrap().left_over = LeftOverPolicy::Agents;
+    let mut lab = Lab::new(settings, 4);
+    let away = |lab: &mut Lab, number| {
+        lab.begin(number);
+        lab.study.set_connected(number, false, lab.now_ms);
+    };
+    away(&mut lab, 3);
+    // Two come alone, one after the other, and play with agents.
+    lab.begin(1);
+    lab.wait(0);
+    lab.wait(60_000);
+    lab.begin(2);
+    lab.wait(0);
+    lab.wait(59_000);
+    away(&mut lab, 4);
+    lab.wait(1_000);
+    assert_eq!(groups(&lab).len(), 2);
+    lab.study.set_connected(4, true, lab.now_ms);
+    lab.wait(0);
+    assert_eq!(reason(&lab, 4), End::LeftOver);
+    // Nor may one return who had no group.
+    assert_eq!(reason(&lab, 3), End::DroppedOut);
+    assert_eq!(lab.open(3), Err(Refusal::Full));
 }
 
 #[test]
@@ -225,8 +331,7 @@ fn a_member_for_whom_the_others_wait_too_long_has_dropped_out() {
     }
     lab.act(1);
     lab.wait(0);
-    let wake_at = lab.study.wake_at().unwrap();
-    assert_eq!(wake_at, lab.now_ms + 60_000);
+    assert_eq!(lab.wake_in(), Some(60_000));
     lab.wait(59_999);
     assert!(lab.place(1).is_empty());
     lab.wait(1);
@@ -275,12 +380,19 @@ fn a_test_participant_goes_on_alone() {
     );
     let grouped = lab.study.proceed(lab.at(2), lab.now_ms).unwrap();
     lab.fold(grouped);
-    assert_eq!(lab.study.players_with(2), [2]);
+    assert_eq!(groups(&lab)[&1], [(2, 0)]);
     for number in [3, 4] {
         lab.begin(number);
     }
     lab.wait(0);
     assert_eq!(groups(&lab)[&2], [(3, 2), (4, 3)]);
+    // Nor does its game wait for another test participant any longer, if it continues.
+    lab.study.set_connected(4, false, lab.now_ms);
+    assert!(lab.place(3).is_empty());
+    let late = lab.study.without_late(3, lab.now_ms);
+    late.into_iter().for_each(|change| lab.fold(change));
+    assert_eq!(reason(&lab, 4), End::DroppedOut);
+    assert_eq!(lab.place(3).len(), 1);
 }
 
 #[test]
@@ -416,7 +528,7 @@ fn check(lab: &Lab) {
 }
 
 fn plans() -> impl Strategy<Value = Settings> {
-    let left_over = prop::sample::select(vec![LeftOver::Dismiss, LeftOver::Agents]);
+    let left_over = prop::sample::select(vec![LeftOverPolicy::Dismiss, LeftOverPolicy::Agents]);
     (2..=4u32, left_over, any::<[u8; 32]>()).prop_map(|(size, left_over, seed)| {
         let mut settings = in_groups(size);
         settings.assignment_seed = seed;

@@ -101,11 +101,11 @@ fn who_is_away_too_long_drops_out_and_may_return_until_the_slot_is_given_again()
 
     lab.study.set_connected(1, false, lab.now_ms);
     lab.wait(59_999);
-    assert_eq!(lab.study.wake_at(), Some(lab.now_ms + 1));
+    assert_eq!(lab.wake_in(), Some(1));
     assert_eq!(status(&lab, 1), Status::Active);
     lab.wait(1);
     assert_eq!(status(&lab, 1), Status::DroppedOut);
-    assert_eq!(lab.study.wake_at(), None);
+    assert_eq!(lab.wake_in(), None);
     assert!(lab.study.due(1).is_none());
 
     // Its slot is free: it continues where it was.
@@ -255,7 +255,7 @@ fn a_full_or_closed_study_accepts_nobody() {
     assert_eq!(lab.open(2), Err(Refusal::Full));
     assert!(lab.study.view(2).is_none());
     lab.wait(0);
-    assert_eq!(lab.study.wake_at(), Some(2_000_000));
+    assert_eq!(lab.wake_in(), Some(2_000_000 - lab.now_ms));
     lab.wait(1_000_000);
     assert!(lab.study.is_closed() && lab.study.close().is_none());
     assert_eq!(lab.open(2), Err(Refusal::Closed));
@@ -275,7 +275,7 @@ fn a_study_closes_when_its_data_are_deleted_and_not_after_that() {
     let mut lab = Lab::new(settings.clone(), 1);
     lab.begin(1);
     assert_eq!(lab.study.view(1).unwrap().deletes_at_ms, Some(2_000_000));
-    assert_eq!(lab.study.wake_at(), Some(2_000_000));
+    assert_eq!(lab.wake_in(), Some(2_000_000 - lab.now_ms));
     lab.wait(1_000_000);
     assert!(lab.study.is_closed());
     // Before it closes, or given in microseconds.

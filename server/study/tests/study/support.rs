@@ -76,12 +76,17 @@ impl Lab {
     pub(crate) fn wait(&mut self, ms: u64) {
         self.now_ms += ms;
         loop {
-            let changes = self.study.next(self.now_ms);
+            let changes = self.study.next(self.now_ms, self.now_ms);
             if changes.is_empty() {
                 return;
             }
             changes.into_iter().for_each(|change| self.fold(change));
         }
+    }
+
+    /// In how many milliseconds something follows by itself.
+    pub(crate) fn wake_in(&self) -> Option<u64> {
+        self.study.wake_in(self.now_ms, self.now_ms)
     }
 
     /// Where a participant is.

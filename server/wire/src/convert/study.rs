@@ -12,9 +12,9 @@ use chefshat_room::journal::{Fill, ParticipantKind, SeatLabels};
 use chefshat_room::policy::{Durability, Policy, Visibility};
 use chefshat_study::{
     AnswerSet, Arrival, Condition, Consent, Device, ExternalQuestionnaire, Factor, Groups, Hide,
-    Item, ItemKind, Labels, Language, LeftOver, Order, Outcome, Part, Participant, PlayedGame,
-    Pointer, Questionnaire, Recruiting, ScreenOut, Settings, SettingsProblem, ShownIf, Stage,
-    Status, Study, Task, Template, Text,
+    Item, ItemKind, Labels, Language, LeftOverPolicy, Order, Outcome, Part, Participant,
+    PlayedGame, Pointer, Questionnaire, Recruiting, ScreenOut, Settings, SettingsProblem, ShownIf,
+    Stage, Status, Study, Task, Template, Text,
 };
 
 use super::agent::check_budget;
@@ -106,7 +106,13 @@ pub fn complete_settings(
         }
     }
     for (index, condition) in message.conditions.iter_mut().enumerate() {
-        complete_condition(&format!("conditions[{index}]"), condition, durable)?;
+        let field = format!("conditions[{index}]");
+        complete_condition(&field, condition, durable)?;
+        let abort = condition.policy.as_ref().map(v1::RoomPolicy::abort);
+        if message.groups.is_some() && abort != Some(v1::AbortPolicy::Never) {
+            let words = "with groups it is NEVER: agents play on for those who leave";
+            return Err(problem(format!("{field}.policy.abort"), words));
+        }
     }
     for stage in &mut message.stages {
         let stages = match &mut stage.stage {
@@ -315,8 +321,8 @@ fn recruiting(message: v1::StudyRecruiting) -> Recruiting {
 
 fn groups(message: &v1::StudyGroups) -> Result<Groups, SettingsProblem> {
     let left_over = match v1::StudyLeftOver::try_from(message.left_over) {
-        Ok(v1::StudyLeftOver::Unspecified | v1::StudyLeftOver::Dismiss) => LeftOver::Dismiss,
-        Ok(v1::StudyLeftOver::Agents) => LeftOver::Agents,
+        Ok(v1::StudyLeftOver::Unspecified | v1::StudyLeftOver::Dismiss) => LeftOverPolicy::Dismiss,
+        Ok(v1::StudyLeftOver::Agents) => LeftOverPolicy::Agents,
         Err(_) => return Err(problem("groups.left_over", "choose DISMISS or AGENTS")),
     };
     Ok(Groups {
@@ -732,7 +738,7 @@ pub fn study_participant(
                 at_ms: consent.at_ms,
             }),
         games: (participant.games.iter())
-            .map(|game| study_game(study, plan, participant, game, &join_code))
+            .map(|game| study_game(study, plan, (number_of, participant), game, &join_code))
             .collect(),
         data_deleted: participant.data_deleted,
         panel_id: participant.panel_id().to_owned(),
@@ -744,7 +750,7 @@ pub fn study_participant(
 fn study_game(
     study: &Study,
     plan: &StudyPlan,
-    participant: &Participant,
+    (number_of, participant): (u32, &Participant),
     game: &PlayedGame,
     join_code: &impl Fn(Id) -> String,
 ) -> v1::StudyGame {
@@ -756,6 +762,8 @@ fn study_game(
         Some((Outcome::Aborted, at_ms)) => (v1::RoomState::Aborted, at_ms),
     };
     let runs = game.ended.is_none() && participant.status == Status::Active;
+    // Programs join the room of a group once.
+    let is_first = runs && study.players_of(number_of).first() == Some(&number_of);
     let has_open = (condition.fills.iter()).any(|fill| matches!(fill, Fill::Open { .. }));
     v1::StudyGame {
         step: number(placed.step),
@@ -768,7 +776,7 @@ fn study_game(
         game_id: Id(placed.game).to_string(),
         ended: ended.into(),
         ended_at_ms,
-        join_code: match runs && has_open {
+        join_code: match is_first && has_open {
             true => join_code(Id(placed.room)),
             false => String::new(),
         },

@@ -492,7 +492,7 @@ fn who_else_of_a_group_plays_does_not_change_what_is_shown() {
 
 /// That somebody of a group has left for good is in the record alone.
 #[test]
-fn nobody_is_told_of_a_hidden_seat_that_its_participant_has_left() {
+fn that_the_participant_of_a_hidden_seat_has_left_is_not_shown() {
     let mut hidden = Hidden::new(SeatLabels::Players);
     hidden.grouped = true;
     let mut table = hidden.room(Fill::Open {

@@ -53,8 +53,8 @@ export const studies: Texts["studies"] = {
     title: "Warten auf die anderen",
     here: (here, size) => `${here} von ${size} Personen sind da`,
     text: (minutes) =>
-      `Lassen Sie diese Seite geöffnet. Es geht hier von selbst weiter, sobald alle da sind. Nach spätestens ${plural(minutes, { one: "# Minute", other: "# Minuten" })} erfahren Sie, wie es weitergeht.`,
-    goOn: "Es geht weiter",
+      `Lassen Sie diese Seite geöffnet. Die Studie geht von selbst weiter, sobald alle da sind. Nach spätestens ${plural(minutes, { one: "# Minute", other: "# Minuten" })} erfahren Sie, wie es weitergeht.`,
+    complete: "Alle sind da",
   },
   labels: {
     agent: (seat) => `Agent ${seat}`,

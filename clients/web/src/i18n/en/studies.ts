@@ -50,8 +50,8 @@ export const studies = {
     title: "Waiting for the others",
     here: (here: number, size: number) => `${here} of ${size} people are here`,
     text: (minutes: number) =>
-      `Leave this page open: it goes on by itself as soon as everybody is here. After ${plural(minutes, { one: "# minute", other: "# minutes" })} at the latest you learn how it goes on.`,
-    goOn: "It goes on",
+      `Leave this page open: the study continues by itself as soon as everybody is here. After ${plural(minutes, { one: "# minute", other: "# minutes" })} at the latest you learn what comes next.`,
+    complete: "Everybody is here",
   },
   labels: {
     agent: (seat: number) => `Agent ${seat}`,
@@ -94,7 +94,7 @@ export const studies = {
     title: "Test participation",
     text: "You take part as a test: nothing that you do here counts, and you may skip questions.",
     skip: "Skip the questions",
-    alone: "Go on without the others",
+    alone: "Continue without the others",
     end: "End the game",
   },
   withdraw: {

@@ -53,7 +53,7 @@ export const studies: Texts["studies"] = {
     here: (here, size) => `Han llegado ${here} de ${size} personas`,
     text: (minutes) =>
       `Deje abierta esta página. El estudio continúa aquí por sí solo cuando estén todos. Como máximo en ${plural(minutes, { one: "# minuto", other: "# minutos" })} sabrá cómo continúa.`,
-    goOn: "Continúa",
+    complete: "Están todos",
   },
   labels: {
     agent: (seat) => `Agente ${seat}`,

@@ -53,7 +53,7 @@ export const studies: Texts["studies"] = {
     here: (here, size) => `Persone presenti: ${here} su ${size}`,
     text: (minutes) =>
       `Lasci aperta questa pagina. Lo studio continua qui da solo quando ci sono tutti. Al più tardi fra ${plural(minutes, { one: "# minuto", other: "# minuti" })} saprà come si continua.`,
-    goOn: "Si continua",
+    complete: "Ci sono tutti",
   },
   labels: {
     agent: (seat) => `Agente ${seat}`,

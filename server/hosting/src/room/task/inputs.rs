@@ -209,7 +209,7 @@ impl Room {
         }
     }
 
-    /// Gives up a seat whose participant has left the tournament.
+    /// Gives up a seat whose participant has left the tournament or study.
     fn retire(&mut self, seat: Seat) {
         let handed = self.handed();
         self.core.retire(self.now, seat, handed);

@@ -316,7 +316,10 @@ const STATES: [(Status, &str); 8] = [
     (Status::Active, "has begun"),
     (Status::Completed, "has completed all steps"),
     (Status::Withdrawn, "has withdrawn"),
-    (Status::DroppedOut, "had no page open for too long"),
+    (
+        Status::DroppedOut,
+        "had no page open for too long, or others of its group waited for it for too long",
+    ),
     (Status::Removed, "was removed by the study's owner"),
     (Status::ScreenedOut, "was screened out by its answers"),
     (Status::LeftOver, "its group was not complete in time"),
@@ -376,23 +379,7 @@ impl GameRow<'_> {
 
     /// Number of participants who began the game.
     fn players(&self) -> usize {
-        let group = self
-            .participant
-            .group
-            .filter(|_| !self.game.placed.practice);
-        if group.is_none() {
-            return 1;
-        }
-        let others = self
-            .study
-            .participants()
-            .values()
-            .filter(|it| it.group == group);
-        let has_game = |it: &&Participant| {
-            let mut games = it.games.iter();
-            games.any(|played| played.placed.game == self.game.placed.game)
-        };
-        others.filter(has_game).count()
+        self.study.began_with(self.number, self.game.placed.game)
     }
 
     fn seed(&self) -> Option<String> {

@@ -289,7 +289,7 @@ async fn games(
 ) -> Result<Vec<Sheet>, ExportError> {
     let settings = study.settings();
     let mut file = TableFile::new(columns::games(settings), sender).await?;
-    let (mut records, mut unreadable) = (Vec::new(), Vec::new());
+    let (mut records, mut unreadable) = (Vec::new(), BTreeMap::new());
     // Those of a group have one game.
     let mut exported = BTreeSet::new();
     for &(number, participant) in people {
@@ -302,7 +302,7 @@ async fn games(
                 // One game that cannot be read ends no export of the others.
                 Err(StoreError::Unreadable(problem)) => {
                     error!(study = %handle.id(), %problem, "a game is left out of an export");
-                    unreadable.push((id, problem));
+                    unreadable.insert(id, problem);
                     None
                 }
                 lines => lines?,
@@ -325,8 +325,8 @@ async fn games(
     let mut sheets = vec![file.end().await?];
     if !unreadable.is_empty() {
         let mut file = TableFile::new(columns::unreadable(), sender).await?;
-        for row in &unreadable {
-            file.row(row).await?;
+        for row in unreadable {
+            file.row(&row).await?;
         }
         sheets.push(file.end().await?);
     }
@@ -476,14 +476,15 @@ async fn traces(
     }
     let traces = rooms.store().traces(handle.id()).await?;
     let mut file = TableFile::new(columns::traces(settings), sender).await?;
-    let mut earlier: BTreeMap<Id, &[v1::StudyTrace]> = BTreeMap::new();
+    let mut earlier: BTreeMap<(u32, Id), &[v1::StudyTrace]> = BTreeMap::new();
     for stored in &traces {
         let Some(condition) = conditions.get(&(stored.number, stored.game)) else {
             continue;
         };
         let participant = study.participant(stored.number);
         // Traces whose receipt did not reach the device came again, before those that followed.
-        let before = earlier.insert(stored.game, &stored.traces);
+        let of = (stored.number, stored.game);
+        let before = earlier.insert(of, &stored.traces);
         let new = before.and_then(|before| stored.traces.strip_prefix(before));
         for trace in new.unwrap_or(&stored.traces) {
             let row = TraceRow {

@@ -60,7 +60,9 @@ class _DetachReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_DetachRe
     DETACH_REASON_UNSPECIFIED: _DetachReason.ValueType  # 0
     """Not set."""
     DETACH_REASON_REQUESTED: _DetachReason.ValueType  # 1
-    """The client requested it, or gave the seat back; or the participant has left the tournament."""
+    """The client requested it, or gave the seat back; or the participant has left the tournament
+    or study.
+    """
     DETACH_REASON_SUPERSEDED: _DetachReason.ValueType  # 2
     """A newer connection attached the seat."""
     DETACH_REASON_GAME_OVER: _DetachReason.ValueType  # 3
@@ -80,7 +82,9 @@ class DetachReason(_DetachReason, metaclass=_DetachReasonEnumTypeWrapper):
 DETACH_REASON_UNSPECIFIED: DetachReason.ValueType  # 0
 """Not set."""
 DETACH_REASON_REQUESTED: DetachReason.ValueType  # 1
-"""The client requested it, or gave the seat back; or the participant has left the tournament."""
+"""The client requested it, or gave the seat back; or the participant has left the tournament
+or study.
+"""
 DETACH_REASON_SUPERSEDED: DetachReason.ValueType  # 2
 """A newer connection attached the seat."""
 DETACH_REASON_GAME_OVER: DetachReason.ValueType  # 3

@@ -133,8 +133,8 @@ class _StudyLeftOverEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_StudyLe
     STUDY_LEFT_OVER_DISMISS: _StudyLeftOver.ValueType  # 1
     """Their participation ends; the page thanks them."""
     STUDY_LEFT_OVER_AGENTS: _StudyLeftOver.ValueType  # 2
-    """They are a group of fewer. The `substitute` of the condition's policy plays in place of those who
-    are missing.
+    """They are a group of fewer, if slots are free. The `substitute` of the condition's policy plays in
+    place of those who are missing.
     """
 
 class StudyLeftOver(_StudyLeftOver, metaclass=_StudyLeftOverEnumTypeWrapper):
@@ -145,8 +145,8 @@ STUDY_LEFT_OVER_UNSPECIFIED: StudyLeftOver.ValueType  # 0
 STUDY_LEFT_OVER_DISMISS: StudyLeftOver.ValueType  # 1
 """Their participation ends; the page thanks them."""
 STUDY_LEFT_OVER_AGENTS: StudyLeftOver.ValueType  # 2
-"""They are a group of fewer. The `substitute` of the condition's policy plays in place of those who
-are missing.
+"""They are a group of fewer, if slots are free. The `substitute` of the condition's policy plays in
+place of those who are missing.
 """
 Global___StudyLeftOver: _TypeAlias = StudyLeftOver  # noqa: Y015
 
@@ -195,7 +195,7 @@ class _StudyParticipantStateEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[
     STUDY_PARTICIPANT_STATE_WITHDRAWN: _StudyParticipantState.ValueType  # 4
     """It has withdrawn."""
     STUDY_PARTICIPANT_STATE_DROPPED_OUT: _StudyParticipantState.ValueType  # 5
-    """It had no page open for too long."""
+    """It had no page open for too long, or others of its group waited for it for too long."""
     STUDY_PARTICIPANT_STATE_REMOVED: _StudyParticipantState.ValueType  # 6
     """It was removed by the study's owner."""
     STUDY_PARTICIPANT_STATE_SCREENED_OUT: _StudyParticipantState.ValueType  # 7
@@ -217,7 +217,7 @@ STUDY_PARTICIPANT_STATE_COMPLETED: StudyParticipantState.ValueType  # 3
 STUDY_PARTICIPANT_STATE_WITHDRAWN: StudyParticipantState.ValueType  # 4
 """It has withdrawn."""
 STUDY_PARTICIPANT_STATE_DROPPED_OUT: StudyParticipantState.ValueType  # 5
-"""It had no page open for too long."""
+"""It had no page open for too long, or others of its group waited for it for too long."""
 STUDY_PARTICIPANT_STATE_REMOVED: StudyParticipantState.ValueType  # 6
 """It was removed by the study's owner."""
 STUDY_PARTICIPANT_STATE_SCREENED_OUT: StudyParticipantState.ValueType  # 7
@@ -241,7 +241,9 @@ class _StudyEndReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_StudyE
     STUDY_END_REASON_DATA_DELETED: _StudyEndReason.ValueType  # 3
     """Its data were deleted."""
     STUDY_END_REASON_DROPPED_OUT: _StudyEndReason.ValueType  # 4
-    """It was away for too long, and its place was given to somebody else."""
+    """It was away for too long, or others waited for it for too long; somebody else, or an agent, has its
+    place.
+    """
     STUDY_END_REASON_REMOVED: _StudyEndReason.ValueType  # 5
     """It was removed by the researchers."""
     STUDY_END_REASON_SCREENED_OUT: _StudyEndReason.ValueType  # 6
@@ -261,7 +263,9 @@ STUDY_END_REASON_WITHDRAWN: StudyEndReason.ValueType  # 2
 STUDY_END_REASON_DATA_DELETED: StudyEndReason.ValueType  # 3
 """Its data were deleted."""
 STUDY_END_REASON_DROPPED_OUT: StudyEndReason.ValueType  # 4
-"""It was away for too long, and its place was given to somebody else."""
+"""It was away for too long, or others waited for it for too long; somebody else, or an agent, has its
+place.
+"""
 STUDY_END_REASON_REMOVED: StudyEndReason.ValueType  # 5
 """It was removed by the researchers."""
 STUDY_END_REASON_SCREENED_OUT: StudyEndReason.ValueType  # 6
@@ -1106,7 +1110,7 @@ Global___StudyScreenOut: _TypeAlias = StudyScreenOut  # noqa: Y015
 class StudyGroups(_message.Message):
     """Participants who play their games together. They wait for each other at the stage `arrival`, which
     makes them a group, and before each game. In place of one who leaves, the `substitute` of the
-    condition's policy plays on.
+    condition's policy plays on; the policy's `abort` is NEVER.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -1119,8 +1123,8 @@ class StudyGroups(_message.Message):
     a multiple of it, and a slot of `block_size` one of a group.
     """
     wait_ms: _builtins.int
-    """How long participants wait for others, in milliseconds, 10000..=3600000; by default 600000. Those
-    for whom the others of a group wait so long before a game have dropped out.
+    """How long participants wait for others, in milliseconds, 10000..=3600000; by default 600000. One for
+    whom others of its group wait that long before a game has dropped out.
     """
     left_over: Global___StudyLeftOver.ValueType
     """What becomes of those whose group is not complete in this time."""
@@ -1452,7 +1456,9 @@ class StudyGame(_message.Message):
     ended_at_ms: _builtins.int
     """When it ended, milliseconds since the Unix epoch; 0 until then."""
     join_code: _builtins.str
-    """While it runs and has open seats: the join code for the researcher's programs. Else empty."""
+    """While it runs and has open seats: the join code for the researcher's programs. Else empty; of a
+    group, set for the first alone.
+    """
     robot_behaviour: _builtins.str
     """While it runs: `robot_behaviour` of its condition."""
     def __init__(
@@ -1760,7 +1766,7 @@ class StudyView(_message.Message):
 
     @_builtins.property
     def arrival(self) -> Global___StudyShownArrival:
-        """Others to wait for: the next view comes by itself. A test participant may go on alone by
+        """Others to wait for: the next view comes by itself. A test participant may continue alone by
         ContinueStudy, with agents in place of the others.
         """
 

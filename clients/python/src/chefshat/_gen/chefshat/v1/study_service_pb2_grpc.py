@@ -151,7 +151,8 @@ class StudyServiceServicer(object):
 
     def RemoveStudyParticipant(self, request, context):
         """Removes a participant, whose slot is free again, and adds another in its place if requested. Its
-        running game is closed; its data are kept. Repeating the call without `replace` changes nothing.
+        running game is closed; its data are kept. In a group, an agent plays on in its place, and the slots
+        are free again when all have left. Repeating the call without `replace` changes nothing.
         NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (PARTICIPATION_OVER if it
         has withdrawn, STUDY_CLOSED); UNAVAILABLE (SHUTTING_DOWN).
         """
@@ -169,10 +170,10 @@ class StudyServiceServicer(object):
 
     def ExportStudy(self, request, context):
         """Streams the data of a study as files: `study.json`, the tables `participants.csv`,
-        `sessions.csv`, `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the
-        record of a game cannot be read, the records of its games under `records/` and samples under
-        `samples/`, and last what the columns of the tables mean, `codebook.csv` for people and
-        `datapackage.json` for programs.
+        `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
+        `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
+        under `records/` and samples under `samples/`, and last what the columns of the tables mean,
+        `codebook.csv` for people and `datapackage.json` for programs.
         NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -699,8 +700,9 @@ class ParticipationServiceServicer(object):
 
     def ContinueStudy(self, request, context):
         """Continues from a text, a questionnaire on another site, or a game that has ended. A test participant
-        continues from a questionnaire, too, without answers; a game of its that runs is closed first, and
-        the view says when it has ended.
+        continues from a questionnaire, too, without answers, and from its arrival, as a group of its own; a
+        game of its that runs is closed first, and the view says when it has ended; those for whom its game
+        waits drop out.
         FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
@@ -720,7 +722,7 @@ class ParticipationServiceServicer(object):
 
     def WithdrawFromStudy(self, request, context):
         """Withdraws, at any time, also after the end and from any device: the link is enough. A running
-        game is closed. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        game is closed, or played on by an agent for the others of a group. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -62,7 +62,8 @@ class StudyServiceStub:
     """
     RemoveStudyParticipant: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.RemoveStudyParticipantRequest, _study_service_pb2.RemoveStudyParticipantResponse]
     """Removes a participant, whose slot is free again, and adds another in its place if requested. Its
-    running game is closed; its data are kept. Repeating the call without `replace` changes nothing.
+    running game is closed; its data are kept. In a group, an agent plays on in its place, and the slots
+    are free again when all have left. Repeating the call without `replace` changes nothing.
     NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (PARTICIPATION_OVER if it
     has withdrawn, STUDY_CLOSED); UNAVAILABLE (SHUTTING_DOWN).
     """
@@ -72,10 +73,10 @@ class StudyServiceStub:
     """
     ExportStudy: _grpc.UnaryStreamMultiCallable[_study_service_pb2.ExportStudyRequest, _study_service_pb2.ExportStudyResponse]
     """Streams the data of a study as files: `study.json`, the tables `participants.csv`,
-    `sessions.csv`, `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the
-    record of a game cannot be read, the records of its games under `records/` and samples under
-    `samples/`, and last what the columns of the tables mean, `codebook.csv` for people and
-    `datapackage.json` for programs.
+    `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
+    `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
+    under `records/` and samples under `samples/`, and last what the columns of the tables mean,
+    `codebook.csv` for people and `datapackage.json` for programs.
     NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteStudyParticipant: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]
@@ -127,7 +128,8 @@ class StudyServiceAsyncStub(StudyServiceStub):
     """
     RemoveStudyParticipant: _aio.UnaryUnaryMultiCallable[_study_service_pb2.RemoveStudyParticipantRequest, _study_service_pb2.RemoveStudyParticipantResponse]  # type: ignore[assignment]
     """Removes a participant, whose slot is free again, and adds another in its place if requested. Its
-    running game is closed; its data are kept. Repeating the call without `replace` changes nothing.
+    running game is closed; its data are kept. In a group, an agent plays on in its place, and the slots
+    are free again when all have left. Repeating the call without `replace` changes nothing.
     NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (PARTICIPATION_OVER if it
     has withdrawn, STUDY_CLOSED); UNAVAILABLE (SHUTTING_DOWN).
     """
@@ -137,10 +139,10 @@ class StudyServiceAsyncStub(StudyServiceStub):
     """
     ExportStudy: _aio.UnaryStreamMultiCallable[_study_service_pb2.ExportStudyRequest, _study_service_pb2.ExportStudyResponse]  # type: ignore[assignment]
     """Streams the data of a study as files: `study.json`, the tables `participants.csv`,
-    `sessions.csv`, `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the
-    record of a game cannot be read, the records of its games under `records/` and samples under
-    `samples/`, and last what the columns of the tables mean, `codebook.csv` for people and
-    `datapackage.json` for programs.
+    `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
+    `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
+    under `records/` and samples under `samples/`, and last what the columns of the tables mean,
+    `codebook.csv` for people and `datapackage.json` for programs.
     NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
     """
     DeleteStudyParticipant: _aio.UnaryUnaryMultiCallable[_study_service_pb2.DeleteStudyParticipantRequest, _study_service_pb2.DeleteStudyParticipantResponse]  # type: ignore[assignment]
@@ -231,7 +233,8 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.RemoveStudyParticipantResponse, _abc.Awaitable[_study_service_pb2.RemoveStudyParticipantResponse]]:
         """Removes a participant, whose slot is free again, and adds another in its place if requested. Its
-        running game is closed; its data are kept. Repeating the call without `replace` changes nothing.
+        running game is closed; its data are kept. In a group, an agent plays on in its place, and the slots
+        are free again when all have left. Repeating the call without `replace` changes nothing.
         NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (PARTICIPATION_OVER if it
         has withdrawn, STUDY_CLOSED); UNAVAILABLE (SHUTTING_DOWN).
         """
@@ -253,10 +256,10 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_study_service_pb2.ExportStudyResponse], _abc.AsyncIterator[_study_service_pb2.ExportStudyResponse]]:
         """Streams the data of a study as files: `study.json`, the tables `participants.csv`,
-        `sessions.csv`, `games.csv`, `items.csv`, `answers.csv` and `traces.csv`, `unreadable.csv` if the
-        record of a game cannot be read, the records of its games under `records/` and samples under
-        `samples/`, and last what the columns of the tables mean, `codebook.csv` for people and
-        `datapackage.json` for programs.
+        `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
+        `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
+        under `records/` and samples under `samples/`, and last what the columns of the tables mean,
+        `codebook.csv` for people and `datapackage.json` for programs.
         NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
         """
 
@@ -337,8 +340,9 @@ class ParticipationServiceStub:
     """
     ContinueStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.ContinueStudyRequest, _study_service_pb2.ContinueStudyResponse]
     """Continues from a text, a questionnaire on another site, or a game that has ended. A test participant
-    continues from a questionnaire, too, without answers; a game of its that runs is closed first, and
-    the view says when it has ended.
+    continues from a questionnaire, too, without answers, and from its arrival, as a group of its own; a
+    game of its that runs is closed first, and the view says when it has ended; those for whom its game
+    waits drop out.
     FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
     """
     RecordTraces: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.RecordTracesRequest, _study_service_pb2.RecordTracesResponse]
@@ -350,7 +354,7 @@ class ParticipationServiceStub:
     """
     WithdrawFromStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.WithdrawFromStudyRequest, _study_service_pb2.WithdrawFromStudyResponse]
     """Withdraws, at any time, also after the end and from any device: the link is enough. A running
-    game is closed. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    game is closed, or played on by an agent for the others of a group. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
 
 @_typing.type_check_only
@@ -400,8 +404,9 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
     """
     ContinueStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.ContinueStudyRequest, _study_service_pb2.ContinueStudyResponse]  # type: ignore[assignment]
     """Continues from a text, a questionnaire on another site, or a game that has ended. A test participant
-    continues from a questionnaire, too, without answers; a game of its that runs is closed first, and
-    the view says when it has ended.
+    continues from a questionnaire, too, without answers, and from its arrival, as a group of its own; a
+    game of its that runs is closed first, and the view says when it has ended; those for whom its game
+    waits drop out.
     FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
     """
     RecordTraces: _aio.UnaryUnaryMultiCallable[_study_service_pb2.RecordTracesRequest, _study_service_pb2.RecordTracesResponse]  # type: ignore[assignment]
@@ -413,7 +418,7 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
     """
     WithdrawFromStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.WithdrawFromStudyRequest, _study_service_pb2.WithdrawFromStudyResponse]  # type: ignore[assignment]
     """Withdraws, at any time, also after the end and from any device: the link is enough. A running
-    game is closed. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+    game is closed, or played on by an agent for the others of a group. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
 
 class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
@@ -502,8 +507,9 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.ContinueStudyResponse, _abc.Awaitable[_study_service_pb2.ContinueStudyResponse]]:
         """Continues from a text, a questionnaire on another site, or a game that has ended. A test participant
-        continues from a questionnaire, too, without answers; a game of its that runs is closed first, and
-        the view says when it has ended.
+        continues from a questionnaire, too, without answers, and from its arrival, as a group of its own; a
+        game of its that runs is closed first, and the view says when it has ended; those for whom its game
+        waits drop out.
         FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
         """
 
@@ -527,7 +533,7 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.WithdrawFromStudyResponse, _abc.Awaitable[_study_service_pb2.WithdrawFromStudyResponse]]:
         """Withdraws, at any time, also after the end and from any device: the link is enough. A running
-        game is closed. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
+        game is closed, or played on by an agent for the others of a group. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         """
 
 def add_ParticipationServiceServicer_to_server(servicer: ParticipationServiceServicer, server: _typing.Union[_grpc.Server, _aio.Server]) -> None: ...
