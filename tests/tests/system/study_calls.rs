@@ -188,15 +188,8 @@ async fn a_study_is_followed_until_it_is_over_and_deleted() {
     store.close().await;
 }
 
-/// A server open to all on a folder, and what its operator calls.
-async fn operated(folder: &Path) -> (Host, AdminServiceClient<Connection>) {
-    let new = NewToken {
-        role: Role::Admin,
-        label: String::new(),
-        lifetime: None,
-        scope: None,
-    };
-    let token = TokenFile::of(folder).create(new).expect("a token");
+/// A server on a folder that asks for tokens only where its operator is needed.
+pub(crate) async fn open_to_all(folder: &Path) -> Host {
     let store = SqliteStore::open(folder).await.expect("a store");
     let mut config = ServerConfig {
         data_dir: Some(PathBuf::from(folder)),
@@ -205,7 +198,19 @@ async fn operated(folder: &Path) -> (Host, AdminServiceClient<Connection>) {
     };
     config.access.mode = Some(Mode::Open);
     let host = Host::start(config, Arc::new(store)).await;
-    let host = host.expect("a free port");
+    host.expect("a free port")
+}
+
+/// A server open to all on a folder, and what its operator calls.
+pub(crate) async fn operated(folder: &Path) -> (Host, AdminServiceClient<Connection>) {
+    let new = NewToken {
+        role: Role::Admin,
+        label: String::new(),
+        lifetime: None,
+        scope: None,
+    };
+    let token = TokenFile::of(folder).create(new).expect("a token");
+    let host = open_to_all(folder).await;
     let options = ConnectOptions {
         token: Some(token.to_text()),
         ca: None,

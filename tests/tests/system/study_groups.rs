@@ -10,11 +10,13 @@ use chefshat_record::replay::replay;
 use chefshat_tests::patiently;
 use tokio::sync::oneshot;
 use tonic::transport::Channel;
+use tonic_types::StatusExt as _;
 
 use crate::studies::{
-    Lab, Person, SECRETS, Tap, address, analysed, assert_as_described, contains, host, playable,
-    rows, settings, stage,
+    Lab, Person, SECRETS, Tap, address, analysed, assert_as_described, contains, playable, rows,
+    settings, stage,
 };
+use crate::study_calls::{open_to_all, operated};
 
 /// Steps: consent, arrival, games, text.
 const STEPS: u32 = 4;
@@ -91,7 +93,7 @@ async fn game_of(person: &mut Person) -> v1::StudyShownGame {
 #[tokio::test(flavor = "multi_thread")]
 async fn pairs_of_people_play_together_and_a_partner_who_leaves_is_replaced() {
     let folder = tempfile::tempdir().expect("a folder");
-    let first_host = host(folder.path()).await;
+    let (first_host, mut operator) = operated(folder.path()).await;
     let tap = Tap::new(address(&first_host)).await;
     let channel = Channel::from_shared(first_host.url().to_owned()).expect("a URL");
     let channel = channel.connect().await.expect("the server listens");
@@ -120,12 +122,20 @@ async fn pairs_of_people_play_together_and_a_partner_who_leaves_is_replaced() {
     let games = tokio::join!(game_of(&mut ada), game_of(&mut bo));
     assert_eq!(games.0.game_id, games.1.game_id);
     assert_ne!(games.0.ticket, games.1.ticket);
+    // What others play as well is not deleted under them.
+    let request = v1::DeleteParticipantRequest {
+        name: name(2),
+        ..v1::DeleteParticipantRequest::default()
+    };
+    let refused = operator.delete_participant(request).await;
+    let refused = refused.expect_err("it plays").get_details_error_info();
+    assert_eq!(refused.expect("error info").reason, "PARTICIPANT_PLAYING");
     let (cy_waits, _) = cy.go_on(c, 1).await;
     let (di_waits, _) = di.go_on(d, 1).await;
     assert_eq!((cy_waits.step, di_waits.step), (1, 1));
     let stopping = patiently("the server to stop", first_host.stop());
     stopping.await.expect("a clean end");
-    let second_host = host(folder.path()).await;
+    let second_host = open_to_all(folder.path()).await;
     *tap.target.lock().expect("not poisoned") = address(&second_host);
     let mut lab = Lab::connect(&second_host, owner.clone()).await;
 

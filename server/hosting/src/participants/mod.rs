@@ -87,15 +87,7 @@ impl Participants {
         let _deleting = self.deleting.lock().await;
         self.check(who).await?;
         let mut studies = 0;
-        let found = self.data.in_studies(who).await?;
-        for (stored, number) in &found {
-            let study = self.studies.get(stored.header.id);
-            // What others still play cannot be deleted yet.
-            if study.is_some_and(|it| it.read(|study| study.plays_with_others(*number))) {
-                return Err(ForgetError::GameRunning(who.name.clone()).into());
-            }
-        }
-        for (stored, number) in found {
+        for (stored, number) in self.data.in_studies(who).await? {
             let id = stored.header.id;
             match self.studies.get(id).filter(|study| !study.is_stopped()) {
                 Some(study) => {
@@ -140,7 +132,7 @@ impl Participants {
     /// # Errors
     /// A game or tournament with the name is not over.
     pub async fn check(&self, who: &Named) -> Result<(), DataError> {
-        if self.plays(who).await {
+        if self.plays(who).await || self.plays_with_others(who) {
             return Err(ForgetError::GameRunning(who.name.clone()).into());
         }
         if self.tournaments.is_playing(who) {
@@ -172,6 +164,21 @@ impl Participants {
             }
         }
         false
+    }
+
+    /// Whether the participant has a game of a study that others play, too: it is over before it can be
+    /// deleted.
+    fn plays_with_others(&self, who: &Named) -> bool {
+        let studies = self.studies.earlier(None).into_iter();
+        let mut studies = studies.map(|(_, study)| study);
+        studies.any(|study| {
+            study.read(|study| {
+                let mut participants = study.participants().iter();
+                participants.any(|(number, it)| {
+                    who.is(&it.pseudonym, "") && study.plays_with_others(*number)
+                })
+            })
+        })
     }
 
     /// The games that are over and whose rooms show the participant.

@@ -1,9 +1,10 @@
-//! The language of a study: which ones there are, and which have the texts of templates.
+//! The settings of a study: the languages there are, with those that have the texts of templates, and
+//! what groups need of conditions.
 
 use chefshat_proto::v1::{self, study_stage};
 use chefshat_study::SettingsProblem;
 
-use super::complete_settings;
+use super::{complete_settings, study_plan};
 
 /// The questionnaire of a study in this language, made from a template and these items.
 fn completed(
@@ -53,4 +54,47 @@ fn an_unknown_language_is_refused_with_those_there_are() {
         "{}",
         refused.problem
     );
+}
+
+/// Pairs who play with two agents, under this policy.
+fn in_pairs(policy: v1::RoomPolicy) -> v1::StudySettings {
+    let condition = v1::StudyCondition {
+        id: "only".to_owned(),
+        policy: Some(policy),
+        seats: vec![v1::SeatConfig::default(); 2],
+        seeds: vec![vec![1; 32]],
+        ..v1::StudyCondition::default()
+    };
+    v1::StudySettings {
+        name: "pairs".to_owned(),
+        block_size: 1,
+        conditions: vec![condition],
+        groups: Some(v1::StudyGroups {
+            size: 2,
+            ..v1::StudyGroups::default()
+        }),
+        ..v1::StudySettings::default()
+    }
+}
+
+#[test]
+fn the_games_of_groups_are_played_to_their_ends() {
+    let complete = complete_settings(in_pairs(v1::RoomPolicy::default()), || [1; 32], true);
+    let complete = complete.unwrap();
+    let groups = complete.groups.as_ref().unwrap();
+    assert_eq!(groups.wait_ms, 600_000);
+    assert_eq!(groups.left_over(), v1::StudyLeftOver::Dismiss);
+    assert_eq!(study_plan(&complete).unwrap().conditions[0].fills.len(), 2);
+    for abort in [v1::AbortPolicy::AnyLost, v1::AbortPolicy::AllLost] {
+        let policy = v1::RoomPolicy {
+            abort: abort.into(),
+            ..v1::RoomPolicy::default()
+        };
+        let refused = complete_settings(in_pairs(policy), || [1; 32], true).unwrap_err();
+        assert_eq!(refused.field, "conditions[0].policy.abort");
+    }
+    let mut three = complete;
+    three.groups.as_mut().unwrap().size = 3;
+    let refused = study_plan(&three).unwrap_err();
+    assert_eq!(refused.field, "conditions[0].seats");
 }
