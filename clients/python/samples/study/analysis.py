@@ -72,11 +72,12 @@ def summary(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
     """Summarises each measure by condition: number of participants or groups, mean and standard deviation over them."""
     values = pd.concat([of_games(tables), of_answers(tables)]).dropna(subset=["condition", "value"])
     values["value"] = values["value"].astype(float)
-    unit = values.groupby(["measure", "condition", "number"], observed=True)["value"].mean()
+    units = values.groupby(["measure", "condition", "number"], observed=True)["value"].mean()
     if "groups" in tables:
         groups = tables["participants"].set_index("number")["group"]
-        unit = unit.reset_index().join(groups, on="number").groupby(["measure", "condition", "group"], observed=True)["value"].mean()
-    by_condition = unit.groupby(level=["measure", "condition"], observed=True)
+        of_groups = units.reset_index().join(groups, on="number")
+        units = of_groups.groupby(["measure", "condition", "group"], observed=True)["value"].mean()
+    by_condition = units.groupby(level=["measure", "condition"], observed=True)
     counted = "groups" if "groups" in tables else "participants"
     figures = pd.DataFrame({counted: by_condition.count(), "mean": by_condition.mean(), "sd": by_condition.std()})
     return figures.reset_index()
