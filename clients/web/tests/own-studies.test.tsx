@@ -38,7 +38,7 @@ import { studyApi } from "../src/studies/client";
 import { OwnStudy } from "../src/studies/OwnStudyPage";
 import { createStudy, exportStudy, keepOwnerToken, ownerTokenOf } from "../src/studies/owning";
 import { StudiesPage } from "../src/studies/StudiesPage";
-import { settingsFrom } from "../src/studies/settings-file";
+import { fileOf, settingsFrom } from "../src/studies/settings-file";
 import { emptyForm, faultsOf, settingsOf } from "../src/studies/study-form";
 import { root, settle } from "./mounted";
 import { refused } from "./study-fake";
@@ -214,6 +214,13 @@ test("those of a study with groups may be added together, in whole groups", asyn
   await enter("4");
   await press("Add");
   expect(add.mock.calls[0]?.[0]).toMatchObject({ count: 4, together: true });
+});
+
+test("the settings of a study make a file that gives the same ones", async () => {
+  const path = resolve(import.meta.dirname, "../../../docs/studies/pairs.toml");
+  const settings = await settingsFrom(readFileSync(path, "utf8"), path);
+  settings.seeds = [new Uint8Array(32).fill(7)];
+  expect(await settingsFrom(fileOf(settings), "pairs-pilot.json")).toEqual(settings);
 });
 
 test("a time of TOML may be a date with its zone", async () => {

@@ -615,6 +615,15 @@ async fn a_study_from_its_links_to_its_data() {
     let repeated = service.create_study(request).await.expect("the same");
     assert_eq!(repeated.into_inner(), created);
     let study = created.study.expect("a study");
+    // What the server has made of the settings makes the same study again.
+    let again = v1::CreateStudyRequest {
+        settings: study.settings.clone(),
+        request_id: Vec::new(),
+    };
+    let again = service.create_study(again).await.expect("valid");
+    let again = again.into_inner().study.expect("a study");
+    assert_eq!(again.settings, study.settings);
+    assert_ne!(again.study_id, study.study_id);
     assert_eq!(
         (study.steps, study.games, study.practice_games),
         (STEPS, 2, 1)

@@ -37,6 +37,7 @@ import {
   removeFromStudy,
 } from "./owning";
 import { MAX_ADDED, participantsIn } from "./participants";
+import { fileOf } from "./settings-file";
 
 /** The page. */
 export function OwnStudyPage({ route: { studyId } }: PageProps<"ownStudy">) {
@@ -142,6 +143,16 @@ export function OwnStudy({ study, participants }: FollowedStudy) {
         <CopyLine label={words.key} text={ownerTokenOf(studyId) ?? ""} mono />
         <CopyLine label={words.seeds} text={hex(study.seedsSha256)} mono />
       </details>
+      {settings && (
+        <div>
+          <Button
+            look="quiet"
+            onClick={() => download(fileOf(settings), `${fileName(settings.name)}.json`, "application/json")}
+          >
+            {words.settings}
+          </Button>
+        </div>
+      )}
       {!closed && (
         <ConfirmButton label={words.close} confirm={words.closeDo} act={() => closeStudy(studyId).then(() => false)}>
           {words.closeText}

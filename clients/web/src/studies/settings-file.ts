@@ -2,7 +2,7 @@
 // The names are those of StudySettings; values of enums may be short ("players"), seeds are in
 // hexadecimal digits, and times of TOML may be dates. The server checks the values.
 
-import { fromJson, type JsonValue } from "@bufbuild/protobuf";
+import { fromJson, type JsonValue, toJson } from "@bufbuild/protobuf";
 import { base64Encode } from "@bufbuild/protobuf/wire";
 import { type StudySettings, StudySettingsSchema } from "../gen/chefshat/v1/study_pb";
 import { fromHex } from "../hex";
@@ -15,6 +15,11 @@ export async function settingsFrom(text: string, name: string): Promise<StudySet
   const settings = fromJson(StudySettingsSchema, inProtocolForm(value as JsonValue));
   if (settings.conditions.length === 0) throw new Error("it has no conditions");
   return settings;
+}
+
+/** The settings of a study as a file that creates the same study again, in the JSON form of the protocol. */
+export function fileOf(settings: StudySettings): string {
+  return `${JSON.stringify(toJson(StudySettingsSchema, settings, { useProtoFieldName: true }), null, 2)}\n`;
 }
 
 /** What the names of an enum's values begin with, by the field. */

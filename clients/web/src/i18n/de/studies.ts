@@ -204,6 +204,7 @@ export const studies: Texts["studies"] = {
     deleteText: (name) =>
       `Code, Einwilligung, Antworten, Bedienungsdaten und Partien von ${name} löschen? Sie können nicht wiederhergestellt werden.`,
     export: "Daten herunterladen (ZIP)",
+    settings: "Einstellungen herunterladen, für eine weitere Studie (JSON)",
     exporting: (files) => plural(files, { one: "bisher # Datei…", other: "bisher # Dateien…" }),
     close: "Studie schließen…",
     closeDo: "Jetzt schließen",

@@ -200,6 +200,7 @@ export const studies = {
     deleteText: (name: string) =>
       `Delete the code, consent, answers, traces and games of ${name}? They cannot be restored.`,
     export: "Download the data (ZIP)",
+    settings: "Download the settings, for another study (JSON)",
     exporting: (files: number) => plural(files, { one: "# file so far…", other: "# files so far…" }),
     close: "Close the study…",
     closeDo: "Close it now",

@@ -202,6 +202,7 @@ export const studies: Texts["studies"] = {
     deleteText: (name) =>
       `¿Borrar el código, el consentimiento, las respuestas, las trazas y las partidas de ${name}? No se pueden recuperar.`,
     export: "Descargar los datos (ZIP)",
+    settings: "Descargar los ajustes, para otro estudio (JSON)",
     exporting: (files) => plural(files, { one: "# archivo hasta ahora…", other: "# archivos hasta ahora…" }),
     close: "Cerrar el estudio…",
     closeDo: "Cerrarlo ahora",

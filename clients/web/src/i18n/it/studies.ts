@@ -202,6 +202,7 @@ export const studies: Texts["studies"] = {
     deleteText: (name) =>
       `Cancellare codice, consenso, risposte, tracce e partite di ${name}? Non si possono recuperare.`,
     export: "Scarica i dati (ZIP)",
+    settings: "Scarica le impostazioni, per un altro studio (JSON)",
     exporting: (files) => plural(files, { one: "# file finora…", other: "# file finora…" }),
     close: "Chiudi lo studio…",
     closeDo: "Chiudilo ora",
