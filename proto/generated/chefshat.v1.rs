@@ -8986,7 +8986,8 @@ pub struct StudyGroups {
     #[prost(uint32, tag = "1")]
     pub size: u32,
     /// How long participants wait for others, in milliseconds, 10000..=3600000; by default 600000. One for
-    /// whom others of its group wait that long before a game has dropped out.
+    /// whom others of its group wait that long before a game has dropped out. It is also the longest
+    /// `waiting_time_ms` of their rooms.
     #[prost(uint64, tag = "2")]
     pub wait_ms: u64,
     /// What becomes of those whose group is not complete in this time.
@@ -9230,6 +9231,10 @@ pub struct StudyParticipant {
     /// Number of its group, from 1; 0: it has none.
     #[prost(uint32, tag = "16")]
     pub group: u32,
+    /// Number of the first of those with whom it was added to play (`together` of
+    /// AddStudyParticipantsRequest); 0: it plays with whom it arrives.
+    #[prost(uint32, tag = "17")]
+    pub planned_with: u32,
 }
 /// The link of a participant.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -9250,6 +9255,9 @@ pub struct StudyLink {
     /// Whether it is the link of a test participant.
     #[prost(bool, tag = "5")]
     pub test: bool,
+    /// As `planned_with` of StudyParticipant.
+    #[prost(uint32, tag = "6")]
+    pub planned_with: u32,
 }
 /// A study. Only for researchers.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -10579,7 +10587,8 @@ pub mod study_service_client {
         }
         /// Removes a participant, whose slot is free again, and adds another in its place if requested. Its
         /// running game is closed; its data are kept. In a group, an agent plays on in its place, and the slots
-        /// are free again when all have left. Repeating the call without `replace` changes nothing.
+        /// are free again when all have left. The other is planned to play with the same, if these wait for it;
+        /// otherwise it plays with whom it arrives. Repeating the call without `replace` changes nothing.
         /// NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (PARTICIPATION_OVER if it
         /// has withdrawn, STUDY_CLOSED); UNAVAILABLE (SHUTTING_DOWN).
         pub async fn remove_study_participant(
@@ -10805,7 +10814,8 @@ pub mod study_service_server {
         >;
         /// Removes a participant, whose slot is free again, and adds another in its place if requested. Its
         /// running game is closed; its data are kept. In a group, an agent plays on in its place, and the slots
-        /// are free again when all have left. Repeating the call without `replace` changes nothing.
+        /// are free again when all have left. The other is planned to play with the same, if these wait for it;
+        /// otherwise it plays with whom it arrives. Repeating the call without `replace` changes nothing.
         /// NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (PARTICIPATION_OVER if it
         /// has withdrawn, STUDY_CLOSED); UNAVAILABLE (SHUTTING_DOWN).
         async fn remove_study_participant(

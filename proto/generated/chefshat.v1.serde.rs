@@ -39076,6 +39076,9 @@ impl serde::Serialize for StudyLink {
         if self.test {
             len += 1;
         }
+        if self.planned_with != 0 {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyLink", len)?;
         if self.number != 0 {
             struct_ser.serialize_field("number", &self.number)?;
@@ -39092,6 +39095,9 @@ impl serde::Serialize for StudyLink {
         if self.test {
             struct_ser.serialize_field("test", &self.test)?;
         }
+        if self.planned_with != 0 {
+            struct_ser.serialize_field("plannedWith", &self.planned_with)?;
+        }
         struct_ser.end()
     }
 }
@@ -39107,6 +39113,8 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
             "link",
             "joined",
             "test",
+            "planned_with",
+            "plannedWith",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -39116,6 +39124,7 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
             Link,
             Joined,
             Test,
+            PlannedWith,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -39142,6 +39151,7 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
                             "link" => Ok(GeneratedField::Link),
                             "joined" => Ok(GeneratedField::Joined),
                             "test" => Ok(GeneratedField::Test),
+                            "plannedWith" | "planned_with" => Ok(GeneratedField::PlannedWith),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -39166,6 +39176,7 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
                 let mut link__ = None;
                 let mut joined__ = None;
                 let mut test__ = None;
+                let mut planned_with__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Number => {
@@ -39200,6 +39211,14 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
                             }
                             test__ = Some(map_.next_value()?);
                         }
+                        GeneratedField::PlannedWith => {
+                            if planned_with__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("plannedWith"));
+                            }
+                            planned_with__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
                     }
                 }
                 Ok(StudyLink {
@@ -39208,6 +39227,7 @@ impl<'de> serde::Deserialize<'de> for StudyLink {
                     link: link__.unwrap_or_default(),
                     joined: joined__.unwrap_or_default(),
                     test: test__.unwrap_or_default(),
+                    planned_with: planned_with__.unwrap_or_default(),
                 })
             }
         }
@@ -39473,6 +39493,9 @@ impl serde::Serialize for StudyParticipant {
         if self.group != 0 {
             len += 1;
         }
+        if self.planned_with != 0 {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyParticipant", len)?;
         if self.number != 0 {
             struct_ser.serialize_field("number", &self.number)?;
@@ -39528,6 +39551,9 @@ impl serde::Serialize for StudyParticipant {
         if self.group != 0 {
             struct_ser.serialize_field("group", &self.group)?;
         }
+        if self.planned_with != 0 {
+            struct_ser.serialize_field("plannedWith", &self.planned_with)?;
+        }
         struct_ser.end()
     }
 }
@@ -39558,6 +39584,8 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
             "panelId",
             "test",
             "group",
+            "planned_with",
+            "plannedWith",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -39578,6 +39606,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
             PanelId,
             Test,
             Group,
+            PlannedWith,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -39615,6 +39644,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                             "panelId" | "panel_id" => Ok(GeneratedField::PanelId),
                             "test" => Ok(GeneratedField::Test),
                             "group" => Ok(GeneratedField::Group),
+                            "plannedWith" | "planned_with" => Ok(GeneratedField::PlannedWith),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -39650,6 +39680,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                 let mut panel_id__ = None;
                 let mut test__ = None;
                 let mut group__ = None;
+                let mut planned_with__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Number => {
@@ -39762,6 +39793,14 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                                 Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
                             ;
                         }
+                        GeneratedField::PlannedWith => {
+                            if planned_with__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("plannedWith"));
+                            }
+                            planned_with__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
                     }
                 }
                 Ok(StudyParticipant {
@@ -39781,6 +39820,7 @@ impl<'de> serde::Deserialize<'de> for StudyParticipant {
                     panel_id: panel_id__.unwrap_or_default(),
                     test: test__.unwrap_or_default(),
                     group: group__.unwrap_or_default(),
+                    planned_with: planned_with__.unwrap_or_default(),
                 })
             }
         }

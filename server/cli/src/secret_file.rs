@@ -42,6 +42,23 @@ impl<'a> SecretFile<'a> {
         }
     }
 
+    /// As [`Self::prepare`], for the owner token of what is to be created. A file that exists may be the
+    /// only copy of another one.
+    ///
+    /// # Errors
+    /// It exists, or cannot be written.
+    pub(super) fn for_owner(path: &'a Path) -> Result<Self, CommandError> {
+        const FLAG: &str = "--owner-file";
+        if path.symlink_metadata().is_ok_and(|it| it.is_file()) {
+            let path = path.display();
+            return Err(format!(
+                "{FLAG}: {path} exists and may be the only copy of another owner token: choose another file; nothing was created"
+            )
+            .into());
+        }
+        Self::prepare(path, FLAG, "an owner token")
+    }
+
     /// Writes the secret.
     ///
     /// # Errors
@@ -69,6 +86,17 @@ mod tests {
 
     fn prepare(file: &Path) -> Result<SecretFile<'_>, CommandError> {
         SecretFile::prepare(file, "--code-file", "a join code")
+    }
+
+    #[test]
+    fn an_owner_token_replaces_no_other() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("owner");
+        let prepared = SecretFile::for_owner(&file).expect("it can be written");
+        prepared.write("first").expect("written");
+        let refused = SecretFile::for_owner(&file).err().expect("it exists");
+        assert!(refused.to_string().contains("choose another file"));
+        assert_eq!(std::fs::read_to_string(&file).expect("read"), "first\n");
     }
 
     #[cfg(unix)]

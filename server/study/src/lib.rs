@@ -70,8 +70,8 @@ pub use questionnaire::{
 };
 pub use recruiting::Recruiting;
 pub use settings::{
-    Condition, Factor, Groups, Hide, Labels, LeftOverPolicy, MAX_FACTORS, MAX_GAMES, MAX_LEVELS,
-    MAX_PARTICIPANTS, MAX_SEEDS, MAX_STEPS, MAX_TESTS, Settings,
+    Condition, Factor, GROUP_SIZES, Groups, Hide, Labels, LeftOverPolicy, MAX_FACTORS, MAX_GAMES,
+    MAX_LEVELS, MAX_PARTICIPANTS, MAX_SEEDS, MAX_STEPS, MAX_TESTS, Settings,
 };
 pub use stage::{
     Arrival, Consent, ExternalQuestionnaire, MAX_BLOCK, MAX_STAGE_GAMES, MAX_STAGES, Part,

@@ -2,6 +2,7 @@
 //! and robots' behaviours of its conditions belong to the server.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
 
 use sha2::{Digest as _, Sha256};
 
@@ -25,6 +26,8 @@ pub const MAX_SEEDS: usize = 1000;
 pub const MAX_STEPS: usize = 200;
 /// Maximum number of games of a participant, with practice.
 pub const MAX_GAMES: u32 = 1000;
+/// Numbers of participants who can be a group.
+pub const GROUP_SIZES: RangeInclusive<u32> = 2..=6;
 /// Maximum number of times that a sequence occurs in a block.
 const MAX_REPEATS: usize = 16;
 const MAX_TITLE: usize = 128;
@@ -281,11 +284,14 @@ impl Settings {
         let field = |index: usize| format!("stages[{index}]");
         let Some(groups) = &self.groups else {
             return match first {
-                Some((index, _)) => refuse(field(index), "only groups arrive: set groups"),
+                Some((index, _)) => refuse(
+                    field(index),
+                    "people arrive in groups: add groups, or remove this stage",
+                ),
                 None => Ok(()),
             };
         };
-        within("groups.size", groups.size, 2..=6)?;
+        within("groups.size", groups.size, GROUP_SIZES)?;
         within("groups.wait_ms", groups.wait_ms, 10_000..=3_600_000)?;
         for (index, condition) in self.conditions.iter().enumerate() {
             let players = condition.players as u32;
@@ -296,10 +302,8 @@ impl Settings {
             )?;
         }
         if !self.participants.is_multiple_of(groups.size) {
-            let problem = format!(
-                "it is not a multiple of the size of groups, {}",
-                groups.size
-            );
+            let (all, size) = (self.participants, groups.size);
+            let problem = format!("{all} is not a multiple of {size}, the size of groups");
             return refuse("participants", problem);
         }
         let Some((index, stage)) = first else {
@@ -309,7 +313,7 @@ impl Settings {
             );
         };
         if let Some((second, _)) = arrivals.next() {
-            return refuse(field(second), "there is an arrival before");
+            return refuse(field(second), "there is one arrival: remove this one");
         }
         let has_games = |stage: &Stage| match stage {
             Stage::Once(part) => matches!(part.task, Task::Games { .. }),

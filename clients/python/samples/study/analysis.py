@@ -41,9 +41,9 @@ def type_of(field: dict[str, Any]) -> pd.CategoricalDtype | str:
 
 
 def of_games(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    """The measures of games, as rows of participant, condition, measure and value."""
+    """The measures of games, as rows of participant, condition, measure and value; not where a substitute played for it."""
     games = tables["games"]
-    games = games[(games["outcome"] == "finished") & ~games["practice"]]
+    games = games[(games["outcome"] == "finished") & ~games["practice"] & ~games["substituted"].fillna(True)]
     values = games[["number", "condition", "place", "points", "hints"]].assign(
         seconds_per_decision=games["decision_time_us"] / games["timed_decisions"] / 1e6,
         timeouts_per_decision=games["timeouts"] / games["decisions"],
@@ -68,6 +68,11 @@ def of_answers(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
     )
 
 
+def only_groups(tables: dict[str, pd.DataFrame], kept: set[int]) -> dict[str, pd.DataFrame]:
+    """The tables with the games and answers of these groups alone."""
+    return tables | {name: tables[name][tables[name]["group"].isin(kept)] for name in ("games", "answers")}
+
+
 def summary(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
     """Summarises each measure by condition: number of participants or groups, mean and standard deviation over them."""
     values = pd.concat([of_games(tables), of_answers(tables)]).dropna(subset=["condition", "value"])
@@ -87,9 +92,17 @@ def main() -> None:
     """Prints who took part and the summary."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="what `chefshat study export` has written")
-    tables = read(parser.parse_args().folder)
+    parser.add_argument("--whole-groups", action="store_true", help="leave out groups of fewer, and those that somebody has left")
+    options = parser.parse_args()
+    tables = read(options.folder)
     states = tables["participants"]["state"].value_counts()
     print("participants:", ", ".join(f"{count} {state}" for state, count in states.items() if count))
+    if "groups" in tables:
+        groups = tables["groups"]
+        whole = groups[(groups["completed"] == groups["participants"]) & (groups["participants"] == groups["participants"].max())]
+        print(f"groups: {len(groups)}, of which {len(whole)} are whole")
+        if options.whole_groups:
+            tables = only_groups(tables, set(whole["group"]))
     figures = summary(tables)
     if figures.empty:
         print("no finished games and no answers yet")

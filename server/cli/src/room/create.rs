@@ -102,7 +102,7 @@ impl Create {
             .map(|file| SecretFile::prepare(file, "--code-file", "a join code"))
             .transpose()?;
         let owner_file = (self.owner_file.as_deref())
-            .map(|file| SecretFile::prepare(file, "--owner-file", "an owner token"))
+            .map(SecretFile::for_owner)
             .transpose()?;
         let created = client.create_room(request).await.map_err(refused)?;
         let room = created

@@ -100,7 +100,7 @@ impl Create {
         let settings = file::settings(&self.file)?;
         let mut service = service(&self.server).await?;
         let owner_file = (self.owner_file.as_deref())
-            .map(|file| SecretFile::prepare(file, "--owner-file", "an owner token"))
+            .map(SecretFile::for_owner)
             .transpose()?;
         let request = v1::CreateStudyRequest {
             settings: Some(settings),
@@ -130,10 +130,14 @@ impl Create {
         ))?;
         say(format_args!(
             "each of {} participants has {} steps with {} games and at most {} for practice",
-            study.settings.map_or(0, |it| it.participants),
+            study.settings.as_ref().map_or(0, |it| it.participants),
             study.steps,
             study.games,
             study.practice_games
-        ))
+        ))?;
+        match study.settings.and_then(|it| it.groups) {
+            None => Ok(()),
+            Some(groups) => say(format_args!("they play in groups of {}", groups.size)),
+        }
     }
 }

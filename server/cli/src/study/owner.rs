@@ -195,9 +195,13 @@ impl Show {
 impl Links {
     pub(super) async fn run(self) -> Result<(), CommandError> {
         let owned = self.owned;
+        let adds = self.add > 0 || !self.pseudonyms.is_empty();
+        if self.together && !adds {
+            return Err("--together: add participants with --add or --pseudonym".into());
+        }
         let mut service = service(&owned.server).await?;
         let (study_id, owner_token) = (owned.study_id.clone(), owned.owner.token()?);
-        let links = if self.add == 0 && self.pseudonyms.is_empty() {
+        let links = if !adds {
             let request = v1::ListStudyLinksRequest {
                 study_id,
                 owner_token,
@@ -374,11 +378,15 @@ fn print_link(link: &v1::StudyLink, server: &str, json: bool) -> Result<(), Comm
         let (number, pseudonym) = (link.number, &link.pseudonym);
         return say(json!({
             "number": number, "pseudonym": pseudonym, "link": link.link, "address": address,
-            "joined": link.joined, "test": link.test,
+            "joined": link.joined, "test": link.test, "planned_with": link.planned_with,
         }));
     }
+    let plan = match link.planned_with {
+        0 => String::new(),
+        first => format!("\tplays with the group of {first}"),
+    };
     say(format_args!(
-        "{}\t{}\t{address}",
+        "{}\t{}\t{address}{plan}",
         link.number, link.pseudonym
     ))
 }

@@ -31,7 +31,7 @@ use crate::{CommandError, progress, say};
 /// try an analysis with. Neither counts nor exported data of others include them.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Games with seats for programs of yours wait for these: let them run meanwhile."
+    after_help = "Games with seats for programs of yours wait for these: let them run meanwhile. Built-in agents take their time: in a copy of the study with `policy = { pace_ms = 0 }` they do not."
 )]
 pub(super) struct Test {
     #[command(flatten)]
@@ -65,7 +65,7 @@ impl Test {
         let wanted = self.participants.unwrap_or(8);
         let whole = wanted.next_multiple_of(size);
         if self.participants.is_some() && wanted != whole {
-            let problem = format!("{wanted} make no whole groups; give a multiple of {size}");
+            let problem = format!("{wanted} is not a multiple of {size}, the size of groups");
             return Err(format!("--participants: {problem}").into());
         }
         let request = v1::AddStudyParticipantsRequest {

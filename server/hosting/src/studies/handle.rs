@@ -127,6 +127,7 @@ impl StudyHandle {
             link: ParticipantLink::new(&self.header.key, self.short_id(), number).to_text(),
             joined: participant.is_some_and(|it| it.joined.is_some()),
             test: participant.is_some_and(|it| it.test),
+            planned_with: participant.and_then(|it| it.planned).unwrap_or(0),
         }
     }
 

@@ -11,10 +11,10 @@ use chefshat_room::ids::Id;
 use chefshat_room::journal::{Fill, ParticipantKind, SeatLabels};
 use chefshat_room::policy::{Durability, Policy, Visibility};
 use chefshat_study::{
-    AnswerSet, Arrival, Condition, Consent, Device, ExternalQuestionnaire, Factor, Groups, Hide,
-    Item, ItemKind, Labels, Language, LeftOverPolicy, Order, Outcome, Part, Participant,
-    PlayedGame, Pointer, Questionnaire, Recruiting, ScreenOut, Settings, SettingsProblem, ShownIf,
-    Stage, Status, Study, Task, Template, Text,
+    AnswerSet, Arrival, Condition, Consent, Device, ExternalQuestionnaire, Factor, GROUP_SIZES,
+    Groups, Hide, Item, ItemKind, Labels, Language, LeftOverPolicy, Order, Outcome, Part,
+    Participant, PlayedGame, Pointer, Questionnaire, Recruiting, ScreenOut, Settings,
+    SettingsProblem, ShownIf, Stage, Status, Study, Task, Template, Text,
 };
 
 use super::agent::check_budget;
@@ -325,6 +325,11 @@ fn groups(message: &v1::StudyGroups) -> Result<Groups, SettingsProblem> {
         Ok(v1::StudyLeftOver::Agents) => LeftOverPolicy::Agents,
         Err(_) => return Err(problem("groups.left_over", "choose DISMISS or AGENTS")),
     };
+    if !GROUP_SIZES.contains(&message.size) {
+        let (least, most) = (GROUP_SIZES.start(), GROUP_SIZES.end());
+        let words = format!("{} is not within {least}..={most}", message.size);
+        return Err(problem("groups.size", words));
+    }
     Ok(Groups {
         size: message.size,
         wait_ms: message.wait_ms,
@@ -349,16 +354,19 @@ fn condition_of(
         .map_err(|it| inner(&format!("{field}.policy."), &it))?;
     let players = rules.players();
     let seats_field = format!("{field}.seats");
-    if message.seats.len().saturating_add(group_size) != players {
+    let Some(expected) = players.checked_sub(group_size) else {
+        let words = format!("{players} players are fewer than a group of {group_size}");
+        return Err(problem(format!("{field}.rules.players"), words));
+    };
+    if message.seats.len() != expected {
         let others = message.seats.len();
-        let words = match group_size {
-            1 => format!(
-                "{others} other seats are described, but the rule set has {players} players, of whom one is the participant"
-            ),
-            _ => format!(
-                "{others} other seats are described, but the rule set has {players} players, of whom {group_size} are a group of participants"
-            ),
+        let people = match group_size {
+            1 => "one is the participant".to_owned(),
+            _ => format!("{group_size} are a group of participants"),
         };
+        let words = format!(
+            "{others} other seats are described, but the rule set has {players} players, of whom {people}: describe {expected}"
+        );
         return Err(problem(seats_field, words));
     }
     let of_seats = |it: FieldProblem| problem(seats_field.clone(), it.message);
@@ -744,6 +752,7 @@ pub fn study_participant(
         panel_id: participant.panel_id().to_owned(),
         test: participant.test,
         group: participant.group.unwrap_or(0),
+        planned_with: participant.planned.unwrap_or(0),
     })
 }
 

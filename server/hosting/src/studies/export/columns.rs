@@ -29,7 +29,7 @@ const NO_RECORD: &str = "the game has not ended, its record cannot be read, or i
     the data of another participant";
 const NO_RESULT: &str = "the game was not finished, its record cannot be read, or it was deleted \
     with the data of another participant";
-const GROUP: &str = "number of the group, from 1";
+pub(super) const GROUP: &str = "number of the group, from 1";
 
 pub(super) fn text(value: impl ToString) -> String {
     value.to_string()
@@ -187,14 +187,16 @@ impl ParticipantRow<'_> {
 
 pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>> {
     type Row<'s> = ParticipantRow<'s>;
-    const NO_SLOT: &str = "it was assigned no slot";
-    const SLOT: &str = "its slot in the assignment of conditions, from 0; of one that has \
-        left the slot it had, which another may have now";
+    const NO_SLOT: &str =
+        "it was assigned no slot: it has not begun, not consented, or has no group";
+    const SLOT: &str = "its slot in the assignment of conditions, from 0: those of a group follow each \
+        other; of one that has left the slot it had, which another may have now";
     const AT_STEP: &str =
         "step it is at, from 0; the number of steps once it has completed the study";
     const PANEL_ID: &str = "its id at the panel that recruited it";
     const NO_CONSENT: &str = "it has not consented";
-    const NO_GROUP: &str = "it plays with no other participant";
+    const NO_GROUP: &str = "it has no group";
+    const PLANNED: &str = "number of the first of those with whom it was planned to play";
     let states = STATES.map(|(status, label)| Code::new(state_name(status), label));
     let conditions = Kind::Codes {
         codes: conditions(settings),
@@ -226,6 +228,10 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
         .empty(NO_SLOT)
         .with("group", COUNT, GROUP, |row| optional(row.participant.group))
         .empty(NO_GROUP)
+        .with("planned_with", COUNT, PLANNED, |row| {
+            optional(row.participant.planned)
+        })
+        .empty("nobody was planned to play with it")
         .with("conditions", conditions, "its conditions in order", |row| {
             row.of_each(|condition| condition.id.clone())
         })
@@ -377,6 +383,13 @@ impl GameRow<'_> {
         &self.study.settings().conditions[self.game.placed.condition]
     }
 
+    /// The group that plays the game.
+    fn group(&self) -> Option<u32> {
+        self.participant
+            .group
+            .filter(|_| !self.game.placed.practice)
+    }
+
     /// Number of participants who began the game.
     fn players(&self) -> usize {
         self.study.began_with(self.number, self.game.placed.game)
@@ -416,6 +429,8 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
         "index of its seed in the list of the condition, or else of the study, from 0";
     const GAME: &str = "identifies the game; records/<game_id>.jsonl is its record, if it has one";
     const PLAYERS: &str = "number of participants of the study who began it together";
+    const SUBSTITUTED: &str = "whether a substitute played for the participant, for a while or to the end: \
+        place and points are then not its own alone";
     const DECISIONS: &str =
         "decisions of the participant, with those that timed out, without those of a substitute";
     const TIME: &str = "sum of the times of timed_decisions, measured by the server";
@@ -440,6 +455,8 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
     with_factors(table, settings, false, None, |row, factor| {
         level(row.condition(), factor)
     })
+    .with("group", COUNT, GROUP, |row| optional(row.group()))
+    .empty("it plays the game alone")
     .with("step", COUNT, STEP, |row| text(row.game.placed.step))
     .with("practice", Kind::Boolean, "whether it is practice", |row| {
         text(row.game.placed.practice)
@@ -487,6 +504,10 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
     .empty(NO_RESULT)
     .with("points", COUNT, "points of the participant", |row| {
         row.statistics(|it| it.points)
+    })
+    .empty(NO_RESULT)
+    .with("substituted", Kind::Boolean, SUBSTITUTED, |row| {
+        row.statistics(|it| it.substituted)
     })
     .empty(NO_RESULT)
     .with("shifts", COUNT, "Shifts played", |row| {

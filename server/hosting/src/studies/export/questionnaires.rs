@@ -6,7 +6,7 @@ use chefshat_study::{
 };
 
 use super::columns::{
-    CONDITION, COUNT, MILLISECONDS, NUMBER, PSEUDONYM, SINCE_EPOCH, STEP, conditions, level,
+    CONDITION, COUNT, GROUP, MILLISECONDS, NUMBER, PSEUDONYM, SINCE_EPOCH, STEP, conditions, level,
     optional, text, with_factors,
 };
 use super::table::{Code, Kind, Table};
@@ -259,6 +259,8 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
     .with("participant", Kind::Text, PSEUDONYM, |row| {
         row.participant.pseudonym.clone()
     })
+    .with("group", COUNT, GROUP, |row| optional(row.participant.group))
+    .empty("it has no group")
     .with("step", COUNT, STEP, |row| text(row.step))
     .with("condition", condition, CONDITION, |row| {
         optional(row.condition.map(|it| &it.id))

@@ -1124,7 +1124,8 @@ class StudyGroups(_message.Message):
     """
     wait_ms: _builtins.int
     """How long participants wait for others, in milliseconds, 10000..=3600000; by default 600000. One for
-    whom others of its group wait that long before a game has dropped out.
+    whom others of its group wait that long before a game has dropped out. It is also the longest
+    `waiting_time_ms` of their rooms.
     """
     left_over: Global___StudyLeftOver.ValueType
     """What becomes of those whose group is not complete in this time."""
@@ -1509,6 +1510,7 @@ class StudyParticipant(_message.Message):
     PANEL_ID_FIELD_NUMBER: _builtins.int
     TEST_FIELD_NUMBER: _builtins.int
     GROUP_FIELD_NUMBER: _builtins.int
+    PLANNED_WITH_FIELD_NUMBER: _builtins.int
     number: _builtins.int
     """Number, from 1."""
     pseudonym: _builtins.str
@@ -1537,6 +1539,10 @@ class StudyParticipant(_message.Message):
     """Whether it is a test participant (AddStudyParticipantsRequest)."""
     group: _builtins.int
     """Number of its group, from 1; 0: it has none."""
+    planned_with: _builtins.int
+    """Number of the first of those with whom it was added to play (`together` of
+    AddStudyParticipantsRequest); 0: it plays with whom it arrives.
+    """
     @_builtins.property
     def conditions(self) -> _containers.RepeatedScalarFieldContainer[_builtins.str]:
         """Ids of its conditions in their order; empty until it begins."""
@@ -1568,10 +1574,11 @@ class StudyParticipant(_message.Message):
         panel_id: _builtins.str = ...,
         test: _builtins.bool = ...,
         group: _builtins.int = ...,
+        planned_with: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_slot", b"_slot", "consent", b"consent", "slot", b"slot"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_slot", b"_slot", "began_at_ms", b"began_at_ms", "conditions", b"conditions", "connected", b"connected", "consent", b"consent", "data_deleted", b"data_deleted", "ended_at_ms", b"ended_at_ms", "games", b"games", "group", b"group", "number", b"number", "panel_id", b"panel_id", "pseudonym", b"pseudonym", "sessions", b"sessions", "slot", b"slot", "state", b"state", "step", b"step", "test", b"test"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_slot", b"_slot", "began_at_ms", b"began_at_ms", "conditions", b"conditions", "connected", b"connected", "consent", b"consent", "data_deleted", b"data_deleted", "ended_at_ms", b"ended_at_ms", "games", b"games", "group", b"group", "number", b"number", "panel_id", b"panel_id", "planned_with", b"planned_with", "pseudonym", b"pseudonym", "sessions", b"sessions", "slot", b"slot", "state", b"state", "step", b"step", "test", b"test"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__slot: _TypeAlias = _typing.Literal["slot"]  # noqa: Y015
     _WhichOneofArgType__slot: _TypeAlias = _typing.Literal["_slot", b"_slot"]  # noqa: Y015
@@ -1590,6 +1597,7 @@ class StudyLink(_message.Message):
     LINK_FIELD_NUMBER: _builtins.int
     JOINED_FIELD_NUMBER: _builtins.int
     TEST_FIELD_NUMBER: _builtins.int
+    PLANNED_WITH_FIELD_NUMBER: _builtins.int
     number: _builtins.int
     """Number of the participant."""
     pseudonym: _builtins.str
@@ -1602,6 +1610,8 @@ class StudyLink(_message.Message):
     """Whether the participant joined by the open link, and has its own link already."""
     test: _builtins.bool
     """Whether it is the link of a test participant."""
+    planned_with: _builtins.int
+    """As `planned_with` of StudyParticipant."""
     def __init__(
         self,
         *,
@@ -1610,10 +1620,11 @@ class StudyLink(_message.Message):
         link: _builtins.str = ...,
         joined: _builtins.bool = ...,
         test: _builtins.bool = ...,
+        planned_with: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["joined", b"joined", "link", b"link", "number", b"number", "pseudonym", b"pseudonym", "test", b"test"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["joined", b"joined", "link", b"link", "number", b"number", "planned_with", b"planned_with", "pseudonym", b"pseudonym", "test", b"test"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -152,7 +152,8 @@ class StudyServiceServicer(object):
     def RemoveStudyParticipant(self, request, context):
         """Removes a participant, whose slot is free again, and adds another in its place if requested. Its
         running game is closed; its data are kept. In a group, an agent plays on in its place, and the slots
-        are free again when all have left. Repeating the call without `replace` changes nothing.
+        are free again when all have left. The other is planned to play with the same, if these wait for it;
+        otherwise it plays with whom it arrives. Repeating the call without `replace` changes nothing.
         NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (PARTICIPATION_OVER if it
         has withdrawn, STUDY_CLOSED); UNAVAILABLE (SHUTTING_DOWN).
         """

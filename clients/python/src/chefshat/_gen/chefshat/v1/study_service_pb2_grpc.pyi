@@ -63,7 +63,8 @@ class StudyServiceStub:
     RemoveStudyParticipant: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.RemoveStudyParticipantRequest, _study_service_pb2.RemoveStudyParticipantResponse]
     """Removes a participant, whose slot is free again, and adds another in its place if requested. Its
     running game is closed; its data are kept. In a group, an agent plays on in its place, and the slots
-    are free again when all have left. Repeating the call without `replace` changes nothing.
+    are free again when all have left. The other is planned to play with the same, if these wait for it;
+    otherwise it plays with whom it arrives. Repeating the call without `replace` changes nothing.
     NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (PARTICIPATION_OVER if it
     has withdrawn, STUDY_CLOSED); UNAVAILABLE (SHUTTING_DOWN).
     """
@@ -129,7 +130,8 @@ class StudyServiceAsyncStub(StudyServiceStub):
     RemoveStudyParticipant: _aio.UnaryUnaryMultiCallable[_study_service_pb2.RemoveStudyParticipantRequest, _study_service_pb2.RemoveStudyParticipantResponse]  # type: ignore[assignment]
     """Removes a participant, whose slot is free again, and adds another in its place if requested. Its
     running game is closed; its data are kept. In a group, an agent plays on in its place, and the slots
-    are free again when all have left. Repeating the call without `replace` changes nothing.
+    are free again when all have left. The other is planned to play with the same, if these wait for it;
+    otherwise it plays with whom it arrives. Repeating the call without `replace` changes nothing.
     NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (PARTICIPATION_OVER if it
     has withdrawn, STUDY_CLOSED); UNAVAILABLE (SHUTTING_DOWN).
     """
@@ -234,7 +236,8 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_study_service_pb2.RemoveStudyParticipantResponse, _abc.Awaitable[_study_service_pb2.RemoveStudyParticipantResponse]]:
         """Removes a participant, whose slot is free again, and adds another in its place if requested. Its
         running game is closed; its data are kept. In a group, an agent plays on in its place, and the slots
-        are free again when all have left. Repeating the call without `replace` changes nothing.
+        are free again when all have left. The other is planned to play with the same, if these wait for it;
+        otherwise it plays with whom it arrives. Repeating the call without `replace` changes nothing.
         NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (PARTICIPATION_OVER if it
         has withdrawn, STUDY_CLOSED); UNAVAILABLE (SHUTTING_DOWN).
         """
