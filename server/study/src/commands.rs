@@ -252,10 +252,10 @@ impl Study {
         now_ms: u64,
     ) -> Result<Option<Change>, Refusal> {
         let participant = self.known(number)?;
-        let has_place = self.has_place(participant.test, participant.planned);
+        let has_place = || self.has_place(participant.test, participant.planned);
         let slot = match participant.status {
             Status::Invited if self.is_closed() => return Err(Refusal::Closed),
-            Status::Invited if !has_place => return Err(Refusal::Full),
+            Status::Invited if !has_place() => return Err(Refusal::Full),
             Status::Invited => {
                 let settings = self.settings();
                 let assigns = settings.groups.is_none() && !settings.assigns_by_consent();
@@ -263,12 +263,14 @@ impl Study {
             }
             Status::Active => None,
             Status::DroppedOut if self.is_replaced(participant) => return Ok(None),
-            Status::DroppedOut if self.settings().groups.is_some() => {
+            Status::DroppedOut => {
                 // Who has no group needs a place in one.
-                let returns = participant.group.is_some() || has_place;
-                returns.then_some(None).ok_or(Refusal::Full)?
+                let needs_place = self.settings().groups.is_some() && participant.group.is_none();
+                if needs_place && !has_place() {
+                    return Err(Refusal::Full);
+                }
+                None
             }
-            Status::DroppedOut => None,
             _ => return Ok(None),
         };
         if participant.session >= MAX_SESSIONS {

@@ -309,7 +309,7 @@ impl Study {
         let limit_ms = self.settings.drop_out_after_ms;
         let drop_out = self.presence.next_drop_out_ms(limit_ms);
         let groups = self.settings.groups;
-        let waited = groups.and_then(|it| self.presence.next_waited_ms(it.wait_ms));
+        let waited = groups.and_then(|it| self.presence.next_waited_ms(it.wait_ms, elapsed_ms));
         let by_presence = drop_out.into_iter().chain(waited).min();
         let close = self.settings.end_ms().filter(|_| !self.is_closed());
         let by_presence = by_presence.map(|at_ms| at_ms.saturating_sub(elapsed_ms));

@@ -66,10 +66,14 @@ impl Presence {
         long.map(|(number, _)| *number).collect()
     }
 
-    /// When the next participant has been noted for `limit_ms`.
-    pub(crate) fn next_waited_ms(&self, limit_ms: u64) -> Option<u64> {
-        let since = self.waiting.values().min();
-        since.map(|since| since.saturating_add(limit_ms))
+    /// When the next participant has been noted for `limit_ms`. For those who have been, nothing follows
+    /// before somebody comes.
+    pub(crate) fn next_waited_ms(&self, limit_ms: u64, now_ms: u64) -> Option<u64> {
+        let ends = self
+            .waiting
+            .values()
+            .map(|since| since.saturating_add(limit_ms));
+        ends.filter(|end| *end > now_ms).min()
     }
 
     /// When the next participant drops out.

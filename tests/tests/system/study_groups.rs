@@ -240,7 +240,10 @@ async fn pairs_of_people_play_together_and_a_partner_who_leaves_is_replaced() {
         .filter_map(|line| line.split_whitespace().nth(2))
         .collect();
     assert_eq!(counts, ["1", "1"], "{printed}");
-    assert!(printed.contains("groups: 2, of which 1 are whole"), "{printed}");
+    assert!(
+        printed.contains("groups: 2, of which 1 are whole"),
+        "{printed}"
+    );
 
     // A game is deleted with the data of one of its players.
     let request = v1::DeleteStudyParticipantRequest {

@@ -250,6 +250,46 @@ fn of_a_group_of_three_only_the_late_one_drops_out() {
 }
 
 #[test]
+fn nothing_is_due_while_nobody_is_here_who_waits() {
+    let mut settings = in_groups(3);
+    settings.drop_out_after_ms = 600_000;
+    settings.stages.insert(3, Stage::once(testing::text()));
+    settings
+        .stages
+        .insert(4, Stage::once(Task::Games { count: 1 }));
+    let mut lab = Lab::new(settings, 3);
+    for number in 1..=3 {
+        lab.begin(number);
+    }
+    lab.wait(0);
+    for _ in 0..2 {
+        place(&mut lab, 1);
+        for number in 1..=3 {
+            end(&mut lab, number, Outcome::Finished);
+        }
+        for number in 1..=3 {
+            lab.act(number);
+        }
+    }
+    // The first reads; the others wait for it, and have no page open.
+    for number in 2..=3 {
+        lab.act(number);
+        lab.study.set_connected(number, false, lab.now_ms);
+    }
+    lab.wait(0);
+    lab.wait(60_000);
+    assert_eq!(lab.wake_in(), Some(540_000));
+    // When one is back, the two who are late have dropped out.
+    lab.study.set_connected(2, true, lab.now_ms);
+    lab.wait(0);
+    assert_eq!(
+        [1, 3].map(|number| reason(&lab, number)),
+        [End::DroppedOut; 2]
+    );
+    assert_eq!(lab.place(2).len(), 1);
+}
+
+#[test]
 fn who_is_alone_in_its_group_may_return() {
     let mut settings = in_groups(2);
     settings.groups.as_mut().unwrap().left_over = LeftOverPolicy::Agents;
