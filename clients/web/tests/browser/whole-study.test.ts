@@ -31,7 +31,7 @@ const COLUMNS = {
     "number,participant,panel_id,test,state,slot,conditions,factor_warmth,step,sessions,began_at_ms,ended_at_ms,consent_at_ms,consent_version,consent_text_sha256,consent_language,attention_checks,attention_checks_passed,data_deleted",
   "sessions.csv": "number,participant,session,opened_at_ms,width,height,pixels,pointer,time_zone",
   "games.csv":
-    "study,number,participant,condition,factor_warmth,step,practice,attempt,seed_index,seed,seat,game_id,outcome,started_at_ms,ended_at_ms,place,points,shifts,decisions,invalid_answers,timeouts,hints,timed_decisions,decision_time_us",
+    "study,number,participant,condition,factor_warmth,step,practice,attempt,seed_index,seed,seat,game_id,outcome,started_at_ms,ended_at_ms,place,points,substituted,shifts,decisions,invalid_answers,timeouts,hints,timed_decisions,decision_time_us",
   "answers.csv":
     "number,participant,step,condition,factor_warmth,questionnaire,item,scale,position,status,answer,label,passed,answered_after_ms,questionnaire_shown_at_ms,questionnaire_answered_at_ms",
   "traces.csv": "number,participant,condition,factor_warmth,game_id,session,decision_id,at_ms,kind,target,duration_ms",

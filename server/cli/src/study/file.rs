@@ -187,10 +187,7 @@ mod tests {
             let complete = chefshat_server::convert::complete_settings(settings, || [1; 32], true);
             let complete = complete.expect("the server accepts it");
             assert_eq!(complete.conditions.len(), conditions);
-            assert_eq!(
-                complete.block_size,
-                2 * (complete.conditions.len() as u32 / 2)
-            );
+            assert_eq!(complete.block_size as usize, conditions);
         }
     }
 

@@ -29,7 +29,7 @@ const NO_RECORD: &str = "the game has not ended, its record cannot be read, or i
     the data of another participant";
 const NO_RESULT: &str = "the game was not finished, its record cannot be read, or it was deleted \
     with the data of another participant";
-pub(super) const GROUP: &str = "number of the group, from 1";
+const GROUP: &str = "number of the group, from 1";
 
 pub(super) fn text(value: impl ToString) -> String {
     value.to_string()
@@ -74,6 +74,20 @@ pub(super) fn with_factors<R>(
             None => table,
         }
     })
+}
+
+/// Adds the column of the group in a study with groups. `group`: that of a row, if it has one.
+pub(super) fn with_group<R>(
+    table: Table<R>,
+    settings: &Settings,
+    group: impl Fn(&R) -> Option<u32> + Send + Sync + 'static,
+) -> Table<R> {
+    match settings.groups.is_some() {
+        true => table
+            .with("group", COUNT, GROUP, move |row| optional(group(row)))
+            .empty("it has no group, or is practice"),
+        false => table,
+    }
 }
 
 pub(super) fn level(condition: &Condition, factor: &str) -> String {
@@ -195,7 +209,6 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
         "step it is at, from 0; the number of steps once it has completed the study";
     const PANEL_ID: &str = "its id at the panel that recruited it";
     const NO_CONSENT: &str = "it has not consented";
-    const NO_GROUP: &str = "it has no group";
     const PLANNED: &str = "number of the first of those with whom it was planned to play";
     let states = STATES.map(|(status, label)| Code::new(state_name(status), label));
     let conditions = Kind::Codes {
@@ -225,13 +238,17 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
             |row| state_name(row.participant.status),
         )
         .with("slot", COUNT, SLOT, |row| optional(row.participant.slot))
-        .empty(NO_SLOT)
-        .with("group", COUNT, GROUP, |row| optional(row.participant.group))
-        .empty(NO_GROUP)
-        .with("planned_with", COUNT, PLANNED, |row| {
-            optional(row.participant.planned)
-        })
-        .empty("nobody was planned to play with it")
+        .empty(NO_SLOT);
+    let table = with_group(table, settings, |row| row.participant.group);
+    let table = match settings.groups.is_some() {
+        true => table
+            .with("planned_with", COUNT, PLANNED, |row: &Row<'s>| {
+                optional(row.participant.planned)
+            })
+            .empty("nobody was planned to play with it"),
+        false => table,
+    };
+    let table = table
         .with("conditions", conditions, "its conditions in order", |row| {
             row.of_each(|condition| condition.id.clone())
         })
@@ -452,104 +469,109 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
         .with("condition", condition, CONDITION, |row| {
             row.condition().id.clone()
         });
-    with_factors(table, settings, false, None, |row, factor| {
+    let table = with_factors(table, settings, false, None, |row, factor| {
         level(row.condition(), factor)
-    })
-    .with("group", COUNT, GROUP, |row| optional(row.group()))
-    .empty("it plays the game alone")
-    .with("step", COUNT, STEP, |row| text(row.game.placed.step))
-    .with("practice", Kind::Boolean, "whether it is practice", |row| {
-        text(row.game.placed.practice)
-    })
-    .with("attempt", COUNT, ATTEMPT, |row| {
-        text(row.game.placed.attempt)
-    })
-    .with("seed_index", COUNT, SEED_INDEX, |row| {
-        optional(row.game.placed.seed_index)
-    })
-    .empty(PRACTICE)
-    .with(
-        "seed",
-        Kind::Text,
-        "its seed, in hexadecimal digits",
-        |row| optional(row.seed()),
-    )
-    .empty(PRACTICE)
-    .with("seat", COUNT, "seat of the participant, from 0", |row| {
-        text(row.game.placed.seat)
-    })
-    .with("game_id", Kind::Text, GAME, |row| {
-        text(Id(row.game.placed.game))
-    })
-    .with("participants", COUNT, PLAYERS, |row| text(row.players()))
-    .with("outcome", Kind::one_of(outcomes), "how it ended", |row| {
-        let outcome = match row.game.ended {
-            None => "playing",
-            Some((Outcome::Finished, _)) => "finished",
-            Some((Outcome::Aborted, _)) => "aborted",
-        };
-        outcome.to_owned()
-    })
-    .with("started_at_ms", SINCE_EPOCH, "when it started", |row| {
-        optional(row.result.as_ref().and_then(|it| it.started_at_ms))
-    })
-    .empty("it has not started, or has no record yet")
-    .with("ended_at_ms", SINCE_EPOCH, "when it ended", |row| {
-        optional(row.game.ended.map(|(_, at_ms)| at_ms))
-    })
-    .empty("it has not ended")
-    .with("place", COUNT, "place of the participant, from 1", |row| {
-        row.statistics(|it| it.place)
-    })
-    .empty(NO_RESULT)
-    .with("points", COUNT, "points of the participant", |row| {
-        row.statistics(|it| it.points)
-    })
-    .empty(NO_RESULT)
-    .with("substituted", Kind::Boolean, SUBSTITUTED, |row| {
-        row.statistics(|it| it.substituted)
-    })
-    .empty(NO_RESULT)
-    .with("shifts", COUNT, "Shifts played", |row| {
-        row.outcome(|shifts, _| shifts)
-    })
-    .empty(NO_RESULT)
-    .with("decisions", COUNT, DECISIONS, |row| {
-        row.statistics(|it| it.decisions)
-    })
-    .empty(NO_RESULT)
-    .with(
-        "invalid_answers",
-        COUNT,
-        "invalid attempts at them",
-        |row| row.statistics(|it| it.wrong_actions),
-    )
-    .empty(NO_RESULT)
-    .with("timeouts", COUNT, "those of them that timed out", |row| {
-        row.statistics(|it| it.timeouts)
-    })
-    .empty(NO_RESULT)
-    .with(
-        "hints",
-        COUNT,
-        "hints that the participant was given",
-        |row| optional(row.result.as_ref().map(|it| it.hints)),
-    )
-    .empty(NO_RECORD)
-    .with(
-        "timed_decisions",
-        COUNT,
-        "those of them that the participant took in time",
-        |row| row.statistics(|it| it.timed_decisions),
-    )
-    .empty(NO_RESULT)
-    .with(
-        "decision_time_us",
-        Kind::Integer("microseconds"),
-        TIME,
-        |row| row.statistics(|it| it.decision_time_us),
-    )
-    .empty(NO_RESULT)
+    });
+    let table = with_group(table, settings, GameRow::group);
+    let table = match settings.groups.is_some() {
+        true => table.with("participants", COUNT, PLAYERS, |row: &Row<'s>| {
+            text(row.players())
+        }),
+        false => table,
+    };
+    table
+        .with("step", COUNT, STEP, |row| text(row.game.placed.step))
+        .with("practice", Kind::Boolean, "whether it is practice", |row| {
+            text(row.game.placed.practice)
+        })
+        .with("attempt", COUNT, ATTEMPT, |row| {
+            text(row.game.placed.attempt)
+        })
+        .with("seed_index", COUNT, SEED_INDEX, |row| {
+            optional(row.game.placed.seed_index)
+        })
+        .empty(PRACTICE)
+        .with(
+            "seed",
+            Kind::Text,
+            "its seed, in hexadecimal digits",
+            |row| optional(row.seed()),
+        )
+        .empty(PRACTICE)
+        .with("seat", COUNT, "seat of the participant, from 0", |row| {
+            text(row.game.placed.seat)
+        })
+        .with("game_id", Kind::Text, GAME, |row| {
+            text(Id(row.game.placed.game))
+        })
+        .with("outcome", Kind::one_of(outcomes), "how it ended", |row| {
+            let outcome = match row.game.ended {
+                None => "playing",
+                Some((Outcome::Finished, _)) => "finished",
+                Some((Outcome::Aborted, _)) => "aborted",
+            };
+            outcome.to_owned()
+        })
+        .with("started_at_ms", SINCE_EPOCH, "when it started", |row| {
+            optional(row.result.as_ref().and_then(|it| it.started_at_ms))
+        })
+        .empty("it has not started, or has no record yet")
+        .with("ended_at_ms", SINCE_EPOCH, "when it ended", |row| {
+            optional(row.game.ended.map(|(_, at_ms)| at_ms))
+        })
+        .empty("it has not ended")
+        .with("place", COUNT, "place of the participant, from 1", |row| {
+            row.statistics(|it| it.place)
+        })
+        .empty(NO_RESULT)
+        .with("points", COUNT, "points of the participant", |row| {
+            row.statistics(|it| it.points)
+        })
+        .empty(NO_RESULT)
+        .with("substituted", Kind::Boolean, SUBSTITUTED, |row| {
+            row.statistics(|it| it.substituted)
+        })
+        .empty(NO_RESULT)
+        .with("shifts", COUNT, "Shifts played", |row| {
+            row.outcome(|shifts, _| shifts)
+        })
+        .empty(NO_RESULT)
+        .with("decisions", COUNT, DECISIONS, |row| {
+            row.statistics(|it| it.decisions)
+        })
+        .empty(NO_RESULT)
+        .with(
+            "invalid_answers",
+            COUNT,
+            "invalid attempts at them",
+            |row| row.statistics(|it| it.wrong_actions),
+        )
+        .empty(NO_RESULT)
+        .with("timeouts", COUNT, "those of them that timed out", |row| {
+            row.statistics(|it| it.timeouts)
+        })
+        .empty(NO_RESULT)
+        .with(
+            "hints",
+            COUNT,
+            "hints that the participant was given",
+            |row| optional(row.result.as_ref().map(|it| it.hints)),
+        )
+        .empty(NO_RECORD)
+        .with(
+            "timed_decisions",
+            COUNT,
+            "those of them that the participant took in time",
+            |row| row.statistics(|it| it.timed_decisions),
+        )
+        .empty(NO_RESULT)
+        .with(
+            "decision_time_us",
+            Kind::Integer("microseconds"),
+            TIME,
+            |row| row.statistics(|it| it.decision_time_us),
+        )
+        .empty(NO_RESULT)
 }
 
 /// A game whose record cannot be read, and why.

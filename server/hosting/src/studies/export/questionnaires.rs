@@ -6,8 +6,8 @@ use chefshat_study::{
 };
 
 use super::columns::{
-    CONDITION, COUNT, GROUP, MILLISECONDS, NUMBER, PSEUDONYM, SINCE_EPOCH, STEP, conditions, level,
-    optional, text, with_factors,
+    CONDITION, COUNT, MILLISECONDS, NUMBER, PSEUDONYM, SINCE_EPOCH, STEP, conditions, level,
+    optional, text, with_factors, with_group,
 };
 use super::table::{Code, Kind, Table};
 
@@ -259,13 +259,12 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
     .with("participant", Kind::Text, PSEUDONYM, |row| {
         row.participant.pseudonym.clone()
     })
-    .with("group", COUNT, GROUP, |row| optional(row.participant.group))
-    .empty("it has no group")
     .with("step", COUNT, STEP, |row| text(row.step))
     .with("condition", condition, CONDITION, |row| {
         optional(row.condition.map(|it| &it.id))
     })
     .empty(NO_CONDITION);
+    let table = with_group(table, settings, |row| row.participant.group);
     with_factors(table, settings, false, Some(NO_CONDITION), |row, factor| {
         row.condition
             .map_or_else(String::new, |it| level(it, factor))
