@@ -76,16 +76,21 @@ pub(super) fn with_factors<R>(
     })
 }
 
-/// Adds the column of the group in a study with groups. `group`: that of a row, if it has one.
+/// When the group of a participant is empty.
+pub(super) const NO_GROUP: &str = "it has no group";
+
+/// Adds the column of the group in a study with groups. `group`: that of a row; `missing`: when it has
+/// none.
 pub(super) fn with_group<R>(
     table: Table<R>,
     settings: &Settings,
+    missing: &'static str,
     group: impl Fn(&R) -> Option<u32> + Send + Sync + 'static,
 ) -> Table<R> {
     match settings.groups.is_some() {
         true => table
             .with("group", COUNT, GROUP, move |row| optional(group(row)))
-            .empty("it has no group, or is practice"),
+            .empty(missing),
         false => table,
     }
 }
@@ -239,7 +244,7 @@ pub(super) fn participants<'s>(settings: &Settings) -> Table<ParticipantRow<'s>>
         )
         .with("slot", COUNT, SLOT, |row| optional(row.participant.slot))
         .empty(NO_SLOT);
-    let table = with_group(table, settings, |row| row.participant.group);
+    let table = with_group(table, settings, NO_GROUP, |row| row.participant.group);
     let table = match settings.groups.is_some() {
         true => table
             .with("planned_with", COUNT, PLANNED, |row: &Row<'s>| {
@@ -472,7 +477,7 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
     let table = with_factors(table, settings, false, None, |row, factor| {
         level(row.condition(), factor)
     });
-    let table = with_group(table, settings, GameRow::group);
+    let table = with_group(table, settings, "practice is played alone", GameRow::group);
     let table = match settings.groups.is_some() {
         true => table.with("participants", COUNT, PLAYERS, |row: &Row<'s>| {
             text(row.players())

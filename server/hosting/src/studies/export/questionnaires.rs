@@ -6,8 +6,8 @@ use chefshat_study::{
 };
 
 use super::columns::{
-    CONDITION, COUNT, MILLISECONDS, NUMBER, PSEUDONYM, SINCE_EPOCH, STEP, conditions, level,
-    optional, text, with_factors, with_group,
+    CONDITION, COUNT, MILLISECONDS, NO_GROUP, NUMBER, PSEUDONYM, SINCE_EPOCH, STEP, conditions,
+    level, optional, text, with_factors, with_group,
 };
 use super::table::{Code, Kind, Table};
 
@@ -264,7 +264,7 @@ pub(super) fn answers<'s>(settings: &Settings) -> Table<AnswerRow<'s>> {
         optional(row.condition.map(|it| &it.id))
     })
     .empty(NO_CONDITION);
-    let table = with_group(table, settings, |row| row.participant.group);
+    let table = with_group(table, settings, NO_GROUP, |row| row.participant.group);
     with_factors(table, settings, false, Some(NO_CONDITION), |row, factor| {
         row.condition
             .map_or_else(String::new, |it| level(it, factor))
