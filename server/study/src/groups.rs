@@ -59,7 +59,7 @@ impl Study {
     fn with_group(&self, number: u32) -> Vec<u32> {
         let group = self.participant(number).and_then(|it| it.group);
         let members = group.and_then(|group| self.state.groups.get(&group));
-        members.cloned().unwrap_or_else(|| vec![number])
+        members.map_or_else(|| vec![number], |them| them.iter().copied().collect())
     }
 
     /// The participants of a group who are in the middle of the study, by number.

@@ -151,7 +151,7 @@ pub(crate) struct StudyState {
     /// By number, from 1.
     pub(crate) participants: BTreeMap<u32, Participant>,
     /// The participants of each group, with those who have left, by number of the group.
-    pub(crate) groups: BTreeMap<u32, Vec<u32>>,
+    pub(crate) groups: BTreeMap<u32, BTreeSet<u32>>,
     pub(crate) closed: bool,
 }
 
@@ -283,7 +283,7 @@ impl StudyState {
                     participant.group = Some(*group);
                     participant.slot = Some(*slot);
                     participant.advance(steps, *passed_over, *at_ms);
-                    self.groups.entry(*group).or_default().push(*number);
+                    self.groups.entry(*group).or_default().insert(*number);
                 }
             }
             Change::LeftOver { number, at_ms } => {
