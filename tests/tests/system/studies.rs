@@ -509,6 +509,19 @@ pub(crate) fn contains(bytes: &[u8], word: &str) -> bool {
         .any(|window| window == word.as_bytes())
 }
 
+/// The header of an exported record, whose game is replayed.
+pub(crate) fn checked_header(record: &[u8]) -> v1::RecordHeader {
+    let lines = std::str::from_utf8(record).expect("UTF-8").lines();
+    let lines: Vec<v1::RecordLine> = lines
+        .map(|line| serde_json::from_str(line).expect("a line of a record"))
+        .collect();
+    replay(&lines).expect("the record is right");
+    match lines.into_iter().next().and_then(|line| line.line) {
+        Some(Line::Header(header)) => header,
+        _ => panic!("a header comes first"),
+    }
+}
+
 /// Asserts that every cell of the exported tables is what their descriptor says.
 pub(crate) fn assert_as_described(files: &BTreeMap<String, Vec<u8>>) {
     let descriptor: serde_json::Value =
@@ -791,14 +804,7 @@ async fn a_study_from_its_links_to_its_data() {
             continue;
         }
         records += 1;
-        let lines = std::str::from_utf8(bytes).expect("UTF-8").lines();
-        let lines: Vec<v1::RecordLine> = lines
-            .map(|line| serde_json::from_str(line).expect("a line of a record"))
-            .collect();
-        replay(&lines).expect("the record is right");
-        let Some(Line::Header(header)) = &lines[0].line else {
-            panic!("a header comes first");
-        };
+        let header = checked_header(bytes);
         let of_study = header.study.as_ref().expect("it says where it belongs");
         let participant = &participants[of_study.number as usize - 1];
         assert_eq!(of_study.participant, participant.pseudonym);

@@ -5,16 +5,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chefshat_client::{ActionId, Agent};
 use chefshat_proto::v1::study_service_client::StudyServiceClient;
-use chefshat_proto::v1::{self, record_line::Line, study_stage::Stage, study_view::Content};
-use chefshat_record::replay::replay;
+use chefshat_proto::v1::{self, study_stage::Stage, study_view::Content};
 use chefshat_tests::patiently;
 use tokio::sync::oneshot;
 use tonic::transport::Channel;
 use tonic_types::StatusExt as _;
 
 use crate::studies::{
-    Lab, Person, SECRETS, Tap, address, analysed, assert_as_described, contains, playable, rows,
-    settings, stage,
+    Lab, Person, SECRETS, Tap, address, analysed, assert_as_described, checked_header, contains,
+    playable, rows, settings, stage,
 };
 use crate::study_calls::{open_to_all, operated};
 
@@ -206,14 +205,7 @@ async fn pairs_of_people_play_together_and_a_partner_who_leaves_is_replaced() {
         .iter()
         .filter(|(file, _)| file.starts_with("records/"))
     {
-        let lines = std::str::from_utf8(bytes).expect("UTF-8").lines();
-        let lines: Vec<v1::RecordLine> = lines
-            .map(|line| serde_json::from_str(line).expect("a line of a record"))
-            .collect();
-        replay(&lines).expect("the record is right");
-        let Some(Line::Header(header)) = &lines[0].line else {
-            panic!("a header comes first");
-        };
+        let header = checked_header(bytes);
         let study = header.study.clone().expect("it says where it belongs");
         let others = study.others.iter().map(|other| (other.number, other.seat));
         let members: Vec<(u32, u32)> = [(study.number, study.seat)]

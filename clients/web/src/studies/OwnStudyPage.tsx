@@ -272,7 +272,7 @@ function Add({ study: { studyId, settings } }: { study: Study }) {
     setTried(true);
     if (!valid || isUneven) return;
     run(async () => {
-      await addParticipants(studyId, number, pseudonyms, together && size > 1);
+      await addParticipants(studyId, number, pseudonyms, together);
       setCount("");
       setNames("");
       setTried(false);

@@ -88,7 +88,8 @@ fn a_game_without_a_result_is_played_again() {
             (due.attempt, due.seed, due.seat),
             (attempt, Some((0, [0; 32])), 0)
         );
-        lab.place(1).into_iter().for_each(|it| lab.fold(it));
+        let placed = lab.place(1);
+        lab.fold_all(placed);
         assert!(lab.study.due(1).is_none() && lab.study.place(1, [0; 16], [0; 16]).is_empty());
         assert!(
             lab.study

@@ -14,7 +14,7 @@ use super::support::{Lab, tests};
 /// A group's next game is placed, if it waits for nobody.
 fn place(lab: &mut Lab, number: u32) {
     let placed = lab.place(number);
-    placed.into_iter().for_each(|change| lab.fold(change));
+    lab.fold_all(placed);
 }
 
 fn end(lab: &mut Lab, number: u32, outcome: Outcome) {
@@ -76,6 +76,7 @@ fn those_who_arrive_together_play_the_same_games_in_one_condition() {
         let participant = lab.study.participant(1).unwrap();
         let seats = lab.study.seats_of_group(participant, &placed[0].placed);
         assert_eq!(seats, [round, round + 2]);
+        assert_eq!(lab.study.players_of(3), [1, 3]);
         assert!(
             [1, 3]
                 .iter()
@@ -112,7 +113,7 @@ fn a_plan_says_who_plays_with_whom() {
         ..NewParticipants::numbered(4)
     };
     let added = lab.study.add(&planned).unwrap();
-    added.into_iter().for_each(|change| lab.fold(change));
+    lab.fold_all(added);
     lab.add(2);
     for number in [1, 3, 5, 6, 4] {
         lab.begin(number);
@@ -127,9 +128,9 @@ fn a_plan_says_who_plays_with_whom() {
     assert_eq!(members(&lab), [vec![5, 6], vec![3, 4]]);
     // Somebody else comes in place of the one who was planned.
     let removed = lab.study.remove(2, lab.now_ms).unwrap();
-    removed.into_iter().for_each(|change| lab.fold(change));
+    lab.fold_all(removed);
     let replacement = lab.study.replacement(2).unwrap();
-    replacement.into_iter().for_each(|change| lab.fold(change));
+    lab.fold_all(replacement);
     lab.begin(7);
     lab.wait(1);
     assert_eq!(members(&lab)[2], [1, 7]);
@@ -196,7 +197,7 @@ fn a_member_who_leaves_keeps_nobody_waiting() {
     lab.wait(0);
     place(&mut lab, 1);
     let withdrew = lab.study.withdraw(2, true, lab.now_ms).unwrap();
-    withdrew.into_iter().for_each(|change| lab.fold(change));
+    lab.fold_all(withdrew);
     assert!(lab.study.plays_with_others(2) && !lab.study.plays_with_others(1));
     for number in [1, 2] {
         end(&mut lab, number, Outcome::Finished);
@@ -213,7 +214,7 @@ fn a_member_who_leaves_keeps_nobody_waiting() {
     lab.wait(0);
     assert_eq!(groups(&lab)[&2], [(3, 2), (4, 3)]);
     let removed = lab.study.remove(1, lab.now_ms).unwrap();
-    removed.into_iter().for_each(|change| lab.fold(change));
+    lab.fold_all(removed);
     lab.add(2);
     lab.begin(5);
     lab.begin(6);
@@ -315,7 +316,7 @@ fn plans_do_not_take_each_others_places() {
         ..NewParticipants::numbered(6)
     };
     let added = lab.study.add(&planned).unwrap();
-    added.into_iter().for_each(|change| lab.fold(change));
+    lab.fold_all(added);
     lab.begin(1);
     lab.begin(3);
     // Two pairs are expected: there is a place for their others, and for nobody else.
@@ -326,7 +327,7 @@ fn plans_do_not_take_each_others_places() {
     assert_eq!(groups(&lab).len(), 2);
     // In place of one whose group is formed comes somebody who may play with anybody.
     let replacement = lab.study.replacement(2).unwrap();
-    replacement.into_iter().for_each(|change| lab.fold(change));
+    lab.fold_all(replacement);
     assert_eq!(lab.study.participant(7).unwrap().planned, None);
 }
 
@@ -397,7 +398,7 @@ fn nobody_begins_for_whom_there_is_no_place() {
     assert_eq!(lab.study.consent(lab.at(3), lab.now_ms), Err(Refusal::Full));
     for number in [1, 2] {
         let removed = lab.study.remove(number, lab.now_ms).unwrap();
-        removed.into_iter().for_each(|change| lab.fold(change));
+        lab.fold_all(removed);
     }
     lab.act(3);
     assert_eq!(here(&lab, 3), 1);
@@ -407,7 +408,7 @@ fn nobody_begins_for_whom_there_is_no_place() {
 fn a_test_participant_goes_on_alone() {
     let mut lab = Lab::new(in_groups(2), 1);
     let added = lab.study.add(&tests(3)).unwrap();
-    added.into_iter().for_each(|change| lab.fold(change));
+    lab.fold_all(added);
     for number in [1, 2] {
         lab.begin(number);
     }
@@ -430,7 +431,7 @@ fn a_test_participant_goes_on_alone() {
     lab.study.set_connected(4, false, lab.now_ms);
     assert!(lab.place(3).is_empty());
     let late = lab.study.without_late(3, lab.now_ms);
-    late.into_iter().for_each(|change| lab.fold(change));
+    lab.fold_all(late);
     assert_eq!(reason(&lab, 4), End::DroppedOut);
     assert_eq!(lab.place(3).len(), 1);
 }

@@ -50,7 +50,8 @@ fn happen(lab: &mut Lab, (kind, who): Event) {
             lab.act(number);
         }
         10 if is_active && lab.study.due(number).is_some() => {
-            lab.place(number).into_iter().for_each(|it| lab.fold(it));
+            let placed = lab.place(number);
+            lab.fold_all(placed);
             let aborted = lab.ended(number, Outcome::Aborted);
             lab.fold(aborted);
         }

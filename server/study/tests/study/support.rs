@@ -53,9 +53,13 @@ impl Lab {
         }
     }
 
+    pub(crate) fn fold_all(&mut self, changes: impl IntoIterator<Item = Change>) {
+        changes.into_iter().for_each(|change| self.fold(change));
+    }
+
     pub(crate) fn add(&mut self, count: usize) {
         let added = self.study.add(&NewParticipants::numbered(count)).unwrap();
-        added.into_iter().for_each(|change| self.fold(change));
+        self.fold_all(added);
     }
 
     pub(crate) fn open(&mut self, number: u32) -> Result<(), Refusal> {
@@ -80,7 +84,7 @@ impl Lab {
             if changes.is_empty() {
                 return;
             }
-            changes.into_iter().for_each(|change| self.fold(change));
+            self.fold_all(changes);
         }
     }
 
@@ -114,7 +118,8 @@ impl Lab {
                 self.study.answer(at, answers, now_ms).unwrap()
             }
             Content::Game(game) if game.place.is_none() => {
-                self.place(number).into_iter().for_each(|it| self.fold(it));
+                let placed = self.place(number);
+                self.fold_all(placed);
                 return due;
             }
             // Its group comes by itself.
