@@ -141,6 +141,11 @@ impl<A: Agent> SeatSession<A> {
         self.agent.on_awaited(awaited);
     }
 
+    /// Whether a substitute plays for the seat, where no event says so.
+    pub(crate) fn substitution(&mut self, substitution: v1::Substitution) {
+        self.substituted = substitution.active;
+    }
+
     /// Updates the state after an event. Attaching ends earlier substitutions.
     fn follow(&mut self, event: v1::GameEvent) {
         match event.kind {

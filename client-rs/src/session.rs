@@ -250,6 +250,7 @@ impl<'a, A: Agent> Session<'a, A> {
         match update {
             Update::Events(batch) => self.progress |= seat.events(batch),
             Update::Awaited(awaited) => seat.awaited(&awaited),
+            Update::Substitution(substitution) => seat.substitution(substitution),
             Update::Decision(request) => seat.decision(request),
             Update::Result(result) => self.progress |= seat.result(&result),
             Update::Detached(detached) => {

@@ -514,6 +514,16 @@ fn a_substituted_seat_resumes_once() {
 }
 
 #[test]
+fn a_substitution_that_others_do_not_see_is_ended_as_well() {
+    let mut harness = Harness::seated(&[5]);
+    let update = |active| Update::Substitution(v1::Substitution { active });
+    assert_eq!(harness.receive(vec![(0, update(true))]), ["0:resume"]);
+    assert!(harness.receive(vec![(0, update(false))]).is_empty());
+    let over = vec![(0, update(true)), (0, update(false))];
+    assert!(harness.receive(over).is_empty());
+}
+
+#[test]
 fn a_substitution_before_the_attachment_is_over() {
     let mut harness = Harness::new(&[&[]]);
     harness.connect(&[(0, 1, 10)]);

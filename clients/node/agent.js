@@ -74,6 +74,7 @@ function seatOf(ticket, about = {}) {
       if (event.game_ended || event.game_aborted) end = event;
       if (event.substituted?.seat === seat) send({ resume: {} }); // Takes the seat back from its substitute.
     }),
+    substitution: ({ active }, send) => { if (active) send({ resume: {} }); }, // The same where a study hides its participants.
     decision: (request, send) => {
       open = request;
       const legal = legalActions(request.action_mask);

@@ -463,10 +463,11 @@ pub struct Participant {
     /// Whether the seat is attached to a stream now; always true for a built-in agent.
     #[prost(bool, tag = "6")]
     pub connected: bool,
-    /// Whether a substitute plays for the seat now. In lists of records: whether the participant did
-    /// not play to the end by itself, because a substitute took a decision for it, its own fallback took
-    /// more than a tenth of those with a choice (Annotations.extra), it was given a hint, or it was gone
-    /// when the game was broken off; ratings count it.
+    /// Whether a substitute plays for the seat now; not shown where a study hides who has it. In lists of
+    /// records: whether the participant did not play to the end by itself, because a substitute took a
+    /// decision for it, its own fallback took more than a tenth of those with a choice
+    /// (Annotations.extra), it was given a hint, or it was gone when the game was broken off; ratings
+    /// count it.
     #[prost(bool, tag = "7")]
     pub substituted: bool,
     /// The recorded player that the built-in agent "replay" imitates; unset for all others.
@@ -3242,7 +3243,8 @@ pub struct ServerRestarted {}
 /// which the seat reached its limit of timeouts, or its absence time was over
 /// (RoomPolicy.absence_time_ms); never a special action: nobody else may learn that one ran out. If its
 /// participant has left the tournament or study (`for_good`), it comes at any time, and the built-in
-/// agent plays until the end of the game.
+/// agent plays until the end of the game. Where a study hides who plays on the seat, it is in the record
+/// alone; the seat's own participant receives Substitution.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct Substituted {
     /// The seat.
@@ -5071,8 +5073,9 @@ pub struct Attach {
     pub entropy: ::prost::alloc::vec::Vec<u8>,
 }
 /// Ends a substitution: the seat's own participant plays again, and every viewer receives Returned.
-/// A seat learns from a Substituted event with its own number that a built-in agent plays for it; it
-/// is sent at once. Attaching ends a substitution too.
+/// A seat learns from a Substituted event with its own number that a built-in agent plays for it, or
+/// from Substitution where a study hides its participants; both are sent at once. Attaching ends a
+/// substitution too.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct ResumeSeat {}
 /// Detaches the seat without ending the stream.
@@ -5184,6 +5187,15 @@ pub struct Detached {
     #[prost(enumeration = "DetachReason", tag = "1")]
     pub reason: i32,
 }
+/// Whether a built-in agent plays for the seat, when that changes and no event says so: where a study
+/// hides its participants, nobody else may learn that one was away, so that neither Substituted nor
+/// Returned is sent. Not sent when attaching ends a substitution.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct Substitution {
+    /// Whether one plays.
+    #[prost(bool, tag = "1")]
+    pub active: bool,
+}
 /// A command was refused. The stream and its other seats are unaffected. A seat whose Attach is
 /// refused has no further updates. Repeating the command on a new stream is worthwhile only if
 /// `code` is one that is worth repeating for a call (proto/README.md, Errors).
@@ -5220,7 +5232,7 @@ pub struct SeatUpdate {
     #[prost(uint32, tag = "1")]
     pub handle: u32,
     /// The update.
-    #[prost(oneof = "seat_update::Update", tags = "2, 3, 4, 5, 6, 7, 8, 9, 10")]
+    #[prost(oneof = "seat_update::Update", tags = "2, 3, 4, 5, 6, 7, 8, 9, 10, 11")]
     pub update: ::core::option::Option<seat_update::Update>,
 }
 /// Nested message and enum types in `SeatUpdate`.
@@ -5256,6 +5268,9 @@ pub mod seat_update {
         /// the seat's own.
         #[prost(message, tag = "10")]
         Awaited(super::Awaited),
+        /// Whether a built-in agent plays for the seat.
+        #[prost(message, tag = "11")]
+        Substitution(super::Substitution),
     }
 }
 /// All updates that were ready when the message was written.

@@ -32472,6 +32472,9 @@ impl serde::Serialize for SeatUpdate {
                 seat_update::Update::Awaited(v) => {
                     struct_ser.serialize_field("awaited", v)?;
                 }
+                seat_update::Update::Substitution(v) => {
+                    struct_ser.serialize_field("substitution", v)?;
+                }
             }
         }
         struct_ser.end()
@@ -32494,6 +32497,7 @@ impl<'de> serde::Deserialize<'de> for SeatUpdate {
             "refused",
             "entered",
             "awaited",
+            "substitution",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -32508,6 +32512,7 @@ impl<'de> serde::Deserialize<'de> for SeatUpdate {
             Refused,
             Entered,
             Awaited,
+            Substitution,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -32539,6 +32544,7 @@ impl<'de> serde::Deserialize<'de> for SeatUpdate {
                             "refused" => Ok(GeneratedField::Refused),
                             "entered" => Ok(GeneratedField::Entered),
                             "awaited" => Ok(GeneratedField::Awaited),
+                            "substitution" => Ok(GeneratedField::Substitution),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -32631,6 +32637,13 @@ impl<'de> serde::Deserialize<'de> for SeatUpdate {
                                 return Err(serde::de::Error::duplicate_field("awaited"));
                             }
                             update__ = map_.next_value::<::std::option::Option<_>>()?.map(seat_update::Update::Awaited)
+;
+                        }
+                        GeneratedField::Substitution => {
+                            if update__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("substitution"));
+                            }
+                            update__ = map_.next_value::<::std::option::Option<_>>()?.map(seat_update::Update::Substitution)
 ;
                         }
                     }
@@ -43794,6 +43807,97 @@ impl<'de> serde::Deserialize<'de> for Substituted {
             }
         }
         deserializer.deserialize_struct("chefshat.v1.Substituted", FIELDS, GeneratedVisitor)
+    }
+}
+impl serde::Serialize for Substitution {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if self.active {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.Substitution", len)?;
+        if self.active {
+            struct_ser.serialize_field("active", &self.active)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for Substitution {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "active",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Active,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "active" => Ok(GeneratedField::Active),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = Substitution;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.Substitution")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<Substitution, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut active__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Active => {
+                            if active__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("active"));
+                            }
+                            active__ = Some(map_.next_value()?);
+                        }
+                    }
+                }
+                Ok(Substitution {
+                    active: active__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.Substitution", FIELDS, GeneratedVisitor)
     }
 }
 impl serde::Serialize for TablePause {

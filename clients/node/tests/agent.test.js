@@ -193,10 +193,12 @@ test("a refused decision is answered again, and the seat is taken back from its 
     await hear();
     stream.write({ updates: [events({ sequence: 1, substituted: { seat: 1 } }, { sequence: 2, substituted: { seat: 2 } })] });
     await hear();
+    stream.write({ updates: [{ handle: 0, substitution: { active: true } }, { handle: 0, substitution: { active: false } }] });
+    await hear();
     stream.write({ updates: [events(ended(3)), detached("GAME_OVER")] });
   });
   await play({ address: server.address, code: "TABLE", name: "Ada" });
-  assert.deepEqual(heard, [[0, 1, undefined], [0, 1, undefined], [0, undefined, {}]]);
+  assert.deepEqual(heard, [[0, 1, undefined], [0, 1, undefined], [0, undefined, {}], [0, undefined, {}]]);
 });
 
 for (const [what, updates, message] of [

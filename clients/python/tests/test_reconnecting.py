@@ -130,6 +130,15 @@ def test_a_substituted_seat_resumes_once(stage: Stage) -> None:
     assert stage.commands() == [(0, "resume")]
 
 
+def test_a_substitution_that_others_do_not_see_is_ended_as_well(stage: Stage) -> None:
+    active, over = (pb.SeatUpdate(substitution=pb.Substitution(active=active)) for active in (True, False))
+    stage.receive(active)
+    assert stage.commands() == [(0, "resume")]
+    stage.receive(over)
+    stage.receive(active, over)
+    assert stage.commands() == []
+
+
 def test_a_decision_that_is_left_open_leaves_the_seat_to_the_substitute(stage: Stage) -> None:
     (ask,) = stage.receive(decision(1))
     stage.session.answer(ask, None)

@@ -124,6 +124,17 @@ describe("an open decision", () => {
   });
 });
 
+describe("a substitution that others do not see", () => {
+  const substitution = (active: boolean): Init => ({ case: "substitution", value: { active } });
+
+  test("closes the open decision, and ends when the seat is back or attached again", () => {
+    const away = updated(updated(start(), decision(7n, {})), substitution(true));
+    expect([away.substituted, away.decision]).toEqual([true, undefined]);
+    expect(updated(away, substitution(false)).substituted).toBe(false);
+    expect(updated(away, { case: "attached", value: { seat: 0 } }).substituted).toBe(false);
+  });
+});
+
 describe("whom the game waits for", () => {
   const awaited = (value: Extract<Init, { case: "awaited" }>["value"]): Init => ({ case: "awaited", value });
   const away = updated(start(), awaited({ seat: 2, away: true, waitedMs: 8000, leftMs: 12_400 })).awaited;

@@ -45,12 +45,8 @@ impl Core {
             }
             Change::Returned(seat) => {
                 let state = &mut self.seats[seat.index()];
-                state.away = false;
-                // The substitution was shown to all, so its end is.
-                match std::mem::take(&mut state.substituted) {
-                    true => self.log.push(at, RoomEvent::Returned(*seat)),
-                    false => self.log_presence(at, *seat, RoomEvent::Returned(*seat)),
-                }
+                (state.away, state.substituted) = (false, false);
+                self.log_presence(at, *seat, RoomEvent::Returned(*seat));
                 if let Some(open) = &mut self.open
                     && open.decision.seat == *seat
                     && open.start.is_none()
@@ -62,15 +58,13 @@ impl Core {
                 let state = &mut self.seats[seat.index()];
                 state.substituted = true;
                 state.ever_substituted = true;
-                self.log.push(at, RoomEvent::Substituted(*seat));
+                self.log_presence(at, *seat, RoomEvent::Substituted(*seat));
             }
             Change::Retired(seat) => {
                 let state = &mut self.seats[seat.index()];
                 state.retired = true;
-                state.retired_unseen = self.header.is_hidden(*seat) && !state.substituted;
                 state.substituted = true;
                 state.ever_substituted = true;
-                // A hidden seat's retirement is not published: no client needs it.
                 self.log_presence(at, *seat, RoomEvent::Retired(*seat));
             }
             Change::Attempted { .. } => {
@@ -113,8 +107,8 @@ impl Core {
         }
     }
 
-    /// Logs that the participant of a seat came or went. A built-in agent never does, so it is not
-    /// shown of a seat of which nobody may know whether one plays there.
+    /// Logs that the participant of a seat came or went, or has a substitute. A built-in agent never
+    /// does, so it is not shown of a seat of which nobody may know whether one plays there.
     fn log_presence(&mut self, at: Duration, seat: Seat, event: RoomEvent) {
         if !self.header.is_hidden(seat) {
             self.log.push(at, event);

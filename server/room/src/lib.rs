@@ -149,8 +149,6 @@ struct SeatState {
     retiring: bool,
     /// Whether its participant has left for good.
     retired: bool,
-    /// Whether that was not published: nobody may know who has the seat.
-    retired_unseen: bool,
     ever_hinted: bool,
     /// Whose decisions those of its participant were.
     choices: OwnChoices,
@@ -309,7 +307,6 @@ impl Core {
                     ever_substituted: false,
                     retiring: false,
                     retired: false,
-                    retired_unseen: false,
                     ever_hinted: false,
                     choices: OwnChoices::default(),
                     decisions: 0,
@@ -499,8 +496,14 @@ impl Core {
             fill: state.fill,
             participant: state.participant.as_deref(),
             connected: state.connection.is_some(),
-            substituted: state.substituted && !state.retired_unseen,
+            substituted: state.substituted,
         }
+    }
+
+    /// Whether a substitute plays for a seat, of which no event says so because nobody else may know
+    /// who has the seat.
+    pub fn is_substituted_unseen(&self, seat: Seat) -> bool {
+        self.seats[seat.index()].substituted && self.header.is_hidden(seat)
     }
 
     /// The observation of a viewer. At a physical table it has only known cards.

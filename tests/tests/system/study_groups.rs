@@ -5,8 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chefshat_client::{ActionId, Agent};
 use chefshat_proto::v1::study_service_client::StudyServiceClient;
-use chefshat_proto::v1::{self, study_stage::Stage, study_view::Content};
-use chefshat_tests::patiently;
+use chefshat_proto::v1::{
+    self, game_event::Kind, seat_command::Command, seat_update::Update, study_stage::Stage,
+    study_view::Content,
+};
+use chefshat_server::host::Host;
+use chefshat_tests::{StreamSeat, first_legal, patiently};
 use tokio::sync::oneshot;
 use tonic::transport::Channel;
 use tonic_types::StatusExt as _;
@@ -89,24 +93,94 @@ async fn game_of(person: &mut Person) -> v1::StudyShownGame {
     game.expect("a game").clone()
 }
 
+/// Creates a study on a server.
+async fn created(host: &Host, settings: v1::StudySettings) -> Lab {
+    let channel = Channel::from_shared(host.url().to_owned()).expect("a URL");
+    let channel = channel.connect().await.expect("the server listens");
+    let request = v1::CreateStudyRequest {
+        settings: Some(settings),
+        request_id: Vec::new(),
+    };
+    let created = StudyServiceClient::new(channel).create_study(request).await;
+    let created = created.expect("valid").into_inner();
+    let id = created.study.expect("a study").study_id;
+    Lab::connect(host, (id, created.owner_token)).await
+}
+
+/// That an agent stands in for somebody shows that it is a person: others are not told.
+#[tokio::test(flavor = "multi_thread")]
+async fn that_an_agent_stands_in_for_one_of_a_pair_only_the_one_itself_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let host = open_to_all(folder.path()).await;
+    let tap = Tap::new(address(&host)).await;
+    let mut settings = pairs();
+    settings.participants = 2;
+    settings.conditions.truncate(1);
+    settings.factors[0].levels.truncate(1);
+    for condition in &mut settings.conditions {
+        let policy = condition.policy.as_mut().expect("it has one");
+        (policy.decision_time_ms, policy.bank_ms) = (Some(1_000), Some(0));
+        policy.max_timeouts = Some(1);
+    }
+    let mut lab = created(&host, settings).await;
+    let links = lab.links(vec!["Ada".to_owned(), "Bo".to_owned()]).await;
+    let (mut ada, a) = Person::new(&tap, &links[0]).await;
+    let (mut bo, b) = Person::new(&tap, &links[1]).await;
+    let [_, _] = arrive(&mut ada, a, &mut bo, b).await;
+    let games = tokio::join!(game_of(&mut ada), game_of(&mut bo));
+    let seat = async |person: &Person, game: &v1::StudyShownGame| {
+        StreamSeat::attached(person.client.channel(), &game.ticket).await
+    };
+    let mut own = seat(&ada, &games.0).await;
+    let mut other = seat(&bo, &games.1).await;
+    // One never answers, and takes its seat back once.
+    let idle = async {
+        let mut told = Vec::new();
+        loop {
+            match own.next().await {
+                Update::Substitution(it) => {
+                    told.push(it.active);
+                    if told == [true] {
+                        own.send(Command::Resume(v1::ResumeSeat {})).await;
+                    }
+                }
+                Update::Detached(_) => break told,
+                _ => {}
+            }
+        }
+    };
+    // The other one answers, however late it may be.
+    let answering = async {
+        loop {
+            match other.next().await {
+                Update::Decision(request) => {
+                    let action = first_legal(&request);
+                    other.answer(request.decision_id, action).await;
+                }
+                Update::Detached(_) => break,
+                _ => {}
+            }
+        }
+    };
+    let (told, ()) = tokio::join!(idle, answering);
+    assert_eq!(told, [true, false, true]);
+    for seat in [&own, &other] {
+        let presence = |event: &&v1::GameEvent| {
+            matches!(event.kind, Some(Kind::Substituted(_) | Kind::Returned(_)))
+        };
+        assert_eq!(seat.events.iter().find(presence), None);
+    }
+    let stopping = patiently("the server to stop", host.stop());
+    stopping.await.expect("a clean end");
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn pairs_of_people_play_together_and_a_partner_who_leaves_is_replaced() {
     let folder = tempfile::tempdir().expect("a folder");
     let (first_host, mut operator) = operated(folder.path()).await;
     let tap = Tap::new(address(&first_host)).await;
-    let channel = Channel::from_shared(first_host.url().to_owned()).expect("a URL");
-    let channel = channel.connect().await.expect("the server listens");
-    let request = v1::CreateStudyRequest {
-        settings: Some(pairs()),
-        request_id: Vec::new(),
-    };
-    let created = StudyServiceClient::new(channel).create_study(request).await;
-    let created = created.expect("valid").into_inner();
-    let owner = (
-        created.study.expect("a study").study_id,
-        created.owner_token,
-    );
-    let mut lab = Lab::connect(&first_host, owner.clone()).await;
+    let mut lab = created(&first_host, pairs()).await;
+    let owner = (lab.study_id.clone(), lab.owner_token.clone());
     let name = |number| format!("Pseudonym-{number}-of-all");
     let links = lab.links((1..=4).map(name).collect()).await;
     let mut people = Vec::new();

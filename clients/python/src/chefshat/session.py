@@ -198,6 +198,8 @@ class PlaySession:
                 self._snapshot(seat, update.snapshot)
             elif what == "awaited":
                 self._awaited(seat, update.awaited)
+            elif what == "substitution":
+                seat.substituted = update.substitution.active
             elif what == "detached":
                 self._detached(seat, update.handle, update.detached)
             if seat.substituted:

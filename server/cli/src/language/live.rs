@@ -98,6 +98,12 @@ impl Live {
                 self.me = Some(attached.seat);
                 self.open = None;
                 self.awaited = None;
+                self.view.substitute(attached.seat, None);
+            }
+            Update::Substitution(substitution) => {
+                if let Some(me) = self.me {
+                    self.view.substitute(me, substitution.active.then_some(""));
+                }
             }
             Update::Awaited(awaited) => self.awaited = AwaitedSeat::new(&awaited, now_ms),
             Update::Events(batch) => batch.events.iter().for_each(|event| self.event(event)),

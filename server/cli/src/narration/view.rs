@@ -134,6 +134,16 @@ impl GameView {
         self.seats.get(usize::try_from(seat).ok()?)
     }
 
+    /// A substitute plays for a seat from now on: an agent of this name; `None`: none does.
+    pub fn substitute(&mut self, seat: u32, agent: Option<&str>) {
+        self.with(seat, |place| {
+            if agent.is_some() || place.substituted {
+                place.substituted = agent.is_some();
+                place.built_in = clean(agent.unwrap_or_default(), MAX_NAME);
+            }
+        });
+    }
+
     fn seat_mut(&mut self, seat: u32) -> Option<&mut SeatView> {
         self.seats.get_mut(usize::try_from(seat).ok()?)
     }
@@ -193,20 +203,11 @@ impl GameView {
                 }
             }
             Kind::Disconnected(seat) => self.with(seat.seat, |place| place.connected = false),
-            Kind::Returned(seat) => self.with(seat.seat, |place| {
-                place.connected = true;
-                if place.substituted {
-                    place.substituted = false;
-                    place.built_in.clear();
-                }
-            }),
-            Kind::Substituted(seat) => {
-                let agent = clean(&seat.built_in_agent, MAX_NAME);
-                self.with(seat.seat, |place| {
-                    place.substituted = true;
-                    place.built_in = agent;
-                });
+            Kind::Returned(seat) => {
+                self.with(seat.seat, |place| place.connected = true);
+                self.substitute(seat.seat, None);
             }
+            Kind::Substituted(seat) => self.substitute(seat.seat, Some(&seat.built_in_agent)),
             Kind::GameStarted(start) => self.game_started(start),
             Kind::ShiftStarted(start) => self.shift_started(start),
             Kind::RolesAssigned(assigned) => {

@@ -96,6 +96,8 @@ pub struct SeatConnection {
     acknowledged: u64,
     /// Whether a decision request is among the pending updates.
     decision_pending: bool,
+    /// Whether it was told that a substitute plays for it, which no event says.
+    substituted: bool,
     _counted: Counted,
 }
 
@@ -122,6 +124,7 @@ impl SeatConnection {
             sent: 0,
             acknowledged: 0,
             decision_pending: false,
+            substituted: false,
             _counted: counted,
         }
     }
@@ -194,7 +197,9 @@ impl Subscriber {
 
     /// Whether updates may be due even without a decision, an urgent event or a full backlog.
     pub fn must_always_be_visited(&self) -> bool {
-        self.stalled || (self.connection()).is_none_or(|connection| connection.options.at_once)
+        let must =
+            |connection: &SeatConnection| connection.options.at_once || connection.substituted;
+        self.stalled || self.connection().is_none_or(must)
     }
 
     /// Position in the log of the first event that has not been sent.
@@ -335,6 +340,7 @@ impl Subscriber {
         let awaited = self.awaited_of(news);
         let key = awaited.map(|it| it.key());
         let awaits_another = !over && key != self.awaited;
+        let substitution = self.new_substitution(core);
         let backlog = visible - self.position;
         let at_once = (self.connection()).is_none_or(|connection| connection.options.at_once);
         let due = decision.is_some()
@@ -342,6 +348,7 @@ impl Subscriber {
             || over
             || self.stalled
             || awaits_another
+            || substitution.is_some()
             || backlog >= MAX_PENDING_EVENTS
             || (at_once && (backlog > 0 || !self.pending.is_empty()));
         if !due {
@@ -367,6 +374,11 @@ impl Subscriber {
                 Role::Spectator { .. } => self.pending.add_spectator_awaited(&awaited),
             }
         }
+        if let (Some(active), Role::Seat(connection)) = (substitution, &mut self.role) {
+            connection.substituted = active;
+            let substitution = Update::Substitution(v1::Substitution { active });
+            self.pending.add(connection.handle, substitution);
+        }
         if let (Some(open), Role::Seat(connection)) = (decision, &mut self.role) {
             let mut request = Vec::with_capacity(DECISION_CAPACITY);
             encode_decision(core, open, now, !connection.options.no_mask, &mut request);
@@ -390,6 +402,13 @@ impl Subscriber {
             }
         }
         !self.ended && !self.is_abandoned()
+    }
+
+    /// Whether a substitute plays for its seat, if that has changed and no event says so.
+    fn new_substitution(&self, core: &Core) -> Option<bool> {
+        let connection = self.connection()?;
+        let active = core.is_substituted_unseen(connection.seat);
+        (active != connection.substituted).then_some(active)
     }
 
     /// Whom the game waits for, if the subscriber is sent this: not its own seat.

@@ -31,9 +31,9 @@ pub(super) fn labelled(core: &Core, mut seats: Vec<v1::Participant>) -> Vec<v1::
             seat: shown.seat,
             name,
             kind: kind_to_proto(kind),
-            // A built-in agent always is.
+            // A built-in agent always is, and has no substitute.
             connected: shown.connected || core.header().is_hidden(seat),
-            substituted: shown.substituted,
+            substituted: shown.substituted && !core.header().is_hidden(seat),
             ..v1::Participant::default()
         };
     }

@@ -572,7 +572,7 @@ fn in_a_hidden_study_the_first_gift_is_asked_for_at_the_same_time_whatever_fills
 }
 
 #[test]
-fn of_a_hidden_seat_only_a_substitution_is_shown() {
+fn of_a_hidden_seat_only_what_it_plays_is_shown() {
     let agents = Fill::Open {
         reserved_for: Some(ParticipantKind::Agent),
     };
@@ -592,6 +592,57 @@ fn of_a_hidden_seat_only_a_substitution_is_shown() {
     let length = table.core.log().len();
     table.lost(Seat::new(0), connections[0]);
     assert_eq!(table.core.log().len(), length + 1);
+
+    // Both are substituted, and come back.
+    let own = Seat::new(0);
+    let connection = table.attach(hidden);
+    table.lost(hidden, connection);
+    let substituted = |table: &Table, seat| table.core.standing(seat).substituted;
+    while !(substituted(&table, own) && substituted(&table, hidden)) {
+        if table
+            .core
+            .awaited()
+            .is_some_and(|open| ![own, hidden].contains(&open.decision.seat))
+        {
+            let (seat, id) = table.open();
+            let action = table.legal(0);
+            table.answer(seat, id, action);
+        }
+        table.pass_time(ms(50));
+    }
+    assert!(table.core.is_substituted_unseen(hidden) && !table.core.is_substituted_unseen(own));
+    let room = convert::describe_at(&table.core, table.now);
+    let shown: Vec<bool> = room.seats.iter().map(|seat| seat.substituted).collect();
+    assert_eq!(shown, [true, false, false, false]);
+    for seat in [own, hidden] {
+        table.attach(seat);
+        assert!(!substituted(&table, seat));
+    }
+    let presence = |kind: v1::game_event::Kind| match kind {
+        v1::game_event::Kind::Substituted(it) => Some(("substituted", it.seat)),
+        v1::game_event::Kind::Returned(it) => Some(("returned", it.seat)),
+        _ => None,
+    };
+    let events = (0..table.core.log().len()).filter_map(|position| {
+        convert::event_to_proto(&table.core, position, Viewer::Everything)?.kind
+    });
+    let shown: Vec<_> = events.filter_map(presence).collect();
+    assert_eq!(shown, [("substituted", 0), ("returned", 0)]);
+    // The record has both.
+    let lines = convert::record_lines(table.core.header(), &table.journal);
+    let events = lines.into_iter().filter_map(|line| match line.line {
+        Some(v1::record_line::Line::Event(event)) => event.kind,
+        _ => None,
+    });
+    let recorded: Vec<_> = events.filter_map(presence).collect();
+    for seat in [0, 2] {
+        assert!(recorded.contains(&("substituted", seat)), "{recorded:?}");
+        assert_eq!(
+            recorded.iter().rfind(|(_, of)| *of == seat),
+            Some(&("returned", seat))
+        );
+    }
+    table.assert_replays();
 }
 
 /// The open decision as a message: the expected encoding.

@@ -78,12 +78,17 @@ export function applyUpdate(live: LiveState, update: SeatUpdate, nowMs: number):
       const table = { ...live.table, roomId: payload.value.roomId, gameId: payload.value.gameId };
       // The open decision may have been closed while the stream was down; if not, the server sends
       // it again, and whom it waits for.
-      return { ...live, own, table, decision: undefined, awaited: undefined, attachment: { kind: "attached" } };
+      const fresh = { decision: undefined, awaited: undefined, substituted: false };
+      return { ...live, ...fresh, own, table, attachment: { kind: "attached" } };
     }
     case "events":
       return payload.value.events.reduce(withEvent, live);
     case "snapshot":
       return withSnapshot(live, applySnapshot(live.table, payload.value, live.own));
+    case "substitution": {
+      const substituted = payload.value.active;
+      return { ...live, substituted, decision: substituted ? undefined : live.decision };
+    }
     case "awaited":
       return { ...live, awaited: awaitedSeat(payload.value, nowMs) };
     case "decision":

@@ -228,6 +228,12 @@ impl App {
                 self.notice.clear();
                 self.open = None;
                 self.awaited = None;
+                self.table.substitute(attached.seat, None);
+            }
+            Update::Substitution(substitution) => {
+                if let Some(me) = self.me {
+                    self.table.substitute(me, substitution.active.then_some(""));
+                }
             }
             Update::Awaited(awaited) => self.awaited = AwaitedSeat::new(&awaited, now_ms),
             Update::Events(batch) => {

@@ -397,7 +397,8 @@ class Substituted(_message.Message):
     which the seat reached its limit of timeouts, or its absence time was over
     (RoomPolicy.absence_time_ms); never a special action: nobody else may learn that one ran out. If its
     participant has left the tournament or study (`for_good`), it comes at any time, and the built-in
-    agent plays until the end of the game.
+    agent plays until the end of the game. Where a study hides who plays on the seat, it is in the record
+    alone; the seat's own participant receives Substitution.
     """
 
     DESCRIPTOR: _descriptor.Descriptor

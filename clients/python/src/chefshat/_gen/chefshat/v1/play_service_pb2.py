@@ -28,7 +28,7 @@ from chefshat._gen.chefshat.v1 import event_pb2 as chefshat_dot_v1_dot_event__pb
 from chefshat._gen.chefshat.v1 import room_pb2 as chefshat_dot_v1_dot_room__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1e\x63hefshat/v1/play_service.proto\x12\x0b\x63hefshat.v1\x1a\"chefshat/v1/analysis_service.proto\x1a\x1a\x63hefshat/v1/decision.proto\x1a\x17\x63hefshat/v1/event.proto\x1a\x16\x63hefshat/v1/room.proto\"\xa5\x01\n\x06\x41ttach\x12\x0e\n\x06ticket\x18\x01 \x01(\t\x12\x12\n\nrequest_id\x18\x02 \x01(\r\x12\x15\n\rfrom_sequence\x18\x03 \x01(\x04\x12\x10\n\x08snapshot\x18\x04 \x01(\x08\x12,\n\x08\x64\x65livery\x18\x05 \x01(\x0e\x32\x1a.chefshat.v1.EventDelivery\x12\x0f\n\x07no_mask\x18\x06 \x01(\x08\x12\x0f\n\x07\x65ntropy\x18\x07 \x01(\x0c\"\x0c\n\nResumeSeat\"\x08\n\x06\x44\x65tach\"\xf4\x01\n\x0bSeatCommand\x12\x0e\n\x06handle\x18\x01 \x01(\r\x12%\n\x06\x61ttach\x18\x02 \x01(\x0b\x32\x13.chefshat.v1.AttachH\x00\x12%\n\x06\x61nswer\x18\x03 \x01(\x0b\x32\x13.chefshat.v1.AnswerH\x00\x12*\n\x07\x65xpress\x18\x04 \x01(\x0b\x32\x17.chefshat.v1.ExpressionH\x00\x12)\n\x06resume\x18\x05 \x01(\x0b\x32\x17.chefshat.v1.ResumeSeatH\x00\x12%\n\x06\x64\x65tach\x18\x06 \x01(\x0b\x32\x13.chefshat.v1.DetachH\x00\x42\t\n\x07\x63ommand\"9\n\x0bPlayRequest\x12*\n\x08\x63ommands\x18\x01 \x03(\x0b\x32\x18.chefshat.v1.SeatCommand\"\x8c\x01\n\x08\x41ttached\x12\x12\n\nrequest_id\x18\x01 \x01(\r\x12\x0f\n\x07room_id\x18\x02 \x01(\t\x12\x0f\n\x07game_id\x18\x03 \x01(\t\x12\x0c\n\x04seat\x18\x04 \x01(\r\x12\x15\n\rnext_sequence\x18\x05 \x01(\x04\x12\x0e\n\x06ticket\x18\x06 \x01(\t\x12\x15\n\rtournament_id\x18\x07 \x01(\t\"I\n\x07\x45ntered\x12\x12\n\nrequest_id\x18\x01 \x01(\r\x12\x15\n\rtournament_id\x18\x02 \x01(\t\x12\x13\n\x0bparticipant\x18\x03 \x01(\r\"4\n\nEventBatch\x12&\n\x06\x65vents\x18\x01 \x03(\x0b\x32\x16.chefshat.v1.GameEvent\"\x80\x01\n\x08Snapshot\x12.\n\x0cgame_started\x18\x01 \x01(\x0b\x32\x18.chefshat.v1.GameStarted\x12-\n\x0bobservation\x18\x02 \x01(\x0b\x32\x18.chefshat.v1.Observation\x12\x15\n\rnext_sequence\x18\x03 \x01(\x04\"5\n\x08\x44\x65tached\x12)\n\x06reason\x18\x01 \x01(\x0e\x32\x19.chefshat.v1.DetachReason\"\xb3\x01\n\x07Refused\x12\x12\n\nrequest_id\x18\x01 \x01(\r\x12\x0e\n\x06reason\x18\x02 \x01(\t\x12\x0f\n\x07message\x18\x03 \x01(\t\x12\x34\n\x08metadata\x18\x04 \x03(\x0b\x32\".chefshat.v1.Refused.MetadataEntry\x12\x0c\n\x04\x63ode\x18\x05 \x01(\r\x1a/\n\rMetadataEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\t:\x02\x38\x01\"\xac\x03\n\nSeatUpdate\x12\x0e\n\x06handle\x18\x01 \x01(\r\x12)\n\x08\x61ttached\x18\x02 \x01(\x0b\x32\x15.chefshat.v1.AttachedH\x00\x12)\n\x06\x65vents\x18\x03 \x01(\x0b\x32\x17.chefshat.v1.EventBatchH\x00\x12\x30\n\x08\x64\x65\x63ision\x18\x04 \x01(\x0b\x32\x1c.chefshat.v1.DecisionRequestH\x00\x12+\n\x06result\x18\x05 \x01(\x0b\x32\x19.chefshat.v1.AnswerResultH\x00\x12)\n\x08snapshot\x18\x06 \x01(\x0b\x32\x15.chefshat.v1.SnapshotH\x00\x12)\n\x08\x64\x65tached\x18\x07 \x01(\x0b\x32\x15.chefshat.v1.DetachedH\x00\x12\'\n\x07refused\x18\x08 \x01(\x0b\x32\x14.chefshat.v1.RefusedH\x00\x12\'\n\x07\x65ntered\x18\t \x01(\x0b\x32\x14.chefshat.v1.EnteredH\x00\x12\'\n\x07\x61waited\x18\n \x01(\x0b\x32\x14.chefshat.v1.AwaitedH\x00\x42\x08\n\x06update\"8\n\x0cPlayResponse\x12(\n\x07updates\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.SeatUpdate\"=\n\x17PlayServiceWatchRequest\x12\"\n\x05seats\x18\x01 \x03(\x0b\x32\x13.chefshat.v1.Attach\"D\n\x18PlayServiceWatchResponse\x12(\n\x07updates\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.SeatUpdate\"\xcb\x01\n\nActRequest\x12\x0e\n\x06ticket\x18\x01 \x01(\t\x12%\n\x06\x61nswer\x18\x02 \x01(\x0b\x32\x13.chefshat.v1.AnswerH\x00\x12*\n\x07\x65xpress\x18\x03 \x01(\x0b\x32\x17.chefshat.v1.ExpressionH\x00\x12)\n\x06resume\x18\x04 \x01(\x0b\x32\x17.chefshat.v1.ResumeSeatH\x00\x12$\n\x04hint\x18\x05 \x01(\x0b\x32\x14.chefshat.v1.AskHintH\x00\x42\t\n\x07\x63ommand\"2\n\x07\x41skHint\x12\x13\n\x0b\x64\x65\x63ision_id\x18\x01 \x01(\x04\x12\x12\n\nrequest_id\x18\x02 \x01(\x0c\"D\n\x04Hint\x12\x0e\n\x06\x61\x63tion\x18\x01 \x01(\r\x12,\n\x07\x61\x63tions\x18\x02 \x03(\x0b\x32\x1b.chefshat.v1.ActionEstimate\"Y\n\x0b\x41\x63tResponse\x12)\n\x06result\x18\x01 \x01(\x0b\x32\x19.chefshat.v1.AnswerResult\x12\x1f\n\x04hint\x18\x02 \x01(\x0b\x32\x11.chefshat.v1.Hint*n\n\rEventDelivery\x12\x1e\n\x1a\x45VENT_DELIVERY_UNSPECIFIED\x10\x00\x12!\n\x1d\x45VENT_DELIVERY_WITH_DECISIONS\x10\x01\x12\x1a\n\x16\x45VENT_DELIVERY_AT_ONCE\x10\x02*\xec\x01\n\x0c\x44\x65tachReason\x12\x1d\n\x19\x44\x45TACH_REASON_UNSPECIFIED\x10\x00\x12\x1b\n\x17\x44\x45TACH_REASON_REQUESTED\x10\x01\x12\x1c\n\x18\x44\x45TACH_REASON_SUPERSEDED\x10\x02\x12\x1b\n\x17\x44\x45TACH_REASON_GAME_OVER\x10\x03\x12!\n\x1d\x44\x45TACH_REASON_TOURNAMENT_OVER\x10\x05\x12!\n\x1d\x44\x45TACH_REASON_SERVER_STOPPING\x10\x06\"\x04\x08\x04\x10\x04*\x19\x44\x45TACH_REASON_ROOM_FAILED2\xe0\x01\n\x0bPlayService\x12?\n\x04Play\x12\x18.chefshat.v1.PlayRequest\x1a\x19.chefshat.v1.PlayResponse(\x01\x30\x01\x12V\n\x05Watch\x12$.chefshat.v1.PlayServiceWatchRequest\x1a%.chefshat.v1.PlayServiceWatchResponse0\x01\x12\x38\n\x03\x41\x63t\x12\x17.chefshat.v1.ActRequest\x1a\x18.chefshat.v1.ActResponseB\x94\x01\n\x15io.github.chefshat.v1P\x01Z9github.com/chefshat/chefshat/proto/chefshat/v1;chefshatv1\xa2\x02\x03\x43HX\xaa\x02\x0b\x43hefsHat.V1\xba\x02\x0c\x43hefsHat_V1_\xca\x02\x0b\x43hefsHat\\V1\xea\x02\x0c\x43hefsHat::V1b\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1e\x63hefshat/v1/play_service.proto\x12\x0b\x63hefshat.v1\x1a\"chefshat/v1/analysis_service.proto\x1a\x1a\x63hefshat/v1/decision.proto\x1a\x17\x63hefshat/v1/event.proto\x1a\x16\x63hefshat/v1/room.proto\"\xa5\x01\n\x06\x41ttach\x12\x0e\n\x06ticket\x18\x01 \x01(\t\x12\x12\n\nrequest_id\x18\x02 \x01(\r\x12\x15\n\rfrom_sequence\x18\x03 \x01(\x04\x12\x10\n\x08snapshot\x18\x04 \x01(\x08\x12,\n\x08\x64\x65livery\x18\x05 \x01(\x0e\x32\x1a.chefshat.v1.EventDelivery\x12\x0f\n\x07no_mask\x18\x06 \x01(\x08\x12\x0f\n\x07\x65ntropy\x18\x07 \x01(\x0c\"\x0c\n\nResumeSeat\"\x08\n\x06\x44\x65tach\"\xf4\x01\n\x0bSeatCommand\x12\x0e\n\x06handle\x18\x01 \x01(\r\x12%\n\x06\x61ttach\x18\x02 \x01(\x0b\x32\x13.chefshat.v1.AttachH\x00\x12%\n\x06\x61nswer\x18\x03 \x01(\x0b\x32\x13.chefshat.v1.AnswerH\x00\x12*\n\x07\x65xpress\x18\x04 \x01(\x0b\x32\x17.chefshat.v1.ExpressionH\x00\x12)\n\x06resume\x18\x05 \x01(\x0b\x32\x17.chefshat.v1.ResumeSeatH\x00\x12%\n\x06\x64\x65tach\x18\x06 \x01(\x0b\x32\x13.chefshat.v1.DetachH\x00\x42\t\n\x07\x63ommand\"9\n\x0bPlayRequest\x12*\n\x08\x63ommands\x18\x01 \x03(\x0b\x32\x18.chefshat.v1.SeatCommand\"\x8c\x01\n\x08\x41ttached\x12\x12\n\nrequest_id\x18\x01 \x01(\r\x12\x0f\n\x07room_id\x18\x02 \x01(\t\x12\x0f\n\x07game_id\x18\x03 \x01(\t\x12\x0c\n\x04seat\x18\x04 \x01(\r\x12\x15\n\rnext_sequence\x18\x05 \x01(\x04\x12\x0e\n\x06ticket\x18\x06 \x01(\t\x12\x15\n\rtournament_id\x18\x07 \x01(\t\"I\n\x07\x45ntered\x12\x12\n\nrequest_id\x18\x01 \x01(\r\x12\x15\n\rtournament_id\x18\x02 \x01(\t\x12\x13\n\x0bparticipant\x18\x03 \x01(\r\"4\n\nEventBatch\x12&\n\x06\x65vents\x18\x01 \x03(\x0b\x32\x16.chefshat.v1.GameEvent\"\x80\x01\n\x08Snapshot\x12.\n\x0cgame_started\x18\x01 \x01(\x0b\x32\x18.chefshat.v1.GameStarted\x12-\n\x0bobservation\x18\x02 \x01(\x0b\x32\x18.chefshat.v1.Observation\x12\x15\n\rnext_sequence\x18\x03 \x01(\x04\"5\n\x08\x44\x65tached\x12)\n\x06reason\x18\x01 \x01(\x0e\x32\x19.chefshat.v1.DetachReason\"\x1e\n\x0cSubstitution\x12\x0e\n\x06\x61\x63tive\x18\x01 \x01(\x08\"\xb3\x01\n\x07Refused\x12\x12\n\nrequest_id\x18\x01 \x01(\r\x12\x0e\n\x06reason\x18\x02 \x01(\t\x12\x0f\n\x07message\x18\x03 \x01(\t\x12\x34\n\x08metadata\x18\x04 \x03(\x0b\x32\".chefshat.v1.Refused.MetadataEntry\x12\x0c\n\x04\x63ode\x18\x05 \x01(\r\x1a/\n\rMetadataEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\t:\x02\x38\x01\"\xdf\x03\n\nSeatUpdate\x12\x0e\n\x06handle\x18\x01 \x01(\r\x12)\n\x08\x61ttached\x18\x02 \x01(\x0b\x32\x15.chefshat.v1.AttachedH\x00\x12)\n\x06\x65vents\x18\x03 \x01(\x0b\x32\x17.chefshat.v1.EventBatchH\x00\x12\x30\n\x08\x64\x65\x63ision\x18\x04 \x01(\x0b\x32\x1c.chefshat.v1.DecisionRequestH\x00\x12+\n\x06result\x18\x05 \x01(\x0b\x32\x19.chefshat.v1.AnswerResultH\x00\x12)\n\x08snapshot\x18\x06 \x01(\x0b\x32\x15.chefshat.v1.SnapshotH\x00\x12)\n\x08\x64\x65tached\x18\x07 \x01(\x0b\x32\x15.chefshat.v1.DetachedH\x00\x12\'\n\x07refused\x18\x08 \x01(\x0b\x32\x14.chefshat.v1.RefusedH\x00\x12\'\n\x07\x65ntered\x18\t \x01(\x0b\x32\x14.chefshat.v1.EnteredH\x00\x12\'\n\x07\x61waited\x18\n \x01(\x0b\x32\x14.chefshat.v1.AwaitedH\x00\x12\x31\n\x0csubstitution\x18\x0b \x01(\x0b\x32\x19.chefshat.v1.SubstitutionH\x00\x42\x08\n\x06update\"8\n\x0cPlayResponse\x12(\n\x07updates\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.SeatUpdate\"=\n\x17PlayServiceWatchRequest\x12\"\n\x05seats\x18\x01 \x03(\x0b\x32\x13.chefshat.v1.Attach\"D\n\x18PlayServiceWatchResponse\x12(\n\x07updates\x18\x01 \x03(\x0b\x32\x17.chefshat.v1.SeatUpdate\"\xcb\x01\n\nActRequest\x12\x0e\n\x06ticket\x18\x01 \x01(\t\x12%\n\x06\x61nswer\x18\x02 \x01(\x0b\x32\x13.chefshat.v1.AnswerH\x00\x12*\n\x07\x65xpress\x18\x03 \x01(\x0b\x32\x17.chefshat.v1.ExpressionH\x00\x12)\n\x06resume\x18\x04 \x01(\x0b\x32\x17.chefshat.v1.ResumeSeatH\x00\x12$\n\x04hint\x18\x05 \x01(\x0b\x32\x14.chefshat.v1.AskHintH\x00\x42\t\n\x07\x63ommand\"2\n\x07\x41skHint\x12\x13\n\x0b\x64\x65\x63ision_id\x18\x01 \x01(\x04\x12\x12\n\nrequest_id\x18\x02 \x01(\x0c\"D\n\x04Hint\x12\x0e\n\x06\x61\x63tion\x18\x01 \x01(\r\x12,\n\x07\x61\x63tions\x18\x02 \x03(\x0b\x32\x1b.chefshat.v1.ActionEstimate\"Y\n\x0b\x41\x63tResponse\x12)\n\x06result\x18\x01 \x01(\x0b\x32\x19.chefshat.v1.AnswerResult\x12\x1f\n\x04hint\x18\x02 \x01(\x0b\x32\x11.chefshat.v1.Hint*n\n\rEventDelivery\x12\x1e\n\x1a\x45VENT_DELIVERY_UNSPECIFIED\x10\x00\x12!\n\x1d\x45VENT_DELIVERY_WITH_DECISIONS\x10\x01\x12\x1a\n\x16\x45VENT_DELIVERY_AT_ONCE\x10\x02*\xec\x01\n\x0c\x44\x65tachReason\x12\x1d\n\x19\x44\x45TACH_REASON_UNSPECIFIED\x10\x00\x12\x1b\n\x17\x44\x45TACH_REASON_REQUESTED\x10\x01\x12\x1c\n\x18\x44\x45TACH_REASON_SUPERSEDED\x10\x02\x12\x1b\n\x17\x44\x45TACH_REASON_GAME_OVER\x10\x03\x12!\n\x1d\x44\x45TACH_REASON_TOURNAMENT_OVER\x10\x05\x12!\n\x1d\x44\x45TACH_REASON_SERVER_STOPPING\x10\x06\"\x04\x08\x04\x10\x04*\x19\x44\x45TACH_REASON_ROOM_FAILED2\xe0\x01\n\x0bPlayService\x12?\n\x04Play\x12\x18.chefshat.v1.PlayRequest\x1a\x19.chefshat.v1.PlayResponse(\x01\x30\x01\x12V\n\x05Watch\x12$.chefshat.v1.PlayServiceWatchRequest\x1a%.chefshat.v1.PlayServiceWatchResponse0\x01\x12\x38\n\x03\x41\x63t\x12\x17.chefshat.v1.ActRequest\x1a\x18.chefshat.v1.ActResponseB\x94\x01\n\x15io.github.chefshat.v1P\x01Z9github.com/chefshat/chefshat/proto/chefshat/v1;chefshatv1\xa2\x02\x03\x43HX\xaa\x02\x0b\x43hefsHat.V1\xba\x02\x0c\x43hefsHat_V1_\xca\x02\x0b\x43hefsHat\\V1\xea\x02\x0c\x43hefsHat::V1b\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -38,10 +38,10 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['DESCRIPTOR']._serialized_options = b'\n\025io.github.chefshat.v1P\001Z9github.com/chefshat/chefshat/proto/chefshat/v1;chefshatv1\242\002\003CHX\252\002\013ChefsHat.V1\272\002\014ChefsHat_V1_\312\002\013ChefsHat\\V1\352\002\014ChefsHat::V1'
   _globals['_REFUSED_METADATAENTRY']._loaded_options = None
   _globals['_REFUSED_METADATAENTRY']._serialized_options = b'8\001'
-  _globals['_EVENTDELIVERY']._serialized_start=2339
-  _globals['_EVENTDELIVERY']._serialized_end=2449
-  _globals['_DETACHREASON']._serialized_start=2452
-  _globals['_DETACHREASON']._serialized_end=2688
+  _globals['_EVENTDELIVERY']._serialized_start=2422
+  _globals['_EVENTDELIVERY']._serialized_end=2532
+  _globals['_DETACHREASON']._serialized_start=2535
+  _globals['_DETACHREASON']._serialized_end=2771
   _globals['_ATTACH']._serialized_start=161
   _globals['_ATTACH']._serialized_end=326
   _globals['_RESUMESEAT']._serialized_start=328
@@ -62,26 +62,28 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_SNAPSHOT']._serialized_end=1059
   _globals['_DETACHED']._serialized_start=1061
   _globals['_DETACHED']._serialized_end=1114
-  _globals['_REFUSED']._serialized_start=1117
-  _globals['_REFUSED']._serialized_end=1296
-  _globals['_REFUSED_METADATAENTRY']._serialized_start=1249
-  _globals['_REFUSED_METADATAENTRY']._serialized_end=1296
-  _globals['_SEATUPDATE']._serialized_start=1299
-  _globals['_SEATUPDATE']._serialized_end=1727
-  _globals['_PLAYRESPONSE']._serialized_start=1729
-  _globals['_PLAYRESPONSE']._serialized_end=1785
-  _globals['_PLAYSERVICEWATCHREQUEST']._serialized_start=1787
-  _globals['_PLAYSERVICEWATCHREQUEST']._serialized_end=1848
-  _globals['_PLAYSERVICEWATCHRESPONSE']._serialized_start=1850
-  _globals['_PLAYSERVICEWATCHRESPONSE']._serialized_end=1918
-  _globals['_ACTREQUEST']._serialized_start=1921
-  _globals['_ACTREQUEST']._serialized_end=2124
-  _globals['_ASKHINT']._serialized_start=2126
-  _globals['_ASKHINT']._serialized_end=2176
-  _globals['_HINT']._serialized_start=2178
-  _globals['_HINT']._serialized_end=2246
-  _globals['_ACTRESPONSE']._serialized_start=2248
-  _globals['_ACTRESPONSE']._serialized_end=2337
-  _globals['_PLAYSERVICE']._serialized_start=2691
-  _globals['_PLAYSERVICE']._serialized_end=2915
+  _globals['_SUBSTITUTION']._serialized_start=1116
+  _globals['_SUBSTITUTION']._serialized_end=1146
+  _globals['_REFUSED']._serialized_start=1149
+  _globals['_REFUSED']._serialized_end=1328
+  _globals['_REFUSED_METADATAENTRY']._serialized_start=1281
+  _globals['_REFUSED_METADATAENTRY']._serialized_end=1328
+  _globals['_SEATUPDATE']._serialized_start=1331
+  _globals['_SEATUPDATE']._serialized_end=1810
+  _globals['_PLAYRESPONSE']._serialized_start=1812
+  _globals['_PLAYRESPONSE']._serialized_end=1868
+  _globals['_PLAYSERVICEWATCHREQUEST']._serialized_start=1870
+  _globals['_PLAYSERVICEWATCHREQUEST']._serialized_end=1931
+  _globals['_PLAYSERVICEWATCHRESPONSE']._serialized_start=1933
+  _globals['_PLAYSERVICEWATCHRESPONSE']._serialized_end=2001
+  _globals['_ACTREQUEST']._serialized_start=2004
+  _globals['_ACTREQUEST']._serialized_end=2207
+  _globals['_ASKHINT']._serialized_start=2209
+  _globals['_ASKHINT']._serialized_end=2259
+  _globals['_HINT']._serialized_start=2261
+  _globals['_HINT']._serialized_end=2329
+  _globals['_ACTRESPONSE']._serialized_start=2331
+  _globals['_ACTRESPONSE']._serialized_end=2420
+  _globals['_PLAYSERVICE']._serialized_start=2774
+  _globals['_PLAYSERVICE']._serialized_end=2998
 # @@protoc_insertion_point(module_scope)

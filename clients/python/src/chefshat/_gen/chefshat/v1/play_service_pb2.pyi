@@ -163,8 +163,9 @@ Global___Attach: _TypeAlias = Attach  # noqa: Y015
 @_typing.final
 class ResumeSeat(_message.Message):
     """Ends a substitution: the seat's own participant plays again, and every viewer receives Returned.
-    A seat learns from a Substituted event with its own number that a built-in agent plays for it; it
-    is sent at once. Attaching ends a substitution too.
+    A seat learns from a Substituted event with its own number that a built-in agent plays for it, or
+    from Substitution where a study hides its participants; both are sent at once. Attaching ends a
+    substitution too.
     """
 
     DESCRIPTOR: _descriptor.Descriptor
@@ -436,6 +437,31 @@ class Detached(_message.Message):
 Global___Detached: _TypeAlias = Detached  # noqa: Y015
 
 @_typing.final
+class Substitution(_message.Message):
+    """Whether a built-in agent plays for the seat, when that changes and no event says so: where a study
+    hides its participants, nobody else may learn that one was away, so that neither Substituted nor
+    Returned is sent. Not sent when attaching ends a substitution.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    ACTIVE_FIELD_NUMBER: _builtins.int
+    active: _builtins.bool
+    """Whether one plays."""
+    def __init__(
+        self,
+        *,
+        active: _builtins.bool = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["active", b"active"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___Substitution: _TypeAlias = Substitution  # noqa: Y015
+
+@_typing.final
 class Refused(_message.Message):
     """A command was refused. The stream and its other seats are unaffected. A seat whose Attach is
     refused has no further updates. Repeating the command on a new stream is worthwhile only if
@@ -518,6 +544,7 @@ class SeatUpdate(_message.Message):
     REFUSED_FIELD_NUMBER: _builtins.int
     ENTERED_FIELD_NUMBER: _builtins.int
     AWAITED_FIELD_NUMBER: _builtins.int
+    SUBSTITUTION_FIELD_NUMBER: _builtins.int
     handle: _builtins.int
     """Handle of the seat on this stream: the number of its Attach on the stream, from 0. Refused
     Attaches and those of participants are counted. Seats that the server attaches, in games of a
@@ -561,6 +588,10 @@ class SeatUpdate(_message.Message):
         the seat's own.
         """
 
+    @_builtins.property
+    def substitution(self) -> Global___Substitution:
+        """Whether a built-in agent plays for the seat."""
+
     def __init__(
         self,
         *,
@@ -574,12 +605,13 @@ class SeatUpdate(_message.Message):
         refused: Global___Refused | None = ...,
         entered: Global___Entered | None = ...,
         awaited: _room_pb2.Awaited | None = ...,
+        substitution: Global___Substitution | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["attached", b"attached", "awaited", b"awaited", "decision", b"decision", "detached", b"detached", "entered", b"entered", "events", b"events", "refused", b"refused", "result", b"result", "snapshot", b"snapshot", "update", b"update"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["attached", b"attached", "awaited", b"awaited", "decision", b"decision", "detached", b"detached", "entered", b"entered", "events", b"events", "refused", b"refused", "result", b"result", "snapshot", b"snapshot", "substitution", b"substitution", "update", b"update"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["attached", b"attached", "awaited", b"awaited", "decision", b"decision", "detached", b"detached", "entered", b"entered", "events", b"events", "handle", b"handle", "refused", b"refused", "result", b"result", "snapshot", b"snapshot", "update", b"update"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["attached", b"attached", "awaited", b"awaited", "decision", b"decision", "detached", b"detached", "entered", b"entered", "events", b"events", "handle", b"handle", "refused", b"refused", "result", b"result", "snapshot", b"snapshot", "substitution", b"substitution", "update", b"update"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
-    _WhichOneofReturnType_update: _TypeAlias = _typing.Literal["attached", "events", "decision", "result", "snapshot", "detached", "refused", "entered", "awaited"]  # noqa: Y015
+    _WhichOneofReturnType_update: _TypeAlias = _typing.Literal["attached", "events", "decision", "result", "snapshot", "detached", "refused", "entered", "awaited", "substitution"]  # noqa: Y015
     _WhichOneofArgType_update: _TypeAlias = _typing.Literal["update", b"update"]  # noqa: Y015
     def WhichOneof(self, oneof_group: _WhichOneofArgType_update) -> _WhichOneofReturnType_update | None: ...
 

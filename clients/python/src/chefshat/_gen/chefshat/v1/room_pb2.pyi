@@ -701,10 +701,11 @@ class Participant(_message.Message):
     connected: _builtins.bool
     """Whether the seat is attached to a stream now; always true for a built-in agent."""
     substituted: _builtins.bool
-    """Whether a substitute plays for the seat now. In lists of records: whether the participant did
-    not play to the end by itself, because a substitute took a decision for it, its own fallback took
-    more than a tenth of those with a choice (Annotations.extra), it was given a hint, or it was gone
-    when the game was broken off; ratings count it.
+    """Whether a substitute plays for the seat now; not shown where a study hides who has it. In lists of
+    records: whether the participant did not play to the end by itself, because a substitute took a
+    decision for it, its own fallback took more than a tenth of those with a choice
+    (Annotations.extra), it was given a hint, or it was gone when the game was broken off; ratings
+    count it.
     """
     at_table: _builtins.bool
     """Whether the player sits at the physical table with real cards."""
