@@ -157,6 +157,16 @@ impl Batch {
         )
     }
 
+    /// Plays all games on the current rayon pool; returns how each ended, by its index. `progress`: as
+    /// for [`Batch::run`].
+    pub fn results(&self, progress: impl Fn(u64) + Sync) -> Vec<Standings> {
+        let add = |results: &mut Vec<Standings>, index| {
+            results.push(self.play_game(index, &mut Silent));
+            progress(1);
+        };
+        self.fold(Vec::new, add, |results, part| results.extend(part))
+    }
+
     /// Folds all games on the current rayon pool: `add` adds a game, by its index, to a value;
     /// `merge` merges the value of later games into it. Grouping and order depend on the number of
     /// games alone, so that sums of fractions are the same on every machine.
@@ -180,6 +190,11 @@ impl Batch {
         table.add_game_end(&standings, &last);
     }
 }
+
+/// Ignores all events.
+pub(crate) struct Silent;
+
+impl Listener for Silent {}
 
 /// Adds a game to a table while it is played.
 struct Adder<'t> {

@@ -1,7 +1,7 @@
 //! Plays Chef's Hat offline: batches of games on all cores with tables of metrics, comparisons of
 //! two agents on duplicate deals, vector environments, offline tournaments, the paper's experiment
-//! on the mechanics of the game, and checks of the engine against test vectors. Rooms, clocks and
-//! the protocol are not involved.
+//! on the mechanics of the game, the power of studies, and checks of the engine against test
+//! vectors. Rooms, clocks and the protocol are not involved.
 //!
 //! ```
 //! use chefshat_agents::AgentKind;
@@ -22,6 +22,7 @@ pub mod conformance;
 mod duplicate;
 mod fold;
 pub mod mechanics;
+pub mod power;
 mod rules_form;
 mod table;
 pub mod tournament;

@@ -1,10 +1,10 @@
 //! The games of participants: which one comes next, with which condition, seed and seat. Rooms
 //! belong to the server.
 
-use crate::Study;
 use crate::change::{Change, Outcome, PlacedGame};
 use crate::stage::Task;
 use crate::state::{Participant, PlayedGame, Status};
+use crate::{Settings, Study};
 
 /// Number of times that a game without a result is played.
 pub const MAX_ATTEMPTS: u32 = 3;
@@ -62,6 +62,16 @@ impl Phase<'_> {
 /// How many seats after the first of a group the one with this index sits: as far apart as possible.
 fn seats_apart(index: u32, size: u32, players: usize) -> usize {
     index as usize * players / size as usize
+}
+
+impl Settings {
+    /// The seats of a group, or of a participant who plays alone, in a game of a condition in which the
+    /// first of them sits here.
+    pub fn seats_of_group(&self, condition: usize, first: usize) -> Vec<usize> {
+        let (size, players) = (self.group_size(), self.conditions[condition].players);
+        let seats = (0..size).map(|index| (first + seats_apart(index, size, players)) % players);
+        seats.collect()
+    }
 }
 
 impl Participant {
@@ -146,9 +156,7 @@ impl Study {
         }
         let own = self.offset_in_group(participant, players);
         let first = (game.seat + players - own) % players;
-        let size = self.settings().group_size();
-        let seats = (0..size).map(|index| (first + seats_apart(index, size, players)) % players);
-        seats.collect()
+        self.settings().seats_of_group(game.condition, first)
     }
 
     /// The room of the game that a test participant is playing.

@@ -205,6 +205,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "chefshat-search",
             "chefshat-server",
             "chefshat-simulation",
+            "chefshat-study",
             "chefshat-tournament",
         ],
     ),

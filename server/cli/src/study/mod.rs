@@ -5,6 +5,7 @@
 mod connection;
 mod file;
 mod owner;
+mod simulate;
 mod trial;
 
 use std::path::PathBuf;
@@ -23,6 +24,7 @@ use super::{CommandError, say};
 /// Run studies with people: conditions, participants, questionnaires, data.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  \
+                  chefshat study simulate docs/studies/example.toml --measure points --effect strength=strong\n  \
                   chefshat study create docs/studies/example.toml --owner-file ./owner\n  \
                   chefshat study test STUDY-ID --owner-file ./owner\n  \
                   chefshat study links STUDY-ID --add 16 --owner-file ./owner\n  \
@@ -44,6 +46,8 @@ enum StudyAction {
     Show(owner::Show),
     /// Print the links of the participants, after adding some if wanted.
     Links(owner::Links),
+    /// Simulate a study with an effect that is known, to learn how likely it is to be found.
+    Simulate(simulate::Simulate),
     /// Let test participants go through a study, with answers by chance.
     Test(trial::Test),
     /// Follow the progress of a study until it is closed and nobody but test participants is active.
@@ -67,6 +71,7 @@ impl StudyCommand {
             StudyAction::List(command) => command.run().await?,
             StudyAction::Show(command) => command.run().await?,
             StudyAction::Links(command) => command.run().await?,
+            StudyAction::Simulate(command) => return command.run(),
             StudyAction::Test(command) => return command.run().await,
             StudyAction::Follow(command) => command.run().await?,
             StudyAction::Export(command) => command.run().await?,

@@ -45,6 +45,107 @@ fn a_study_is_created_and_deleted() {
     chefshat(&["study", "--help"]).assert_helps("chefshat study links");
 }
 
+/// The example of the documentation with pairs.
+const PAIRS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/studies/pairs.toml");
+
+#[test]
+fn a_study_is_simulated_with_an_effect_that_is_known() {
+    let simulate = |file: &str, options: &str| {
+        let options = options.split_whitespace();
+        let given: Vec<&str> = ["study", "simulate", file]
+            .into_iter()
+            .chain(options)
+            .collect();
+        chefshat(&given)
+    };
+    let of_answers = "--measure nasa_tlx/effort --effect strength=strong:1sd --studies 400";
+    let printed = simulate(EXAMPLE, &format!("{of_answers} --json"))
+        .well()
+        .json();
+    let rows = printed["results"].as_array().unwrap();
+    let participants: Vec<&Value> = rows.iter().map(|row| &row["participants"]).collect();
+    assert_eq!(participants, [16, 32, 64]);
+    let power: Vec<f64> = rows
+        .iter()
+        .map(|row| row["power"].as_f64().unwrap())
+        .collect();
+    assert!(
+        power.is_sorted() && power[0] < 0.8 && power[2] > 0.9,
+        "{printed:#}"
+    );
+    for row in rows {
+        let found = row["found_without_effect"].as_f64().unwrap();
+        assert!(found < 0.12, "{printed:#}");
+        assert_eq!(row["with_level"], row["without_level"]);
+    }
+    let again = simulate(EXAMPLE, &format!("{of_answers} --json --threads 1"))
+        .well()
+        .json();
+    assert_eq!(again, printed);
+    simulate(EXAMPLE, of_answers)
+        .well()
+        .assert_says(&["80 %", "400 simulated studies"]);
+
+    // A pair counts once: of 16 participants 8 pairs, 4 with each level.
+    let pairs =
+        "--measure afterwards/together --effect agents=strong:2 --participants 16 --studies 100";
+    let printed = simulate(PAIRS, &format!("{pairs} --json")).well().json();
+    let row = &printed["results"][0];
+    assert_eq!(
+        [&row["with_level"], &row["without_level"]],
+        [4, 4],
+        "{printed:#}"
+    );
+
+    // Greedy agents score more against weak agents than against strong ones.
+    let games = "--measure points --effect strength=strong --participants 8 --studies 100 --json";
+    let printed = simulate(EXAMPLE, games).well().json();
+    let means = &printed["measured"]["means"];
+    let mean = |condition: &str| means[condition].as_f64().unwrap();
+    assert!(
+        mean("weak-opponents") > mean("strong-opponents") + 1.0,
+        "{printed:#}"
+    );
+    let difference = printed["results"][0]["difference"].as_f64().unwrap();
+    assert!(difference < -1.0, "{printed:#}");
+
+    let with_size = "--effect strength=strong:1";
+    for (options, problem) in [
+        (
+            "--measure nasa_tlx/effort --effect kind=strong:1",
+            "strength",
+        ),
+        (
+            "--measure nasa_tlx/effort --effect strength=average:1",
+            "weak, strong",
+        ),
+        (
+            "--measure nasa_tlx/effort --effect strength=strong",
+            "its size",
+        ),
+        (&format!("--measure effort {with_size}"), "nasa_tlx/effort"),
+        (
+            &format!("--measure before/experience {with_size}"),
+            "before the first game",
+        ),
+        (
+            &format!("--measure points {with_size}"),
+            "leave out the size",
+        ),
+        (
+            &format!("--measure nasa_tlx/effort {with_size} --participants 3"),
+            "at least 2",
+        ),
+    ] {
+        simulate(EXAMPLE, options).assert_failed(problem);
+    }
+    simulate(
+        PAIRS,
+        "--measure points --effect agents=strong --participants 7",
+    )
+    .assert_failed("multiple of 2");
+}
+
 /// Opens the study with a participant's link: from then on it is active.
 fn open(url: &str, link: &str) {
     let request = v1::OpenStudyRequest {

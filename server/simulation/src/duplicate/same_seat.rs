@@ -7,9 +7,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
 use super::Contender;
+use crate::batch::Silent;
 use crate::fold::fold_in_order;
 use chefshat_agents::seating_agent_seed;
-use chefshat_agents::{BuiltInAgent, Following, Listener, game_seed, play_agents};
+use chefshat_agents::{BuiltInAgent, Following, game_seed, play_agents};
 use chefshat_tournament::statistics::Moments;
 
 /// Deals played by one thread at a time. Part of the result: it decides how figures are grouped for
@@ -192,7 +193,3 @@ impl Following for Exploring {
 fn below(generator: &mut ChaCha8Rng, end: u64) -> u64 {
     generator.next_u64() % end
 }
-
-struct Silent;
-
-impl Listener for Silent {}

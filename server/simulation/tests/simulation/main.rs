@@ -9,6 +9,7 @@ mod batch;
 mod conformance;
 mod duplicate;
 mod mechanics;
+mod power;
 mod ratings;
 mod same_seat;
 mod tournament;
