@@ -56,6 +56,7 @@ def test_a_player_that_fails_is_named() -> None:
         VectorEnv(None, 16, client_seats=[0], opponents=opponent, rules={"faces": 5}, seed=1)
 
 
+@pytest.mark.slow
 def test_a_training_against_a_player_resumes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -41,6 +41,7 @@ def place(tmp_path: Path, real_address: str) -> Place:
     return Place(tmp_path, real_address)
 
 
+@pytest.mark.slow
 @pytest.mark.server
 def test_a_training_resumes_after_ctrl_c(
     place: Place, processes: list["subprocess.Popen[str]"], capsys: pytest.CaptureFixture[str]

@@ -228,6 +228,7 @@ def test_a_missing_parameter_file_is_reported(tmp_path: Path, capsys: pytest.Cap
         assert f'{path} has no object "parameters"' in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.server
 def test_results_of_a_few_shifts_are_counts(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     # With other seeds an untrained agent without a mask may take thousands of attempts.

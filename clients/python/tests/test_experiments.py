@@ -21,9 +21,10 @@ from chefshat.experiments import command, mechanics, page, plots, rules, tables 
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "experiments.md"
 
-# A learning experiment compiles a program for each kind of agent, and this one has most of them.
-WINNING = pytest.param("winning", marks=pytest.mark.slow)
-QUICKER = [name for name in command.EXPERIMENTS if name != "winning"]
+# A learning experiment compiles a program for each kind of agent.
+LEARNING = ("rules", "winning")
+QUICKER = [name for name in command.EXPERIMENTS if name not in LEARNING]
+ALL = [*QUICKER, *(pytest.param(name, marks=pytest.mark.slow) for name in LEARNING)]
 
 
 def a_result(experiment: str = "mechanics", *, quick: bool = False) -> Result:
@@ -340,7 +341,7 @@ def test_the_papers_figures() -> None:
 
 @pytest.fixture(scope="module")
 def quick_run(request: pytest.FixtureRequest, real_address: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a quick run of all experiments, except for the longest unless a test that is run needs it."""
+    """The folder of a quick run of all experiments, except for the longest unless a test that is run needs them."""
     folder = tmp_path_factory.mktemp("experiments")
     if any(item.get_closest_marker("slow") for item in request.session.items):
         assert main(["all", "--quick", "--out", str(folder), "--address", real_address]) == 0
@@ -351,7 +352,7 @@ def quick_run(request: pytest.FixtureRequest, real_address: str, tmp_path_factor
 
 
 @pytest.mark.server
-@pytest.mark.parametrize("name", [*QUICKER, WINNING])
+@pytest.mark.parametrize("name", ALL)
 def test_a_quick_run_writes_results_and_plots(quick_run: Path, name: str) -> None:
     result = results.read(command.results_file(quick_run, name))
     assert result.experiment == name
@@ -374,7 +375,7 @@ def test_a_quick_run_writes_results_and_plots(quick_run: Path, name: str) -> Non
     ("name", "reported"),
     [
         ("mechanics", ["28%", "35%", "60%", "31", "33", "35"]),
-        ("rules", ["0.5", "-0.82", "65", "62", "63", "60"]),
+        pytest.param("rules", ["0.5", "-0.82", "65", "62", "63", "60"], marks=pytest.mark.slow),
         pytest.param("winning", ["215", "117", "45", "55", "33", "30%"], marks=pytest.mark.slow),
     ],
 )
@@ -403,6 +404,7 @@ def test_mechanics_counts_shifts(quick_run: Path) -> None:
     assert len({json.dumps(values) for values in result.values.values()}) == len(result.values)
 
 
+@pytest.mark.slow
 @pytest.mark.server
 def test_after_ten_illegal_actions_a_random_legal_one_is_taken(quick_run: Path) -> None:
     values = results.read(command.results_file(quick_run, "rules")).values

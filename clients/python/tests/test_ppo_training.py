@@ -64,6 +64,7 @@ def test_some_games_may_be_against_a_past_self(real_address: str, tmp_path: Path
     assert found.opponents == (str(file), "greedy")
 
 
+@pytest.mark.slow
 def test_a_training_resumes_against_the_same_file_only(
     real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -28,7 +28,10 @@ TYPED_BY = {
 }
 
 #: Pages whose commands take long, and why.
-SLOW = {"docs/index.md": "cameras, people and a robot play a Shift; so they do in clients/robot/tests/test_rehearsal.py"}
+SLOW = {
+    "docs/benchmark.md": "thousands of games; a few of each task are played in server/lab/tests/cli/bench.rs",
+    "docs/index.md": "cameras, people and a robot play a Shift; so they do in clients/robot/tests/test_rehearsal.py",
+}
 
 #: What sets up a machine: `cargo xtask test` has done it.
 SET_UP = re.compile(r"(cargo (build|install|xtask)|pip install|python3[.\d]* -m venv|npm ci|cd clients/|apt-get install|cmake) ?")

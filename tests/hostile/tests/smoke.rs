@@ -88,6 +88,7 @@ fn survived(attack: &str, counted: &str) -> Option<Value> {
 }
 
 #[test]
+#[ignore = "long"]
 fn what_an_attack_wants_is_granted_as_far_as_it_may_be() {
     for attack in [
         "mcp-sessions",
@@ -102,6 +103,7 @@ fn what_an_attack_wants_is_granted_as_far_as_it_may_be() {
 }
 
 #[test]
+#[ignore = "long"]
 fn a_picture_may_take_longer_than_the_attack() {
     survived("replay-pictures", "tried");
 }
@@ -122,6 +124,7 @@ fn what_no_server_accepts_is_refused() {
 }
 
 #[test]
+#[ignore = "long"]
 fn long_analyses_are_asked_for() {
     // None of them ends as early as this attack, so none counts as granted.
     if let Some(row) = survived("evaluations", "tried") {
@@ -158,6 +161,7 @@ fn idle_connections_are_counted_and_stay() {
 }
 
 #[test]
+#[ignore = "long"]
 fn spectators_that_do_not_read_are_admitted_and_players_miss_nothing() {
     let report = scenario(&[
         "spectators",
@@ -177,6 +181,7 @@ fn spectators_that_do_not_read_are_admitted_and_players_miss_nothing() {
 }
 
 #[test]
+#[ignore = "long"]
 fn rooms_of_a_soak_start_and_end() {
     let report = scenario(&["soak", "--seconds", "3", "--settle", "1", "--rooms", "2"]);
     assert!(report["games"].as_u64() > Some(0), "{report:#}");

@@ -44,6 +44,7 @@ fn a_moment_of_load_is_counted_on_both_sides() {
 }
 
 #[test]
+#[ignore = "long"]
 fn two_builds_are_measured_beside_the_same_bare_room_at_several_scales() {
     let program = env!("CARGO_BIN_EXE_chefshat-load");
     let output = run(&["--smoke", "--scale", "--against", program, "--json"]);
@@ -84,6 +85,7 @@ fn a_scenario_that_fails_is_named_in_the_report() {
 }
 
 #[test]
+#[ignore = "long"]
 fn durable_rooms_are_measured_beside_ephemeral_ones() {
     let output = run(&["--smoke", "--durability", "--json"]);
     let errors = String::from_utf8_lossy(&output.stderr);
@@ -118,6 +120,7 @@ fn positive(value: &Value) -> bool {
 }
 
 #[test]
+#[ignore = "long"]
 fn games_of_a_client_are_stepped_and_counted() {
     let output = run(&["--smoke", "--vector", "--json"]);
     let errors = String::from_utf8_lossy(&output.stderr);

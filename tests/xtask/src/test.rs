@@ -78,7 +78,7 @@ fn changed(places: &Places) -> Result<Vec<Part>, Failure> {
 }
 
 /// What is run.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Clone, Copy, clap::Args)]
 pub(crate) struct Options {
     /// Run only the tests of one part.
     #[arg(long, value_enum)]
@@ -93,12 +93,8 @@ pub(crate) struct Options {
 }
 
 /// Sets up and runs the tests of one part, or of all.
-pub(crate) fn run(
-    places: &Places,
-    steps: &mut Steps,
-    Options { only, slow, lint }: &Options,
-) -> Result<(), Failure> {
-    let (only, slow, lint) = (*only, *slow, *lint);
+pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Result<(), Failure> {
+    let Options { only, slow, lint } = *options;
     if lint {
         lint::sources(places, steps)?;
     }
@@ -202,18 +198,16 @@ pub(crate) fn run(
             steps.skip("commands at a terminal", &failure.to_string());
         }
         lanes.push(Box::new(|steps| {
-            let mut tests = cargo_command(places, lint);
-            tests.args(["test", "--workspace", "--features", OPTIONAL_FEATURES]);
-            tests.arg("--no-fail-fast");
-            // Most tests wait for servers and clocks.
-            tests.env("RUST_TEST_THREADS", "4");
+            let mut runs = vec![cargo_test(places, *options, &["--test", "*"])];
             if slow {
-                tests.env("CHEFSHAT_FAULTS", "200");
-                tests.env("CHEFSHAT_SIMULATIONS", "300");
-                tests.env("CHEFSHAT_MODEL", "all");
+                runs.push(cargo_test(
+                    places,
+                    *options,
+                    &["--test", "smoke", "--", "--ignored"],
+                ));
                 lint::platforms(places, steps)?;
             }
-            steps.program("cargo test", &mut tests)
+            of_all(steps, runs)
         }));
     }
     if wants(Part::Python) && !has_python {
@@ -224,41 +218,44 @@ pub(crate) fn run(
     if wants(Part::Python) {
         for package in places.python_packages() {
             // The longest suite has the most processes.
-            let options: &[&str] = match package {
+            let processes: &[&str] = match package {
                 CLIENTS => &["--numprocesses=2", "--dist=loadfile"],
                 DEPLOYMENT => continue,
                 _ => &[],
             };
             lanes.push(Box::new(move |steps| {
-                let mut runs = vec![pytest(places, package, options)];
+                let mut runs = vec![pytest(places, package, processes)];
                 if slow && package == CLIENTS {
                     runs.push(pytest(places, package, &["-m", "slow"]));
                 }
-                Failure::of_any(
-                    runs.iter_mut()
-                        .map(|(name, pytest)| steps.program(name, pytest)),
-                )
+                of_all(steps, runs)
             }));
         }
     }
     if wants(Part::Web) {
         match has_web {
             true => {
-                lanes.push(Box::new(|steps| web::test_in_browser(places, steps)));
+                lanes.push(Box::new(|steps| web::test_in_browser(places, steps, slow)));
                 lanes.push(Box::new(|steps| web::test(places, steps)));
             }
             false => steps.skip("vitest, browser tests", NO_WEB_PACKAGE),
         }
+    }
+    if wants(Part::Rust) {
+        lanes.push(Box::new(|steps| {
+            let kinds = [["--lib", "--bins"].as_slice(), &["--doc"]];
+            of_all(
+                steps,
+                kinds.map(|kinds| cargo_test(places, *options, kinds)),
+            )
+        }));
     }
     if deployment {
         lanes.push(Box::new(|steps| test_deployment(places, steps, slow)));
     }
     if wants(Part::Python) && has_python {
         lanes.push(Box::new(|steps| {
-            Failure::of_any(VERSIONS.map(|which| {
-                let (name, mut pytest) = pytest_with(places, which);
-                steps.program(&name, &mut pytest)
-            }))
+            of_all(steps, VERSIONS.map(|which| pytest_with(places, which)))
         }));
     }
     if wants(Part::Node) {
@@ -277,6 +274,30 @@ pub(crate) fn run(
         outcomes.push(wheels::run(places, steps, &wheels::HOST, "release", true));
     }
     Failure::of_any(outcomes)
+}
+
+/// Runs programs as steps, one after another; each that fails is named.
+fn of_all(
+    steps: &mut Steps,
+    runs: impl IntoIterator<Item = (String, Command)>,
+) -> Result<(), Failure> {
+    let run = |(name, mut program): (String, Command)| steps.program(&name, &mut program);
+    Failure::of_any(runs.into_iter().map(run))
+}
+
+/// Tests in Rust of these kinds. They are of all packages, so that nothing is built again.
+fn cargo_test(places: &Places, options: Options, kinds: &[&str]) -> (String, Command) {
+    let mut tests = cargo_command(places, options.lint);
+    tests.args(["test", "--workspace", "--features", OPTIONAL_FEATURES]);
+    tests.arg("--no-fail-fast").args(kinds);
+    // Most tests wait for servers and clocks.
+    tests.env("RUST_TEST_THREADS", "4");
+    if options.slow {
+        tests.env("CHEFSHAT_FAULTS", "200");
+        tests.env("CHEFSHAT_SIMULATIONS", "300");
+        tests.env("CHEFSHAT_MODEL", "all");
+    }
+    (format!("cargo test {}", kinds.join(" ")), tests)
 }
 
 /// The tests of docker/ and of what the documents tell to type.

@@ -35,10 +35,21 @@ pub(crate) fn test(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     steps.program("vitest", npm(places).args(["exec", "--", "vitest", "run"]))
 }
 
-/// The browser tests, which start the server.
-pub(crate) fn test_in_browser(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
+/// The browser tests, which start the server; the long ones only if `slow`.
+pub(crate) fn test_in_browser(
+    places: &Places,
+    steps: &mut Steps,
+    slow: bool,
+) -> Result<(), Failure> {
     match setup::chromium() {
-        Ok(()) => steps.program("browser tests", npm(places).args(["run", "test:browser"])),
+        Ok(()) => {
+            let mut tests = npm(places);
+            tests.args(["run", "test:browser"]);
+            if !slow {
+                tests.args(["--", "--exclude", "**/*.slow.test.ts"]);
+            }
+            steps.program("browser tests", &mut tests)
+        }
         Err(failure) => {
             steps.skip("browser tests", &failure.to_string());
             Ok(())
