@@ -3227,7 +3227,8 @@ pub struct Disconnected {
     #[prost(bool, tag = "2")]
     pub with_node: bool,
 }
-/// A seat is connected again, or resumed after a substitute played for it.
+/// A seat is connected again, or resumed after a substitute played for it. Where a study hides who plays
+/// on the seat, it is in the record alone.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct Returned {
     /// The seat.
@@ -5072,7 +5073,8 @@ pub struct Attach {
     #[prost(bytes = "vec", tag = "7")]
     pub entropy: ::prost::alloc::vec::Vec<u8>,
 }
-/// Ends a substitution: the seat's own participant plays again, and every viewer receives Returned.
+/// Ends a substitution: the seat's own participant plays again, and every viewer receives Returned,
+/// unless a study hides who plays on the seat.
 /// A seat learns from a Substituted event with its own number that a built-in agent plays for it, or
 /// from Substitution where a study hides its participants; both are sent at once. Attaching ends a
 /// substitution too.

@@ -224,7 +224,7 @@ impl Fault {
                 "A result CLOSED is not an error: continue with the following decisions."
             }
             Self::NeverResumed => {
-                "On an event Substituted for your own seat send ResumeSeat, or attach again."
+                "On an event Substituted for your own seat, or an update Substitution with `active`, send ResumeSeat, or attach again."
             }
             Self::OneAtATime => {
                 "Join the tournament with max_games of 2 or more, and play every seat that the server attaches to the stream."

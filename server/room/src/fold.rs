@@ -108,7 +108,7 @@ impl Core {
     }
 
     /// Logs that the participant of a seat came or went, or has a substitute. A built-in agent never
-    /// does, so it is not shown of a seat of which nobody may know whether one plays there.
+    /// does: of a seat of which nobody may know whether one plays there, the event would be the answer.
     fn log_presence(&mut self, at: Duration, seat: Seat, event: RoomEvent) {
         if !self.header.is_hidden(seat) {
             self.log.push(at, event);

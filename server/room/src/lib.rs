@@ -500,8 +500,7 @@ impl Core {
         }
     }
 
-    /// Whether a substitute plays for a seat, of which no event says so because nobody else may know
-    /// who has the seat.
+    /// Whether a substitute plays for a hidden seat. No event shows it.
     pub fn is_substituted_unseen(&self, seat: Seat) -> bool {
         self.seats[seat.index()].substituted && self.header.is_hidden(seat)
     }

@@ -107,9 +107,9 @@ async fn created(host: &Host, settings: v1::StudySettings) -> Lab {
     Lab::connect(host, (id, created.owner_token)).await
 }
 
-/// That an agent stands in for somebody shows that it is a person: others are not told.
+/// A substitution shows that a seat is a person's: others do not learn of it.
 #[tokio::test(flavor = "multi_thread")]
-async fn that_an_agent_stands_in_for_one_of_a_pair_only_the_one_itself_is_told() {
+async fn only_the_one_of_a_pair_for_whom_a_substitute_plays_learns_of_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let host = open_to_all(folder.path()).await;
     let tap = Tap::new(address(&host)).await;
@@ -135,35 +135,39 @@ async fn that_an_agent_stands_in_for_one_of_a_pair_only_the_one_itself_is_told()
     let mut other = seat(&bo, &games.1).await;
     // One never answers, and takes its seat back once.
     let idle = async {
-        let mut told = Vec::new();
+        let mut received = Vec::new();
         loop {
             match own.next().await {
                 Update::Substitution(it) => {
-                    told.push(it.active);
-                    if told == [true] {
+                    received.push(it.active);
+                    if received == [true] {
                         own.send(Command::Resume(v1::ResumeSeat {})).await;
                     }
                 }
-                Update::Detached(_) => break told,
+                Update::Detached(_) => break received,
                 _ => {}
             }
         }
     };
-    // The other one answers, however late it may be.
+    // The other one answers. Only if that was too late does a substitute play for it as well.
     let answering = async {
+        let (mut received, mut was_late) = (Vec::new(), false);
         loop {
             match other.next().await {
                 Update::Decision(request) => {
                     let action = first_legal(&request);
                     other.answer(request.decision_id, action).await;
                 }
-                Update::Detached(_) => break,
-                _ => {}
+                Update::Result(it) => was_late |= it.status() == v1::AnswerStatus::Closed,
+                Update::Substitution(it) => received.push(it.active),
+                Update::Detached(_) => break (received, was_late),
+                update => panic!("unexpected {update:?}"),
             }
         }
     };
-    let (told, ()) = tokio::join!(idle, answering);
-    assert_eq!(told, [true, false, true]);
+    let (received, (of_other, was_late)) = tokio::join!(idle, answering);
+    assert_eq!(received, [true, false, true]);
+    assert!(of_other.is_empty() || was_late, "{of_other:?}");
     for seat in [&own, &other] {
         let presence = |event: &&v1::GameEvent| {
             matches!(event.kind, Some(Kind::Substituted(_) | Kind::Returned(_)))

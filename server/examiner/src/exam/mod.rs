@@ -310,12 +310,8 @@ impl Exam {
                 self.detached(stream, handle, detached.reason(), now);
             }
             Update::Entered(entered) => self.entered(stream, handle, entered),
-            Update::Substitution(substitution) => match substitution.active {
-                true => self.substituted(now),
-                false => self.fulfil(Fault::NeverResumed),
-            },
-            // Nothing is asked of the agent.
-            Update::Awaited(_) => {}
+            // Nothing is asked of the agent, or not in the rooms of an examination.
+            Update::Awaited(_) | Update::Substitution(_) => {}
         }
     }
 
@@ -325,7 +321,16 @@ impl Exam {
         let live = event.sequence >= seen.live_from;
         match &event.kind {
             Some(Kind::GameStarted(started)) => seen.learn(started),
-            Some(Kind::Substituted(it)) if it.seat == key.seat && live => self.substituted(now),
+            Some(Kind::Substituted(it)) if it.seat == key.seat && live => {
+                if std::mem::take(&mut self.dropping) {
+                    self.interfered();
+                }
+                self.demand(
+                    Fault::NeverResumed,
+                    "ResumeSeat or a new attachment after a substitute took over",
+                    Some(now + self.patience.each),
+                );
+            }
             Some(Kind::Returned(it)) if it.seat == key.seat && live => {
                 self.fulfil(Fault::NeverResumed);
             }
@@ -336,18 +341,6 @@ impl Exam {
             ),
             _ => {}
         }
-    }
-
-    /// A substitute plays for the agent's seat.
-    fn substituted(&mut self, now: Duration) {
-        if std::mem::take(&mut self.dropping) {
-            self.interfered();
-        }
-        self.demand(
-            Fault::NeverResumed,
-            "ResumeSeat or a new attachment after a substitute took over",
-            Some(now + self.patience.each),
-        );
     }
 
     /// Records a fault; the case continues.

@@ -96,7 +96,7 @@ pub struct SeatConnection {
     acknowledged: u64,
     /// Whether a decision request is among the pending updates.
     decision_pending: bool,
-    /// Whether it was told that a substitute plays for it, which no event says.
+    /// What was last sent of whether a substitute plays for it.
     substituted: bool,
     _counted: Counted,
 }
@@ -340,7 +340,7 @@ impl Subscriber {
         let awaited = self.awaited_of(news);
         let key = awaited.map(|it| it.key());
         let awaits_another = !over && key != self.awaited;
-        let substitution = self.new_substitution(core);
+        let substitution = self.new_substitution(core).filter(|_| !over);
         let backlog = visible - self.position;
         let at_once = (self.connection()).is_none_or(|connection| connection.options.at_once);
         let due = decision.is_some()

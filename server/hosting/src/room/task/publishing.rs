@@ -233,10 +233,10 @@ impl Room {
         let awaited = self.core.awaited().map(|open| open.decision.seat);
         let all = length >= self.backlog_due_at || self.core.state().is_over();
         for seat in self.core.all_seats() {
-            let urgent = events.clone().any(|entry| is_urgent(&entry.event, seat))
-                || self.core.is_substituted_unseen(seat);
+            let urgent = events.clone().any(|entry| is_urgent(&entry.event, seat));
+            let substituted = self.core.is_substituted_unseen(seat);
             let always_visit = &mut self.always_visit[seat.index()];
-            if (all || urgent || *always_visit || awaited == Some(seat))
+            if (all || urgent || substituted || *always_visit || awaited == Some(seat))
                 && let Some(subscriber) = &mut self.connections[seat.index()]
             {
                 subscriber.deliver(&news, urgent);

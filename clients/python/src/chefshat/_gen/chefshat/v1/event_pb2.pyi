@@ -351,7 +351,9 @@ Global___Disconnected: _TypeAlias = Disconnected  # noqa: Y015
 
 @_typing.final
 class Returned(_message.Message):
-    """A seat is connected again, or resumed after a substitute played for it."""
+    """A seat is connected again, or resumed after a substitute played for it. Where a study hides who plays
+    on the seat, it is in the record alone.
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 

@@ -162,7 +162,8 @@ Global___Attach: _TypeAlias = Attach  # noqa: Y015
 
 @_typing.final
 class ResumeSeat(_message.Message):
-    """Ends a substitution: the seat's own participant plays again, and every viewer receives Returned.
+    """Ends a substitution: the seat's own participant plays again, and every viewer receives Returned,
+    unless a study hides who plays on the seat.
     A seat learns from a Substituted event with its own number that a built-in agent plays for it, or
     from Substitution where a study hides its participants; both are sent at once. Attaching ends a
     substitution too.
