@@ -6,11 +6,12 @@
 //! (Plackett and Luce's model, with Gumbel noise), so that of any two participants one beats the
 //! other with the probability [`win_chance`](chefshat_tournament::ratings::win_chance).
 
-use std::f64::consts::{SQRT_2, TAU};
+use std::f64::consts::SQRT_2;
 
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
+use rand_chacha::rand_core::SeedableRng as _;
 
+use crate::chance::{index, normal, uniform};
 use crate::fold::fold_in_order;
 use chefshat_tournament::ratings::BETA;
 use chefshat_tournament::ratings::{FIRST_MEAN, Rating};
@@ -156,18 +157,6 @@ fn places(table: &[usize], skills: &[f64], generator: &mut ChaCha8Rng) -> Vec<u3
 
 fn shuffle(order: &mut [usize], generator: &mut ChaCha8Rng) {
     for last in (1..order.len()).rev() {
-        let other = (uniform(generator) * (last + 1) as f64) as usize;
-        order.swap(last, other.min(last));
+        order.swap(last, index(generator, last + 1));
     }
-}
-
-/// A uniform number above 0 and below 1.
-fn uniform(generator: &mut ChaCha8Rng) -> f64 {
-    ((generator.next_u64() >> 12) as f64 + 0.5) / (1u64 << 52) as f64
-}
-
-/// A normal number with mean 0 and deviation 1, by Box and Muller's formula.
-fn normal(generator: &mut ChaCha8Rng) -> f64 {
-    let length = (-2.0 * uniform(generator).ln()).sqrt();
-    length * (TAU * uniform(generator)).cos()
 }

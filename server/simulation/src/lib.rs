@@ -18,6 +18,7 @@
 
 mod batch;
 pub mod calibration;
+mod chance;
 pub mod conformance;
 mod duplicate;
 mod fold;

@@ -1,14 +1,15 @@
-//! The power of a study by simulation: the same study again and again, with an effect that is known,
-//! each analysed by a test for the difference of two means. The share of studies that find the
+//! The power of a study by simulation: the same study again and again, with a known effect, each
+//! analysed by a test for the difference of two means. The share of studies that find the
 //! effect is their power; the share that find one where there is none shows that the test keeps its
 //! level. Which study, measure and effect they have is up to the caller.
 
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
+use rand_chacha::rand_core::SeedableRng as _;
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use chefshat_tournament::statistics::{Interval, Moments, wilson95};
 
+use crate::chance::{index, normal};
 use crate::fold::fold_in_order;
 
 /// Studies that one thread simulates at a time.
@@ -17,8 +18,8 @@ const CHUNK: u64 = 16;
 /// Who takes part in a study, and in which conditions.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Design {
-    /// For each unit of the analysis, the conditions that it meets, each once. Either every unit meets
-    /// conditions with the level and others (within), or none does (between).
+    /// For each unit of the analysis, the conditions that it meets, each once: conditions with the level
+    /// and others (within), or one of both (between), as all other units do.
     pub units: Vec<Vec<usize>>,
     /// Number of participants who are a unit together, at least 1.
     pub members: usize,
@@ -56,7 +57,9 @@ pub struct Answers {
     pub mean: f64,
     /// Standard deviation of the opinions that answers express.
     pub sd: f64,
-    /// Correlation of two opinions of one participant, from `group_correlation` to 1.
+    /// Correlation of two opinions of one participant in one condition, from `correlation` to 1.
+    pub item_correlation: f64,
+    /// Correlation of two opinions of one participant in two conditions, from `group_correlation`.
     pub correlation: f64,
     /// Correlation of two opinions of different participants of a unit, from 0.
     pub group_correlation: f64,
@@ -127,14 +130,16 @@ pub fn power(
     progress: impl Fn(u64) + Sync,
 ) -> Power {
     let without = measure.without_effect();
+    let is_within = design.is_within();
     let add = |power: &mut Power, study| {
-        let mut chance = Chance::of(seed, study);
-        let test = design.test(measure, &mut chance);
+        let mut generator = ChaCha8Rng::seed_from_u64(seed);
+        generator.set_stream(study);
+        let test = design.test(is_within, measure, &mut generator);
         power.studies += 1;
         power.found += u64::from(test.p < alpha);
         power.difference.add(test.difference);
         power.variance.add(test.variance);
-        let null = design.test(&without, &mut chance);
+        let null = design.test(is_within, &without, &mut generator);
         power.false_positives += u64::from(null.p < alpha);
         progress(1);
     };
@@ -144,8 +149,8 @@ pub fn power(
 }
 
 impl Design {
-    /// Whether the units meet conditions with the level and without it.
-    fn is_within(&self) -> bool {
+    /// Whether each unit meets conditions with the level and without it.
+    pub fn is_within(&self) -> bool {
         let levels = |unit: &Vec<usize>| unit.iter().filter(|it| self.has_level[**it]).count();
         (self.units.iter()).any(|unit| (1..unit.len()).contains(&levels(unit)))
     }
@@ -162,12 +167,12 @@ impl Design {
     }
 
     /// Simulates a study and tests its difference.
-    fn test(&self, measure: &Measure, chance: &mut Chance) -> Test {
+    fn test(&self, is_within: bool, measure: &Measure, generator: &mut ChaCha8Rng) -> Test {
         let mut samples = [Moments::default(); 2];
         let mut differences = Moments::default();
         for unit in &self.units {
             let mut own = [Moments::default(); 2];
-            measure.of_unit(self, unit, chance, |condition, value| {
+            measure.of_unit(self, unit, generator, |condition, value| {
                 own[usize::from(!self.has_level[condition])].add(value);
             });
             if own.iter().all(|it| it.count() > 0) {
@@ -179,7 +184,7 @@ impl Design {
                 }
             }
         }
-        match self.is_within() {
+        match is_within {
             true => Test::of_differences(&differences),
             false => Test::of_samples(&samples),
         }
@@ -206,43 +211,60 @@ impl Measure {
         &self,
         design: &Design,
         conditions: &[usize],
-        chance: &mut Chance,
+        generator: &mut ChaCha8Rng,
         mut value: impl FnMut(usize, f64),
     ) {
         match self {
             Self::Games { values, count } => {
                 for &condition in conditions {
                     let of = &values[condition];
-                    let drawn: f64 = (0..*count).map(|_| of[chance.below(of.len())]).sum();
+                    let drawn: f64 = (0..*count).map(|_| of[index(generator, of.len())]).sum();
                     value(condition, drawn / *count as f64);
                 }
             }
-            Self::Answers(answers) => {
-                let common = answers.group_correlation.sqrt() * chance.normal();
-                let mut sums = vec![0.0; conditions.len()];
-                for _ in 0..design.members {
-                    let own = answers.correlation - answers.group_correlation;
-                    let own = common + own.max(0.0).sqrt() * chance.normal();
-                    for (sum, condition) in sums.iter_mut().zip(conditions) {
-                        for _ in 0..answers.count {
-                            let rest = (1.0 - answers.correlation).max(0.0).sqrt();
-                            let deviation = own + rest * chance.normal();
-                            *sum += answers.of(deviation, design.has_level[*condition]);
-                        }
-                    }
-                }
-                let all = (design.members * answers.count) as f64;
-                for (sum, condition) in sums.into_iter().zip(conditions) {
-                    value(*condition, sum / all);
-                }
-            }
+            Self::Answers(answers) => answers.of_unit(design, conditions, generator, value),
         }
     }
 }
 
 impl Answers {
+    /// Passes on the mean answer of a unit in each of its conditions.
+    fn of_unit(
+        &self,
+        design: &Design,
+        conditions: &[usize],
+        generator: &mut ChaCha8Rng,
+        mut value: impl FnMut(usize, f64),
+    ) {
+        // What the opinions of a unit, of a participant, of one in a condition, and of one item have in
+        // common: each explains the part of the variance that the correlation before it does not.
+        let [unit, participant, condition, item] = [
+            self.group_correlation,
+            self.correlation - self.group_correlation,
+            self.item_correlation - self.correlation,
+            1.0 - self.item_correlation,
+        ]
+        .map(|share| share.max(0.0).sqrt());
+        let common = unit * normal(generator);
+        let mut sums = vec![0.0; conditions.len()];
+        for _ in 0..design.members {
+            let own = common + participant * normal(generator);
+            for (sum, of) in sums.iter_mut().zip(conditions) {
+                let there = own + condition * normal(generator);
+                for _ in 0..self.count {
+                    let deviation = there + item * normal(generator);
+                    *sum += self.answer(deviation, design.has_level[*of]);
+                }
+            }
+        }
+        let all = (design.members * self.count) as f64;
+        for (sum, condition) in sums.into_iter().zip(conditions) {
+            value(*condition, sum / all);
+        }
+    }
+
     /// The answer of somebody whose opinion deviates from the mean by this many standard deviations.
-    fn of(&self, deviation: f64, with_level: bool) -> f64 {
+    fn answer(&self, deviation: f64, with_level: bool) -> f64 {
         let effect = if with_level { self.effect } else { 0.0 };
         let opinion = self.mean + effect + self.sd * deviation;
         let steps = ((opinion - self.min) / self.step).round();
@@ -290,32 +312,5 @@ impl Test {
             variance,
             p,
         }
-    }
-}
-
-/// The random numbers of a study.
-struct Chance(ChaCha8Rng);
-
-impl Chance {
-    fn of(seed: u64, study: u64) -> Self {
-        let mut generator = ChaCha8Rng::seed_from_u64(seed);
-        generator.set_stream(study);
-        Self(generator)
-    }
-
-    /// A number from 0 to 1, neither included.
-    fn unit(&mut self) -> f64 {
-        ((self.0.next_u64() >> 12) as f64 + 0.5) / (1_u64 << 52) as f64
-    }
-
-    /// A number below `n`, which must be at least 1.
-    fn below(&mut self, n: usize) -> usize {
-        ((self.unit() * n as f64) as usize).min(n - 1)
-    }
-
-    /// A number of the standard normal distribution (Box and Muller, 1958).
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * self.unit().ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.unit()).cos()
     }
 }

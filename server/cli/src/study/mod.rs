@@ -46,7 +46,7 @@ enum StudyAction {
     Show(owner::Show),
     /// Print the links of the participants, after adding some if wanted.
     Links(owner::Links),
-    /// Simulate a study with an effect that is known, to learn how likely it is to be found.
+    /// Simulate a study with a known effect, to learn how likely it is to be found.
     Simulate(simulate::Simulate),
     /// Let test participants go through a study, with answers by chance.
     Test(trial::Test),

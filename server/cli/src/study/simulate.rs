@@ -1,5 +1,5 @@
-//! `chefshat study simulate`: how likely a study is to find an effect that is known, by simulating it
-//! many times. Participants are normally distributed opinions, or a built-in agent that plays the
+//! `chefshat study simulate`: how likely a study is to find a known effect, by simulating it many
+//! times. Participants are normally distributed opinions, or a built-in agent that plays the
 //! games of each condition; `chefshat_simulation::power` simulates and tests.
 
 use std::collections::BTreeSet;
@@ -30,13 +30,14 @@ const GAME_MEASURES: [&str; 2] = ["points", "place"];
 const USUAL: f64 = 0.8;
 
 const HELP: &str = "\
-The measure is a scale of a questionnaire, or an item that belongs to none (after/workload), or the points or the place of a game. Answers are \
-opinions of the deviation --sd, rounded to the points of the item and kept within them; SIZE shifts them in points (0.5) or in deviations \
-(0.5sd). The games of points and place are played by --agent in every condition: their effect is what the conditions make of it.
+The measure is a scale of a questionnaire, or an item that belongs to none (nasa_tlx/effort), or the points or the place of a game. \
+Everybody answers all of its items: opinions with the deviation --sd, rounded to the values of the item and kept within them. SIZE shifts \
+the opinions, in points (0.5) or in deviations (0.5sd). The games of points and place are played by --agent in every condition, with random \
+deals: their effect is what the conditions make of it.
 
 A participant counts once, with its mean in each condition, and a group once, as in the sample analysis. Conditions with the level are \
-compared with the others: between participants by Welch's t-test, within them by a paired one, two-sided. Everybody who \
-begins is taken to complete the study, since slots of those who leave are given again.
+compared with the others: between participants by Welch's t-test, within them by a paired one, two-sided. Slots of those who leave are \
+given again, so everybody completes the study.
 
 Examples:
   chefshat study simulate docs/studies/example.toml --measure nasa_tlx/effort --effect strength=strong:0.5sd
@@ -44,7 +45,7 @@ Examples:
 
 The same seed gives the same output, on any number of threads.";
 
-/// Simulate a study with an effect that is known, to learn how likely it is to be found.
+/// Simulate a study with a known effect, to learn how likely it is to be found.
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Simulate {
@@ -60,18 +61,23 @@ pub(super) struct Simulate {
     /// Numbers of participants to try; by default the file's, twice and four times as many.
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(2..=i64::from(MAX_PARTICIPANTS)))]
     participants: Vec<u32>,
-    /// Standard deviation of answers, in points; by default a quarter of the item's range.
+    /// Standard deviation of opinions, in points; by default a quarter of the item's range.
     #[arg(long, value_name = "POINTS", value_parser = positive)]
     sd: Option<f64>,
-    /// Mean answer without the level; by default the middle of the item's range.
+    /// Mean opinion without the level, in points; by default the middle of the item's range.
     #[arg(long, value_name = "POINTS", allow_negative_numbers = true)]
     mean: Option<f64>,
-    /// Correlation of two answers of a participant.
-    #[arg(long, default_value_t = 0.5, value_parser = correlation)]
+    /// Correlation of two opinions of a participant in two conditions.
+    #[arg(long, value_name = "R", default_value_t = 0.5, value_parser = correlation)]
     correlation: f64,
-    /// Correlation of two answers of different participants of a group, at most `--correlation`.
-    #[arg(long, default_value_t = 0.2, value_parser = correlation)]
-    group_correlation: f64,
+    /// Correlation of two items of the measure in one condition; by default 0.7, or --correlation if
+    /// that is higher.
+    #[arg(long, value_name = "R", value_parser = correlation)]
+    item_correlation: Option<f64>,
+    /// Correlation of two opinions of different participants of a group; by default 0.2, or
+    /// --correlation if that is lower.
+    #[arg(long, value_name = "R", value_parser = correlation)]
+    group_correlation: Option<f64>,
     /// The built-in agent that plays the participants' games.
     #[arg(long, default_value = "greedy", value_parser = named_agent)]
     agent: NamedAgent,
@@ -167,9 +173,9 @@ impl Simulate {
         let study =
             Study::new(plan.core.clone()).map_err(|problem| format!("{shown}: {problem}"))?;
         let has_level = self.conditions_with_level(&plan.core)?;
+        let designs = self.designs(&study, &has_level)?;
         let pool = threads::pool(self.threads, self.studies)?;
         let measure = pool.install(|| self.measured(&plan))?;
-        let designs = self.designs(&study, &has_level)?;
         let bar = progress::of_items(self.studies * designs.len() as u64, "studies");
         let results: Vec<(u32, Design, Power)> = (designs.into_iter())
             .map(|(participants, design)| {
@@ -231,7 +237,8 @@ impl Simulate {
             }
             return self.games(plan);
         }
-        let (min, max, step, count) = self.scale(&plan.core)?;
+        let ((min, max, step), count) = self.scale(&plan.core)?;
+        let (min, max) = (f64::from(min), f64::from(max));
         let sd = self.sd.unwrap_or((max - min) / 4.0);
         let effect = match self.effect.size {
             Some(Size::Points(points)) => points,
@@ -242,101 +249,95 @@ impl Simulate {
                 );
             }
         };
-        let groups = plan.core.groups.is_some();
-        if groups && self.group_correlation > self.correlation {
+        let mean = self.mean.unwrap_or(f64::midpoint(min, max));
+        if !(min..=max).contains(&mean) {
+            return Err(format!("--mean: answers are from {min} to {max}").into());
+        }
+        let item_correlation = self.item_correlation.unwrap_or(self.correlation.max(0.7));
+        if item_correlation < self.correlation {
+            return Err("--item-correlation: it is at least --correlation".into());
+        }
+        let group_correlation = match plan.core.groups {
+            Some(_) => self.group_correlation.unwrap_or(self.correlation.min(0.2)),
+            None => 0.0,
+        };
+        if group_correlation > self.correlation {
             return Err("--group-correlation: it is at most --correlation".into());
         }
         Ok(Measure::Answers(Answers {
             min,
             max,
-            step,
+            step: step.max(1).into(),
             count,
-            mean: self.mean.unwrap_or(f64::midpoint(min, max)),
+            mean,
             sd,
+            item_correlation,
             correlation: self.correlation,
-            group_correlation: if groups { self.group_correlation } else { 0.0 },
+            group_correlation,
             effect,
         }))
     }
 
-    /// The lowest and highest value of a measure of a questionnaire, the distance of two values, and how
-    /// many of its items a participant answers in each condition.
-    fn scale(&self, settings: &Settings) -> Result<(f64, f64, f64, usize), CommandError> {
-        let mut known = BTreeSet::new();
-        let mut ranges = BTreeSet::new();
-        let mut counts = vec![0; settings.conditions.len()];
-        let mut is_too_early = false;
-        for sequence in settings.sequences() {
-            let mut played = false;
-            let mut own = vec![0; settings.conditions.len()];
-            for step in settings.steps(&sequence) {
-                let questionnaire = match step.task {
-                    Task::Questionnaire(it) => it,
-                    Task::Games { .. } => {
-                        played = true;
-                        continue;
-                    }
-                    _ => continue,
+    /// The lowest and highest value of a measure of questionnaires and the distance of two, and how many of
+    /// its items a participant answers in each condition. All conditions have the same steps.
+    fn scale(&self, settings: &Settings) -> Result<((i32, i32, u32), usize), CommandError> {
+        let refuse = |words: &str| Err(format!("--measure: {words}").into());
+        let sequence = &settings.sequences()[0];
+        let (mut known, mut ranges) = (BTreeSet::new(), BTreeSet::new());
+        let (mut played, mut count) = (false, 0);
+        for step in settings.steps(sequence) {
+            played |= matches!(step.task, Task::Games { .. });
+            let Task::Questionnaire(questionnaire) = step.task else {
+                continue;
+            };
+            for item in &questionnaire.items {
+                let Some(range) = item
+                    .kind
+                    .numbers()
+                    .filter(|_| item.attention_check.is_none())
+                else {
+                    continue;
                 };
-                for item in &questionnaire.items {
-                    let Some(range) = item.kind.numbers() else {
-                        continue;
-                    };
-                    if item.attention_check.is_some() {
-                        continue;
-                    }
-                    let of = if item.scale.is_empty() {
-                        &item.id
-                    } else {
-                        &item.scale
-                    };
-                    let name = format!("{}/{of}", questionnaire.id);
-                    let is_measured = name == self.measure;
-                    known.insert(name);
-                    if !is_measured {
-                        continue;
-                    }
-                    ranges.insert(range);
-                    is_too_early |= !played;
-                    // What is answered once belongs to the condition of who has only one.
-                    let only = (settings.order == Order::Between).then(|| sequence[0]);
-                    if let Some(condition) = step.block.or(only) {
-                        own[condition] += 1;
-                    }
+                let of = if item.scale.is_empty() {
+                    &item.id
+                } else {
+                    &item.scale
+                };
+                let name = format!("{}/{of}", questionnaire.id);
+                let is_measured = name == self.measure;
+                known.insert(name);
+                if !is_measured {
+                    continue;
                 }
+                if !played {
+                    return refuse(
+                        "it is answered before the first game, so no condition changes it",
+                    );
+                }
+                if !step.shown_if.is_empty() || !item.shown_if.is_empty() {
+                    return refuse("not everybody answers it (shown_if)");
+                }
+                ranges.insert(range);
+                // What is answered once belongs to the condition of somebody who has only one.
+                let is_of_first = step
+                    .block
+                    .map_or(settings.order == Order::Between, |it| it == sequence[0]);
+                count += usize::from(is_of_first);
             }
-            for (count, own) in counts.iter_mut().zip(own) {
-                *count = own.max(*count);
+        }
+        match (ranges.first(), ranges.len(), count) {
+            (None, ..) => {
+                let known = known.iter().map(String::as_str);
+                let known: Vec<&str> = GAME_MEASURES.into_iter().chain(known).collect();
+                let words = format!("no {:?}; the study has {}", self.measure, known.join(", "));
+                refuse(&words)
             }
+            (_, _, 0) => {
+                refuse("it is not answered in each condition: ask for it in per_condition")
+            }
+            (Some(range), 1, count) => Ok((*range, count)),
+            _ => refuse("the items of this scale have different ranges"),
         }
-        let refuse = |words: String| Err(format!("--measure: {words}").into());
-        if ranges.is_empty() {
-            let known: Vec<&str> = GAME_MEASURES
-                .into_iter()
-                .chain(known.iter().map(String::as_str))
-                .collect();
-            return refuse(format!(
-                "no {:?}; the study has {}",
-                self.measure,
-                known.join(", ")
-            ));
-        }
-        if is_too_early {
-            return refuse(
-                "it is answered before the first game of the study, so no condition changes it"
-                    .to_owned(),
-            );
-        }
-        if ranges.len() > 1 {
-            return refuse("the items of this scale have different ranges".to_owned());
-        }
-        let Some(count) = counts.iter().min().copied().filter(|count| *count > 0) else {
-            return refuse(
-                "it is not answered in each condition: ask for it in per_condition".to_owned(),
-            );
-        };
-        let (min, max, step) = ranges.first().copied().unwrap_or_default();
-        Ok((min.into(), max.into(), step.max(1).into(), count))
     }
 
     /// Plays the games of each condition.
@@ -449,7 +450,11 @@ impl Simulate {
     }
 }
 
-/// What the simulated participants are units of.
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// What counts once.
 fn units(settings: &Settings) -> &'static str {
     match settings.groups {
         Some(_) => "groups",
@@ -466,71 +471,57 @@ impl Simulate {
     ) -> String {
         let Effect { factor, level, .. } = &self.effect;
         let settings = &plan.core;
+        let (units, is_within) = (units(settings), settings.order == Order::Within);
+        let order = if is_within { "within" } else { "between" };
+        let conditions = counted(settings.conditions.len() as u64, "condition");
+        let mut lines = vec![format!(
+            "{conditions} {order} participants; two-sided t-test of {units}, alpha {}",
+            self.alpha
+        )];
+        match measure {
+            Measure::Answers(it) => {
+                let (min, max, count) = (it.min, it.max, counted(it.count as u64, "answer"));
+                lines.push(format!(
+                    "{count} from {min} to {max} in each condition; mean of opinions {}, deviation {}, effect {}",
+                    it.mean,
+                    it.sd,
+                    signed(it.effect)
+                ));
+                let mut correlations = vec![format!("of a participant {}", it.correlation)];
+                if it.count > 1 {
+                    correlations.push(format!("of its items {}", it.item_correlation));
+                }
+                if settings.groups.is_some() {
+                    correlations.push(format!("of a group {}", it.group_correlation));
+                }
+                lines.push(format!("correlations: {}", correlations.join(", ")));
+            }
+            Measure::Games { values, count } => {
+                let games = counted(*count as u64, "game");
+                let played = grouped(values.first().map_or(0, Vec::len) as u64);
+                lines.push(format!(
+                    "{games} of {} in each condition; means of {played} games:",
+                    self.agent.name()
+                ));
+                let conditions = settings.conditions.iter().zip(values);
+                lines.extend(conditions.map(|(it, of)| format!("  {}: {:.2}", it.id, mean(of))));
+            }
+        }
         let mut text = String::new();
         let words = format!(
             "Power of {:?} to find the effect of {factor} = {level} on {}",
             plan.name, self.measure
         );
         heading(&mut text, &words);
-        let order = match settings.order {
-            Order::Between => "between",
-            Order::Within => "within",
-        };
-        let units = units(settings);
-        let conditions = counted(settings.conditions.len() as u64, "condition");
-        line(
-            &mut text,
-            &format!(
-                "{conditions} {order} participants; two-sided t-test of {units}, level {}",
-                self.alpha
-            ),
-        );
-        match measure {
-            Measure::Answers(it) => {
-                let (min, max, count) = (it.min, it.max, counted(it.count as u64, "answer"));
-                let effect = signed(it.effect);
-                line(
-                    &mut text,
-                    &format!(
-                        "{count} from {min} to {max} in each condition, mean {}, deviation {}",
-                        it.mean, it.sd
-                    ),
-                );
-                let group = match settings.groups {
-                    Some(_) => format!(", in a group {}", it.group_correlation),
-                    None => String::new(),
-                };
-                line(
-                    &mut text,
-                    &format!(
-                        "effect {effect} points; correlation of a participant's answers {}{group}",
-                        it.correlation
-                    ),
-                );
-            }
-            Measure::Games { values, count } => {
-                let games = counted(*count as u64, "game");
-                line(
-                    &mut text,
-                    &format!(
-                        "{games} of {} in each condition; means of {GAMES} games:",
-                        self.agent.name()
-                    ),
-                );
-                for (condition, of) in settings.conditions.iter().zip(values) {
-                    let mean = of.iter().sum::<f64>() / of.len() as f64;
-                    line(&mut text, &format!("  {}: {mean:.2}", condition.id));
-                }
-            }
-        }
+        lines.iter().for_each(|words| line(&mut text, words));
         text.push('\n');
         let header = [
             "participants",
-            "with level | without",
+            if is_within { units } else { "with | without" },
             "power",
             "95 %",
             "difference",
-            "standardized",
+            if is_within { "d_z" } else { "d" },
             "found without effect",
         ];
         let rows = results.iter().map(|(participants, design, power)| {
@@ -538,7 +529,10 @@ impl Simulate {
             let (interval, false_positives) = (power.interval95(), power.false_positives95());
             vec![
                 participants.to_string(),
-                format!("{with} | {without}"),
+                match is_within {
+                    true => with.to_string(),
+                    false => format!("{with} | {without}"),
+                },
                 percent(power.share()),
                 format!(
                     "{:.1} to {:.1}",
@@ -556,20 +550,18 @@ impl Simulate {
         });
         table(&mut text, &header, &[], rows);
         text.push('\n');
-        let enough = results
-            .iter()
-            .find(|(.., power)| power.interval95().low >= USUAL);
+        let enough = results.iter().find(|(.., power)| power.share() >= USUAL);
         let enough = match enough {
             Some((participants, ..)) => {
-                format!("{participants} participants are enough for a power of 80 %")
+                format!("With {participants} participants the power is 80 % or more")
             }
-            None => "None of these is enough for a power of 80 %".to_owned(),
+            None => "With none of these the power is 80 %".to_owned(),
         };
+        let studies = grouped(self.studies);
         line(
             &mut text,
             &format!(
-                "{enough} ({} simulated studies each, seed {}).",
-                grouped(self.studies),
+                "{enough} ({studies} simulated studies each, seed {})",
                 self.seed
             ),
         );
@@ -581,16 +573,11 @@ impl Simulate {
         let measured = match measure {
             Measure::Answers(it) => json!({
                 "min": it.min, "max": it.max, "step": it.step, "answers": it.count, "mean": it.mean, "sd": it.sd,
-                "correlation": it.correlation, "group_correlation": it.group_correlation, "effect": it.effect,
+                "item_correlation": it.item_correlation, "correlation": it.correlation, "group_correlation": it.group_correlation, "effect": it.effect,
             }),
             Measure::Games { values, count } => {
                 let means: serde_json::Map<_, _> = (plan.core.conditions.iter().zip(values))
-                    .map(|(it, of)| {
-                        (
-                            it.id.clone(),
-                            (of.iter().sum::<f64>() / of.len() as f64).into(),
-                        )
-                    })
+                    .map(|(it, of)| (it.id.clone(), mean(of).into()))
                     .collect();
                 json!({"games": count, "agent": self.agent.name(), "means": means})
             }

@@ -48,8 +48,43 @@ fn a_study_is_created_and_deleted() {
 /// The example of the documentation with pairs.
 const PAIRS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/studies/pairs.toml");
 
+/// A study within participants, with a scale of two items, one whose items have different ranges, one that
+/// only some answer, and one item after all conditions.
+const WITHIN: &str = r#"
+name = "within"
+title = "A game of cards"
+participants = 8
+order = "within"
+factors = [{ name = "pace", levels = ["fast", "slow"] }]
+[[conditions]]
+id = "fast"
+levels = { pace = "fast" }
+seats = [{}, { built_in_agent = "random" }, { built_in_agent = "random" }]
+[[conditions]]
+id = "slow"
+levels = { pace = "slow" }
+seats = [{ built_in_agent = "random" }, { built_in_agent = "random" }, { built_in_agent = "random" }]
+[[stages]]
+[[stages.per_condition.stages]]
+games = { count = 1 }
+[[stages.per_condition.stages]]
+[stages.per_condition.stages.questionnaire]
+id = "after"
+items = [
+    { id = "calm-1", scale = "calm", text = "It was calm.", likert = { points = 5, labels = ["no", "yes"] } },
+    { id = "calm-2", scale = "calm", text = "It was quiet.", likert = { points = 5, labels = ["no", "yes"] } },
+    { id = "mixed-1", scale = "mixed", text = "It was fun.", likert = { points = 5, labels = ["no", "yes"] } },
+    { id = "mixed-2", scale = "mixed", text = "It was joy.", likert = { points = 7, labels = ["no", "yes"] } },
+    { id = "some", text = "Why?", likert = { points = 5, labels = ["no", "yes"] }, shown_if = [{ item = "calm-1", answers = { min = 4 } }] },
+]
+[[stages]]
+[stages.questionnaire]
+id = "end"
+items = [{ id = "all", text = "All in all?", likert = { points = 5, labels = ["no", "yes"] } }]
+"#;
+
 #[test]
-fn a_study_is_simulated_with_an_effect_that_is_known() {
+fn a_study_is_simulated_with_a_known_effect() {
     let simulate = |file: &str, options: &str| {
         let options = options.split_whitespace();
         let given: Vec<&str> = ["study", "simulate", file]
@@ -82,9 +117,11 @@ fn a_study_is_simulated_with_an_effect_that_is_known() {
         .well()
         .json();
     assert_eq!(again, printed);
-    simulate(EXAMPLE, of_answers)
-        .well()
-        .assert_says(&["80 %", "400 simulated studies"]);
+    let enough = "With 64 participants the power is 80 % or more (400 simulated studies";
+    simulate(EXAMPLE, of_answers).well().assert_says(&[enough]);
+    let small = format!("{of_answers} --participants 16");
+    let too_few = "With none of these the power is 80 %";
+    simulate(EXAMPLE, &small).well().assert_says(&[too_few]);
 
     // A pair counts once: of 16 participants 8 pairs, 4 with each level.
     let pairs =
@@ -108,6 +145,48 @@ fn a_study_is_simulated_with_an_effect_that_is_known() {
     );
     let difference = printed["results"][0]["difference"].as_f64().unwrap();
     assert!(difference < -1.0, "{printed:#}");
+
+    let folder = TempDir::new().unwrap();
+    let within = folder.path().join("within.toml");
+    std::fs::write(&within, WITHIN).unwrap();
+    let within = within.to_str().unwrap();
+    let of = |measure: &str, options: &str| {
+        let options = format!("--measure {measure} --effect pace=fast:1 --studies 100 {options}");
+        simulate(within, &options)
+    };
+    // Each participant meets both conditions, with two items of the scale in each.
+    let printed = of("after/calm", "--json").well().json();
+    assert_eq!(printed["measured"]["answers"], 2, "{printed:#}");
+    let row = &printed["results"][0];
+    assert_eq!(
+        [&row["with_level"], &row["without_level"]],
+        [8, 8],
+        "{printed:#}"
+    );
+    // Items that measure the same differ less between conditions than those that measure different things.
+    let power = |options: &str| {
+        let printed = of("after/calm", &format!("{options} --json")).well().json();
+        printed["results"][0]["power"].as_f64().unwrap()
+    };
+    assert!(power("--item-correlation 1") + 0.1 < power("--item-correlation 0.5"));
+    of("after/calm", "")
+        .well()
+        .assert_says(&["d_z", "of its items 0.7"]);
+    for (measure, options, problem) in [
+        ("after/mixed", "", "different ranges"),
+        ("after/some", "", "shown_if"),
+        ("end/all", "", "per_condition"),
+        ("after/calm", "--mean 9", "from 1 to 5"),
+        (
+            "after/calm",
+            "--item-correlation 0.4",
+            "at least --correlation",
+        ),
+    ] {
+        of(measure, options).assert_failed(problem);
+    }
+    let games = "--measure place --effect pace=fast";
+    simulate(within, games).assert_failed("\"fast\" has seats without a built-in agent");
 
     let with_size = "--effect strength=strong:1";
     for (options, problem) in [

@@ -27,6 +27,7 @@ fn fine() -> Answers {
         count: 1,
         mean: 5e5,
         sd: 1e4,
+        item_correlation: 0.5,
         correlation: 0.5,
         group_correlation: 0.0,
         effect: 5e3,
@@ -56,16 +57,29 @@ fn the_power_is_that_of_the_t_test() {
     assert!(agrees(within.found, 0.808), "{within:?}");
     // Means of two strangers: d = 0.5 times the root of 2, and 32 in each of two groups.
     let strangers = found(&design(64, 2, false), fine());
-    assert!(agrees(strangers.found, 0.801), "{strangers:?}");
+    assert!(agrees(strangers.found, 0.795), "{strangers:?}");
     // Two who always agree are one.
     let alike = Answers {
+        item_correlation: 1.0,
         correlation: 1.0,
         group_correlation: 1.0,
         ..fine()
     };
     let alike = found(&design(128, 2, false), alike);
     assert!(agrees(alike.found, 0.801), "{alike:?}");
-    for power in [between, within, strangers, alike] {
+    // Five items that measure the same are one, also where conditions are compared within participants.
+    let scale = Answers {
+        count: 5,
+        item_correlation: 1.0,
+        ..fine()
+    };
+    let scale = found(&design(34, 1, true), scale);
+    assert!(agrees(scale.found, 0.808), "{scale:?}");
+    // Five that have nothing else in common than one participant: dz = 0.5 times the root of 5, and 9.
+    let items = Answers { count: 5, ..fine() };
+    let items = found(&design(9, 1, true), items);
+    assert!(agrees(items.found, 0.835), "{items:?}");
+    for power in [between, within, strangers, alike, scale, items] {
         assert!(agrees(power.false_positives, 0.05), "{power:?}");
         assert!(power.interval95().contains(power.share()));
     }
@@ -86,7 +100,7 @@ fn answers_stay_on_their_scale() {
     // With the level nearly everybody answers 5, and without it the mean is below 4.5.
     let difference = bounded.difference.mean();
     assert!((0.5..1.2).contains(&difference), "{difference}");
-    // Who all answer the same show nothing.
+    // Where all answer the same, nothing is found.
     let same = Answers {
         mean: 100.0,
         ..points
