@@ -413,6 +413,7 @@ def test_after_ten_illegal_actions_a_random_legal_one_is_taken(quick_run: Path) 
     assert values["sees what is legal"]["most_attempts_at_a_decision"] > 10
 
 
+@pytest.mark.slow
 @pytest.mark.server
 def test_the_same_seed_gives_the_same_result(
     quick_run: Path, real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -200,6 +200,7 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
         lanes.push(Box::new(|steps| {
             let mut runs = vec![cargo_test(places, *options, &["--test", "*"])];
             if slow {
+                // The others that are ignored measure something.
                 runs.push(cargo_test(
                     places,
                     *options,
@@ -243,7 +244,7 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
     }
     if wants(Part::Rust) {
         lanes.push(Box::new(|steps| {
-            let kinds = [["--lib", "--bins"].as_slice(), &["--doc"]];
+            let kinds = [["--lib", "--bins", "--examples"].as_slice(), &["--doc"]];
             of_all(
                 steps,
                 kinds.map(|kinds| cargo_test(places, *options, kinds)),
