@@ -5,6 +5,7 @@
 mod budget;
 #[cfg(test)]
 mod fuzz;
+mod health;
 #[cfg(test)]
 mod idle_tests;
 
@@ -17,7 +18,6 @@ use futures::future::{Either, try_join};
 use futures::{FutureExt as _, Stream, StreamExt as _, TryStreamExt as _};
 use http::HeaderName;
 use tokio::io::{AsyncRead, AsyncWrite};
-use tokio::sync::watch;
 use tokio::time::{Instant, timeout_at};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::{AbortOnDropHandle, TaskTracker};
@@ -26,7 +26,6 @@ use tonic::service::Routes;
 use tonic::transport;
 use tonic::transport::server::Connected;
 use tonic_health::ServingStatus;
-use tonic_health::server::HealthReporter;
 use tower::util::{MapRequestLayer, option_layer};
 use tower_http::cors::{AllowHeaders, AllowOrigin, Any, CorsLayer};
 use tracing::{info, warn};
@@ -346,12 +345,12 @@ impl Server {
         )?
         .add_service(health_service)
         .add_service(reflection());
-        health.set_service_status("", ServingStatus::Serving).await;
-        let following = node.as_ref().map(|node| {
-            let lease = node.may_publish();
-            let following = follow_lease(health.clone(), lease, closing.clone());
-            tracker.spawn(named(LongTask::NodeHealth, following))
-        });
+        let following = health::report(
+            health.clone(),
+            node.as_ref().map(ClusterNode::may_publish),
+            store.metrics().cloned(),
+        );
+        let following = tracker.spawn(until_closing(LongTask::Health, following.boxed()));
 
         tracker.spawn(until_closing(
             LongTask::TokenFile,
@@ -360,9 +359,15 @@ impl Server {
         let delivering = rooms.webhooks().clone().deliver(closing.clone());
         tracker.spawn(named(LongTask::Webhooks, delivering));
         let encrypted = tls.is_some();
-        if let Some(tls) = tls {
-            tracker.spawn(until_closing(LongTask::Certificates, tls.follow().boxed()));
+        let of_nodes = peers.as_ref().and_then(PeerPort::tls);
+        let shown_to = |whom: &'static str, tls: Option<Arc<Tls>>| tls.map(|tls| (whom, tls));
+        let shown = [shown_to("clients", tls), shown_to("nodes", of_nodes)];
+        let shown: Vec<_> = shown.into_iter().flatten().collect();
+        for (_, tls) in &shown {
+            let follow = Arc::clone(tls).follow();
+            tracker.spawn(until_closing(LongTask::Certificates, follow.boxed()));
         }
+        scrape::add_certificates(rooms.metrics(), shown);
         let forwarding = (peers.as_ref()).map(|port| {
             let directory = Arc::clone(rooms.directory());
             grpc::ForwardLayer::new(directory, port.peers(rooms.metrics()), Arc::clone(&calls))
@@ -377,9 +382,6 @@ impl Server {
         let peer_serving = match peers {
             None => Either::Left(std::future::ready(Ok(()))),
             Some(port) => {
-                if let Some(tls) = port.tls() {
-                    tracker.spawn(until_closing(LongTask::Certificates, tls.follow().boxed()));
-                }
                 let closed = closing.clone();
                 Either::Right(
                     transport::Server::builder()
@@ -458,9 +460,7 @@ impl Server {
                 open_rooms = rooms.open_count(),
                 "shutting down: no new rooms; running games may finish"
             );
-            if let Some(following) = following {
-                following.abort();
-            }
+            following.abort();
             health
                 .set_service_status("", ServingStatus::NotServing)
                 .await;
@@ -518,25 +518,6 @@ impl Server {
             warn!("the database was not closed in time; what was acknowledged is stored");
         }
         Ok(())
-    }
-}
-
-/// Reports a node as healthy while it has a lease.
-async fn follow_lease(
-    health: HealthReporter,
-    mut lease: watch::Receiver<bool>,
-    closing: CancellationToken,
-) {
-    loop {
-        let status = match *lease.borrow_and_update() {
-            true => ServingStatus::Serving,
-            false => ServingStatus::NotServing,
-        };
-        health.set_service_status("", status).await;
-        tokio::select! {
-            () = closing.cancelled() => return,
-            changed = lease.changed() => if changed.is_err() { return },
-        }
     }
 }
 

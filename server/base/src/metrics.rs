@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::{DescriptorEncoder, EncodeMetric, MetricEncoder, text};
@@ -15,6 +15,8 @@ use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::gauge::{ConstGauge, Gauge};
 use prometheus_client::metrics::{MetricType, TypedMetric};
 use prometheus_client::registry::{Registry, Unit};
+use tokio::sync::Notify;
+use tokio::time::{Instant, sleep};
 
 use chefshat_room::State;
 use chefshat_room::journal::{Decided, ParticipantKind, Source};
@@ -467,26 +469,52 @@ pub trait Queue: std::fmt::Debug + Send + Sync + 'static {
     fn depth(&self) -> usize;
 }
 
+/// How long nothing is committed until that is a stall.
+const STALL: Duration = Duration::from_secs(10);
+/// How often that is looked at while something waits.
+const LOOK: Duration = Duration::from_secs(1);
+
 /// The metrics of a store with a writer.
 #[derive(Debug, Clone)]
 pub struct StoreMetrics {
     commit: Histogram,
     commands: Histogram,
     retries: Counter,
-    /// Since when transactions wait for their commit.
-    waiting: Arc<Mutex<BTreeMap<u64, Instant>>>,
-    /// Counts them.
-    waited: Arc<AtomicU64>,
+    waiting: Arc<Mutex<Waiting>>,
+    /// A transaction waits, and none did before.
+    begun: Arc<Notify>,
+}
+
+/// The transactions that wait for their commit.
+#[derive(Debug)]
+struct Waiting {
+    /// By number, in the order in which they began.
+    transactions: BTreeMap<u64, Transaction>,
+    /// How many have begun.
+    begun: u64,
+    last_commit: Instant,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Transaction {
+    since: Instant,
+    /// Whether it is about a row that is locked.
+    is_aside: bool,
 }
 
 impl Default for StoreMetrics {
     fn default() -> Self {
+        let waiting = Waiting {
+            transactions: BTreeMap::new(),
+            begun: 0,
+            last_commit: Instant::now(),
+        };
         Self {
             commit: Histogram::new(SERVER_TIMES, MICROS),
             commands: Histogram::new(BATCH_SIZES, 1.0),
             retries: Counter::default(),
-            waiting: Arc::default(),
-            waited: Arc::default(),
+            waiting: Arc::new(Mutex::new(waiting)),
+            begun: Arc::default(),
         }
     }
 }
@@ -496,6 +524,7 @@ impl StoreMetrics {
     pub fn committed(&self, commands: usize, time: Duration) {
         self.commit.observe_duration(time);
         (self.commands).observe(u64::try_from(commands).unwrap_or(u64::MAX));
+        locked(&self.waiting).last_commit = Instant::now();
     }
 
     /// Counts a transaction that is sent again.
@@ -505,23 +534,53 @@ impl StoreMetrics {
 
     /// A transaction waits for its commit while the guard lives.
     pub fn waits(&self) -> Waits {
-        let number = self.waited.fetch_add(1, Ordering::Relaxed);
-        self.lock_waiting().insert(number, Instant::now());
+        let mut waiting = locked(&self.waiting);
+        if waiting.transactions.is_empty() {
+            self.begun.notify_one();
+        }
+        let number = waiting.begun;
+        waiting.begun += 1;
+        let transaction = Transaction {
+            since: Instant::now(),
+            is_aside: false,
+        };
+        waiting.transactions.insert(number, transaction);
         Waits(Arc::clone(&self.waiting), number)
     }
 
     /// How long the oldest transaction has waited.
     fn longest_wait(&self) -> Duration {
-        let oldest = self.lock_waiting().values().next().copied();
-        oldest.map_or(Duration::ZERO, |since| since.elapsed())
+        let waiting = locked(&self.waiting);
+        let oldest = waiting.transactions.values().next();
+        oldest.map_or(Duration::ZERO, |oldest| oldest.since.elapsed())
     }
 
-    fn lock_waiting(&self) -> MutexGuard<'_, BTreeMap<u64, Instant>> {
-        locked(&self.waiting)
+    /// Whether nothing can be committed: for ten seconds nothing was, although a transaction has waited for
+    /// as long. A single one that is set aside may meet a lock that concerns no other.
+    pub fn is_stalled(&self) -> bool {
+        let waiting = locked(&self.waiting);
+        let late = (waiting.transactions.values()).filter(|it| it.since.elapsed() >= STALL);
+        let (mut aside, mut others) = (0, 0);
+        late.for_each(|it| match it.is_aside {
+            true => aside += 1,
+            false => others += 1,
+        });
+        waiting.last_commit.elapsed() >= STALL && (others > 0 || aside > 1)
+    }
+
+    /// Waits until [`StoreMetrics::is_stalled`] is not this any more.
+    pub async fn is_not(&self, stalled: bool) {
+        while self.is_stalled() == stalled {
+            let is_idle = locked(&self.waiting).transactions.is_empty();
+            if is_idle {
+                self.begun.notified().await;
+            }
+            sleep(LOOK).await;
+        }
     }
 }
 
-fn locked(waiting: &Mutex<BTreeMap<u64, Instant>>) -> MutexGuard<'_, BTreeMap<u64, Instant>> {
+fn locked(waiting: &Mutex<Waiting>) -> MutexGuard<'_, Waiting> {
     waiting
         .lock()
         .expect("no code that holds this lock can panic")
@@ -538,11 +597,20 @@ impl Collector for StoreMetrics {
 
 /// Says that a transaction waits, until it is dropped.
 #[derive(Debug)]
-pub struct Waits(Arc<Mutex<BTreeMap<u64, Instant>>>, u64);
+pub struct Waits(Arc<Mutex<Waiting>>, u64);
+
+impl Waits {
+    /// It meets a lock, and is tried apart from the others.
+    pub fn set_aside(&self) {
+        if let Some(transaction) = locked(&self.0).transactions.get_mut(&self.1) {
+            transaction.is_aside = true;
+        }
+    }
+}
 
 impl Drop for Waits {
     fn drop(&mut self) {
-        locked(&self.0).remove(&self.1);
+        locked(&self.0).transactions.remove(&self.1);
     }
 }
 
@@ -672,6 +740,8 @@ impl EncodeMetric for Histogram {
 
 #[cfg(test)]
 mod tests {
+    use tokio::time::timeout;
+
     use super::*;
 
     fn lines<'a>(text: &'a str, name: &str) -> Vec<&'a str> {
@@ -713,20 +783,48 @@ mod tests {
         assert!(text.contains("chefshat_vector_games 0\n"));
     }
 
-    #[test]
-    fn the_oldest_transaction_is_known_while_it_waits() {
+    #[tokio::test(start_paused = true)]
+    async fn the_oldest_transaction_is_known_while_it_waits() {
         let store = StoreMetrics::default();
         assert_eq!(store.longest_wait(), Duration::ZERO);
+        let second = Duration::from_secs(1);
         let first = store.waits();
-        let since = |number| store.lock_waiting()[&number];
-        let second = store.waits();
-        let (oldest, next) = (since(0), since(1));
-        assert!(store.longest_wait() <= oldest.elapsed() && oldest <= next);
+        sleep(2 * second).await;
+        let next = store.waits();
+        sleep(second).await;
+        assert_eq!(store.longest_wait(), 3 * second);
         drop(first);
-        let left: Vec<Instant> = store.lock_waiting().values().copied().collect();
-        assert_eq!(left, [next]);
-        drop(second);
+        assert_eq!(store.longest_wait(), second);
+        drop(next);
         assert_eq!(store.longest_wait(), Duration::ZERO);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_stall_is_noticed_and_its_end_and_one_lock_is_none() {
+        let store = StoreMetrics::default();
+        let day = Duration::from_secs(86_400);
+        let stalls = || timeout(day, store.is_not(false));
+        assert!(stalls().await.is_err(), "nothing waits");
+        let begun = Instant::now();
+        let waits = store.waits();
+        stalls().await.expect("nothing is committed");
+        assert!((STALL..STALL + 2 * LOOK).contains(&begun.elapsed()));
+        store.committed(1, Duration::ZERO);
+        drop(waits);
+        timeout(2 * LOOK, store.is_not(true))
+            .await
+            .expect("it ends");
+
+        // A lock that one transaction meets keeps nobody else away; those of several may.
+        let one = store.waits();
+        one.set_aside();
+        assert!(stalls().await.is_err(), "one lock");
+        let other = store.waits();
+        other.set_aside();
+        stalls().await.expect("several locks");
+        // Others are committed meanwhile.
+        store.committed(1, Duration::ZERO);
+        assert!(!store.is_stalled());
     }
 
     #[derive(Debug)]

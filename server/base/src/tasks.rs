@@ -30,8 +30,8 @@ long_tasks! {
     Node,
     /// Notices pauses of the process.
     ProcessClock,
-    /// Reports a node as healthy while it has a lease.
-    NodeHealth,
+    /// Reports whether the server serves.
+    Health,
     /// Deletes old games.
     Retention,
     /// Deletes studies at their dates.

@@ -7,6 +7,7 @@ use rustls::pki_types::pem::PemObject as _;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use rustls::server::WebPkiClientVerifier;
 use rustls::{ClientConfig, RootCertStore, ServerConfig};
+use x509_parser::prelude::{FromDer as _, X509Certificate};
 
 /// The files that make a server use TLS.
 #[derive(Debug, Clone)]
@@ -18,6 +19,16 @@ pub struct TlsFiles {
     /// Certificates of the authorities whose clients are admitted, PEM; `None`: clients need no
     /// certificate.
     pub client_authority: Option<PathBuf>,
+}
+
+/// What a server needs of the files.
+#[derive(Debug)]
+pub struct ServerTls {
+    /// How it takes connections.
+    pub config: Arc<ServerConfig>,
+    /// When the first of its certificates, or of its authorities, expires: seconds since the Unix
+    /// epoch. `None`: of none it is known.
+    pub expires_at: Option<i64>,
 }
 
 /// Why the files cannot be used.
@@ -60,9 +71,10 @@ impl TlsFiles {
     ///
     /// # Errors
     /// They cannot be used.
-    pub fn read(&self) -> Result<Arc<ServerConfig>, TlsError> {
+    pub fn read(&self) -> Result<ServerTls, TlsError> {
         let provider = Arc::new(rustls::crypto::ring::default_provider());
         let chain = certificates(&self.certificate)?;
+        let mut expiries: Vec<i64> = chain.iter().filter_map(expires_at).collect();
         let key =
             PrivateKeyDer::from_pem_file(&self.key).map_err(|it| unreadable(&self.key, &it))?;
         let builder = ServerConfig::builder_with_provider(Arc::clone(&provider))
@@ -72,7 +84,9 @@ impl TlsFiles {
             None => builder.with_no_client_auth(),
             Some(path) => {
                 let wrong = |problem: &dyn std::fmt::Display| bad_authority(path, problem);
-                let roots = roots(path)?;
+                let authorities = certificates(path)?;
+                expiries.extend(authorities.iter().filter_map(expires_at));
+                let roots = roots(path, authorities)?;
                 let verifier = WebPkiClientVerifier::builder_with_provider(roots.into(), provider);
                 builder.with_client_cert_verifier(verifier.build().map_err(|error| wrong(&error))?)
             }
@@ -82,7 +96,10 @@ impl TlsFiles {
             TlsError::Certificate { path, source }
         })?;
         config.alpn_protocols = vec![b"h2".to_vec(), b"http/1.1".to_vec()];
-        Ok(Arc::new(config))
+        Ok(ServerTls {
+            config: Arc::new(config),
+            expires_at: expiries.into_iter().min(),
+        })
     }
 
     /// How a node connects to others: it shows its certificate, and admits servers of the authority
@@ -96,7 +113,7 @@ impl TlsFiles {
         let key =
             PrivateKeyDer::from_pem_file(&self.key).map_err(|it| unreadable(&self.key, &it))?;
         let roots = match &self.client_authority {
-            Some(path) => roots(path)?,
+            Some(path) => roots(path, certificates(path)?)?,
             None => RootCertStore::empty(),
         };
         let builder = ClientConfig::builder_with_provider(provider)
@@ -114,13 +131,23 @@ impl TlsFiles {
     }
 }
 
-/// The authorities of a file.
-fn roots(path: &Path) -> Result<RootCertStore, TlsError> {
+/// The authorities with these certificates, which a file has.
+fn roots(
+    path: &Path,
+    authorities: Vec<CertificateDer<'static>>,
+) -> Result<RootCertStore, TlsError> {
     let mut roots = RootCertStore::empty();
-    for certificate in certificates(path)? {
+    for certificate in authorities {
         (roots.add(certificate)).map_err(|error| bad_authority(path, &error))?;
     }
     Ok(roots)
+}
+
+/// When a certificate expires, in seconds since the Unix epoch; `None` if it is of a form that cannot be
+/// read.
+fn expires_at(certificate: &CertificateDer<'static>) -> Option<i64> {
+    let (_, certificate) = X509Certificate::from_der(certificate).ok()?;
+    Some(certificate.validity().not_after.timestamp())
 }
 
 fn bad_authority(path: &Path, problem: &dyn std::fmt::Display) -> TlsError {

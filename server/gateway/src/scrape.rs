@@ -25,6 +25,7 @@ use tokio::sync::Semaphore;
 use tower::Layer as _;
 use tower::util::MapResponse;
 
+use crate::tls::Tls;
 use crate::web::{OriginLayer, Origins};
 use chefshat_base::clock::ProcessClock;
 use chefshat_base::metrics::Metrics;
@@ -89,6 +90,31 @@ pub fn add_state(rooms: &Arc<Rooms>, tournaments: &Arc<Tournaments>) {
     rooms.metrics().add_process(ProcessState);
 }
 
+/// Adds when the certificates expire that a server shows, by the listener that shows them.
+pub fn add_certificates(metrics: &Metrics, shown: Vec<(&'static str, Arc<Tls>)>) {
+    if !shown.is_empty() {
+        metrics.add(Certificates(shown));
+    }
+}
+
+/// Reads when certificates expire.
+#[derive(Debug)]
+struct Certificates(Vec<(&'static str, Arc<Tls>)>);
+
+impl Collector for Certificates {
+    fn encode(&self, mut encoder: DescriptorEncoder<'_>) -> fmt::Result {
+        let known = |(listener, tls): &(&'static str, Arc<Tls>)| {
+            let expires_at = usize::try_from(tls.expires_at()?).ok()?;
+            Some((*listener, expires_at))
+        };
+        let known: Vec<_> = self.0.iter().filter_map(known).collect();
+        let (name, label) = ("certificate_expiry_timestamp", "listener");
+        let help = "When the first certificate of a chain or of its authorities expires, since the Unix epoch";
+        let unit = Some(&Unit::Seconds);
+        Encoder(&mut encoder).gauges(name, help, unit, label, &known, |at| *at)
+    }
+}
+
 /// Reads the state of a server.
 #[derive(Debug)]
 struct ServerState {
@@ -141,10 +167,10 @@ fn queues(rooms: &Rooms, to: &mut Encoder<'_, '_>) -> fmt::Result {
     ];
     let total = |depths: &Vec<usize>| depths.iter().sum();
     let help = "Entries of all queues of a kind";
-    to.gauges("queue_depth", help, "queue", &depths, total)?;
+    to.gauges("queue_depth", help, None, "queue", &depths, total)?;
     let deepest = |depths: &Vec<usize>| depths.iter().copied().max().unwrap_or(0);
     let help = "Entries of the deepest queue of a kind";
-    to.gauges("queue_depth_max", help, "queue", &depths, deepest)
+    to.gauges("queue_depth_max", help, None, "queue", &depths, deepest)
 }
 
 fn states(tournaments: &Tournaments, to: &mut Encoder<'_, '_>) -> fmt::Result {
@@ -158,7 +184,8 @@ fn states(tournaments: &Tournaments, to: &mut Encoder<'_, '_>) -> fmt::Result {
         ("closed", State::Closed),
     ];
     let count = |state: &State| states.iter().filter(|other| *other == state).count();
-    to.gauges("tournaments", "Listed tournaments", "state", &labels, count)
+    let help = "Listed tournaments";
+    to.gauges("tournaments", help, None, "state", &labels, count)
 }
 
 fn disk(usage: DiskUsage, to: &mut Encoder<'_, '_>) -> fmt::Result {
@@ -261,11 +288,12 @@ impl Encoder<'_, '_> {
         &mut self,
         name: &str,
         help: &str,
+        unit: Option<&Unit>,
         label: &'static str,
         values: &[(&'static str, T)],
         gauge: impl Fn(&T) -> usize,
     ) -> fmt::Result {
-        let mut encoder = (self.0).encode_descriptor(name, help, None, MetricType::Gauge)?;
+        let mut encoder = (self.0).encode_descriptor(name, help, unit, MetricType::Gauge)?;
         for (value, what) in values {
             let count = u64::try_from(gauge(what)).unwrap_or(u64::MAX);
             let labels = [(label, *value)];

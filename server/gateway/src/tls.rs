@@ -10,7 +10,6 @@ use std::time::Duration;
 
 use arc_swap::ArcSwap;
 use futures::{Stream, StreamExt as _, stream};
-use rustls::ServerConfig;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::task::JoinSet;
 use tokio::time::{sleep, timeout};
@@ -23,6 +22,7 @@ use crate::handshakes::{Handshake, Handshakes};
 use chefshat_admission::limits::Key;
 use chefshat_base::file_watch::FileWatch;
 use chefshat_base::tasks::short;
+use chefshat_base::tls_files::ServerTls;
 pub use chefshat_base::tls_files::{TlsError, TlsFiles};
 
 /// How long a client may take for the handshake.
@@ -35,7 +35,7 @@ const INTERVAL: Duration = Duration::from_secs(1);
 pub struct Tls {
     files: TlsFiles,
     watch: Mutex<FileWatch>,
-    current: ArcSwap<ServerConfig>,
+    current: ArcSwap<ServerTls>,
 }
 
 impl Tls {
@@ -46,7 +46,7 @@ impl Tls {
     pub fn open(files: TlsFiles) -> Result<Arc<Self>, TlsError> {
         // Watched before they are read: a later change is noticed.
         let watch = Mutex::new(FileWatch::of(files.paths()));
-        let current = ArcSwap::new(files.read()?);
+        let current = ArcSwap::from_pointee(files.read()?);
         Ok(Arc::new(Self {
             files,
             watch,
@@ -61,7 +61,7 @@ impl Tls {
             sleep(INTERVAL).await;
             let mut watch = (self.watch.lock()).expect("no code that holds this lock can panic");
             let read = watch.read_changed(|| {
-                self.current.store(self.files.read()?);
+                self.current.store(Arc::new(self.files.read()?));
                 info!("the certificate was read again");
                 Ok::<_, TlsError>(())
             });
@@ -69,6 +69,11 @@ impl Tls {
                 error!(%error, "the certificate stays as it was");
             }
         }
+    }
+
+    /// When the first of its certificates expires, in seconds since the Unix epoch, if that is known.
+    pub fn expires_at(&self) -> Option<i64> {
+        self.current.load().expires_at
     }
 
     /// These connections, encrypted. Those whose handshake fails, or for whose address `limits` has
@@ -115,7 +120,7 @@ impl Tls {
     where
         C: AsyncRead + AsyncWrite + Unpin + Send + 'static,
     {
-        let acceptor = TlsAcceptor::from(self.current.load_full());
+        let acceptor = TlsAcceptor::from(Arc::clone(&self.current.load().config));
         let computing = admitted.compute(acceptor.accept(connection));
         let shaken = timeout(HANDSHAKE_TIMEOUT, computing).await;
         let stream = shaken.unwrap_or_else(|_| Some(Err(io::ErrorKind::TimedOut.into())))?;

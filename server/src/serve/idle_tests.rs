@@ -31,11 +31,12 @@ use crate::tls::TlsFiles;
 use crate::webhooks::WebhookSettings;
 
 /// What the server runs in [`the_tasks_of_a_server_sleep_while_nothing_is_due`].
-const OF_A_SERVER: [LongTask; 17] = [
+const OF_A_SERVER: [LongTask; 18] = [
     LongTask::Room,
     LongTask::Tournament,
     LongTask::Study,
     LongTask::ProcessClock,
+    LongTask::Health,
     LongTask::Retention,
     LongTask::StudyDeletion,
     LongTask::Webhooks,
@@ -52,7 +53,7 @@ const OF_A_SERVER: [LongTask; 17] = [
 ];
 
 /// What only the node runs in [`the_tasks_of_a_node_sleep_while_nothing_is_due`].
-const OF_A_NODE: [LongTask; 3] = [LongTask::Node, LongTask::NodeHealth, LongTask::Certificates];
+const OF_A_NODE: [LongTask; 2] = [LongTask::Node, LongTask::Certificates];
 
 /// What neither runs.
 const ELSEWHERE: [(LongTask, &str); 5] = [

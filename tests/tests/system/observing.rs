@@ -8,12 +8,13 @@ use std::process::Stdio;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_client::Client;
+use chefshat_client::{Client, ConnectOptions};
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_server::config::ServerConfig;
 use chefshat_server::scrape;
 use chefshat_server::serve::Server;
 use chefshat_server::store::SqliteStore;
+use chefshat_server::tls::TlsFiles;
 use chefshat_server::web::Origins;
 use chefshat_tests::{
     Launch, StreamSeat, one_shift, own_address, patiently, random_agents, room_of_four, skip,
@@ -26,7 +27,7 @@ use tempfile::TempDir;
 use tokio::net::TcpListener;
 use tokio::process::{Child, Command};
 
-/// A server with a database and its metrics.
+/// A server with a database, a certificate and its metrics.
 struct Observed {
     url: String,
     metrics: SocketAddr,
@@ -38,6 +39,11 @@ impl Observed {
         let data = tempfile::tempdir().expect("a temporary folder");
         let config = ServerConfig {
             data_dir: Some(data.path().to_path_buf()),
+            tls: Some(TlsFiles {
+                certificate: source("tests/fixtures/tls/localhost.pem"),
+                key: source("tests/fixtures/tls/localhost.key"),
+                client_authority: None,
+            }),
             ..ServerConfig::default()
         };
         let store = SqliteStore::open(data.path()).await.expect("a store");
@@ -51,14 +57,19 @@ impl Observed {
         tokio::spawn(scrape::serve(scraped, Arc::clone(server.metrics()), names));
         tokio::spawn(server.serve(listener, std::future::pending()));
         Self {
-            url: format!("http://{address}"),
+            url: format!("https://localhost:{}", address.port()),
             metrics,
             _data: data,
         }
     }
 
     async fn client(&self) -> Client {
-        Client::connect(&self.url).await.expect("it listens")
+        let options = ConnectOptions {
+            token: None,
+            ca: Some(source("tests/fixtures/tls/localhost.pem")),
+        };
+        let client = Client::connect_with(&self.url, &options).await;
+        client.expect("it listens")
     }
 
     /// The metrics as Prometheus gets them.
@@ -127,6 +138,11 @@ async fn every_decision_answer_and_refusal_of_a_game_is_counted() {
         ("chefshat_refusals_total{reason=\"ROOM_UNKNOWN\"}", 1.0),
         ("chefshat_queue_depth{queue=\"outbox\"}", 0.0),
         ("chefshat_draining", 0.0),
+        // 2126-10-28, as OpenSSL reads it from the file.
+        (
+            "chefshat_certificate_expiry_timestamp_seconds{listener=\"clients\"}",
+            4_948_864_965.0,
+        ),
     ] {
         assert_eq!(value(&text, sample), expected, "{sample}");
     }

@@ -248,6 +248,7 @@ impl<W: Work> Writer<W> {
             match &self.aside {
                 Some(aside) => {
                     warn!(error = %failed, "what meets a lock is set aside");
+                    batch.waits.set_aside();
                     // Its receiver outlives all other writers.
                     let _ = aside.send(batch);
                 }
