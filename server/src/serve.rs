@@ -45,7 +45,8 @@ use crate::metrics::Metrics;
 use crate::node::{ClusterNode, Hosted};
 use crate::participants::Participants;
 use crate::peers::{
-    CONNECTION_WINDOW, MAX_RESET_STREAMS, PING_INTERVAL, PING_TIMEOUT, PeerPort, STREAM_WINDOW,
+    CONNECTION_WINDOW, MAX_RESET_STREAMS, PING_INTERVAL, PING_TIMEOUT, PeerPort, Peers,
+    STREAM_WINDOW,
 };
 use crate::proxies::{TrustedProxies, TrustedProxy};
 use crate::retention::Retention;
@@ -370,7 +371,15 @@ impl Server {
         scrape::add_certificates(rooms.metrics(), shown);
         let forwarding = (peers.as_ref()).map(|port| {
             let directory = Arc::clone(rooms.directory());
-            grpc::ForwardLayer::new(directory, port.peers(rooms.metrics()), Arc::clone(&calls))
+            let to_others = port.peers(rooms.metrics());
+            let signing_key = rooms.signing_key().map(|key| key.to_string());
+            let looking = look_at_others(
+                Arc::clone(&directory),
+                Arc::clone(&to_others),
+                signing_key.unwrap_or_default(),
+            );
+            tracker.spawn(closing.clone().run_until_cancelled_owned(looking));
+            grpc::ForwardLayer::new(directory, to_others, Arc::clone(&calls))
         });
         let play = grpc::Play::new(
             Arc::clone(&rooms),
@@ -518,6 +527,14 @@ impl Server {
             warn!("the database was not closed in time; what was acknowledged is stored");
         }
         Ok(())
+    }
+}
+
+/// Logs which of the other nodes do not fit to this one, which has just started.
+async fn look_at_others(directory: Arc<dyn Directory>, peers: Arc<Peers>, signing_key: String) {
+    let (_, others) = directory.nodes().await;
+    for (peer, misfit) in peers.misfits(others, &signing_key).await {
+        warn!(node = %peer.node, address = %peer.endpoint, %misfit, "another node does not fit to this one");
     }
 }
 

@@ -8,13 +8,14 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use chefshat_proto::v1;
 use futures::{Stream, StreamExt as _};
 use http::{Request, Response, Uri};
 use hyper_util::rt::TokioIo;
 use rayon::ThreadPoolBuildError;
 use rustls::pki_types::ServerName;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::time::Instant;
+use tokio::time::{Instant, timeout};
 use tokio_rustls::TlsConnector;
 use tokio_rustls::client::TlsStream;
 use tokio_util::either::Either;
@@ -22,6 +23,7 @@ use tonic::body::Body;
 use tonic::transport::{Channel, Endpoint};
 use tower::{ServiceExt as _, service_fn};
 use tracing::warn;
+use v1::server_service_client::ServerServiceClient;
 
 use crate::connections::{self, Connection, Connections, Limits};
 use crate::handshakes::Handshakes;
@@ -36,6 +38,8 @@ use chefshat_room::MAX_GATEWAY_DELAY;
 pub const PEER_NAME: &str = "chefshat-node";
 /// How long connecting to another node may take.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long another node may take to say who it is.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
 /// Time between two pings of a connection between nodes, from either side.
 pub const PING_INTERVAL: Duration = Duration::from_secs(2);
 /// How long the other node may take to answer a ping. After that everything on the connection fails.
@@ -235,6 +239,43 @@ impl Peers {
     }
 }
 
+/// Why a node does not fit to another one.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Misfit {
+    /// It does not answer.
+    #[error(
+        "it does not answer ({0}); look at the network, its --peer-endpoint, and the authority of its certificate"
+    )]
+    Silent(String),
+    /// It signs records with another key.
+    #[error(
+        "it signs records with another key; copy one signing-key into the data directories of all nodes"
+    )]
+    OtherKey,
+}
+
+impl Peers {
+    /// Asks other nodes who they are; returns those that do not fit to a node that signs records with
+    /// this key, empty if it signs none.
+    pub async fn misfits(&self, others: Vec<Peer>, signing_key: &str) -> Vec<(Peer, Misfit)> {
+        let asked = others.into_iter().map(async |peer| {
+            let mut service = ServerServiceClient::new(self.channel(&peer));
+            let asked = service.get_server_info(v1::GetServerInfoRequest {});
+            let misfit = match timeout(ANSWER_TIMEOUT, asked).await {
+                Ok(Ok(answer)) => {
+                    let fits = answer.into_inner().signing_key == signing_key;
+                    (!fits).then_some(Misfit::OtherKey)
+                }
+                Ok(Err(status)) => Some(Misfit::Silent(status.message().to_owned())),
+                Err(late) => Some(Misfit::Silent(late.to_string())),
+            };
+            misfit.map(|misfit| (peer, misfit))
+        });
+        let misfits = futures::future::join_all(asked).await;
+        misfits.into_iter().flatten().collect()
+    }
+}
+
 /// The stream of a connection to another node.
 type ToPeer = Either<TcpStream, Box<TlsStream<TcpStream>>>;
 
@@ -249,7 +290,7 @@ struct Opening {
 impl Opening {
     /// Connects to another node.
     async fn open(&self, address: &str) -> io::Result<TokioIo<ToPeer>> {
-        let connected = tokio::time::timeout(CONNECT_TIMEOUT, self.connect(address)).await;
+        let connected = timeout(CONNECT_TIMEOUT, self.connect(address)).await;
         let connected = connected.unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()));
         if let Err(error) = &connected {
             self.metrics.peer_error();
@@ -278,9 +319,11 @@ impl Opening {
 mod tests {
     use std::path::Path;
 
+    use chefshat_proto::v1::server_service_server::{ServerService, ServerServiceServer};
     use futures::FutureExt as _;
     use tokio::io::AsyncReadExt as _;
     use tokio::net::TcpSocket;
+    use tokio_stream::wrappers::TcpListenerStream;
 
     use super::*;
 
@@ -291,6 +334,69 @@ mod tests {
             address,
             PeerPort::new(listener, None).expect("on this machine"),
         )
+    }
+
+    /// A node that signs with a key.
+    struct Other(&'static str);
+
+    #[tonic::async_trait]
+    impl ServerService for Other {
+        async fn get_server_info(
+            &self,
+            _: tonic::Request<v1::GetServerInfoRequest>,
+        ) -> Result<tonic::Response<v1::GetServerInfoResponse>, tonic::Status> {
+            Ok(tonic::Response::new(v1::GetServerInfoResponse {
+                signing_key: self.0.to_owned(),
+                ..v1::GetServerInfoResponse::default()
+            }))
+        }
+
+        async fn get_action_table(
+            &self,
+            _: tonic::Request<v1::GetActionTableRequest>,
+        ) -> Result<tonic::Response<v1::GetActionTableResponse>, tonic::Status> {
+            unreachable!("nobody asks for it")
+        }
+
+        async fn get_clock(
+            &self,
+            _: tonic::Request<v1::GetClockRequest>,
+        ) -> Result<tonic::Response<v1::GetClockResponse>, tonic::Status> {
+            unreachable!("nobody asks for it")
+        }
+    }
+
+    #[tokio::test]
+    async fn nodes_that_do_not_answer_or_sign_with_another_key_do_not_fit() {
+        let (_, port) = port().await;
+        let peers = port.peers(&Arc::default());
+        let peer = |node: &str, address: SocketAddr| Peer {
+            node: node.into(),
+            endpoint: address.to_string().into(),
+        };
+        let other = async |node, key| {
+            let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+            let address = listener.local_addr().expect("bound");
+            let service = ServerServiceServer::new(Other(key));
+            let incoming = TcpListenerStream::new(listener);
+            let serving = tonic::transport::Server::builder().add_service(service);
+            tokio::spawn(serving.serve_with_incoming(incoming));
+            peer(node, address)
+        };
+        let (fits, differs) = (
+            other("fits", "ours").await,
+            other("differs", "theirs").await,
+        );
+        // Nobody listens there.
+        let closed = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let silent = peer("silent", closed.local_addr().expect("bound"));
+        drop(closed);
+        let others = vec![fits, differs.clone(), silent.clone()];
+        let misfits = peers.misfits(others, "ours").await;
+        let found: Vec<&Peer> = misfits.iter().map(|(peer, _)| peer).collect();
+        assert_eq!(found, [&differs, &silent]);
+        assert_eq!(misfits[0].1, Misfit::OtherKey);
+        assert!(matches!(misfits[1].1, Misfit::Silent(_)), "{misfits:?}");
     }
 
     #[tokio::test(start_paused = true)]
