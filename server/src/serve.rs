@@ -55,7 +55,7 @@ use crate::scrape;
 use crate::store::cluster::{ClusterStore, NodeInfo};
 use crate::store::{Store, StoreError};
 use crate::studies::Studies;
-use crate::tasks::{LongTask, named};
+use crate::tasks::{LongTask, named, short};
 use crate::tls::{MaybeTls, Tls, TlsError};
 use crate::tournaments::Tournaments;
 use crate::web::{OriginLayer, Origins, PageLayer};
@@ -373,12 +373,14 @@ impl Server {
             let directory = Arc::clone(rooms.directory());
             let to_others = port.peers(rooms.metrics());
             let signing_key = rooms.signing_key().map(|key| key.to_string());
-            let looking = look_at_others(
-                Arc::clone(&directory),
-                Arc::clone(&to_others),
-                signing_key.unwrap_or_default(),
-            );
-            tracker.spawn(closing.clone().run_until_cancelled_owned(looking));
+            tracker.spawn(short(
+                "asks each node once, within a time limit",
+                closing.clone().run_until_cancelled_owned(look_at_others(
+                    Arc::clone(&directory),
+                    Arc::clone(&to_others),
+                    signing_key.unwrap_or_default(),
+                )),
+            ));
             grpc::ForwardLayer::new(directory, to_others, Arc::clone(&calls))
         });
         let play = grpc::Play::new(

@@ -111,7 +111,7 @@ struct Effect {
 enum Size {
     /// In points of the item.
     Points(f64),
-    /// In standard deviations of an answer.
+    /// In standard deviations of opinions.
     Deviations(f64),
 }
 
@@ -214,11 +214,9 @@ impl Simulate {
             let all = known(&mut of.levels.iter().map(String::as_str));
             return Err(format!("--effect: {factor} has no level {level:?}, but {all}").into());
         }
-        let has = |levels: &std::collections::BTreeMap<_, _>| levels.get(factor) == Some(level);
-        let has_level: Vec<bool> = settings
-            .conditions
-            .iter()
-            .map(|it| has(&it.levels))
+        let conditions = settings.conditions.iter();
+        let has_level: Vec<bool> = conditions
+            .map(|it| it.levels.get(factor) == Some(level))
             .collect();
         if has_level.iter().all(|has| *has == has_level[0]) {
             let words =
@@ -405,7 +403,7 @@ impl Simulate {
                         },
                     )
                     .collect();
-                of_rows.iter().sum::<f64>() / of_rows.len() as f64
+                mean(&of_rows)
             }));
         }
         Ok(values)
