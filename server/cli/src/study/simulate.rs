@@ -3,6 +3,7 @@
 //! games of each condition; `chefshat_simulation::power` simulates and tests.
 
 use std::collections::BTreeSet;
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -37,7 +38,7 @@ deals: their effect is what the conditions make of it.
 
 A participant counts once, with its mean in each condition, and a group once, as in the sample analysis. Conditions with the level are \
 compared with the others: between participants by Welch's t-test, within them by a paired one, two-sided. Slots of those who leave are \
-given again, so everybody completes the study.
+given to others, so everybody completes the study.
 
 Examples:
   chefshat study simulate docs/studies/example.toml --measure nasa_tlx/effort --effect strength=strong:0.5sd
@@ -62,7 +63,7 @@ pub(super) struct Simulate {
     #[arg(long, value_name = "N,…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(2..=i64::from(MAX_PARTICIPANTS)))]
     participants: Vec<u32>,
     /// Standard deviation of opinions, in points; by default a quarter of the item's range.
-    #[arg(long, value_name = "POINTS", value_parser = positive)]
+    #[arg(long, value_name = "POINTS", allow_negative_numbers = true, value_parser = positive)]
     sd: Option<f64>,
     /// Mean opinion without the level, in points; by default the middle of the item's range.
     #[arg(long, value_name = "POINTS", allow_negative_numbers = true)]
@@ -197,7 +198,11 @@ impl Simulate {
         bar.finish_and_clear();
         match self.json {
             true => say(self.json(&plan, &measure, &results))?,
-            false => say(self.text(&plan, &measure, &results).trim_end())?,
+            false => write!(
+                anstream::stdout().lock(),
+                "{}",
+                self.text(&plan, &measure, &results)
+            )?,
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -253,14 +258,16 @@ impl Simulate {
         }
         let item_correlation = self.item_correlation.unwrap_or(self.correlation.max(0.7));
         if item_correlation < self.correlation {
-            return Err("--item-correlation: it is at least --correlation".into());
+            let words = format!("it must be at least --correlation, {}", self.correlation);
+            return Err(format!("--item-correlation: {words}").into());
         }
         let group_correlation = match plan.core.groups {
             Some(_) => self.group_correlation.unwrap_or(self.correlation.min(0.2)),
             None => 0.0,
         };
         if group_correlation > self.correlation {
-            return Err("--group-correlation: it is at most --correlation".into());
+            let words = format!("it must be at most --correlation, {}", self.correlation);
+            return Err(format!("--group-correlation: {words}").into());
         }
         Ok(Measure::Answers(Answers {
             min,
@@ -551,9 +558,9 @@ impl Simulate {
         let enough = results.iter().find(|(.., power)| power.share() >= USUAL);
         let enough = match enough {
             Some((participants, ..)) => {
-                format!("With {participants} participants the power is 80 % or more")
+                format!("{participants} are the fewest of these with a power of 80 %")
             }
-            None => "With none of these the power is 80 %".to_owned(),
+            None => "None of these reaches a power of 80 %".to_owned(),
         };
         let studies = grouped(self.studies);
         line(

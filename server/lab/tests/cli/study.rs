@@ -117,10 +117,10 @@ fn a_study_is_simulated_with_a_known_effect() {
         .well()
         .json();
     assert_eq!(again, printed);
-    let enough = "With 64 participants the power is 80 % or more (400 simulated studies";
+    let enough = "64 are the fewest of these with a power of 80 % (400 simulated studies";
     simulate(EXAMPLE, of_answers).well().assert_says(&[enough]);
     let small = format!("{of_answers} --participants 16");
-    let too_few = "With none of these the power is 80 %";
+    let too_few = "None of these reaches a power of 80 %";
     simulate(EXAMPLE, &small).well().assert_says(&[too_few]);
 
     // A pair counts once: of 16 participants 8 pairs, 4 with each level.
