@@ -7,7 +7,8 @@ use rustls::pki_types::pem::PemObject as _;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use rustls::server::WebPkiClientVerifier;
 use rustls::{ClientConfig, RootCertStore, ServerConfig};
-use x509_parser::prelude::{FromDer as _, X509Certificate};
+use x509_cert::Certificate;
+use x509_cert::der::Decode as _;
 
 /// The files that make a server use TLS.
 #[derive(Debug, Clone)]
@@ -146,8 +147,9 @@ fn roots(
 /// When a certificate expires, in seconds since the Unix epoch; `None` if it is of a form that cannot be
 /// read.
 fn expires_at(certificate: &CertificateDer<'static>) -> Option<i64> {
-    let (_, certificate) = X509Certificate::from_der(certificate).ok()?;
-    Some(certificate.validity().not_after.timestamp())
+    let certificate = Certificate::from_der(certificate).ok()?;
+    let expires = certificate.tbs_certificate.validity.not_after;
+    i64::try_from(expires.to_unix_duration().as_secs()).ok()
 }
 
 fn bad_authority(path: &Path, problem: &dyn std::fmt::Display) -> TlsError {
