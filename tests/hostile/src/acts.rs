@@ -42,9 +42,11 @@ const SAMPLES: u64 = 512;
 const CHANNELS: usize = 16;
 const STREAMS: u64 = 16;
 /// Bytes of an annotation: nearly the most that are recorded with a decision.
-const ANNOTATION_BYTES: usize = 4_000;
+pub(crate) const ANNOTATION_BYTES: usize = 4_000;
 /// Seats that a stream attaches and detaches with one message.
 const ATTACHED_AT_ONCE: u32 = 128;
+/// How long closing the rooms of an attack may take.
+const CLOSING_LIMIT: Duration = Duration::from_secs(5);
 /// How long a client of HTTP/1 waits for an answer.
 const ANSWER_LIMIT: Duration = Duration::from_secs(5);
 
@@ -182,9 +184,11 @@ pub(crate) fn evaluation(game_id: String, time_ms: u32) -> v1::EvaluateRequest {
     }
 }
 
-/// Plays in many rooms with all seats, and annotates each decision with as much as it may have.
-pub(crate) async fn annotated_games(target: &Target, rooms: u32) -> Result<(), Status> {
-    let client = target.client().await?;
+/// Plays in many rooms with all seats as fast as it can; each decision has an annotation of this many
+/// bytes. Closes the rooms at the end: what is held for those that play is no memory that an attack
+/// leaves.
+pub(crate) async fn games(target: &Target, rooms: u32, annotation: usize) -> Result<(), Status> {
+    let (client, until) = (target.client().await?, target.until);
     let mut playing = JoinSet::new();
     for seed in 0..target.count(rooms) {
         let (client, tally) = (client.clone(), Arc::clone(&target.tally));
@@ -193,16 +197,25 @@ pub(crate) async fn annotated_games(target: &Target, rooms: u32) -> Result<(), S
             let mut rooms = RoomServiceClient::new(client.channel());
             let created = rooms.create_room(room(false, LONG)).await;
             tally.outcome(&created);
-            let tickets = seats(&mut rooms, &created?.into_inner()).await?;
-            let agents = tickets.into_iter().map(|ticket| {
-                let agent = RandomAgent::new(u64::from(seed));
-                (ticket, Talkative(agent))
-            });
-            client.play_many(agents).await;
-            Ok::<_, Status>(())
+            let created = created?.into_inner();
+            let played = async {
+                let tickets = seats(&mut rooms, &created).await?;
+                let agents = tickets.into_iter().map(|ticket| {
+                    let agent = RandomAgent::new(u64::from(seed));
+                    (ticket, Talkative { agent, annotation })
+                });
+                client.play_many(agents).await;
+                Ok::<_, Status>(())
+            };
+            let _ = timeout_at(until, played).await;
+            let request = v1::CloseRoomRequest {
+                room_id: created.room.unwrap_or_default().room_id,
+                owner_token: created.owner_token,
+            };
+            rooms.close_room(request).await
         });
     }
-    let _ = timeout_at(target.until, playing.join_all()).await;
+    let _ = timeout_at(until + CLOSING_LIMIT, playing.join_all()).await;
     Ok(())
 }
 
@@ -223,23 +236,27 @@ async fn seats(
     Ok(tickets)
 }
 
-/// An agent that has much to say about each decision.
-struct Talkative(RandomAgent);
+/// An agent that says something about each decision.
+struct Talkative {
+    agent: RandomAgent,
+    /// Bytes.
+    annotation: usize,
+}
 
 impl Agent for Talkative {
     fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
-        self.0.decide(request)
+        self.agent.decide(request)
     }
 
     fn annotate(&mut self) -> Option<v1::Annotations> {
-        Some(annotations())
+        (self.annotation > 0).then(|| annotations(self.annotation))
     }
 }
 
-/// Nearly the longest annotations that are recorded with a decision.
-pub(crate) fn annotations() -> v1::Annotations {
+/// Annotations of a decision of this many bytes.
+pub(crate) fn annotations(bytes: usize) -> v1::Annotations {
     v1::Annotations {
-        extra: [("thoughts".to_owned(), "x".repeat(ANNOTATION_BYTES))].into(),
+        extra: [("thoughts".to_owned(), "x".repeat(bytes))].into(),
         ..v1::Annotations::default()
     }
 }

@@ -210,6 +210,12 @@ pub(crate) static ATTACKS: &[Attack] = &[
         |target| create_rooms(&target, 8, 1_000_000, true, 1).await
     ),
     attack!(
+        "fast-games",
+        "251 rooms, 1,000 Shifts a game, whose agents answer at once",
+        ListRooms,
+        |target| acts::games(&target, 251, 0).await?
+    ),
+    attack!(
         "list-rooms-stalled",
         "ListRooms with 100 rooms on 20 connections x 1,000 streams with a window of 0",
         ListRooms,
@@ -418,7 +424,7 @@ pub(crate) static ATTACKS: &[Attack] = &[
         "full-disk",
         "251 rooms with 4 KB of annotations for each decision on a disk of 110 MiB",
         ListRooms,
-        |target| acts::annotated_games(&target, 251).await?,
+        |target| acts::games(&target, 251, acts::ANNOTATION_BYTES).await?,
         setup: Setup { disk_mib: Some(110), ..PLAIN }
     ),
     attack!(

@@ -180,7 +180,7 @@ fn parts(lines: Vec<v1::RecordLine>, bytes: usize) -> (v1::RecordLine, Vec<Bytes
     for mut line in lines {
         match &mut line.line {
             Some(Line::Decision(decision)) if in_all < bytes => {
-                decision.annotations = Some(acts::annotations());
+                decision.annotations = Some(acts::annotations(acts::ANNOTATION_BYTES));
             }
             Some(Line::Footer(footer)) => footer.signature = None,
             _ => {}

@@ -15,7 +15,7 @@ use crate::scenarios::{Scenario, seconds};
 #[command(
     name = "chefshat-hostile",
     version,
-    after_help = "Examples:\n  chefshat-hostile                          all attacks, about fifteen minutes\n  chefshat-hostile idle                     memory of 10,000 idle connections\n  chefshat-hostile spectators               1,000 spectators that do not read\n  chefshat-hostile soak --json              an hour of rooms that start and end\n  chefshat-hostile --attack ping-flood      one of them\n  chefshat-hostile --beside                 the same, with the honest room on a server of its own\n  chefshat-hostile --list                   their names\n  chefshat-hostile --server old/chefshat --json > before.json"
+    after_help = "Examples:\n  chefshat-hostile                          all attacks, about fifteen minutes\n  chefshat-hostile idle                     memory of 10,000 idle connections\n  chefshat-hostile spectators               1,000 spectators that do not read\n  chefshat-hostile soak --json              an hour of rooms that start and end\n  chefshat-hostile --attack ping-flood      one of them\n  chefshat-hostile --list                   their names\n  chefshat-hostile --server old/chefshat --json > before.json"
 )]
 pub(crate) struct Options {
     #[command(subcommand)]
@@ -38,10 +38,6 @@ pub(crate) struct Options {
     /// Seconds after the attack in which the server may give its memory back.
     #[arg(long, default_value = "10", value_parser = seconds)]
     pub(crate) rest: Duration,
-    /// Attack a second server of the same kind, so that what the honest room notices is what the
-    /// attack and its server take of this machine.
-    #[arg(long)]
-    pub(crate) beside: bool,
     /// Divide all counts of the attacks by this number, to test that the program works.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000))]
     pub(crate) divide: u32,

@@ -1,5 +1,6 @@
-//! One attack: a new server, the honest room in quiet, the attack beside it, and the time after. For
-//! comparison, the honest room has a server of its own (`--beside`).
+//! One attack: a new server, the honest room in quiet, the attack beside it, and the time after. A
+//! second honest room, the control, plays all the time on a server that nobody attacks, so that what
+//! the attack takes of the machine is told from what it takes of the server.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -72,11 +73,7 @@ async fn attacked(
     options: &Options,
 ) -> Result<Row, HostileError> {
     let server = AttackedServer::start(binary, &attack.setup).await?;
-    let spared = match options.beside {
-        true => Some(AttackedServer::start(binary, &attack.setup).await?),
-        false => None,
-    };
-    let honest_access = &spared.as_ref().unwrap_or(&server).access;
+    let spared = AttackedServer::start(binary, &attack.setup).await?;
     let watched = Watched::new(server.pid());
     let watched = watched.map_err(HostileError::io("reading the server's memory"))?;
     let tally = Arc::new(Tally::default());
@@ -106,13 +103,18 @@ async fn attacked(
             other => return Err(HostileError::Prepare(format!("{other:?}"))),
         }
     }
-    let honest = HonestRoom::start(honest_access.clone(), SHORT);
+    let honest = HonestRoom::start(server.access.clone(), SHORT);
+    let control = HonestRoom::start(spared.access.clone(), SHORT);
     let quiet_begun = Instant::now();
     tokio::time::sleep(options.quiet).await;
-    honest.until_played(PREPARE_LIMIT).await;
+    for room in [&honest, &control] {
+        room.until_played(PREPARE_LIMIT).await;
+    }
     let (quiet, quiet_time) = (honest.take(), quiet_begun.elapsed());
-    if quiet.latencies.is_empty() {
-        return Err(HostileError::Quiet(honest.last_problem()));
+    let unplayed = [(&quiet, &honest), (&control.take(), &control)];
+    let unplayed = (unplayed.into_iter()).find(|(noticed, _)| noticed.latencies.is_empty());
+    if let Some((_, room)) = unplayed {
+        return Err(HostileError::Quiet(room.last_problem()));
     }
     let (before, disk_before) = (watched.memory(), folder_bytes(&server.data()));
 
@@ -131,7 +133,7 @@ async fn attacked(
         tally.outcome::<()>(&Err(status.clone()));
     }
     tokio::time::sleep_until(until).await;
-    let attacked = honest.take();
+    let (attacked, control_attacked) = (honest.take(), control.take());
     let attack_time = begun.elapsed();
     let served = probing.await.unwrap_or_default();
     let after = settled(&watched, before, options.rest).await;
@@ -141,7 +143,7 @@ async fn attacked(
         true => LAST_GAME_LIMIT,
         false => Duration::ZERO,
     };
-    let last = honest.finish(limit).await;
+    let (last, _) = tokio::join!(honest.finish(limit), control.finish(LAST_GAME_LIMIT));
     let (log_lines, starts_again) = server.restart().await;
     Ok(Row::new(
         attack,
@@ -149,6 +151,7 @@ async fn attacked(
             quiet,
             quiet_time,
             attacked,
+            control: control_attacked,
             attack_time,
             last,
         },
