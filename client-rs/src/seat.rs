@@ -135,6 +135,11 @@ impl<A: Agent> SeatSession<A> {
         any
     }
 
+    /// Goes on after a snapshot, which stands for the events before.
+    pub(crate) fn snapshot(&mut self, snapshot: &v1::Snapshot) {
+        self.next_event = self.next_event.max(snapshot.next_sequence);
+    }
+
     /// Passes on whom the game waits for.
     pub(crate) fn awaited(&mut self, awaited: &v1::Awaited) {
         self.awaits = awaited.seat.is_some();

@@ -258,8 +258,8 @@ impl<'a, A: Agent> Session<'a, A> {
                 self.settling(number, |seat| seat.detached(detached.reason()));
                 return;
             }
-            Update::Snapshot(_) | Update::Attached(_) | Update::Refused(_) | Update::Entered(_) => {
-            }
+            Update::Snapshot(snapshot) => seat.snapshot(&snapshot),
+            Update::Attached(_) | Update::Refused(_) | Update::Entered(_) => {}
         }
         if seat.has_to_speak() && self.asked.last() != Some(&handle) {
             self.asked.push(handle);

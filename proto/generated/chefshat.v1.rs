@@ -5055,7 +5055,8 @@ pub struct Attach {
     #[prost(uint32, tag = "2")]
     pub request_id: u32,
     /// Number of the first event to send; 0 and 1: all. After a lost connection: the number of the
-    /// last event received, plus one.
+    /// last event received, plus one. If the room of a long game no longer has it, a Snapshot is sent
+    /// instead; so it is to a seat that reads so slowly that its next event is gone.
     #[prost(uint64, tag = "3")]
     pub from_sequence: u64,
     /// Send one Snapshot instead of the past events.
@@ -8418,7 +8419,7 @@ pub mod spectator_service_client {
         /// Streams the events of a room, as its policy allows, until the game is over. The owner, who shows
         /// the owner token of the room or of its study (`Visibility`), may also watch a room that admits no
         /// spectators. A message without events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
-        /// (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: a long game of built-in agents keeps only its last events; metadata
+        /// (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: the room of a long game keeps only its last events; metadata
         /// `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
         /// (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
         /// last one received.
@@ -8476,7 +8477,7 @@ pub mod spectator_service_server {
         /// Streams the events of a room, as its policy allows, until the game is over. The owner, who shows
         /// the owner token of the room or of its study (`Visibility`), may also watch a room that admits no
         /// spectators. A message without events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
-        /// (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: a long game of built-in agents keeps only its last events; metadata
+        /// (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: the room of a long game keeps only its last events; metadata
         /// `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
         /// (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
         /// last one received.

@@ -275,9 +275,13 @@ impl Core {
 
     /// Records how far delayed spectators may see after this decision.
     pub(super) fn note_decision(&mut self) {
-        if self.header.policy.spectator_delay_decisions > 0 {
+        let delay = self.header.policy.spectator_delay_decisions;
+        if delay > 0 {
+            if self.log_after_decision.len() > delay {
+                self.log_after_decision.pop_front();
+            }
             self.log_after_decision
-                .push(u32::try_from(self.log.len()).unwrap_or(u32::MAX));
+                .push_back(u32::try_from(self.log.len()).unwrap_or(u32::MAX));
         }
     }
 

@@ -26,6 +26,7 @@ pub mod testing;
 #[cfg(test)]
 mod tests;
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -45,9 +46,10 @@ pub use journal::Marker;
 pub use limits::{
     BUILT_IN_BUDGET, CONFIRMATION_TIME, JOIN_HOLD, MARKERS_AT_ONCE, MARKERS_PER_SECOND,
     MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME, MAX_ATTEMPTS, MAX_CONNECTION_EVENTS,
-    MAX_EXPRESSIONS_PER_SEAT, MAX_GAME_CHANGES, MAX_GATEWAY_DELAY, MAX_HANDOVER, MAX_HINTS,
-    MAX_IDLE, MAX_MARKER_AHEAD, MAX_MARKERS, MAX_REPORTS, MAX_SEARCH_TIME, MAX_SEATINGS,
-    RECALL_TIME, SEARCH_PATIENCE, SEARCH_PATIENCE_UNATTENDED,
+    MAX_EVENTS_KEPT, MAX_EVENTS_KEPT_AFTERWARDS, MAX_EXPRESSIONS_PER_SEAT, MAX_GAME_CHANGES,
+    MAX_GATEWAY_DELAY, MAX_HANDOVER, MAX_HINTS, MAX_IDLE, MAX_MARKER_AHEAD, MAX_MARKERS,
+    MAX_REPORTS, MAX_SEARCH_TIME, MAX_SEATINGS, RECALL_TIME, SEARCH_PATIENCE,
+    SEARCH_PATIENCE_UNATTENDED,
 };
 pub use markers::MarkError;
 pub use revive::BadJournal;
@@ -103,7 +105,7 @@ pub struct Core {
     log_before_deal: usize,
     /// Length of the log after the deal and after each decision. Empty unless spectators are
     /// delayed.
-    log_after_decision: Vec<u32>,
+    log_after_decision: VecDeque<u32>,
     changes: u64,
     /// How many participants have taken a seat.
     seatings: usize,
@@ -327,7 +329,7 @@ impl Core {
             silent_since: None,
             log: Log::default(),
             log_before_deal: 0,
-            log_after_decision: Vec::new(),
+            log_after_decision: VecDeque::new(),
             changes: 0,
             seatings: 0,
             decisions: 0,
@@ -369,9 +371,9 @@ impl Core {
         &self.log
     }
 
-    /// Drops events before a position that nobody will read: the room has no participants.
+    /// Drops events before a position, unless the table is physical: its events can be corrected.
     pub fn drop_log_before(&mut self, position: usize) {
-        if self.is_built_in_only() {
+        if self.table().is_none() {
             self.log.drop_before(position);
         }
     }
@@ -546,12 +548,11 @@ impl Core {
         if self.state == State::Waiting {
             return self.log.len();
         }
-        self.log_after_decision
-            .len()
-            .checked_sub(delay + 1)
-            .map_or(self.log_before_deal, |index| {
-                usize::try_from(self.log_after_decision[index]).unwrap_or(usize::MAX)
-            })
+        let shown = self.log_after_decision.front();
+        let shown = shown.filter(|_| self.log_after_decision.len() > delay);
+        shown.map_or(self.log_before_deal, |length| {
+            usize::try_from(*length).unwrap_or(usize::MAX)
+        })
     }
 
     /// Whether a built-in agent or a substitute decides for the seat.

@@ -178,6 +178,11 @@ impl Log {
         self.length == 0
     }
 
+    /// Number of events that have not been dropped.
+    pub fn kept(&self) -> usize {
+        self.length - self.dropped
+    }
+
     /// Position of the first event that has not been dropped.
     pub fn first(&self) -> usize {
         self.dropped

@@ -8,7 +8,7 @@ use std::time::Duration;
 use chefshat_engine::MAX_ENTROPY;
 use chefshat_engine::{Seat, Viewer};
 
-use super::{Core, MAX_MARKERS};
+use super::{Core, MAX_EVENTS_KEPT, MAX_MARKERS};
 use crate::journal::{Change, Entry, Fill, GameHeader, Report, Source};
 
 /// How long a journal need not say again that the server was restarted: what takes a room over
@@ -43,6 +43,7 @@ impl Core {
             })?;
             core.advance_agents(&entry.change);
             core.refold(entry);
+            core.drop_log_before(core.log.len().saturating_sub(MAX_EVENTS_KEPT));
         }
         let just_said = journal.last().is_some_and(|last| {
             let says_so = matches!(last.change, Change::ServerRestarted);

@@ -502,7 +502,7 @@ impl From<SpectateError> for Refusal {
             SpectateError::EventsGone(first) => status(
                 Code::OutOfRange,
                 "EVENTS_GONE",
-                "a long game of built-in agents keeps only its last events; watch with `snapshot`, or from `first_sequence` on, or read its record when it has ended",
+                "the room of a long game keeps only its last events; watch with `snapshot`, or from `first_sequence` on, or read its record when it has ended",
                 [("first_sequence", &(first + 1).to_string())],
             ),
             SpectateError::SnapshotDelayed => status(

@@ -29,6 +29,8 @@ pub const MAX_PENDING_EVENTS: usize = 128;
 const MAX_PENDING_UPDATES: usize = 1_024;
 /// Most events that a spectator's stream may fall behind before it is disconnected.
 pub const MAX_SPECTATOR_LAG: usize = 4_096;
+/// Encoded events that the log no longer has are dropped as soon as they are this many.
+const MAX_READ_ENCODED: usize = 1_024;
 /// Most spectators of one room.
 pub const MAX_SPECTATORS: usize = 256;
 /// Typical size of a decision request, bytes.
@@ -207,6 +209,11 @@ impl Subscriber {
         self.position
     }
 
+    /// Whether nothing more is sent.
+    pub fn has_ended(&self) -> bool {
+        self.ended
+    }
+
     /// Length of the log at which the backlog is due.
     pub fn backlog_due_at(&self) -> usize {
         self.position + MAX_PENDING_EVENTS
@@ -244,12 +251,20 @@ impl Subscriber {
         };
         self.pending.add(handle, Update::Attached(attached));
         if options.snapshot {
-            self.position = core.log().len();
-            let snapshot = convert::snapshot(core, Viewer::Seat(seat));
-            self.pending
-                .add(handle, Update::Snapshot(Box::new(snapshot)));
+            self.skip_events(core);
         }
         self.position = self.position.min(core.log().len());
+    }
+
+    /// Sends a seat a snapshot in place of the events that it has not received.
+    fn skip_events(&mut self, core: &Core) {
+        let Role::Seat(connection) = &self.role else {
+            return;
+        };
+        self.position = core.log().len();
+        let snapshot = convert::snapshot(core, Viewer::Seat(connection.seat));
+        self.pending
+            .add(connection.handle, Update::Snapshot(Box::new(snapshot)));
     }
 
     /// Sends the result of an answer: with the next flush if it was accepted and the seat receives
@@ -356,6 +371,10 @@ impl Subscriber {
         }
         if self.stalled && !self.flush() {
             return self.keeps_up(visible);
+        }
+        if self.position < core.log().first() {
+            // Only a seat can be that far behind: spectators are disconnected before.
+            self.skip_events(core);
         }
         while self.position < visible {
             let end = (self.position + EVENTS_PER_BATCH).min(visible);
@@ -526,6 +545,15 @@ impl PublicEvents {
     /// Drops what is encoded: nobody reads it. What follows starts at this position.
     pub fn restart_at(&mut self, position: usize) {
         self.events = Events::starting_at(position);
+    }
+
+    /// Drops encoded events before a position, if they are many or nobody reads the others.
+    pub fn drop_before(&mut self, position: usize) {
+        if position >= self.events.end() {
+            self.restart_at(position);
+        } else if position >= self.events.first() + MAX_READ_ENCODED {
+            self.events.drop_before(position);
+        }
     }
 
     /// The positions of the encoded events.

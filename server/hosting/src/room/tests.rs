@@ -32,7 +32,9 @@ use chefshat_base::metrics::{Metrics, SearchOutcome};
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::{Change, Entry, Fill, GameHeader, GameStart};
 use chefshat_room::policy::{AbortPolicy, Policy};
-use chefshat_room::{Answer, ConnectionId, Core, JoinError};
+use chefshat_room::{
+    Answer, ConnectionId, Core, JoinError, MAX_EVENTS_KEPT, MAX_EVENTS_KEPT_AFTERWARDS,
+};
 use chefshat_store::{Journal, MemoryStore, Store as _, StoreError, StoredGame};
 use chefshat_wire::outbox::StreamEnd;
 use chefshat_wire::outbox::{Outbox, OutboxStream};
@@ -227,9 +229,10 @@ async fn attach_from(room: &Handle, ticket: Token, charged: Key) -> AttachedSeat
 }
 
 /// Reads until the end of the game; answers decisions with their first legal action if `answering`.
-/// Returns the numbers of all events.
-async fn read(room: &Handle, seat: &mut AttachedSeat, answering: bool) -> Vec<u64> {
-    let mut numbers = Vec::new();
+/// Returns the numbers of all events, also of those that a snapshot stood for, and the number of
+/// snapshots.
+async fn read(room: &Handle, seat: &mut AttachedSeat, answering: bool) -> (Vec<u64>, usize) {
+    let (mut numbers, mut snapshots) = (Vec::new(), 0);
     while let Some(updates) = seat.updates.next().await {
         let written = updates.expect("no error").encode_to_vec();
         let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
@@ -237,6 +240,11 @@ async fn read(room: &Handle, seat: &mut AttachedSeat, answering: bool) -> Vec<u6
             match update.update.expect("an update") {
                 Update::Events(batch) => {
                     numbers.extend(batch.events.iter().map(|event| event.sequence));
+                }
+                Update::Snapshot(snapshot) => {
+                    let next = numbers.last().map_or(1, |last| last + 1);
+                    numbers.extend(next..snapshot.next_sequence);
+                    snapshots += 1;
                 }
                 Update::Decision(decision) if answering => {
                     let action = SeatAction::Answer(Answer::new(
@@ -249,7 +257,7 @@ async fn read(room: &Handle, seat: &mut AttachedSeat, answering: bool) -> Vec<u6
                 }
                 Update::Detached(detached) => {
                     assert_eq!(detached.reason(), v1::DetachReason::GameOver);
-                    return numbers;
+                    return (numbers, snapshots);
                 }
                 _ => {}
             }
@@ -268,8 +276,8 @@ fn first_legal(decision: &v1::DecisionRequest) -> u32 {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_stalled_stream_delays_nobody_and_misses_nothing() {
-    // So long that its events do not fit an outbox.
+async fn a_stalled_stream_delays_nobody_and_goes_on_after_a_snapshot() {
+    // So long that its events neither fit an outbox nor are all kept.
     let policy = Policy {
         abort: AbortPolicy::Never,
         ..Policy::default()
@@ -282,16 +290,32 @@ async fn a_stalled_stream_delays_nobody_and_misses_nothing() {
     let mut stalled = seats.pop().expect("there are four");
     let played = futures::future::join_all(seats.iter_mut().map(|seat| read(&room, seat, true)));
     let played = played.await;
-    let expected: Vec<u64> = (1..).take(played[0].len()).collect();
-    assert!(expected.len() > chefshat_wire::outbox::OUTBOX_CAPACITY);
-    for numbers in &played {
-        assert_eq!(*numbers, expected);
-    }
-    // The stalled stream reads at last: its pending updates, then the rest, in order and once.
-    assert_eq!(read(&room, &mut stalled, false).await, expected);
-    // And a seat that attaches only now.
+    let expected: Vec<u64> = (1..).take(played[0].0.len()).collect();
+    let most = chefshat_wire::outbox::OUTBOX_CAPACITY + MAX_EVENTS_KEPT;
+    assert!(expected.len() > most, "{}", expected.len());
+    // Not compared by assert_eq!, which would print all of them.
+    assert!(played.iter().all(|played| *played == (expected.clone(), 0)));
+    // The stalled stream reads at last: its pending updates, then a snapshot.
+    let behind = read(&room, &mut stalled, false).await;
+    assert!(behind == (expected.clone(), 1), "{}", behind.1);
+    // And seats that attach only now, from the beginning and from what everybody has left is kept.
     let mut late = attach(&room, stalled.ticket).await;
-    assert_eq!(read(&room, &mut late, false).await, expected);
+    let late = read(&room, &mut late, false).await;
+    assert!(late == (expected.clone(), 1), "{}", late.1);
+    let from = expected.len() - MAX_EVENTS_KEPT_AFTERWARDS;
+    let (outbox, updates) = Outbox::new();
+    let mut attachment = attachment(&stalled.ticket, outbox);
+    attachment.options.from = from;
+    let attached = room.attach(attachment).await.expect("the room exists");
+    let attached = attached.expect("a valid ticket");
+    let mut later = AttachedSeat {
+        seat: attached.seat,
+        connection: attached.connection,
+        ticket: stalled.ticket,
+        updates,
+    };
+    let (numbers, snapshots) = read(&room, &mut later, false).await;
+    assert!(numbers == expected[from..] && snapshots == 0);
 }
 
 #[tokio::test(start_paused = true)]
@@ -342,7 +366,7 @@ async fn deadlines_fire_without_any_input() {
     // game.
     let read = futures::future::join_all(seats.iter_mut().map(|seat| read(&room, seat, false)));
     let numbers = read.await;
-    assert!(numbers[0].len() > 12);
+    assert!(numbers[0].0.len() > 12);
     let patience = Policy::default();
     let longest = 4 * (patience.bank + 3 * patience.decision_time);
     assert!(begun.elapsed() <= longest + Duration::from_secs(1));
@@ -467,7 +491,7 @@ async fn a_flood_stops_neither_the_clock_nor_searches() {
     for flood in flood {
         flood.abort();
     }
-    assert!(numbers.expect("the game ends")[0].len() > 12);
+    assert!(numbers.expect("the game ends")[0].0.len() > 12);
     assert!(metrics.searches(SearchOutcome::Searched) > 0);
 }
 

@@ -12,7 +12,9 @@ use crate::ids::Id;
 use crate::journal::{Branch, Change, Entry, Fill, GameHeader, ParticipantKind, Source};
 use crate::log::RoomEvent;
 use crate::policy::Policy;
-use crate::{BUILT_IN_BUDGET, BadJournal, ConnectionId, JOIN_HOLD, RECALL_TIME, State};
+use crate::{
+    BUILT_IN_BUDGET, BadJournal, ConnectionId, JOIN_HOLD, MAX_EVENTS_KEPT, RECALL_TIME, State,
+};
 
 impl Table {
     /// Simulates a crash and a restart after `downtime`.
@@ -63,6 +65,35 @@ fn the_open_decision_stays_open_and_its_clock_waits_for_the_seat() {
     assert_eq!(table.answer(seat, id, action).verdict, Verdict::Accepted);
     assert_eq!(table.last_decision().source, Source::Agent);
     table.assert_replays();
+}
+
+#[test]
+fn a_long_game_is_restored_with_its_last_events_alone() {
+    let rules = RuleSetSpec {
+        stop: Stop::Shifts(1_000),
+        ..RuleSetSpec::default()
+    };
+    let delayed = Policy {
+        spectator_delay_decisions: 3,
+        ..policy()
+    };
+    let mut table = Table::with_rules(delayed, vec![OPEN; 4], rules);
+    table.fill();
+    let mut lengths = Vec::new();
+    while table.core.log().len() < 2 * MAX_EVENTS_KEPT {
+        table.play_one();
+        lengths.push(table.core.log().len());
+    }
+    let shown = lengths[lengths.len() - 4];
+    assert_eq!(table.core.visible_to_spectators(), shown);
+    table.restart(ms(1));
+    let log = table.core.log();
+    let (kept, length) = (log.kept(), log.len());
+    assert!((MAX_EVENTS_KEPT..2 * MAX_EVENTS_KEPT).contains(&kept));
+    // The restart is one more event.
+    assert_eq!(length, lengths[lengths.len() - 1] + 1);
+    assert!(log.get(length - MAX_EVENTS_KEPT).is_some() && log.get(0).is_none());
+    assert_eq!(table.core.visible_to_spectators(), shown);
 }
 
 #[test]

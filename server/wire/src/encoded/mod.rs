@@ -323,6 +323,16 @@ impl Events {
         self.ends.push(end);
     }
 
+    /// Drops the events before a position that is not after the last one.
+    pub fn drop_before(&mut self, position: usize) {
+        let bytes = self.range(self.first, position).len();
+        self.bytes.drain(..bytes);
+        self.ends.drain(..position - self.first);
+        let bytes = u32::try_from(bytes).expect("the ends fit u32");
+        self.ends.iter_mut().for_each(|end| *end -= bytes);
+        self.first = position;
+    }
+
     /// The events between two positions, neither of which is before the first.
     pub fn range(&self, from: usize, to: usize) -> &[u8] {
         let start = |position: usize| {

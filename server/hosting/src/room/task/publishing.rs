@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
-use chefshat_room::ConnectionId;
 use chefshat_room::journal::ParticipantKind;
+use chefshat_room::{ConnectionId, MAX_EVENTS_KEPT, MAX_EVENTS_KEPT_AFTERWARDS};
 use tokio::sync::oneshot;
 
 use super::{AfterCommit, Room, answer, is_connection};
@@ -19,12 +19,6 @@ use crate::room::subscriber::{
 };
 use chefshat_wire::convert;
 use chefshat_wire::outbox::HandStamp;
-
-/// Most events that a room of built-in agents keeps for spectators who come late. Its record has
-/// all of them.
-const MAX_EVENTS_UNREAD: usize = 16_384;
-/// The same, once its game is over.
-const MAX_EVENTS_UNREAD_AFTERWARDS: usize = 1_024;
 
 impl Room {
     fn spectate(&mut self, request: SpectateRequest) -> Result<(), SpectateError> {
@@ -50,19 +44,22 @@ impl Room {
         );
         let position = spectator.position();
         self.spectators.push(spectator);
+        self.encode_from(position);
+        Ok(())
+    }
+
+    /// Encodes the public events from a position on, which somebody reads next.
+    fn encode_from(&mut self, position: usize) {
         if position < self.public.encoded().start {
-            self.public.restart_at(first);
+            self.public.restart_at(self.core.log().first());
             self.public.follow(&self.core);
         }
-        Ok(())
     }
 
     /// Sends committed changes to subscribers and results to callers.
     pub(super) fn publish(&mut self) {
         self.core.released(self.now);
-        if self.core.is_built_in_only() {
-            self.forget_unread();
-        }
+        self.forget_events();
         self.public.follow(&self.core);
         let mut after_commit = std::mem::take(&mut self.after_commit);
         for release in after_commit.drain(..) {
@@ -76,27 +73,42 @@ impl Room {
             markers.follow(&self.core);
         }
         self.deliver();
+        if self.core.state().is_over() {
+            // Those who have received its end are no longer connected.
+            self.forget_events();
+        }
         self.telemetry.trace_decision(&self.core);
         let metrics = &self.context.metrics;
         self.telemetry.count_published(&self.core, metrics);
     }
 
-    /// Drops old events of a game without participants that no spectator waits for.
-    fn forget_unread(&mut self) {
+    /// Drops old events: the most recent ones are kept for those who come late or come back, and what
+    /// connected spectators have not read yet. A seat that is further behind receives a snapshot.
+    fn forget_events(&mut self) {
         let length = self.core.log().len();
-        let unread = self.spectators.iter().map(Subscriber::position).min();
-        // What spectators have not read yet is encoded again, which is little: they keep up.
-        if unread.is_none() || self.public.encoded().len() > 2 * MAX_EVENTS_UNREAD {
-            self.public.restart_at(unread.unwrap_or(length));
-        }
-        let kept = match self.core.state().is_over() {
-            true => MAX_EVENTS_UNREAD_AFTERWARDS,
-            false => MAX_EVENTS_UNREAD,
+        let is_left = self.core.state().is_over() && self.is_left();
+        let most = match is_left {
+            true => MAX_EVENTS_KEPT_AFTERWARDS,
+            false => MAX_EVENTS_KEPT,
         };
-        let visible = self.core.visible_to_spectators();
-        let keep_from = length.saturating_sub(kept).min(visible);
-        let keep_from = unread.map_or(keep_from, |unread| keep_from.min(unread));
-        self.core.drop_log_before(keep_from);
+        if self.core.log().kept() > most {
+            let read_by_spectators = self.spectators.iter().map(Subscriber::position).min();
+            let keep_from = (length - most)
+                .min(self.core.visible_to_spectators())
+                .min(read_by_spectators.unwrap_or(length));
+            self.core.drop_log_before(keep_from);
+        }
+        // While nobody watches a game that nobody plays, or that is over, none are encoded.
+        let is_unwatched = self.core.is_built_in_only() && self.spectators.is_empty();
+        self.public.drop_before(match is_left || is_unwatched {
+            true => length,
+            false => self.core.log().first(),
+        });
+    }
+
+    /// Whether nobody is connected to whom something remains to be sent.
+    fn is_left(&self) -> bool {
+        self.spectators.is_empty() && self.connections.iter().flatten().all(Subscriber::has_ended)
     }
 
     fn release(&mut self, release: AfterCommit) {
@@ -187,6 +199,7 @@ impl Room {
         let mut subscriber =
             Subscriber::seat(connected, request.outbox, Arc::clone(&self.on_space));
         subscriber.confirm_attached(&self.core, request.request_id, request.assigned_ticket);
+        self.encode_from(subscriber.position());
         let news = Publication::new(&self.core, &self.public, self.now);
         subscriber.deliver(&news, true);
         if let Some(mut older) = self.connections[seat.index()].replace(subscriber) {
