@@ -9,7 +9,7 @@ use std::time::Duration;
 use chefshat_engine::Seat;
 use chefshat_study::{Outcome, Participant, PlayedGame, Status};
 use tokio::time::Instant;
-use tracing::warn;
+use tracing::{error, warn};
 
 use super::task::StudyTask;
 use crate::config::TOURNAMENT_RETRY;
@@ -91,12 +91,14 @@ impl StudyTask {
 
     /// The outcome of a game whose room is over or gone; `None` if it has no room yet.
     async fn outcome(&self, game: &PlayedGame) -> Result<Option<Outcome>, StoreError> {
-        let stored = self
-            .unit
-            .rooms
-            .store()
-            .finished(Id(game.placed.game))
-            .await?;
+        let id = Id(game.placed.game);
+        let stored = match self.unit.rooms.store().finished(id).await {
+            Err(StoreError::Unreadable(problem)) => {
+                error!(game = %id, problem, "a game of a study cannot be read, and counts as broken off");
+                return Ok(Some(Outcome::Aborted));
+            }
+            stored => stored?,
+        };
         if let Some(StoredGame::Hosted(_, entries, _)) = stored {
             let was_aborted = (entries.iter()).any(|it| matches!(it.change, Change::Aborted(_)));
             return Ok(Some(match was_aborted {

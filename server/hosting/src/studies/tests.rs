@@ -3,6 +3,7 @@
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::OnceLock;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use chefshat_study::{Answer, At, ItemAnswer, NewParticipants, ParticipantLink, Refusal, Status};
@@ -267,6 +268,38 @@ async fn a_study_that_cannot_be_read_keeps_no_other_from_being_resumed() {
 }
 
 /// What is in the store twice is run once.
+#[tokio::test(start_paused = true)]
+async fn a_game_that_cannot_be_read_back_ends_no_study() {
+    let failing = Arc::new(FailingStore::after(u64::MAX));
+    let store: Arc<dyn Store> = Arc::clone(&failing) as Arc<dyn Store>;
+    let studies = server(&store);
+    let created = studies.create(settings(), None, Key::Local).await;
+    let (study, _) = created.expect("valid settings");
+    let added = study.add(Key::Local, tests(1)).await;
+    assert_eq!(added.expect("it runs"), Ok(1));
+    let lab = Lab {
+        store,
+        studies,
+        study,
+    };
+    let _present = lab.begin().await;
+    failing.games_unreadable.store(true, Ordering::Relaxed);
+    let closing = lab.study.proceed(at(1, 1), lab.studies.rooms()).await;
+    assert_eq!(closing.expect("it runs"), Ok(0));
+    let ended = || {
+        lab.study.read(|it| {
+            let game = it.participants()[&1].games.last().cloned();
+            game.and_then(|game| game.ended).map(|(outcome, _)| outcome)
+        })
+    };
+    while ended().is_none() {
+        lab.settled().await;
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    assert_eq!(ended(), Some(chefshat_study::Outcome::Aborted));
+    lab.settled().await;
+}
+
 #[tokio::test(start_paused = true)]
 async fn a_study_that_runs_is_not_resumed_beside_itself() {
     let lab = Lab::new().await;

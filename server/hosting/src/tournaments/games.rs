@@ -11,7 +11,7 @@ use chefshat_record::outcome;
 use chefshat_tournament::Ended;
 use futures::future::join_all;
 use tokio::time::Instant;
-use tracing::warn;
+use tracing::{error, warn};
 
 use super::message::Call;
 use super::task::TournamentTask;
@@ -86,14 +86,14 @@ impl TournamentTask {
         let background = self.unit.rooms.background();
         // Before it is read: the record of a long game takes much time and memory.
         let slice = background.slice(self.unit.handle.charged).await;
-        if let Some(stored) = self
-            .unit
-            .rooms
-            .store()
-            .finished(game_id)
-            .await?
-            .filter(is_ours)
-        {
+        let stored = match self.unit.rooms.store().finished(game_id).await {
+            Err(StoreError::Unreadable(problem)) => {
+                error!(%game_id, problem, "a game of a tournament cannot be read, and counts as broken off");
+                return Ok(Some(Ended::Aborted));
+            }
+            stored => stored?,
+        };
+        if let Some(stored) = stored.filter(is_ours) {
             let reading = background.run(move || {
                 let lines = stored.lines();
                 (outcome::outcome(&lines), abort_reason(&lines))

@@ -1,13 +1,15 @@
 //! Creating, joining and restoring tournaments.
 
+use std::sync::atomic::Ordering;
+
 use futures::FutureExt as _;
 
 use super::*;
 use crate::config::{MAX_TOURNAMENTS, ServerConfig};
 use chefshat_admission::limits::Key;
-use chefshat_store::testing::TypedUnits as _;
+use chefshat_store::testing::{FailingStore, TypedUnits as _};
 use chefshat_store::{SqliteStore, Store};
-use chefshat_tournament::ByHandProblem;
+use chefshat_tournament::{ByHandProblem, GameState};
 
 #[tokio::test]
 async fn creating_a_tournament_completes_even_if_the_caller_is_cancelled() {
@@ -289,6 +291,29 @@ async fn it_starts_by_itself_at_its_time_if_enough_have_joined() {
             .expect_err("not a time to start at");
         assert!(problem.to_string().starts_with("start_at_ms"), "{problem}");
     }
+}
+
+#[tokio::test]
+async fn a_game_that_cannot_be_read_back_ends_no_tournament() {
+    let store = FailingStore::after(u64::MAX);
+    store.games_unreadable.store(true, Ordering::Relaxed);
+    let store: Arc<dyn Store> = Arc::new(store);
+    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
+    let tournaments = Tournaments::new(rooms, TaskTracker::new());
+    let settings = chefshat_proto::v1::TournamentSettings {
+        built_in_agents: vec!["random".into(); 4],
+        start_when_joined: 4,
+        ..built_in("Coppa")
+    };
+    let plan = convert::tournament_plan(&settings, [7; 32]).expect("valid settings");
+    let created = tournaments.create("Coppa", plan, None, Key::Local).await;
+    let (handle, _) = created.expect("made");
+    until(&handle, |core| core.state() == State::Finished).await;
+    let void = handle.read(|core| {
+        let games = core.games().iter();
+        games.filter(|game| game.state == GameState::Void).count()
+    });
+    assert!(void > 0);
 }
 
 #[tokio::test(start_paused = true)]

@@ -2,7 +2,7 @@
 //! it, so that a test sees whether a call reads more of what exists than of what does not.
 
 use std::collections::BTreeSet;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use chefshat_proto::v1;
@@ -30,6 +30,8 @@ pub struct FailingStore {
     pub tournament_commits: Arc<Semaphore>,
     /// Tournaments and studies that cannot be read.
     pub unreadable: Mutex<BTreeSet<Id>>,
+    /// Whether finished games cannot be read, but for their summaries.
+    pub games_unreadable: AtomicBool,
 }
 
 impl FailingStore {
@@ -42,6 +44,7 @@ impl FailingStore {
             reads: Mutex::default(),
             tournament_commits: Arc::new(Semaphore::new(Semaphore::MAX_PERMITS)),
             unreadable: Mutex::default(),
+            games_unreadable: AtomicBool::new(false),
         }
     }
 }
@@ -113,6 +116,10 @@ impl Store for FailingStore {
     }
 
     fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
+        if self.games_unreadable.load(Ordering::Relaxed) {
+            let unreadable = StoreError::Unreadable("an injected problem".to_owned());
+            return ready(Err(unreadable)).boxed();
+        }
         let finished = self.inner.finished(game);
         let counted = |found: &Result<Option<_>, _>| {
             if let Ok(Some(_)) = found {
