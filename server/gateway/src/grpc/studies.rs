@@ -4,6 +4,7 @@
 mod participation;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::pin::Pin;
 use std::sync::Arc;
 
@@ -25,22 +26,28 @@ use super::forward::Gateway;
 use super::limits::charged;
 use super::lists;
 use super::lookup::Lookup;
-use super::status::{Refusal, field, not_created, read_failed, request_id, shutting_down, status};
+use super::status::{
+    Refusal, field, internal, not_created, read_failed, request_id, shutting_down, status,
+};
 use chefshat_admission::access::{Caller, Role};
 use chefshat_admission::limits::{COST_OF_TOURNAMENT, CallLimits, FairSemaphore, Key, Refused};
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named, short};
 use chefshat_hosting::cluster::FoundBy;
 use chefshat_hosting::config::{
-    FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT, MAX_FOLLOWERS, MAX_STUDY_ADDED,
+    FOLLOW_INTERVAL, FOLLOW_SEND_TIMEOUT, MAX_FOLLOWERS, MAX_RECORDS_SENT, MAX_STUDY_ADDED,
     MAX_STUDY_PARTICIPANTS_SENT, MAX_STUDY_STREAMS,
 };
+use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::studies::{
     CreateProblem, ExportError, ExportedFile, NotAdded, Stopped, Studies, StudyHandle,
 };
 use chefshat_room::ids::{Id, RequestKey};
 use chefshat_store::StoreError;
 use chefshat_wire::convert;
+
+/// Participants of a study that a follower costs its caller as much as one call.
+const FOLLOWED_PER_CALL: usize = 100;
 
 type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
@@ -51,6 +58,8 @@ pub struct StudyCalls {
     lookup: Lookup,
     calls: Arc<CallLimits>,
     followers: Arc<FairSemaphore>,
+    /// Limits the records in memory while clients receive exports.
+    exports: Arc<FairSemaphore>,
     /// Permits for streams of participants.
     participants: Arc<FairSemaphore>,
     /// Cancelled when all streams must end.
@@ -71,6 +80,7 @@ impl StudyCalls {
             lookup,
             calls,
             followers: FairSemaphore::new(MAX_FOLLOWERS, shares),
+            exports: FairSemaphore::new(MAX_RECORDS_SENT, shares),
             participants: FairSemaphore::new(MAX_STUDY_STREAMS, shares),
             closing,
         }
@@ -274,12 +284,15 @@ impl StudyService for StudyCalls {
                 retry_after: FOLLOW_SEND_TIMEOUT,
             })
         })?;
+        let participants = handle.read(|study| study.participants().len());
+        self.calls
+            .charge(key, (participants / FOLLOWED_PER_CALL) as u64);
         let (sender, responses) = mpsc::channel(1);
         let studies = Arc::clone(&self.studies);
         let counted = studies.rooms().metrics().stream(StreamKind::Follow);
         let following = async move {
             let (_place, _counted) = (place, counted);
-            end(&sender, follow(&handle, &studies, &sender).await).await;
+            end(&sender, follow(&handle, &studies, key, &sender).await).await;
         };
         let closing = self.closing.clone();
         let following = closing.run_until_cancelled_owned(following);
@@ -330,10 +343,12 @@ impl StudyService for StudyCalls {
             .owned(&caller, &request.study_id, &request.owner_token)
             .await?;
         self.calls.charge(key, COST_OF_TOURNAMENT);
+        let place = self.exports.take(key).await;
         let (sender, responses) = mpsc::channel(1);
         let (files, mut exported) = mpsc::channel::<ExportedFile>(1);
         let studies = Arc::clone(&self.studies);
         let exporting = async move {
+            let _place = place;
             let forwarding = async {
                 while let Some(part) = exported.recv().await {
                     let response = v1::ExportStudyResponse {
@@ -404,10 +419,29 @@ impl StudyService for StudyCalls {
     }
 }
 
-/// Sends a study and then what changes of it, until it is over.
+/// What has changed of the participants of a study since a follower was sent them, of each of whom it
+/// is known by a hash what that was: a study has up to 10,000, and many followers.
+fn changed_participants(
+    handle: &StudyHandle,
+    rooms: &Rooms,
+    sent: &mut BTreeMap<u32, u64>,
+) -> Vec<v1::StudyParticipant> {
+    let mut participants = handle.participants(rooms);
+    participants.retain(|it| {
+        let mut hasher = DefaultHasher::new();
+        it.encode_to_vec().hash(&mut hasher);
+        let hash = hasher.finish();
+        sent.insert(it.number, hash) != Some(hash)
+    });
+    participants
+}
+
+/// Sends a study and then what changes of it, until it is over. Followers are sent updates in turns,
+/// which are made on threads that give way to those of rooms.
 async fn follow(
     handle: &Arc<StudyHandle>,
     studies: &Studies,
+    key: Key,
     sender: &mpsc::Sender<Result<v1::FollowStudyResponse, Status>>,
 ) -> Result<(), Status> {
     let response = |study, participants| v1::FollowStudyResponse {
@@ -416,16 +450,21 @@ async fn follow(
     };
     let mut changes = handle.changes();
     let mut sent_study = None;
-    let mut sent: BTreeMap<u32, v1::StudyParticipant> = BTreeMap::new();
+    let mut sent = BTreeMap::new();
+    let background = studies.rooms().background();
     loop {
         changes.mark_unchanged();
         let over = handle.is_complete();
         let study = handle.describe();
-        let participants = handle.participants(studies.rooms());
-        let changed: Vec<_> = (participants.into_iter())
-            .filter(|it| sent.get(&it.number) != Some(it))
-            .collect();
-        sent.extend(changed.iter().map(|it| (it.number, it.clone())));
+        let (followed, rooms) = (Arc::clone(handle), Arc::clone(studies.rooms()));
+        let slice = background.slice(key).await;
+        let making = background.run(move || {
+            let changed = changed_participants(&followed, &rooms, &mut sent);
+            (changed, sent)
+        });
+        let changed;
+        (changed, sent) = making.await.ok_or_else(internal)?;
+        drop(slice);
         let study = (sent_study.as_ref() != Some(&study)).then_some(study);
         let began = Instant::now();
         let mut parts = changed.chunks(MAX_STUDY_PARTICIPANTS_SENT);
