@@ -50,7 +50,7 @@ pub(super) struct RatingsCommand {
     /// Only participants with at least this many rated games.
     #[arg(long, value_name = "N", default_value_t = 0)]
     min_games: u32,
-    /// Skip damaged records and report them.
+    /// Damaged records, which are left out, are no failure.
     #[arg(long)]
     skip_damaged: bool,
     /// Print one JSON object.
@@ -85,6 +85,11 @@ impl RatingsCommand {
         } else {
             write!(out, "{}", as_text(&gathered, &board))?;
         }
+        if gathered.damaged > 0 && !self.skip_damaged {
+            let damaged = counted(gathered.damaged, "damaged record");
+            anstream::eprintln!("{damaged} left out; with --skip-damaged this is no failure");
+            return Ok(ExitCode::FAILURE);
+        }
         Ok(ExitCode::SUCCESS)
     }
 
@@ -106,17 +111,10 @@ impl RatingsCommand {
         for (path, record) in read {
             let record = match record {
                 Ok(record) => record,
-                Err(problem) if self.skip_damaged => {
-                    anstream::eprintln!("chefshat: skipped {}: {problem}", path.display());
+                Err(problem) => {
+                    anstream::eprintln!("chefshat: left out {}: {problem}", path.display());
                     gathered.damaged += 1;
                     continue;
-                }
-                Err(problem) => {
-                    return Err(format!(
-                        "{}: {problem}; use --skip-damaged to skip damaged records",
-                        path.display()
-                    )
-                    .into());
                 }
             };
             if !known.insert(record.game_id.clone()) {

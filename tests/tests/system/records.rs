@@ -14,7 +14,7 @@ use chefshat_record::signature::SigningKey;
 use chefshat_server::config::ServerConfig;
 use chefshat_server::participants::ParticipantData;
 use chefshat_server::store::{MemoryStore, SqliteStore, Store};
-use chefshat_tests::{TestServer, one_shift, patiently, play_out, room_of_four};
+use chefshat_tests::{TestServer, one_shift, patiently, play_out, room_of_four, set_up};
 use futures::TryStreamExt as _;
 use tempfile::TempDir;
 use tonic::{Code, Status};
@@ -216,6 +216,31 @@ async fn records_are_listed_in_pages_and_streamed_completely() {
         }
         server.stop().await;
     }
+}
+
+#[tokio::test]
+async fn a_file_that_is_damaged_or_refused_ends_no_import_of_the_others() {
+    let importing = |config: &mut ServerConfig| config.allow_import = true;
+    let server = TestServer::with(importing, Arc::new(MemoryStore::default())).await;
+    let folder = tempfile::tempdir().expect("a folder");
+    let damaged = folder.path().join("damaged.jsonl");
+    std::fs::write(&damaged, "{\n").expect("written");
+    let fixtures = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/records");
+    let [fixed, committed] = ["fixed.jsonl", "committed.jsonl"].map(|it| fixtures.join(it));
+    let import = async |files: &[&std::path::Path]| {
+        let mut command = tokio::process::Command::new(set_up("CHEFSHAT_BIN"));
+        command.args(["records", "import", "--server", &server.url()]);
+        let output = patiently("the import", command.args(files).output()).await;
+        output.expect("the program can be started")
+    };
+    let first = import(&[&fixed]).await;
+    assert!(first.status.success(), "{first:?}");
+    let output = import(&[&damaged, &fixed, &committed]).await;
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(said.matches("not imported: ").count(), 2, "{said}");
+    assert_eq!(listed(&mut service(&server).await, false).await.len(), 2);
+    server.stop().await;
 }
 
 #[tokio::test]

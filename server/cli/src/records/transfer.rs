@@ -12,6 +12,7 @@ use chefshat_record::jsonl;
 use clap::Args;
 use indicatif::ProgressBar;
 use prost::Message as _;
+use tonic::Code;
 
 use super::super::connect::{SecretArgs, ServerArg};
 use super::super::numbers::counted;
@@ -201,10 +202,31 @@ impl Import {
         let client = self.server.connect().await?;
         let mut service = service(&client);
         let bar = progress::of_items(self.files.len() as u64, "records");
+        let mut failed = 0;
         for file in &self.files {
-            let requests = in_parts(jsonl::read(file)?);
-            let added = (service.import_record(tokio_stream::iter(requests)).await)
-                .map_err(|status| refused(file, &Error::from(status)))?;
+            // One that is damaged or refused ends no import of the others.
+            let lines = match jsonl::read(file) {
+                Ok(lines) => lines,
+                Err(problem) => {
+                    bar.suspend(|| anstream::eprintln!("not imported: {problem}"));
+                    failed += 1;
+                    continue;
+                }
+            };
+            let requests = tokio_stream::iter(in_parts(lines));
+            let added = match service.import_record(requests).await {
+                Ok(added) => added,
+                Err(status) => {
+                    let error = Error::from(status);
+                    let refused = refused(file, &error);
+                    if !is_about_record(&error) {
+                        return Err(refused);
+                    }
+                    bar.suspend(|| anstream::eprintln!("not imported: {refused}"));
+                    failed += 1;
+                    continue;
+                }
+            };
             let summary = (added.into_inner().record)
                 .ok_or("the server did not return the imported record")?;
             let line = if self.json {
@@ -216,8 +238,19 @@ impl Import {
             bar.inc(1);
         }
         bar.finish_and_clear();
-        Ok(ExitCode::SUCCESS)
+        Ok(match failed {
+            0 => ExitCode::SUCCESS,
+            _ => ExitCode::FAILURE,
+        })
     }
+}
+
+/// Whether a refusal is about the record alone, so that the server may accept another.
+fn is_about_record(error: &Error) -> bool {
+    matches!(
+        error.code(),
+        Code::InvalidArgument | Code::AlreadyExists | Code::OutOfRange
+    ) || error.reason() == Some("RECORD_TOO_LARGE")
 }
 
 fn service(client: &Client) -> RecordServiceClient<Connection> {

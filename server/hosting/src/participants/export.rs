@@ -123,10 +123,10 @@ impl ParticipantData {
             let found = (self.store)
                 .list(&filter, Part::After(after), AT_A_TIME)
                 .await?;
-            let Some((last, _)) = found.last() else { break };
-            after = *last;
-            for (_, summary) in found {
-                let summary = match summary {
+            let Some(last) = found.last() else { break };
+            after = last.number;
+            for listed in found {
+                let summary = match listed.summary {
                     Ok(summary) => summary,
                     Err(unreadable) => {
                         skipped.named.push(unreadable.to_string());
@@ -149,7 +149,15 @@ impl ParticipantData {
                     let who = who.clone();
                     let reading = blocking(move || lines_of_game(&summary, &stored.lines(), &who));
                     sheet.send(reading.await?).await?;
-                    self.export_samples(game.to_string(), seats, sheet).await?;
+                    let id = game.to_string();
+                    match self.export_samples(id, seats, sheet).await {
+                        Err(DataError::Io(problem)) => {
+                            skipped
+                                .named
+                                .push(format!("samples of game {game}: {problem}"));
+                        }
+                        exported => exported?,
+                    }
                 }
             }
         }

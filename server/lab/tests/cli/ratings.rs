@@ -91,16 +91,19 @@ fn a_leaderboard_is_recomputed_from_the_records() {
 }
 
 #[test]
-fn damaged_records_are_reported_and_skipped_on_request() {
+fn a_damaged_record_is_named_and_the_others_are_rated() {
     let folder = TempDir::new().unwrap();
     let damaged = folder.path().join("damaged.jsonl");
     let whole = std::fs::read_to_string(fixture("records").join("fixed.jsonl")).unwrap();
     std::fs::write(&damaged, whole.replace("\"place\":2", "\"place\":3")).unwrap();
     let (damaged, fixtures) = (damaged.to_str().unwrap(), fixture("records"));
     let fixtures = fixtures.to_str().unwrap();
-    let refused = chefshat(&["ratings", damaged, fixtures]);
-    refused.assert_refused("damaged.jsonl: ");
-    refused.assert_refused("--skip-damaged");
+    let ended = chefshat(&["ratings", damaged, fixtures]);
+    assert_eq!(ended.code, Some(1), "{ended:?}");
+    for named in ["damaged.jsonl: ", "--skip-damaged"] {
+        assert!(ended.stderr.contains(named), "{ended:?}");
+    }
+    assert!(ended.stdout.contains("of 2 records"), "{ended:?}");
     let printed = chefshat(&["ratings", "--json", "--skip-damaged", damaged, fixtures]).well();
     assert!(
         printed.stderr.contains("damaged.jsonl"),

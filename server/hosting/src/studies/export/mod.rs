@@ -363,7 +363,14 @@ async fn samples(
             continue;
         };
         let mut file = File::new(format!("samples/{name}"), sender);
-        let mut stored = tokio::fs::File::open(&path).await.map_err(failed)?;
+        let mut stored = match tokio::fs::File::open(&path).await {
+            Ok(stored) => stored,
+            // They have been deleted since, or the disk fails: no reason to leave out the others.
+            Err(error) => {
+                error!(path = %path.display(), %error, "samples are left out of an export");
+                continue;
+            }
+        };
         while stored.read_buf(&mut file.buffer).await.map_err(failed)? > 0 {
             file.send_full().await?;
         }
