@@ -20,6 +20,11 @@ test("an excess of participants is cut off after one more than the maximum", () 
   expect(participantsIn("A1-A900\nB1-B900").length).toBe(MAX_ADDED + 1);
 });
 
+test("no cell of the table of links is a formula", () => {
+  const formula = { name: "=1+2", address: "\tx" };
+  expect(tableOf([formula])).toBe("name,link\r\n'=1+2,'\tx\r\n");
+});
+
 test("links are a valid CSV table", () => {
   const link = (name: string) => ({ name, address: "https://a.example/study/X" });
   expect(tableOf([link("P07"), link('Ann, "A"')])).toBe(

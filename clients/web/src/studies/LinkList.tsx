@@ -36,12 +36,13 @@ export function LinkList({ links }: { links: readonly NamedLink[] }) {
   );
 }
 
-/** The links as CSV (RFC 4180): names and addresses. */
+/** The links as CSV (RFC 4180): names and addresses. No cell is a formula, as in the server's tables. */
 export function tableOf(links: readonly NamedLink[]): string {
   const rows = [["name", "link"], ...links.map(({ name, address }) => [name, address])];
   return rows.map((row) => `${row.map(quoted).join(",")}\r\n`).join("");
 }
 
-function quoted(cell: string): string {
+function quoted(text: string): string {
+  const cell = /^[=+\-@\t\r\n]/.test(text) ? `'${text}` : text;
   return /[",\r\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell;
 }
