@@ -39,7 +39,7 @@ pub use sqlite::{
 };
 
 use chefshat_base::metrics::StoreMetrics;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{Id, SecretHash};
 use chefshat_room::journal::{Entry, GameHeader, TournamentGame};
 use chefshat_wire::convert;
 use units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
@@ -96,8 +96,17 @@ impl StoredGame {
     }
 }
 
-/// A finished game in a list: its number, and its summary, or why that cannot be read.
-pub type Listed = (u64, Result<v1::RecordSummary, UnreadableGame>);
+/// A finished game in a list.
+#[derive(Debug, Clone)]
+pub struct Listed {
+    /// Its number.
+    pub number: u64,
+    /// The hash of its room's owner token, which says who sees it without reading the game. `None`
+    /// for one that was imported, which everybody sees, or whose header cannot be read.
+    pub owner: Option<SecretHash>,
+    /// Its summary, or why that cannot be read.
+    pub summary: Result<v1::RecordSummary, UnreadableGame>,
+}
 
 /// A finished game whose summary cannot be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -109,8 +118,8 @@ pub struct UnreadableGame {
     pub problem: String,
 }
 
-/// A row of the list of finished games, of its number, its id and its summary.
-fn listed(number: i64, game: &[u8], summary: &[u8]) -> Listed {
+/// A row of the list of finished games, of its number, its id, its summary and its header.
+fn listed(number: i64, game: &[u8], summary: &[u8], header: Option<&[u8]>) -> Listed {
     let number = u64::try_from(number).unwrap_or_default();
     let summary = v1::RecordSummary::decode(summary).map_err(|error| {
         let unreadable = UnreadableGame {
@@ -120,7 +129,11 @@ fn listed(number: i64, game: &[u8], summary: &[u8]) -> Listed {
         tracing::error!(number, problem = %unreadable, "a game is not listed");
         unreadable
     });
-    (number, summary)
+    Listed {
+        number,
+        owner: header.and_then(form::stored_owner),
+        summary,
+    }
 }
 
 /// A part of the list of finished games, and the order of reading. Games are numbered from 1,

@@ -402,7 +402,14 @@ fn listed<'a>(
     games
         .filter(|(_, game)| matches_filter(filter, &game.summary))
         .take(count)
-        .map(|(number, game)| (*number, Ok(game.summary.clone())))
+        .map(|(number, game)| Listed {
+            number: *number,
+            owner: match &game.stored {
+                StoredGame::Hosted(header, ..) => Some(header.owner),
+                StoredGame::Imported(_) => None,
+            },
+            summary: Ok(game.summary.clone()),
+        })
         .collect()
 }
 

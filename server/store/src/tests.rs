@@ -54,7 +54,7 @@ async fn listed(store: &dyn Store, after: u64) -> Vec<(String, u64)> {
     let listed = store.list(&all, Part::After(after), 9).await;
     let listed = listed.expect("readable").into_iter();
     listed
-        .map(|(number, summary)| (summary.expect("readable").room_name, number))
+        .map(|it| (it.summary.expect("readable").room_name, it.number))
         .collect()
 }
 
@@ -277,7 +277,7 @@ async fn a_text_that_no_database_can_search_for_is_stored() {
         let found = found.expect("readable");
         assert_eq!(found.len(), 1);
         assert_eq!(
-            found[0].1.as_ref().expect("readable").room_name,
+            found[0].summary.as_ref().expect("readable").room_name,
             strange.name
         );
     })

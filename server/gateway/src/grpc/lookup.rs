@@ -20,7 +20,7 @@ use chefshat_hosting::cluster::{Elsewhere, FoundBy, Location};
 use chefshat_hosting::room::Handle;
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::tournaments::{TournamentHandle, Tournaments};
-use chefshat_room::ids::{Id, RequestKey, Token};
+use chefshat_room::ids::{Id, RequestKey, SecretHash, Token};
 use chefshat_room::journal::{Change, Entry, GameHeader};
 use chefshat_room::policy::Visibility;
 use chefshat_store::{StoreError, StoredGame};
@@ -328,35 +328,53 @@ impl Lookup {
         })
     }
 
-    /// Whether a recorded game is in the lists of a caller.
-    pub(super) async fn lists_record(
+    /// Whether a recorded game is in the lists of a caller, by its summary and the hash of its room's
+    /// owner token alone. `None` if the game has to be read, for its tickets: never one of a study,
+    /// which only the owner sees, so that no participant learns by time which games a filter finds.
+    pub(super) fn lists_by_summary(
         &self,
         caller: &Caller,
         summary: &v1::RecordSummary,
-    ) -> Result<bool, Status> {
+        owner: Option<&SecretHash>,
+    ) -> Option<bool> {
         if !reaches_record(caller, &summary.room_id, &summary.tournament_id) {
-            return Ok(false);
+            return Some(false);
         }
         let is_public = summary.visibility() == v1::Visibility::Unspecified;
         if is_public || summary.added || caller.relation() > Relation::Stranger {
-            return Ok(true);
+            return Some(true);
         }
         let tournament = Id::parse(&summary.tournament_id);
         let kept = tournament.and_then(|id| self.tournaments.get(id));
         let relation = kept.as_ref().map(|it| it.relation(&caller.secrets));
         if relation > Some(Relation::Stranger) {
-            return Ok(true);
+            return Some(true);
         }
-        // Reading a game takes time: only those that a secret may be of are read. The games of a
-        // tournament may outlast it.
+        // The games of a tournament may outlast it.
         let forgotten = tournament.filter(|_| kept.is_none());
         let study = Id::parse(&summary.study_id);
-        let mut ids = (Id::parse(&summary.room_id).into_iter())
-            .chain(forgotten)
-            .chain(study);
-        if !ids.any(|id| caller.secrets.mention(id)) {
-            return Ok(false);
+        let room = Id::parse(&summary.room_id);
+        if let (Some(room), Some(owner)) = (room, owner) {
+            let by_room = caller.secrets.relation(room, owner, std::iter::empty());
+            let mut units = forgotten.into_iter().chain(study);
+            if by_room == Relation::Owner
+                || units.any(|unit| owns_unit_of(caller, unit, (room, owner)))
+            {
+                return Some(true);
+            }
         }
+        // Reading a game takes time: only those that a ticket may be of are read.
+        let mut ids = room.into_iter().chain(forgotten);
+        let may_take_part = study.is_none() && ids.any(|id| caller.secrets.mention(id));
+        (!may_take_part).then_some(false)
+    }
+
+    /// Whether a recorded game that has to be read is in the lists of a caller.
+    pub(super) async fn lists_by_game(
+        &self,
+        caller: &Caller,
+        summary: &v1::RecordSummary,
+    ) -> Result<bool, Status> {
         let Some(game) = Id::parse(&summary.game_id) else {
             return Ok(false);
         };
@@ -447,11 +465,7 @@ impl Lookup {
         };
         let secrets = &caller.secrets;
         let by_room = secrets.relation(header.room_id, &header.owner, header.table.into_iter());
-        // The owner token of a tournament or a study stands for that of each of its rooms.
-        let by_owner_of = |id| match secrets.of_id(id).any(|token| {
-            let owner = Token::of_tournament_room(header.room_id, &token.hash());
-            header.owner.is(&owner.hash())
-        }) {
+        let by_owner_of = |id| match owns_unit_of(caller, id, (header.room_id, &header.owner)) {
             true => Relation::Owner,
             false => Relation::Stranger,
         };
@@ -466,6 +480,15 @@ impl Lookup {
             .max(by_tournament.unwrap_or(Relation::Stranger))
             .max(by_study.unwrap_or(Relation::Stranger))
     }
+}
+
+/// Whether a caller shows the owner token of a tournament or a study, which stands for that of each
+/// of its rooms. A room is given by its id and the hash of its owner token.
+fn owns_unit_of(caller: &Caller, unit: Id, (room, owner): (Id, &SecretHash)) -> bool {
+    caller.secrets.of_id(unit).any(|token| {
+        let derived = Token::of_tournament_room(room, &token.hash());
+        owner.is(&derived.hash())
+    })
 }
 
 fn standing_in_tournament(caller: &Caller, tournament: &TournamentHandle) -> Relation {

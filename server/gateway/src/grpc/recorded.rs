@@ -18,7 +18,7 @@ use chefshat_base::threads::{Priority, Threads};
 use chefshat_hosting::cluster::{FoundBy, Peer};
 use chefshat_hosting::config::MAX_PEER_MESSAGE_BYTES;
 use chefshat_hosting::rooms::Rooms;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{Id, SecretHash};
 use chefshat_store::MAX_CONCURRENT_RECORDS;
 use chefshat_store::StoreError;
 
@@ -91,7 +91,8 @@ impl Recorded {
             }
             summary => summary.map_err(status::read_failed)?,
         };
-        if let Some(room) = room {
+        // The end of a game is stored a moment before its room says that it is over.
+        if let Some(room) = room.filter(|_| summary.is_none()) {
             self.lookup.room_or(caller, room, unknown).await?;
             return Err(status(
                 Code::FailedPrecondition,
@@ -113,8 +114,11 @@ impl Recorded {
             // Its header, which says who sees it, cannot be read.
             Err(error @ StoreError::Unreadable(_)) => {
                 let status = status::read_failed(error);
-                let is_listed = self.lookup.lists_record(caller, &summary).await?;
-                return Err(if is_listed { status } else { unknown() });
+                let by_summary = self.lookup.lists_by_summary(caller, &summary, None);
+                return Err(match by_summary {
+                    Some(true) => status,
+                    _ => unknown(),
+                });
             }
             stored => stored.map_err(status::read_failed)?,
         };
@@ -133,6 +137,22 @@ impl Recorded {
         }
         let working = move || work(stored.lines().into_owned(), view);
         self.in_background(place, working).await
+    }
+
+    /// Whether a recorded game is in the lists of a caller.
+    pub(super) async fn is_listed(
+        &self,
+        caller: &Caller,
+        summary: &v1::RecordSummary,
+        owner: Option<&SecretHash>,
+    ) -> Result<bool, Status> {
+        match self.lookup.lists_by_summary(caller, summary, owner) {
+            Some(known) => Ok(known),
+            None => {
+                let _place = self.places.take(Key::of_caller(caller)).await;
+                self.lookup.lists_by_game(caller, summary).await
+            }
+        }
     }
 
     /// The record of a finished game as `seen` makes it, for a call that cannot be sent to another

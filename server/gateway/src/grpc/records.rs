@@ -27,8 +27,8 @@ use super::pace::Pace;
 use super::pages;
 use super::recorded::{Recorded, SERIES_OPEN};
 use super::status::{
-    RECORD_UNREADABLE, Refusal, UNREADABLE, disk_nearly_full, field, has_reason, read_failed,
-    status,
+    OWNER_UNREACHABLE, RECORD_UNREADABLE, Refusal, UNREADABLE, disk_nearly_full, field, has_reason,
+    read_failed, status,
 };
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{FairSemaphore, Key, Permit, Shares};
@@ -112,19 +112,18 @@ impl Records {
         let mut resumes_after = Some(&request.after).filter(|game| !game.is_empty());
         loop {
             let page = self.page(filter, Part::After(after), STREAM_PAGE).await?;
-            let Some((last, _)) = page.last() else {
+            let Some(last) = page.last() else {
                 return match resumes_after {
                     Some(game) => Err(cannot_resume(game)),
                     None => Ok(()),
                 };
             };
-            after = *last;
-            for (_, summary) in page {
+            after = last.number;
+            for Listed { summary, owner, .. } in page {
                 let (game, is_listed) = match &summary {
                     Ok(summary) => {
-                        let is_listed =
-                            self.recorded.lookup().lists_record(caller, summary).await?;
-                        (summary.game_id.clone(), is_listed)
+                        let is_listed = self.recorded.is_listed(caller, summary, owner.as_ref());
+                        (summary.game_id.clone(), is_listed.await?)
                     }
                     Err(unreadable) => (unreadable.game.to_string(), caller.is_operator()),
                 };
@@ -159,10 +158,20 @@ impl Records {
                     Err(status)
                         if has_reason(&status, SERIES_OPEN)
                             || has_reason(&status, "GAME_UNKNOWN") => {}
-                    Err(status) if has_reason(&status, RECORD_UNREADABLE) => {
+                    Err(status)
+                        if has_reason(&status, RECORD_UNREADABLE)
+                            || has_reason(&status, OWNER_UNREACHABLE) =>
+                    {
+                        let problem = match has_reason(&status, OWNER_UNREACHABLE) {
+                            true => status.message().to_owned(),
+                            false => UNREADABLE.to_owned(),
+                        };
                         let part = v1::StreamRecordsResponse {
                             lines: Vec::new(),
-                            unreadable: Some(unreadable(game)),
+                            unreadable: Some(v1::UnreadableRecord {
+                                game_id: game,
+                                problem,
+                            }),
                         };
                         send_part(sender, part).await?;
                     }
@@ -209,7 +218,6 @@ impl RecordService for Records {
         let filter = checked(request.filter)?;
         let mut last = pages::last_shown(&request.page_token)?;
         let size = pages::page_size(request.page_size);
-        let lookup = self.recorded.lookup();
         let mut response = v1::ListRecordsResponse::default();
         let (mut rest, mut looked_at) = (true, 0);
         // Records that the caller does not see are skipped, up to a limit for one page.
@@ -222,20 +230,23 @@ impl RecordService for Records {
             let found = self.page(&filter, part, size + 1).await?;
             rest = found.len() > size;
             looked_at += found.len();
-            for (number, summary) in found {
+            for listed in found {
                 if response.records.len() == size {
                     rest = true;
                     break 'page;
                 }
-                last = Some(number);
-                match summary {
-                    Ok(summary) if lookup.lists_record(&caller, &summary).await? => {
-                        response.records.push(summary);
+                last = Some(listed.number);
+                match listed.summary {
+                    Ok(summary) => {
+                        let owner = listed.owner.as_ref();
+                        if self.recorded.is_listed(&caller, &summary, owner).await? {
+                            response.records.push(summary);
+                        }
                     }
                     Err(bad) if caller.is_operator() => {
                         response.unreadable.push(unreadable(bad.game.to_string()));
                     }
-                    Ok(_) | Err(_) => {}
+                    Err(_) => {}
                 }
             }
         }
@@ -615,6 +626,7 @@ mod tests {
     use super::*;
     use chefshat_admission::access::Role;
     use chefshat_hosting::rooms::Rooms;
+    use chefshat_room::ids::Token;
     use chefshat_store::{MemoryStore, Store as _};
 
     fn header(game: u8) -> v1::RecordLine {
@@ -697,6 +709,46 @@ mod tests {
         assert_eq!(memory.taken(), 0);
     }
 
+    fn recorded(store: &Arc<MemoryStore>) -> (Recorded, Arc<Tournaments>) {
+        let config = ServerConfig::default();
+        let rooms = Rooms::new(&config, store.clone(), TaskTracker::new()).expect("threads");
+        let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
+        let lookup = Lookup::new(rooms, Arc::clone(&tournaments));
+        let recorded = Recorded::new(lookup, Role::Spectator).expect("threads");
+        (recorded, tournaments)
+    }
+
+    #[tokio::test]
+    async fn no_game_of_a_study_is_read_to_find_out_who_lists_it() {
+        let (recorded, _) = recorded(&Arc::default());
+        let (room, study) = (Id([1; 16]), Id([2; 16]));
+        let token = Token::random(study);
+        let owner = Token::of_tournament_room(room, &token.hash()).hash();
+        let summary = v1::RecordSummary {
+            room_id: room.to_string(),
+            visibility: v1::Visibility::Private.into(),
+            ..summary_of(3)
+        };
+        let of_study = v1::RecordSummary {
+            study_id: study.to_string(),
+            ..summary.clone()
+        };
+        let lists = |summary, secrets: &[Token]| {
+            let caller = (secrets.iter()).fold(Caller::default(), |caller, secret| {
+                caller.showing(&secret.to_text())
+            });
+            (recorded.lookup()).lists_by_summary(&caller, summary, Some(&owner))
+        };
+        // Its owner sees it; a participant, who knows the ids of the room and the study, does not.
+        assert_eq!(lists(&of_study, &[token]), Some(true));
+        let participant = [Token::random(study), Token::random(room)];
+        assert_eq!(lists(&of_study, &participant), Some(false));
+        // Others are read if the caller may have a ticket.
+        assert_eq!(lists(&summary, &[Token::random(room)]), None);
+        assert_eq!(lists(&summary, &[Token::random(study)]), Some(false));
+        assert_eq!(lists(&summary, &[]), Some(false));
+    }
+
     #[tokio::test]
     async fn a_record_that_is_deleted_before_its_turn_ends_no_stream() {
         let store = Arc::new(MemoryStore::default());
@@ -705,12 +757,8 @@ mod tests {
             let imported = store.import(Id([game; 16]), summary_of(game), lines);
             assert_eq!(imported.await, Ok(true));
         }
-        let config = ServerConfig::default();
-        let rooms = Rooms::new(&config, store.clone(), TaskTracker::new()).expect("threads");
-        let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
-        let lookup = Lookup::new(rooms, Arc::clone(&tournaments));
-        let recorded = Recorded::new(lookup, Role::Spectator).expect("threads");
-        let records = Records::new(recorded, tournaments, &config);
+        let (recorded, tournaments) = recorded(&store);
+        let records = Records::new(recorded, tournaments, &ServerConfig::default());
         let caller = Caller {
             role: Role::Admin,
             ..Caller::default()

@@ -101,6 +101,8 @@ pub fn field(reason: &str, problem: &FieldProblem) -> Status {
     )
 }
 
+/// Reason of the error while the server that has what a call is about cannot be reached.
+pub(super) const OWNER_UNREACHABLE: &str = "OWNER_UNREACHABLE";
 /// The status for a client when the store cannot be read.
 pub fn read_failed(error: StoreError) -> Status {
     tracing::error!(%error, "reading a record failed");
@@ -321,7 +323,7 @@ pub fn is_refusal(status: &Status) -> bool {
 pub fn owner_unreachable() -> Status {
     status(
         Code::Unavailable,
-        "OWNER_UNREACHABLE",
+        OWNER_UNREACHABLE,
         "the server that runs this room or tournament cannot be reached, or another one is just taking over; try again",
         [],
     )

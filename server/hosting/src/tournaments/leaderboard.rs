@@ -85,10 +85,12 @@ impl Folded {
     }
 
     fn add(&mut self, page: Vec<Listed>) {
-        for (number, summary) in page {
-            self.after = number;
+        for listed in page {
+            self.after = listed.number;
             // One that cannot be read is named in the log.
-            let Ok(summary) = summary else { continue };
+            let Ok(summary) = listed.summary else {
+                continue;
+            };
             if let Some(placed) = results(&summary) {
                 let ended = (summary.ended_at_ms, summary.game_id);
                 self.held_back.insert(ended, placed);
@@ -499,7 +501,11 @@ mod tests {
         let numbered = (0..count - count % 8).map(|place| {
             let game = shuffled(place);
             let summary = summary(game + 1, winners[(game % 3) as usize]);
-            (place + 1, Ok(summary))
+            Listed {
+                number: place + 1,
+                owner: None,
+                summary: Ok(summary),
+            }
         });
         let numbered: Vec<Listed> = numbered.collect();
         let mut folded = Folded::new(0);
@@ -507,7 +513,9 @@ mod tests {
             folded.add(page.to_vec());
             assert!(folded.held_back.len() <= HELD_BACK);
         }
-        let games = numbered.into_iter().filter_map(|(_, game)| game.ok());
+        let games = numbered
+            .into_iter()
+            .filter_map(|listed| listed.summary.ok());
         let mut games: Vec<_> = games.collect();
         games.sort_by_key(|game| game.ended_at_ms);
         let mut expected = Ratings::default();

@@ -62,6 +62,13 @@ struct HeaderForm {
     participant_removed: bool,
 }
 
+/// The field `owner` of `HeaderForm` alone.
+#[derive(Clone, PartialEq, Message)]
+struct OwnerForm {
+    #[prost(bytes = "vec", tag = "13")]
+    owner: Vec<u8>,
+}
+
 /// The version of the server whose headers do not name it.
 const FIRST_VERSION: &str = "0.1.0";
 
@@ -247,6 +254,12 @@ pub(crate) fn stored_unit(form: i64, header: Option<&[u8]>) -> Result<Option<Id>
         true => Ok(None),
         false => array(&unit, "the id of what it is part of").map(|id| Some(Id(id))),
     }
+}
+
+/// The owner's hash in a header, which is all that is read of it. `None` if it cannot be read.
+pub(crate) fn stored_owner(header: &[u8]) -> Option<SecretHash> {
+    let header = OwnerForm::decode(header).ok()?;
+    array(&header.owner, "").ok().map(SecretHash::from_bytes)
 }
 
 /// Decodes a header.

@@ -19,7 +19,9 @@ use prost::Message as _;
 #[cfg(test)]
 pub(super) use entry::put_entry;
 pub(super) use entry::{entries_to_bytes, put_entries, read_entries};
-pub(super) use header::{header_from_bytes, header_to_bytes, stored_header, stored_unit};
+pub(super) use header::{
+    header_from_bytes, header_to_bytes, stored_header, stored_owner, stored_unit,
+};
 pub(super) use signature::{signature_from_bytes, signature_to_bytes};
 pub use study::changes_to_bytes;
 pub(super) use study::traces_to_bytes;

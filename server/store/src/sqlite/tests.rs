@@ -386,7 +386,7 @@ async fn an_imported_game_is_stored_once() {
     );
     let listed = (store.list(&v1::RecordFilter::default(), Part::FROM_OLDEST, 9)).await;
     let listed = listed.expect("readable");
-    assert!(listed.len() == 1 && listed[0].1.as_ref().is_ok_and(|it| it.added));
+    assert!(listed.len() == 1 && listed[0].summary.as_ref().is_ok_and(|it| it.added));
     let hosted_here = v1::RecordFilter {
         hosted_here: true,
         ..v1::RecordFilter::default()

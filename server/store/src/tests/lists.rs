@@ -171,27 +171,31 @@ async fn check(store: &dyn Store) {
     for (filter, after, count, expected) in table {
         let part = Part::After(after);
         let listed = store.list(&filter, part, count).await.expect("readable");
-        let numbers: Vec<u64> = listed.iter().map(|(number, _)| *number).collect();
+        let numbers: Vec<u64> = listed.iter().map(|it| it.number).collect();
         assert_eq!(numbers, expected, "{filter:?}");
-        for (number, summary) in listed {
-            let summary = summary.expect("readable");
-            assert!(crate::matches_filter(&filter, &summary), "{number}");
+        for listed in listed {
+            let summary = listed.summary.expect("readable");
+            assert!(
+                crate::matches_filter(&filter, &summary),
+                "{}",
+                listed.number
+            );
         }
         // In reverse order the same games come, whole or page by page.
         let all = store.list(&filter, Part::FROM_OLDEST, 9).await;
         let backwards: Vec<u64> = (all.expect("readable").iter().rev())
-            .map(|(number, _)| *number)
+            .map(|it| it.number)
             .collect();
         for count in [2, 9] {
             let mut numbers = Vec::new();
             let mut part = Part::FROM_NEWEST;
             loop {
                 let listed = store.list(&filter, part, count).await.expect("readable");
-                let Some((last, _)) = listed.last() else {
+                let Some(last) = listed.last() else {
                     break;
                 };
-                part = Part::Before(*last);
-                numbers.extend(listed.iter().map(|(number, _)| *number));
+                part = Part::Before(last.number);
+                numbers.extend(listed.iter().map(|it| it.number));
             }
             assert_eq!(numbers, backwards, "{filter:?}");
         }

@@ -527,7 +527,7 @@ async fn a_cursor_misses_no_game_that_nodes_finish_at_the_same_time() {
         if done && page.is_empty() {
             break;
         }
-        seen.extend(page.iter().map(|(number, _)| *number));
+        seen.extend(page.iter().map(|listed| listed.number));
     }
     assert_eq!(seen, (1..=40).collect::<Vec<u64>>());
     first.close().await;

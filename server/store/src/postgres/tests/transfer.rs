@@ -32,8 +32,8 @@ async fn shown(store: &dyn Store) -> String {
     let listed = store.list(&filter, Part::FROM_OLDEST, 99).await;
     let listed = listed.expect("readable");
     let mut games = Vec::new();
-    for (_, summary) in &listed {
-        let id = Id::parse(&summary.as_ref().expect("readable").game_id).expect("an id");
+    for listed in &listed {
+        let id = Id::parse(&listed.summary.as_ref().expect("readable").game_id).expect("an id");
         let stored = store.finished(id).await.expect("readable");
         games.push(stored.expect("it is listed"));
     }
@@ -73,8 +73,8 @@ async fn a_database_of_an_earlier_version_moves_with_everything_in_it() {
     // Every game that is over replays; every other one resumes where it was.
     let filter = v1::RecordFilter::default();
     let listed = store.list(&filter, Part::FROM_OLDEST, 99).await;
-    for (_, summary) in listed.expect("readable") {
-        let id = Id::parse(&summary.as_ref().expect("readable").game_id).expect("an id");
+    for listed in listed.expect("readable") {
+        let id = Id::parse(&listed.summary.as_ref().expect("readable").game_id).expect("an id");
         let stored = store.finished(id).await.expect("readable");
         let lines = stored.expect("it is listed").lines().into_owned();
         let replayed = replay::replay(&lines);
@@ -115,7 +115,7 @@ async fn a_database_of_an_earlier_version_moves_with_everything_in_it() {
 
     // What comes next is numbered after what was moved.
     let last = store.list(&filter, Part::FROM_NEWEST, 1).await;
-    let (last, _) = last.expect("readable").remove(0);
+    let last = last.expect("readable").remove(0).number;
     let created = store.create(durable(1), vec![entry(1)]).await;
     let finished = created
         .expect("created")
@@ -123,7 +123,7 @@ async fn a_database_of_an_earlier_version_moves_with_everything_in_it() {
         .await;
     finished.expect("committed");
     let next = store.list(&filter, Part::FROM_NEWEST, 1).await;
-    assert_eq!(next.expect("readable").remove(0).0, last + 1);
+    assert_eq!(next.expect("readable").remove(0).number, last + 1);
 
     let again = transfer(folder.path(), database.url(), |_, _| {}).await;
     let error = again.expect_err("it has games");
