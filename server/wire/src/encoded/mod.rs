@@ -433,6 +433,20 @@ mod tests {
     }
 
     #[test]
+    fn dropped_events_leave_the_others_where_they_are() {
+        let mut events = Events::starting_at(5);
+        (1..=300).for_each(|number| events.add(&event(number)));
+        let kept = events.range(100, 305).to_vec();
+        events.drop_before(100);
+        assert_eq!((events.first(), events.end()), (100, 305));
+        assert_eq!(events.range(100, 305), kept);
+        events.add(&event(301));
+        assert_eq!(events.range(100, 305), kept);
+        events.drop_before(306);
+        assert_eq!((events.first(), events.end()), (306, 306));
+    }
+
+    #[test]
     fn messages_written_directly_are_those_of_prost() {
         let numbers = [0, 1, 127, 128, 300, 70_000];
         let large = [0, 1, 127, 128, 1 << 40];
