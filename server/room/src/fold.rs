@@ -298,6 +298,9 @@ impl Core {
             if matches!(event, Event::GameEnded { .. }) {
                 self.state = State::Finished;
             }
+            if matches!(event, Event::ShiftStarted { .. }) {
+                self.shift_start = self.log.len();
+            }
             let brought = rewards.iter().filter(|(bringer, _)| *bringer == index);
             self.log.push(
                 at,

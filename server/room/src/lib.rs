@@ -103,6 +103,8 @@ pub struct Core {
     log: Log,
     /// Length of the log before the first deal.
     log_before_deal: usize,
+    /// Position in the log of the first event of the Shift in progress; 0 before the first Shift.
+    shift_start: usize,
     /// Length of the log after the deal and after each decision. Empty unless spectators are
     /// delayed.
     log_after_decision: VecDeque<u32>,
@@ -329,6 +331,7 @@ impl Core {
             silent_since: None,
             log: Log::default(),
             log_before_deal: 0,
+            shift_start: 0,
             log_after_decision: VecDeque::new(),
             changes: 0,
             seatings: 0,
@@ -372,9 +375,14 @@ impl Core {
     }
 
     /// Drops events before a position, unless the table is physical: its events can be corrected.
+    /// Those of the Shift in progress stay: searches need them, however much is expressed meanwhile.
     pub fn drop_log_before(&mut self, position: usize) {
+        let needed = match self.state.is_over() {
+            true => self.log.len(),
+            false => self.shift_start,
+        };
         if self.table().is_none() {
-            self.log.drop_before(position);
+            self.log.drop_before(position.min(needed));
         }
     }
 

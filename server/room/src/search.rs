@@ -180,14 +180,7 @@ impl Core {
 
     /// The events of the Shift in progress, as a seat saw them.
     fn shift_seen_by(&self, seat: Seat) -> Vec<Event> {
-        let log = &self.log;
-        let is_start = |position: &usize| {
-            log.get(*position).is_some_and(|entry| {
-                matches!(&entry.event, RoomEvent::Game(game) if matches!(game.event, Event::ShiftStarted { .. }))
-            })
-        };
-        let start = (log.first()..log.len()).rev().find(is_start);
-        log.since(start.unwrap_or(log.len()))
+        (self.log.since(self.shift_start))
             .filter_map(|entry| match &entry.event {
                 RoomEvent::Game(game) => Some(game.event.seen_by(Viewer::Seat(seat))),
                 _ => None,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_agents::AgentKind;
-use chefshat_engine::{ActionId, Game, RuleSetSpec, Seat, Seed, Stop, TakenOver};
+use chefshat_engine::{ActionId, Event, Game, RuleSetSpec, Seat, Seed, Stop, TakenOver};
 
 use super::{Answer, Core, OPEN, Table, Verdict, ms, one_shift};
 use crate::ids::Id;
@@ -84,6 +84,14 @@ fn a_long_game_is_restored_with_its_last_events_alone() {
         table.play_one();
         lengths.push(table.core.log().len());
     }
+    // The Shift in progress stays, whatever is dropped.
+    let length = table.core.log().len();
+    table.core.drop_log_before(length);
+    let starts = |event: &RoomEvent| match event {
+        RoomEvent::Game(game) => matches!(game.event, Event::ShiftStarted { .. }),
+        _ => false,
+    };
+    assert_eq!(table.happened(starts), 1);
     let shown = lengths[lengths.len() - 4];
     assert_eq!(table.core.visible_to_spectators(), shown);
     table.restart(ms(1));
