@@ -382,6 +382,7 @@ impl Core {
             false => self.shift_start,
         };
         if self.table().is_none() {
+            let needed = needed.min(self.visible_to_spectators());
             self.log.drop_before(position.min(needed));
         }
     }

@@ -357,7 +357,8 @@ impl StudyService for StudyCalls {
                     };
                     let sent = sender.send_timeout(Ok(response), FOLLOW_SEND_TIMEOUT);
                     if sent.await.is_err() {
-                        return;
+                        // What gathers the export notices it, and gives its place back.
+                        return exported.close();
                     }
                 }
             };

@@ -373,8 +373,12 @@ impl Subscriber {
             return self.keeps_up(visible);
         }
         if self.position < core.log().first() {
-            // Only a seat can be that far behind: spectators are disconnected before.
-            self.skip_events(core);
+            // Only a seat can be that far behind: spectators are disconnected before. No snapshot has
+            // the result of a game that is over, but its last events have.
+            match over {
+                true => self.position = core.log().first(),
+                false => self.skip_events(core),
+            }
         }
         while self.position < visible {
             let end = (self.position + EVENTS_PER_BATCH).min(visible);

@@ -50,7 +50,8 @@ impl Room {
 
     /// Encodes the public events from a position on, which somebody reads next.
     fn encode_from(&mut self, position: usize) {
-        if position < self.public.encoded().start {
+        // Events that are gone are not sent.
+        if position.max(self.core.log().first()) < self.public.encoded().start {
             self.public.restart_at(self.core.log().first());
             self.public.follow(&self.core);
         }
