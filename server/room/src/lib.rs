@@ -376,6 +376,7 @@ impl Core {
 
     /// Drops events before a position, unless the table is physical: its events can be corrected.
     /// Those of the Shift in progress stay: searches need them, however much is expressed meanwhile.
+    /// So do those that delayed spectators have not seen.
     pub fn drop_log_before(&mut self, position: usize) {
         let needed = match self.state.is_over() {
             true => self.log.len(),

@@ -185,8 +185,8 @@ pub(crate) fn evaluation(game_id: String, time_ms: u32) -> v1::EvaluateRequest {
 }
 
 /// Plays in many rooms with all seats as fast as it can; each decision has an annotation of this many
-/// bytes. Closes the rooms at the end: what is held for those that play is no memory that an attack
-/// leaves.
+/// bytes. Closes the rooms at the end, so that the memory of rooms that still play does not count as
+/// memory that is not given back.
 pub(crate) async fn games(target: &Target, rooms: u32, annotation: usize) -> Result<(), Status> {
     let (client, until) = (target.client().await?, target.until);
     let mut playing = JoinSet::new();

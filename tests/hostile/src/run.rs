@@ -1,6 +1,6 @@
 //! One attack: a new server, the honest room in quiet, the attack beside it, and the time after. A
-//! second honest room, the control, plays all the time on a server that nobody attacks, so that what
-//! the attack takes of the machine is told from what it takes of the server.
+//! second honest room, the control, plays all the time on a server that nobody attacks: it shows how
+//! much slower the machine alone becomes.
 
 use std::path::Path;
 use std::sync::Arc;

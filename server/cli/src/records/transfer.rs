@@ -203,13 +203,17 @@ impl Import {
         let mut service = service(&client);
         let bar = progress::of_items(self.files.len() as u64, "records");
         let mut failed = 0;
+        let mut not_imported = |problem: &dyn std::fmt::Display| {
+            bar.suspend(|| anstream::eprintln!("not imported: {problem}"));
+            bar.inc(1);
+            failed += 1;
+        };
         for file in &self.files {
             // One that is damaged or refused ends no import of the others.
             let lines = match jsonl::read(file) {
                 Ok(lines) => lines,
                 Err(problem) => {
-                    bar.suspend(|| anstream::eprintln!("not imported: {problem}"));
-                    failed += 1;
+                    not_imported(&problem);
                     continue;
                 }
             };
@@ -222,8 +226,7 @@ impl Import {
                     if !is_about_record(&error) {
                         return Err(refused);
                     }
-                    bar.suspend(|| anstream::eprintln!("not imported: {refused}"));
-                    failed += 1;
+                    not_imported(&refused);
                     continue;
                 }
             };

@@ -158,27 +158,29 @@ impl Records {
                     Err(status)
                         if has_reason(&status, SERIES_OPEN)
                             || has_reason(&status, "GAME_UNKNOWN") => {}
-                    Err(status)
-                        if has_reason(&status, RECORD_UNREADABLE)
-                            || has_reason(&status, OWNER_UNREACHABLE) =>
-                    {
-                        let problem = match has_reason(&status, OWNER_UNREACHABLE) {
-                            true => status.message().to_owned(),
-                            false => UNREADABLE.to_owned(),
+                    Err(status) if has_reason(&status, RECORD_UNREADABLE) => {
+                        send_part(sender, left_out(unreadable(game))).await?;
+                    }
+                    Err(status) if has_reason(&status, OWNER_UNREACHABLE) => {
+                        let problem = status.message().to_owned();
+                        let unreachable = v1::UnreadableRecord {
+                            game_id: game,
+                            problem,
                         };
-                        let part = v1::StreamRecordsResponse {
-                            lines: Vec::new(),
-                            unreadable: Some(v1::UnreadableRecord {
-                                game_id: game,
-                                problem,
-                            }),
-                        };
-                        send_part(sender, part).await?;
+                        send_part(sender, left_out(unreachable)).await?;
                     }
                     Err(status) => return Err(status),
                 }
             }
         }
+    }
+}
+
+/// The part of a stream that names a record that is left out.
+fn left_out(record: v1::UnreadableRecord) -> v1::StreamRecordsResponse {
+    v1::StreamRecordsResponse {
+        lines: Vec::new(),
+        unreadable: Some(record),
     }
 }
 

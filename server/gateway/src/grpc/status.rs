@@ -103,6 +103,7 @@ pub fn field(reason: &str, problem: &FieldProblem) -> Status {
 
 /// Reason of the error while the server that has what a call is about cannot be reached.
 pub(super) const OWNER_UNREACHABLE: &str = "OWNER_UNREACHABLE";
+
 /// The status for a client when the store cannot be read.
 pub fn read_failed(error: StoreError) -> Status {
     tracing::error!(%error, "reading a record failed");

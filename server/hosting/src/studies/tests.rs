@@ -267,7 +267,6 @@ async fn a_study_that_cannot_be_read_keeps_no_other_from_being_resumed() {
     assert!(studies.get(broken).is_none() && studies.get(readable).is_some());
 }
 
-/// What is in the store twice is run once.
 #[tokio::test(start_paused = true)]
 async fn a_game_that_cannot_be_read_back_ends_no_study() {
     let failing = Arc::new(FailingStore::after(u64::MAX));
@@ -300,6 +299,7 @@ async fn a_game_that_cannot_be_read_back_ends_no_study() {
     lab.settled().await;
 }
 
+/// What is in the store twice is run once.
 #[tokio::test(start_paused = true)]
 async fn a_study_that_runs_is_not_resumed_beside_itself() {
     let lab = Lab::new().await;

@@ -105,6 +105,25 @@ fn a_long_game_is_restored_with_its_last_events_alone() {
 }
 
 #[test]
+fn what_delayed_spectators_have_not_seen_stays_also_after_a_restart() {
+    let rules = RuleSetSpec {
+        stop: Stop::Shifts(1_000),
+        ..RuleSetSpec::default()
+    };
+    let delayed = Policy {
+        spectator_delay_decisions: 10_000,
+        ..policy()
+    };
+    let mut table = Table::with_rules(delayed, vec![OPEN; 4], rules);
+    table.fill();
+    while table.core.log().len() < 2 * MAX_EVENTS_KEPT {
+        table.play_one();
+    }
+    table.restart(ms(1));
+    assert!(table.core.log().first() <= table.core.visible_to_spectators());
+}
+
+#[test]
 fn a_seat_that_does_not_return_times_out_as_usual() {
     let mut table = Table::playing(policy());
     table.play_one();

@@ -94,9 +94,7 @@ impl Room {
         };
         if self.core.log().kept() > most {
             let read_by_spectators = self.spectators.iter().map(Subscriber::position).min();
-            let keep_from = (length - most)
-                .min(self.core.visible_to_spectators())
-                .min(read_by_spectators.unwrap_or(length));
+            let keep_from = (length - most).min(read_by_spectators.unwrap_or(length));
             self.core.drop_log_before(keep_from);
         }
         // While nobody watches a game that nobody plays, or that is over, none are encoded.
