@@ -46,7 +46,7 @@ pub struct Export {
     pub version: String,
 }
 
-/// A skipped record.
+/// A skipped record, or a file of samples that cannot be read to its end.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Skipped {
     /// The file.
@@ -72,9 +72,9 @@ pub struct Exported {
     pub samples: u64,
     /// Games excluded by the filter.
     pub filtered: u64,
-    /// Damaged records and duplicate games.
+    /// Damaged records and files of samples, and duplicate games.
     pub skipped: Vec<Skipped>,
-    /// Number of damaged records among them.
+    /// Number of what is damaged among them.
     pub damaged: u64,
     /// The files except the list of checksums.
     pub files: Vec<FileSummary>,

@@ -87,7 +87,10 @@ impl Export {
                     None => {
                         games.insert(game.info().game_id.clone(), path.clone());
                         sink.add(&game).map_err(write)?;
-                        exported.samples += sink.add_samples(path, &game).map_err(write)?;
+                        let (values, damaged) = sink.add_samples(path, &game).map_err(write)?;
+                        exported.samples += values;
+                        exported.damaged += damaged.len() as u64;
+                        exported.skipped.extend(damaged);
                         exported.count(&game);
                         None
                     }
@@ -233,17 +236,18 @@ impl<'a> Sink<'a> {
         }
     }
 
-    /// Adds the samples beside a record. Returns the number of values.
-    fn add_samples(&mut self, record: &Path, game: &Game) -> io::Result<u64> {
+    /// Adds the samples beside a record. Returns the number of values, and the files that cannot be read
+    /// to their end.
+    fn add_samples(&mut self, record: &Path, game: &Game) -> io::Result<(u64, Vec<Skipped>)> {
         let (Self::Tables { samples: table, .. }, Game::Rows(rows)) = (self, game) else {
-            return Ok(0);
+            return Ok((0, Vec::new()));
         };
         let mut count = 0;
-        samples::of_game(record, &rows.game, |rows| {
+        let damaged = samples::of_game(record, &rows.game, |rows| {
             count += rows.len() as u64;
             table.write(rows)
         })?;
-        Ok(count)
+        Ok((count, damaged))
     }
 
     fn finish(self) -> io::Result<Vec<FileSummary>> {

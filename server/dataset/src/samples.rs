@@ -8,6 +8,7 @@ use chefshat_proto::v1::SampleChunk;
 use chefshat_record::samples;
 
 use super::column::{Column, ColumnInfo, Type, Value};
+use super::export::Skipped;
 use super::game::{GameInfo, SeatInfo};
 
 /// Name of the table.
@@ -76,29 +77,34 @@ pub(super) fn columns() -> Vec<ColumnInfo> {
     COLUMNS.iter().map(Column::info).collect()
 }
 
-/// Passes the rows of a game to `write`, chunk by chunk: those of the file beside its record.
+/// Passes the rows of a game to `write`, chunk by chunk: those of the files beside its record. Returns
+/// the files that cannot be read to their end, whose chunks before are passed on.
 ///
 /// # Errors
-/// A file cannot be read, or `write` fails.
+/// `write` fails.
 pub(super) fn of_game(
     record: &Path,
     game: &Arc<GameInfo>,
     mut write: impl FnMut(&[SampleRow]) -> io::Result<()>,
-) -> io::Result<()> {
+) -> io::Result<Vec<Skipped>> {
+    let mut damaged = Vec::new();
     for (seat, player) in game.seats.iter().enumerate() {
         let Some(path) = samples::beside(record, &game.game_id, seat) else {
             continue;
         };
         let mut written = Ok(());
-        samples::read(&path, |chunk| {
+        let read = samples::read(&path, |chunk| {
             if written.is_ok() {
                 written = write(&rows(game, (seat, player), &chunk));
             }
-        })
-        .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))?;
+        });
         written?;
+        damaged.extend(read.err().map(|error| Skipped {
+            path,
+            problem: error.to_string(),
+        }));
     }
-    Ok(())
+    Ok(damaged)
 }
 
 fn rows(

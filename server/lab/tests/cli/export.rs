@@ -183,6 +183,22 @@ fn damaged_records_are_left_out_and_named() {
 }
 
 #[test]
+fn damaged_samples_are_named_and_the_rest_is_exported() {
+    let stage = Stage::new(2);
+    let (name, _) = contents(&stage.path("data/records")).swap_remove(0);
+    let samples = format!("{}.2.samples", name.trim_end_matches(".jsonl"));
+    std::fs::create_dir(stage.path("data/samples")).unwrap();
+    std::fs::write(stage.path("data/samples").join(&samples), [0xff; 9]).unwrap();
+    let ended = stage.export("");
+    assert_eq!(ended.code, Some(1));
+    assert!(ended.stderr.contains(&samples), "{ended:?}");
+    assert!(ended.stdout.contains(": 2 games, "), "{ended:?}");
+    let said = stage.export("--skip-damaged --force --json").well().json();
+    let left_out = said["left_out"][0]["path"].as_str().unwrap();
+    assert!(left_out.ends_with(&samples), "{left_out}");
+}
+
+#[test]
 fn only_a_dataset_is_replaced() {
     let stage = Stage::new(1);
     assert_eq!(stage.export("").code, Some(0));
