@@ -22,7 +22,8 @@ impl Pace {
         }
     }
 
-    /// Waits until these bytes have passed. Who stops waiting gives their time back.
+    /// Waits until these bytes have passed. If the future is dropped, the time that is left of theirs is
+    /// free for others.
     pub(super) async fn pass(&self, bytes: usize) {
         let time = Duration::from_secs_f64(bytes as f64 / self.per_second as f64);
         let passed = {
@@ -30,7 +31,11 @@ impl Pace {
             *free_at = (*free_at).max(Instant::now()) + time;
             *free_at
         };
-        let waiting = Waiting { pace: self, time };
+        let waiting = Waiting {
+            pace: self,
+            time,
+            passed,
+        };
         sleep_until(passed).await;
         std::mem::forget(waiting);
     }
@@ -40,15 +45,19 @@ impl Pace {
     }
 }
 
-/// Time that is given back when this is dropped.
+/// Bytes that have not passed yet.
 struct Waiting<'a> {
     pace: &'a Pace,
+    /// How long they take.
     time: Duration,
+    /// When they have passed.
+    passed: Instant,
 }
 
 impl Drop for Waiting<'_> {
     fn drop(&mut self) {
-        *self.pace.free_at() -= self.time;
+        let left = self.passed.saturating_duration_since(Instant::now());
+        *self.pace.free_at() -= left.min(self.time);
     }
 }
 
@@ -73,5 +82,14 @@ mod tests {
         assert!(gone.await.is_err());
         pace.pass(1000).await;
         assert_eq!(begun.elapsed().as_millis(), 2000);
+        // But what has passed of its bytes until then has passed.
+        let begun = Instant::now();
+        let first = tokio::time::timeout(Duration::from_secs(1), pace.pass(2000));
+        let (first, (), ()) = tokio::join!(first, pace.pass(2000), async {
+            tokio::time::sleep(Duration::from_millis(1500)).await;
+            pace.pass(1000).await;
+        });
+        assert!(first.is_err());
+        assert_eq!(begun.elapsed().as_millis(), 4000);
     }
 }
