@@ -1,18 +1,28 @@
-//! The journal of a game that a database stores when it ends. Until then its entries are in memory,
-//! encoded, which takes a small part of the space.
+//! The journal of a game that a database stores when it ends. Until then its entries are encoded in
+//! memory, which takes a small part of the space, and those of a long game in a file without a name,
+//! which is gone with the server.
 
 use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use chefshat_proto::v1;
 use futures::FutureExt as _;
-use futures::future::{BoxFuture, ready};
-use tracing::error;
+use futures::future::BoxFuture;
+use tokio::sync::Semaphore;
+use tokio::task::spawn_blocking;
+use tracing::{error, warn};
 
+use super::decode_pool::MAX_CONCURRENT_RECORDS;
 use super::form;
 use super::{Journal, StoreError};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
+
+/// Most encoded entries of a game that stay in memory, bytes, if its file can be written.
+pub(super) const MAX_IN_MEMORY: usize = 64 * 1024;
 
 /// The ids of games that are stored when they end, of records that are being imported, and of games
 /// that are being created. Nothing else can take them meanwhile.
@@ -59,43 +69,167 @@ pub(super) trait StoreFinished: Send + Sync + 'static {
     ) -> BoxFuture<'a, Result<(), StoreError>>;
 }
 
+/// Where long games keep their entries until they end.
+#[derive(Debug, Clone)]
+pub(super) struct Scratch {
+    folder: PathBuf,
+    /// Complete games in memory, on their way into the database.
+    loaded: Arc<Semaphore>,
+}
+
+impl Scratch {
+    /// Files without a name in a folder.
+    pub(super) fn in_folder(folder: PathBuf) -> Self {
+        let loaded = Arc::new(Semaphore::new(MAX_CONCURRENT_RECORDS));
+        Self { folder, loaded }
+    }
+}
+
 /// The journal of a game that is stored by `whole`.
 pub(super) struct EphemeralJournal<W> {
     header: Arc<GameHeader>,
+    scratch: Scratch,
+    /// The first entries, in a file.
+    filed: Filed,
+    /// The entries after them.
     encoded: Vec<u8>,
+    /// So many bytes of them are moved to the file.
+    most_in_memory: usize,
     whole: W,
+}
+
+/// What of a journal is in its file.
+#[derive(Debug, Clone, Default)]
+struct Filed {
+    file: Option<Arc<File>>,
+    bytes: u64,
+}
+
+impl Filed {
+    /// Adds encoded entries. After an error it has what it had before.
+    fn add(&mut self, encoded: &[u8], scratch: &Scratch) -> io::Result<()> {
+        let mut file: &File = match &mut self.file {
+            Some(file) => file,
+            none => none.insert(Arc::new(tempfile::tempfile_in(&scratch.folder)?)),
+        };
+        file.seek(SeekFrom::Start(self.bytes))?;
+        file.write_all(encoded)?;
+        self.bytes += encoded.len() as u64;
+        Ok(())
+    }
+
+    /// All entries, with those that are not in the file.
+    fn followed_by(&self, encoded: &[u8]) -> io::Result<Vec<u8>> {
+        let mut all = Vec::new();
+        if let Some(file) = &self.file {
+            let mut file = &**file;
+            file.seek(SeekFrom::Start(0))?;
+            file.take(self.bytes).read_to_end(&mut all)?;
+        }
+        all.extend_from_slice(encoded);
+        Ok(all)
+    }
 }
 
 impl<W> EphemeralJournal<W> {
     /// A journal that begins with these encoded entries.
-    pub(super) fn new(header: Arc<GameHeader>, encoded: Vec<u8>, whole: W) -> Self {
+    pub(super) fn new(
+        header: Arc<GameHeader>,
+        encoded: Vec<u8>,
+        scratch: Scratch,
+        whole: W,
+    ) -> Self {
         Self {
             header,
+            scratch,
+            filed: Filed::default(),
             encoded,
+            most_in_memory: MAX_IN_MEMORY,
             whole,
         }
     }
+
+    /// Bytes of encoded entries in memory.
+    #[cfg(test)]
+    pub(super) fn in_memory(&self) -> usize {
+        self.encoded.len()
+    }
+
+    /// Moves the entries in memory to the file. If it cannot be written, they stay in memory, and it
+    /// is tried again when they are twice as many.
+    async fn file_entries(&mut self) -> Result<(), StoreError> {
+        let encoded = std::mem::take(&mut self.encoded);
+        let (mut filed, scratch) = (self.filed.clone(), self.scratch.clone());
+        let writing = spawn_blocking(move || {
+            let written = filed.add(&encoded, &scratch);
+            (filed, encoded, written)
+        });
+        let (filed, mut encoded, written) = writing.await.map_err(unread)?;
+        self.filed = filed;
+        if let Err(problem) = written {
+            let (game, bytes) = (self.header.game_id, encoded.len());
+            let folder = self.scratch.folder.display();
+            warn!(%game, bytes, %problem, %folder, "a long game that is stored when it ends stays in memory");
+            self.most_in_memory = 2 * bytes;
+        } else {
+            encoded.clear();
+            self.most_in_memory = MAX_IN_MEMORY;
+        }
+        self.encoded = encoded;
+        Ok(())
+    }
+
+    /// Works on all encoded entries.
+    async fn with_all<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(Vec<u8>) -> T + Send + 'static,
+    ) -> Result<T, StoreError> {
+        let (filed, encoded) = (self.filed.clone(), self.encoded.clone());
+        if filed.file.is_none() {
+            return Ok(work(encoded));
+        }
+        let reading = spawn_blocking(move || filed.followed_by(&encoded).map(work));
+        reading.await.map_err(unread)?.map_err(unread)
+    }
+}
+
+fn unread(problem: impl std::fmt::Display) -> StoreError {
+    StoreError::Failed(format!("the file of an unfinished game: {problem}"))
 }
 
 impl<W: StoreFinished> Journal for EphemeralJournal<W> {
     fn append_now(&mut self, entries: &mut Vec<Entry>) -> bool {
-        form::put_entries(entries, &mut self.encoded);
-        true
+        let has_room = self.encoded.len() < self.most_in_memory;
+        if has_room {
+            form::put_entries(entries, &mut self.encoded);
+        }
+        has_room
     }
 
     fn append<'a>(
         &'a mut self,
         entries: &'a mut Vec<Entry>,
     ) -> BoxFuture<'a, Result<(), StoreError>> {
-        self.append_now(entries);
-        ready(Ok(())).boxed()
+        form::put_entries(entries, &mut self.encoded);
+        async move {
+            match self.encoded.len() < self.most_in_memory {
+                true => Ok(()),
+                false => self.file_entries().await,
+            }
+        }
+        .boxed()
     }
 
     fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
-        let mut entries = Vec::new();
-        let read = form::read_entries(&self.encoded, &mut entries);
-        let failed = |problem: form::Unreadable| StoreError::Failed(problem.to_string());
-        ready(read.map(|()| entries).map_err(failed)).boxed()
+        let decode = |encoded: Vec<u8>| {
+            let mut entries = Vec::new();
+            form::read_entries(&encoded, &mut entries).map(|()| entries)
+        };
+        async move {
+            let decoded = self.with_all(decode).await?;
+            decoded.map_err(|problem| StoreError::Failed(problem.to_string()))
+        }
+        .boxed()
     }
 
     fn finish(
@@ -103,9 +237,13 @@ impl<W: StoreFinished> Journal for EphemeralJournal<W> {
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        let entries = std::mem::take(&mut self.encoded);
         let signature = signature.as_ref().map(form::signature_to_bytes);
         async move {
+            let _loaded = match self.filed.file {
+                Some(_) => Some(self.scratch.loaded.acquire().await.map_err(unread)?),
+                None => None,
+            };
+            let entries = self.with_all(|encoded| encoded).await?;
             let stored = (self.whole).store_finished(&self.header, entries, summary, signature);
             match stored.await {
                 // The game was played anyway; the record that was stored first stays.

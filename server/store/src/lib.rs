@@ -118,7 +118,8 @@ pub struct UnreadableGame {
     pub problem: String,
 }
 
-/// A row of the list of finished games, of its number, its id, its summary and its header.
+/// A row of the list of finished games, of its number, its id, its summary and the beginning of its
+/// header.
 fn listed(number: i64, game: &[u8], summary: &[u8], header: Option<&[u8]>) -> Listed {
     let number = u64::try_from(number).unwrap_or_default();
     let summary = v1::RecordSummary::decode(summary).map_err(|error| {

@@ -7,6 +7,7 @@ use chefshat_engine::{ActionId, MAX_SEATS, Seat, SeedPlan};
 use chefshat_proto::v1;
 use chefshat_record::convert::{FieldProblem, rules_from_proto, rules_to_proto, seat_number};
 use prost::Message;
+use prost::encoding::{DecodeContext, decode_key, skip_field};
 
 use super::entry::{number_of, value_of};
 use super::{Unreadable, action, array, check_form};
@@ -62,12 +63,8 @@ struct HeaderForm {
     participant_removed: bool,
 }
 
-/// The field `owner` of `HeaderForm` alone.
-#[derive(Clone, PartialEq, Message)]
-struct OwnerForm {
-    #[prost(bytes = "vec", tag = "13")]
-    owner: Vec<u8>,
-}
+/// The tag of `HeaderForm::owner`.
+const OWNER: u32 = 13;
 
 /// The version of the server whose headers do not name it.
 const FIRST_VERSION: &str = "0.1.0";
@@ -256,10 +253,19 @@ pub(crate) fn stored_unit(form: i64, header: Option<&[u8]>) -> Result<Option<Id>
     }
 }
 
-/// The owner's hash in a header, which is all that is read of it. `None` if it cannot be read.
-pub(crate) fn stored_owner(header: &[u8]) -> Option<SecretHash> {
-    let header = OwnerForm::decode(header).ok()?;
-    array(&header.owner, "").ok().map(SecretHash::from_bytes)
+/// The owner's hash in a header, of which no more than the first 8 KiB are needed: what may be long, the
+/// actions of a branch, comes after it. `None` if it cannot be read.
+pub(crate) fn stored_owner(mut header: &[u8]) -> Option<SecretHash> {
+    let context = DecodeContext::default();
+    loop {
+        let (tag, kind) = decode_key(&mut header).ok()?;
+        if tag == OWNER {
+            let mut owner = Vec::new();
+            prost::encoding::bytes::merge(kind, &mut owner, &mut header, context).ok()?;
+            return array(&owner, "").ok().map(SecretHash::from_bytes);
+        }
+        skip_field(kind, tag, &mut header, context.clone()).ok()?;
+    }
 }
 
 /// Decodes a header.

@@ -24,6 +24,7 @@ mod values;
 mod writer;
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
@@ -43,7 +44,7 @@ pub use open::{DatabaseError, migrate};
 pub use transfer::{TransferError, Transferred, transfer};
 
 use super::decode_pool::DecodePool;
-use super::ephemeral::EphemeralJournal;
+use super::ephemeral::{EphemeralJournal, Scratch};
 use super::form;
 use super::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
 use super::{
@@ -91,6 +92,8 @@ pub struct PostgresOptions {
     /// Whether records are written to files, so that only games whose record has been written may
     /// be deleted.
     pub record_files: bool,
+    /// Where long games that are stored when they end have a file until then.
+    pub scratch: PathBuf,
 }
 
 impl Default for PostgresOptions {
@@ -101,6 +104,7 @@ impl Default for PostgresOptions {
             lock_limit: Duration::from_secs(1),
             retention: Duration::from_secs(600),
             record_files: true,
+            scratch: std::env::temp_dir(),
         }
     }
 }
@@ -124,6 +128,7 @@ pub struct PostgresStore {
     node: AtomicI64,
     /// The epochs at which the tournaments and studies of this node are written.
     epochs: Mutex<HashMap<Id, i64>>,
+    scratch: Scratch,
     closing: CancellationToken,
     writing: Mutex<Vec<JoinHandle<()>>>,
     metrics: StoreMetrics,
@@ -173,6 +178,7 @@ impl PostgresStore {
         };
         let mut writing = Vec::new();
         Ok(Self {
+            scratch: Scratch::in_folder(options.scratch.clone()),
             options,
             reader: readers,
             control,
@@ -309,6 +315,7 @@ impl PostgresStore {
                 Box::new(EphemeralJournal::new(
                     header,
                     first,
+                    self.scratch.clone(),
                     Whole { owned, commands },
                 ))
             }

@@ -42,7 +42,7 @@ use open::{FolderLock, IfGone};
 pub(crate) use open::{moved, moved_to};
 
 use super::decode_pool::DecodePool;
-use super::ephemeral::{EphemeralJournal, Reservations};
+use super::ephemeral::{EphemeralJournal, Reservations, Scratch};
 use super::form;
 use super::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
 use super::{
@@ -71,6 +71,7 @@ pub struct SqliteStore {
     numbers: Arc<AtomicI64>,
     /// The ids of what is not in the database yet.
     reserved: Reservations,
+    scratch: Scratch,
     writing: Mutex<Option<JoinHandle<()>>>,
     closed: Arc<AtomicBool>,
     metrics: StoreMetrics,
@@ -166,6 +167,7 @@ impl SqliteStore {
             failed,
             numbers: Arc::new(AtomicI64::new(last + 1)),
             reserved: Reservations::default(),
+            scratch: Scratch::in_folder(data_dir.to_path_buf()),
             writing: Mutex::new(Some(writing)),
             closed: Arc::new(AtomicBool::new(false)),
             metrics,
@@ -220,7 +222,7 @@ impl Store for SqliteStore {
                     _reserved: reserved,
                 };
                 let first = form::entries_to_bytes(&mut entries);
-                let journal = EphemeralJournal::new(header, first, whole);
+                let journal = EphemeralJournal::new(header, first, self.scratch.clone(), whole);
                 return Ok(Box::new(journal) as Box<dyn Journal>);
             }
             let mut journal = DurableJournal {

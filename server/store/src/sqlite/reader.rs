@@ -31,7 +31,7 @@ const MAX_PRUNABLE_READ: usize = 1_024;
 macro_rules! list_query {
     ($part:literal, $order:literal) => {
         concat!(
-            "SELECT listed, summary, game_id, header FROM games
+            "SELECT listed, summary, game_id, substr(header, 1, 8192) FROM games
              WHERE summary IS NOT NULL AND ",
             $part,
             " AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)

@@ -8,6 +8,7 @@ pub(crate) mod tournaments;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use chefshat_agents::{AgentKind, NamedAgent};
@@ -15,14 +16,16 @@ use chefshat_engine::SeedPlan;
 use chefshat_engine::{ActionId, RULES_VERSION, RuleSetSpec, Seat, Seed};
 use chefshat_proto::v1;
 use futures::FutureExt as _;
+use futures::future::{BoxFuture, ready};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{Connection as _, Executor as _};
 
 use super::{OpenError, SqliteStore};
+use crate::ephemeral::{EphemeralJournal, MAX_IN_MEMORY, Scratch, StoreFinished};
 use crate::form;
 use crate::testing::{TypedUnits as _, cup};
 use crate::tournaments::TournamentEntry;
-use crate::{Keep, Part, Store, StoredGame};
+use crate::{Journal, Keep, Part, Store, StoreError, StoredGame};
 use chefshat_room::ids::{Id, SecretHash};
 use chefshat_room::journal::{
     AbortReason, Branch, Change, Decided, Entry, Fill, GameHeader, GameStart, Marked,
@@ -331,6 +334,102 @@ async fn an_ephemeral_game_is_stored_only_when_it_ends() {
         .expect("committed");
     let journal = finished_journal(&store, header.game_id).await;
     assert_eq!(shown(&journal), shown(&entries()));
+}
+
+/// Appends entries as rooms do, until they take several files' worth of memory; all of them.
+async fn append_many(journal: &mut dyn Journal) -> Vec<Entry> {
+    let mut all = Vec::new();
+    for _ in 0..2_000 {
+        all.extend(entries());
+        let mut new = entries();
+        if !journal.append_now(&mut new) {
+            journal.append(&mut new).await.expect("it is kept");
+        }
+        assert!(new.is_empty());
+    }
+    all
+}
+
+#[tokio::test]
+async fn a_long_ephemeral_game_is_in_a_file_until_it_ends() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    let header = Arc::new(header(1, Durability::Ephemeral));
+    let mut journal = (store.create(Arc::clone(&header), entries()).await).expect("begun");
+    let mut all = entries();
+    all.extend(append_many(&mut *journal).await);
+    let read = journal.entries().await.expect("readable");
+    assert_eq!(shown(&read), shown(&all));
+    // And what comes after it was read.
+    all.extend(append_many(&mut *journal).await);
+    let end = journal.finish(Some(summary(&header)), None).await;
+    end.expect("committed");
+    let stored = finished_journal(&store, header.game_id).await;
+    assert_eq!(shown(&stored), shown(&all));
+}
+
+/// Stores nothing but how many bytes arrive.
+#[derive(Default)]
+struct Counted(AtomicUsize);
+
+impl StoreFinished for Arc<Counted> {
+    fn store_finished<'a>(
+        &'a self,
+        _: &'a GameHeader,
+        entries: Vec<u8>,
+        _: Option<Box<v1::RecordSummary>>,
+        _: Option<Vec<u8>>,
+    ) -> BoxFuture<'a, Result<(), StoreError>> {
+        self.0.store(entries.len(), Ordering::Relaxed);
+        ready(Ok(())).boxed()
+    }
+}
+
+#[tokio::test]
+async fn a_file_that_cannot_be_written_costs_memory_and_no_game() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for path in [folder.path().to_path_buf(), folder.path().join("missing")] {
+        let is_writable = path.exists();
+        let header = Arc::new(header(1, Durability::Ephemeral));
+        let counted = Arc::new(Counted::default());
+        let scratch = Scratch::in_folder(path);
+        let mut journal = EphemeralJournal::new(
+            Arc::clone(&header),
+            Vec::new(),
+            scratch,
+            Arc::clone(&counted),
+        );
+        let mut all = append_many(&mut journal).await;
+        let encoded = form::entries_to_bytes(&mut all).len();
+        assert!(encoded > 4 * MAX_IN_MEMORY);
+        // A room commits little at a time.
+        let most = if is_writable {
+            2 * MAX_IN_MEMORY
+        } else {
+            encoded
+        };
+        assert!(journal.in_memory() <= most);
+        let end = journal.finish(Some(summary(&header)), None).await;
+        end.expect("stored");
+        assert_eq!(counted.0.load(Ordering::Relaxed), encoded);
+    }
+}
+
+#[tokio::test]
+async fn the_owner_of_a_long_branch_is_listed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let store = opened(folder.path()).await;
+    let mut header = header(1, Durability::Durable);
+    let branch = header.start.branch.as_mut().expect("it is one");
+    branch.taken_over[0].actions = vec![ActionId::new(199); 100_000];
+    let header = Arc::new(header);
+    let mut journal = (store.create(Arc::clone(&header), entries()).await).expect("begun");
+    let end = journal.finish(Some(summary(&header)), None).await;
+    end.expect("committed");
+    let all = v1::RecordFilter::default();
+    let listed = (store.list(&all, Part::After(0), 9).await).expect("readable");
+    let owner = listed[0].owner.as_ref().expect("it is read");
+    assert_eq!(owner.bytes(), header.owner.bytes());
 }
 
 #[tokio::test]
