@@ -91,8 +91,8 @@ impl SeatFollower {
     }
 
     /// The next update; `None` when the game is over. Every connection begins with
-    /// [`Update::Attached`]; each event comes once and in order, and an open decision again after
-    /// each connection. Cancel safe: dropping the future loses nothing.
+    /// [`Update::Attached`]; each event comes once and in order, a snapshot in place of those that the
+    /// room of a long game no longer has, and an open decision again after each connection. Cancel safe: dropping the future loses nothing.
     ///
     /// # Errors
     /// See [`PlayError`]. After an error there are no more updates.
@@ -166,7 +166,12 @@ impl SeatFollower {
                 v1::DetachReason::Superseded => self.fail(PlayError::Superseded),
                 _ => self.fail(PlayError::Detached),
             },
-            update => self.ready.push_back(update),
+            update => {
+                if let Update::Snapshot(snapshot) = &update {
+                    self.next_event = self.next_event.max(snapshot.next_sequence);
+                }
+                self.ready.push_back(update);
+            }
         }
     }
 

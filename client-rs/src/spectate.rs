@@ -16,6 +16,8 @@ use crate::v1::{self, spectator_service_client::SpectatorServiceClient};
 pub enum Watched {
     /// An event of the game.
     Event(Box<v1::GameEvent>),
+    /// The state of the game, in place of events that the room of a long game no longer has.
+    Snapshot(Box<v1::Snapshot>),
     /// Whom the game waits for, after the events so far; nobody when a new connection begins, until
     /// the server says it.
     Awaited(v1::Awaited),
@@ -70,13 +72,14 @@ impl Spectator {
     pub fn next_sequence(&self) -> u64 {
         let first = self.ready.iter().find_map(|watched| match watched {
             Watched::Event(event) => Some(event.sequence),
+            Watched::Snapshot(snapshot) => Some(snapshot.next_sequence),
             Watched::Awaited(_) => None,
         });
         first.unwrap_or(self.next_event).max(1)
     }
 
-    /// The next event, or `None` when the game is over. Cancel safe: dropping the future loses no
-    /// event.
+    /// The next event, or `None` when the game is over. Where numbers are missing, the room no longer
+    /// has these events. Cancel safe: dropping the future loses no event.
     ///
     /// # Errors
     /// The server's refusal (`ROOM_UNKNOWN`, `SPECTATORS_NOT_ADMITTED`), or the last failure if the
@@ -85,13 +88,14 @@ impl Spectator {
         loop {
             match self.next_watched().await? {
                 Some(Watched::Event(event)) => return Ok(Some(*event)),
-                Some(Watched::Awaited(_)) => {}
+                Some(Watched::Snapshot(_) | Watched::Awaited(_)) => {}
                 None => return Ok(None),
             }
         }
     }
 
-    /// The next event, or whom the game waits for when that changes; `None` when the game is over.
+    /// The next event, a snapshot in place of events that are gone, or whom the game waits for when
+    /// that changes; `None` when the game is over.
     /// Cancel safe, as [`Spectator::next`].
     ///
     /// # Errors
@@ -144,6 +148,10 @@ impl Spectator {
     fn take(&mut self, response: v1::SpectatorServiceWatchResponse) {
         if response.room.is_some() {
             self.room = response.room;
+        }
+        if let Some(snapshot) = response.snapshot {
+            self.next_event = self.next_event.max(snapshot.next_sequence);
+            self.ready.push_back(Watched::Snapshot(Box::new(snapshot)));
         }
         for event in response.events {
             if event.sequence >= self.next_event {

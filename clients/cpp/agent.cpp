@@ -500,6 +500,9 @@ class Player {
       case v1::SeatUpdate::kEvents:
         for (const auto& event : update.events().events()) observe(seat, update.handle(), event);
         break;
+      case v1::SeatUpdate::kSnapshot:  // Stands for events that the room no longer has.
+        seat.next_event = std::max(seat.next_event, update.snapshot().next_sequence());
+        break;
       case v1::SeatUpdate::kSubstitution:
         if (update.substitution().active()) command(update.handle()).mutable_resume();
         break;

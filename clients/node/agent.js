@@ -74,6 +74,7 @@ function seatOf(ticket, about = {}) {
       if (event.game_ended || event.game_aborted) end = event;
       if (event.substituted?.seat === seat) send({ resume: {} }); // Takes the seat back from its substitute.
     }),
+    snapshot: ({ next_sequence }) => { self.next = Math.max(self.next, next_sequence); }, // Stands for events that the room no longer has.
     substitution: ({ active }, send) => { if (active) send({ resume: {} }); }, // The same where a study hides its participants.
     decision: (request, send) => {
       open = request;

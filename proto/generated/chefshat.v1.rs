@@ -5170,7 +5170,9 @@ pub struct EventBatch {
     #[prost(message, repeated, tag = "1")]
     pub events: ::prost::alloc::vec::Vec<GameEvent>,
 }
-/// The state of the game, in place of the past events.
+/// The state of the game, in place of the past events: if the attachment asked for it, and, with or
+/// without a new attachment, if the room no longer has the next event for the seat (it keeps only the
+/// last ones of a long game). If a built-in agent plays for the seat then, Substitution follows.
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct Snapshot {
     /// The start of the game; unset before it begins.
@@ -5190,9 +5192,9 @@ pub struct Detached {
     #[prost(enumeration = "DetachReason", tag = "1")]
     pub reason: i32,
 }
-/// Whether a built-in agent plays for the seat, when that changes and no event says so: where a study
-/// hides its participants, nobody else may learn that one was away, so that neither Substituted nor
-/// Returned is sent. Not sent when attaching ends a substitution.
+/// Whether a built-in agent plays for the seat, when that changes and no event says so: after a
+/// Snapshot, and where a study hides its participants. Nobody else may learn there that one was away,
+/// so that neither Substituted nor Returned is sent. Not sent when attaching ends a substitution.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct Substitution {
     /// Whether one plays.
@@ -5407,7 +5409,7 @@ pub enum DetachReason {
     Requested = 1,
     /// A newer connection attached the seat.
     Superseded = 2,
-    /// The game is over and all its events have been sent.
+    /// The game is over and the events that the room still has have been sent, with its result.
     GameOver = 3,
     /// The tournament is over, at least for the participant: it withdrew, was removed or replaced. It
     /// is not seated again.
@@ -6056,13 +6058,15 @@ pub struct ListRecordsResponse {
     #[prost(message, repeated, tag = "3")]
     pub unreadable: ::prost::alloc::vec::Vec<UnreadableRecord>,
 }
-/// A record that the server has but cannot read.
+/// A record that the server has but cannot read; or, in a stream of a cluster, one whose tournament is
+/// on a node that did not answer, so that nobody can say whether the caller may see it. Ask for that one
+/// again later.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct UnreadableRecord {
     /// Identifies the game.
     #[prost(string, tag = "1")]
     pub game_id: ::prost::alloc::string::String,
-    /// The reason, in words; only for operators.
+    /// The reason, in words.
     #[prost(string, tag = "2")]
     pub problem: ::prost::alloc::string::String,
 }
@@ -6097,7 +6101,7 @@ pub struct StreamRecordsResponse {
     /// The next lines, in order, of one record.
     #[prost(message, repeated, tag = "1")]
     pub lines: ::prost::alloc::vec::Vec<RecordLine>,
-    /// Instead of lines: a record that cannot be read. The next one follows.
+    /// Instead of lines: a record that cannot be read or shown now. The next one follows.
     #[prost(message, optional, tag = "2")]
     pub unreadable: ::core::option::Option<UnreadableRecord>,
 }
@@ -8298,7 +8302,9 @@ pub struct SpectatorServiceWatchRequest {
     /// Identifies the room.
     #[prost(string, tag = "1")]
     pub room_id: ::prost::alloc::string::String,
-    /// Number of the first event to send; 0 and 1: all.
+    /// Number of the first event to send; 0 and 1: all. The room of a long game keeps only its last
+    /// events. In place of those that are gone the stream starts with a snapshot; in a room with a delay,
+    /// or whose game is over, with the first event that is left.
     #[prost(uint64, tag = "2")]
     pub from_sequence: u64,
     /// Start with a snapshot instead of the past events. Only in rooms without a delay, else
@@ -8315,7 +8321,8 @@ pub struct SpectatorServiceWatchResponse {
     /// The room; in the first message only.
     #[prost(message, optional, tag = "2")]
     pub room: ::core::option::Option<Room>,
-    /// The state of the game; in the first message only, if requested.
+    /// The state of the game; in the first message only, if it was requested or stands for events that
+    /// the room no longer has.
     #[prost(message, optional, tag = "3")]
     pub snapshot: ::core::option::Option<Snapshot>,
     /// Whom the game waits for after these events, when that changes; the last one counts. Not in
@@ -8419,8 +8426,8 @@ pub mod spectator_service_client {
         /// Streams the events of a room, as its policy allows, until the game is over. The owner, who shows
         /// the owner token of the room or of its study (`Visibility`), may also watch a room that admits no
         /// spectators. A message without events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
-        /// (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: the room of a long game keeps only its last events; metadata
-        /// `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
+        /// (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED
+        /// (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
         /// (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
         /// last one received.
         pub async fn watch(
@@ -8477,8 +8484,8 @@ pub mod spectator_service_server {
         /// Streams the events of a room, as its policy allows, until the game is over. The owner, who shows
         /// the owner token of the room or of its study (`Visibility`), may also watch a room that admits no
         /// spectators. A message without events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
-        /// (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: the room of a long game keeps only its last events; metadata
-        /// `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
+        /// (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED
+        /// (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
         /// (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
         /// last one received.
         async fn watch(

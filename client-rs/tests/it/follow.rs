@@ -92,6 +92,32 @@ async fn events_come_once_and_open_decisions_again_across_lost_streams() {
 }
 
 #[tokio::test]
+async fn events_that_a_snapshot_stands_for_are_not_asked_for_again() {
+    let fake = Fake::default();
+    let snapshot = Update::Snapshot(Box::new(v1::Snapshot {
+        next_sequence: 5_000,
+        ..v1::Snapshot::default()
+    }));
+    fake.follow(vec![
+        Ok(vec![attached(), snapshot.clone()]),
+        Err(Status::unavailable("lost")),
+    ]);
+    fake.follow(vec![Ok(vec![
+        attached(),
+        ending(5_000),
+        detached(v1::DetachReason::GameOver),
+    ])]);
+    let mut seat = follower(&fake).await;
+    assert_eq!(seat.next().await.unwrap(), Some(attached()));
+    assert_eq!(seat.next().await.unwrap(), Some(snapshot));
+    while seat.next().await.unwrap().is_some() {}
+    let from: Vec<u64> = (fake.attached().iter())
+        .map(|it| it.from_sequence)
+        .collect();
+    assert_eq!(from, [1, 5_000]);
+}
+
+#[tokio::test]
 async fn a_seat_that_is_lost_says_why_after_what_came_before() {
     let refused = Update::Refused(v1::Refused {
         reason: "TICKET_UNKNOWN".to_owned(),

@@ -74,6 +74,7 @@ async fn whom_the_game_waits_for_comes_between_the_events() {
         watched.push(match next {
             Watched::Event(event) => (event.sequence, None),
             Watched::Awaited(awaited) => (0, Some(awaited.seat)),
+            Watched::Snapshot(_) => panic!("there is none"),
         });
     }
     let nobody = (0, Some(None));
@@ -92,6 +93,30 @@ async fn whom_the_game_waits_for_comes_between_the_events() {
             (4, None)
         ]
     );
+}
+
+#[tokio::test]
+async fn a_snapshot_stands_for_events_that_are_gone() {
+    let fake = Fake::default();
+    let snapshot = v1::Snapshot {
+        next_sequence: 5_000,
+        ..v1::Snapshot::default()
+    };
+    let first = v1::SpectatorServiceWatchResponse {
+        snapshot: Some(snapshot.clone()),
+        ..v1::SpectatorServiceWatchResponse::default()
+    };
+    fake.watch(vec![Ok(first), Err(Status::unavailable("lost"))]);
+    fake.watch(vec![part([5_000])]);
+    let client = fake.start().await;
+    let mut spectator = client.spectate("room", 0).with_backoff(quick());
+    let watched = spectator.next_watched().await.unwrap();
+    assert_eq!(watched, Some(Watched::Snapshot(Box::new(snapshot))));
+    // The next connection asks for what follows.
+    assert_eq!(spectator.next_sequence(), 5_000);
+    let event = spectator.next().await.unwrap().unwrap();
+    assert_eq!(event.sequence, 5_000);
+    assert_eq!(fake.watched_from(), [0, 5_000]);
 }
 
 #[tokio::test]

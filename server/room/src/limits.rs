@@ -44,7 +44,7 @@ pub(crate) const RECHECK_INTERVAL: Duration = Duration::from_millis(20);
 /// a physical table, whose reports are few, keeps them too.
 pub const MAX_EVENTS_KEPT: usize = 4_096;
 /// The same, once its game is over and everybody has left.
-pub const MAX_EVENTS_KEPT_AFTERWARDS: usize = 2_048;
+pub const MAX_EVENTS_KEPT_AFTERWARDS: usize = 1_024;
 /// Most expressions of one seat in one game.
 pub const MAX_EXPRESSIONS_PER_SEAT: u32 = 10_000;
 /// Most markers in one game.

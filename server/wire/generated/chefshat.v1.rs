@@ -1001,8 +1001,8 @@ pub mod spectator_service_client {
         /// Streams the events of a room, as its policy allows, until the game is over. The owner, who shows
         /// the owner token of the room or of its study (`Visibility`), may also watch a room that admits no
         /// spectators. A message without events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
-        /// (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: the room of a long game keeps only its last events; metadata
-        /// `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
+        /// (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED
+        /// (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
         /// (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
         /// last one received.
         pub async fn watch(
@@ -1055,8 +1055,8 @@ pub mod spectator_service_server {
         /// Streams the events of a room, as its policy allows, until the game is over. The owner, who shows
         /// the owner token of the room or of its study (`Visibility`), may also watch a room that admits no
         /// spectators. A message without events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
-        /// (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: the room of a long game keeps only its last events; metadata
-        /// `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
+        /// (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED
+        /// (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
         /// (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
         /// last one received.
         async fn watch(

@@ -68,7 +68,7 @@ async fn watch_until(watching: &mut Spectator, wanted: impl Fn(&Kind) -> bool) -
         match next.expect("a watched room").expect("the game runs") {
             Watched::Awaited(it) => awaited.push(it),
             Watched::Event(event) if event.kind.as_ref().is_some_and(&wanted) => return awaited,
-            Watched::Event(_) => {}
+            Watched::Event(_) | Watched::Snapshot(_) => {}
         }
     }
 }

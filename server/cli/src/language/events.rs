@@ -22,7 +22,7 @@ pub struct EventText {
     pub sequence: u64,
     /// What happened.
     pub words: String,
-    /// Whether a Shift begins with it.
+    /// Whether a Shift begins with it, or what is known of one.
     pub begins_shift: bool,
 }
 

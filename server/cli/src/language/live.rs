@@ -114,11 +114,19 @@ impl Live {
                     since_ms: now_ms,
                 });
             }
-            Update::Result(_)
-            | Update::Refused(_)
-            | Update::Snapshot(_)
-            | Update::Detached(_)
-            | Update::Entered(_) => {}
+            Update::Snapshot(snapshot) => {
+                self.view.restore(&snapshot, self.me);
+                self.played = Hand::default();
+                if let Some(seen) = &snapshot.observation {
+                    self.played.counts = seen.played.to_vec();
+                }
+                self.events.push(EventText {
+                    sequence: snapshot.next_sequence.saturating_sub(1),
+                    words: "What happened before is no longer known".to_owned(),
+                    begins_shift: true,
+                });
+            }
+            Update::Result(_) | Update::Refused(_) | Update::Detached(_) | Update::Entered(_) => {}
         }
     }
 

@@ -98,6 +98,20 @@ impl Narrator {
         self.remarks(line.as_slice(), DIM)
     }
 
+    /// Goes on after a snapshot in place of events that are gone.
+    pub fn restore(&mut self, snapshot: &v1::Snapshot) -> String {
+        let broken_off = self.break_off();
+        self.exchanges.clear();
+        self.view.restore(snapshot, None);
+        self.chain = Chain::new(&self.view);
+        let line = Line {
+            seat: None,
+            words: "what happened before is no longer known".to_owned(),
+            heading: false,
+        };
+        broken_off.to_owned() + &self.remarks(&[line], DIM)
+    }
+
     /// Ends an open line when no more events will come.
     pub fn break_off(&mut self) -> &'static str {
         self.chain.break_off()

@@ -3,11 +3,12 @@
 
 use chefshat_agents::{AgentKind, BuiltInAgent};
 use chefshat_client::v1::{self, game_event::Kind};
-use chefshat_engine::{Event, Game, RuleSet, RuleSetSpec, Seed, Viewer};
-use chefshat_record::convert::{By, event_kind, rules_to_proto};
+use chefshat_engine::{Event, Game, RuleSet, RuleSetSpec, Seat, Seed, Viewer};
+use chefshat_record::convert::{By, event_kind, observation_to_proto, rules_to_proto};
 
 use super::Narrator;
 use super::text::{WIDTH, columns};
+use super::view::GameView;
 
 /// The text of events without colours.
 fn text_of(narrator: &mut Narrator, events: impl IntoIterator<Item = Kind>) -> String {
@@ -413,9 +414,84 @@ fn a_correction_at_a_physical_table_takes_back_what_is_void() {
     assert_eq!((hand, narrator.view.turns), (Some(2), 2));
 }
 
+#[test]
+fn a_snapshot_has_what_the_events_have_shown() {
+    let names = ["Greta", "Rolf", "Gustav", "Rita"];
+    let rules = standard();
+    let viewer = Viewer::Seat(Seat::new(0));
+    let start = game_started(&rules, &names);
+    let mut by_events = GameView::default();
+    let event = |kind| v1::GameEvent {
+        kind: Some(kind),
+        ..v1::GameEvent::default()
+    };
+    by_events.apply(&event(start.clone()));
+    let Kind::GameStarted(start) = start else {
+        panic!("it is the start")
+    };
+    let mut compared = 0;
+    let mut seen = 0;
+    play_engine(rules, names.len(), 7, |game, events| {
+        for next in &events[seen..] {
+            let kind = event_kind(&next.seen_by(viewer), rules.actions(), BY);
+            kind.into_iter()
+                .for_each(|kind| by_events.apply(&event(kind)));
+        }
+        seen = events.len();
+        let observation = game.observe(viewer);
+        // Of an exchange in progress a snapshot shows the cards that are given already.
+        if observation.pizza == 0 {
+            return;
+        }
+        let snapshot = v1::Snapshot {
+            game_started: Some(*start.clone()),
+            observation: Some(observation_to_proto(&observation)),
+            next_sequence: 1,
+        };
+        let mut restored = GameView::default();
+        restored.restore(&snapshot, Some(0));
+        // What a snapshot does not say.
+        let mut known = by_events.clone();
+        known.turns = known.turns.min(1);
+        known.turn = None;
+        known.last_order.clear();
+        for view in [&mut known, &mut restored] {
+            view.board.iter_mut().for_each(|board| board.golden = false);
+            for place in &mut view.seats {
+                // With the place in the Shift the events show no more of who has passed.
+                place.passed &= place.finished.is_none();
+            }
+        }
+        assert_eq!(format!("{restored:?}"), format!("{known:?}"));
+        compared += 1;
+    });
+    assert!(compared > 100, "{compared}");
+}
+
+/// How decisions of [`play_engine`] are told.
+const BY: By = By {
+    source: v1::DecisionSource::Disconnected,
+    decision_time_us: 0,
+};
+
 /// Plays a game of the engine; the text a spectator reads.
 fn played(rules: RuleSet, names: &[&str], seed: u8) -> String {
-    let mut agents: Vec<BuiltInAgent> = (0..names.len())
+    let events = play_engine(rules, names.len(), seed, |_, _| ());
+    let kinds = events
+        .iter()
+        .filter_map(|event| event_kind(&event.seen_by(Viewer::Spectator), rules.actions(), BY));
+    let all = std::iter::once(game_started(&rules, names)).chain(kinds);
+    text_of(&mut Narrator::default(), all)
+}
+
+/// Plays a game of the engine, shown before each decision; its events.
+fn play_engine(
+    rules: RuleSet,
+    players: usize,
+    seed: u8,
+    mut show: impl FnMut(&Game, &[Event]),
+) -> Vec<Event> {
+    let mut agents: Vec<BuiltInAgent> = (0..players)
         .map(|seat| {
             let kind = AgentKind::ALL[seat % 3];
             let seat = u8::try_from(seat).expect("a seat is below six");
@@ -425,6 +501,7 @@ fn played(rules: RuleSet, names: &[&str], seed: u8) -> String {
     let mut events: Vec<Event> = Vec::new();
     let mut game = Game::new(rules, Seed([seed; 32]), |event| events.push(event));
     while let Some(decision) = game.decision() {
+        show(&game, &events);
         let legal = game.legal_actions();
         let seen = game.observe(Viewer::Seat(decision.seat));
         let wish = agents[decision.seat.index()].decide(&seen, &legal);
@@ -436,15 +513,7 @@ fn played(rules: RuleSet, names: &[&str], seed: u8) -> String {
         game.apply(action, |event| events.push(event))
             .expect("the action is legal");
     }
-    let by = By {
-        source: v1::DecisionSource::Disconnected,
-        decision_time_us: 0,
-    };
-    let kinds = events
-        .iter()
-        .filter_map(|event| event_kind(&event.seen_by(Viewer::Spectator), rules.actions(), by));
-    let all = std::iter::once(game_started(&rules, names)).chain(kinds);
-    text_of(&mut Narrator::default(), all)
+    events
 }
 
 #[test]

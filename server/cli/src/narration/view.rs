@@ -144,6 +144,46 @@ impl GameView {
         });
     }
 
+    /// Takes a snapshot in place of the events so far. It does not say whose turn it is, nor, of the
+    /// turns of this Shift, more than whether there were any.
+    pub fn restore(&mut self, snapshot: &v1::Snapshot, me: Option<u32>) {
+        let (Some(start), Some(seen)) = (&snapshot.game_started, &snapshot.observation) else {
+            return;
+        };
+        self.game_started(start);
+        self.shift = seen.shift;
+        self.pizza = seen.pizza.max(1);
+        self.turns = u32::from(self.pizza > 1 || seen.played.iter().any(|count| *count > 0));
+        self.turn = None;
+        self.board = seen.board_owner.map(|seat| OnBoard {
+            seat,
+            face: seen.board_face,
+            quantity: match seen.board_face > self.faces() {
+                true => 0,
+                false => seen.board_size.saturating_sub(seen.board_jokers),
+            },
+            jokers: seen.board_jokers,
+            golden: false,
+        });
+        let of = |counts: &[u8], index: usize| counts.get(index).copied().unwrap_or_default();
+        for (index, place) in self.seats.iter_mut().enumerate() {
+            place.cards = of(&seen.cards_left, index).into();
+            place.passed = of(&seen.passed, index) > 0;
+            place.finished = Some(of(&seen.places, index).into()).filter(|place| *place > 0);
+            place.role = i32::from(of(&seen.roles, index))
+                .try_into()
+                .unwrap_or_default();
+            place.points = seen.points.get(index).copied().unwrap_or_default();
+        }
+        if let Some(me) = me.filter(|_| !seen.hand.is_empty()) {
+            let hand = Hand {
+                counts: seen.hand.to_vec(),
+                golden: seen.golden,
+            };
+            self.with(me, |place| place.hand = Some(hand));
+        }
+    }
+
     fn seat_mut(&mut self, seat: u32) -> Option<&mut SeatView> {
         self.seats.get_mut(usize::try_from(seat).ok()?)
     }

@@ -60,6 +60,15 @@ impl Watch {
         loop {
             let event = match spectator.next_watched().await {
                 Ok(Some(Watched::Event(event))) => *event,
+                Ok(Some(Watched::Snapshot(snapshot))) => {
+                    if self.json {
+                        writeln!(out, "{}", json_line("snapshot", "snapshot", &snapshot)?)?;
+                    } else {
+                        write!(out, "{}", narrator.restore(&snapshot))?;
+                    }
+                    out.flush()?;
+                    continue;
+                }
                 Ok(Some(Watched::Awaited(awaited))) => {
                     if self.json {
                         writeln!(out, "{}", json_line("awaited", "awaited", &awaited)?)?;

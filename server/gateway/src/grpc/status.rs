@@ -502,12 +502,6 @@ impl From<SpectateError> for Refusal {
                 "this room has no space for more spectators, or none for more of yours",
                 [],
             ),
-            SpectateError::EventsGone(first) => status(
-                Code::OutOfRange,
-                "EVENTS_GONE",
-                "the room of a long game keeps only its last events; watch with `snapshot`, or from `first_sequence` on, or read its record when it has ended",
-                [("first_sequence", &(first + 1).to_string())],
-            ),
             SpectateError::SnapshotDelayed => status(
                 Code::FailedPrecondition,
                 "SNAPSHOT_DELAYED",

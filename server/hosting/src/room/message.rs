@@ -159,8 +159,6 @@ pub enum SpectateError {
     Full,
     /// A snapshot of a delayed room would reveal its present state.
     SnapshotDelayed,
-    /// The requested events have been dropped; the position of the first one that is there.
-    EventsGone(usize),
 }
 
 /// A command of a seat.

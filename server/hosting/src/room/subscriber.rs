@@ -1,7 +1,8 @@
 //! Subscribers of a room: the connections of its seats, and its spectators. Each has a viewer, a
 //! position in the log and an outbox. Events after the position are sent when they are due. A room
-//! never waits for a full outbox: the position stays, and delivery resumes when there is space; a
-//! spectator that falls too far behind is disconnected.
+//! never waits for a full outbox: the position stays, and delivery resumes when there is space. Of a
+//! long game the log has only the last events: whoever is further behind is sent a snapshot, but a
+//! spectator that falls too far behind while connected is disconnected.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
@@ -30,7 +31,7 @@ const MAX_PENDING_UPDATES: usize = 1_024;
 /// Most events that a spectator's stream may fall behind before it is disconnected.
 pub const MAX_SPECTATOR_LAG: usize = 4_096;
 /// Encoded events that the log no longer has are dropped as soon as they are this many.
-const MAX_READ_ENCODED: usize = 1_024;
+const MAX_ENCODED_GONE: usize = 1_024;
 /// Most spectators of one room.
 pub const MAX_SPECTATORS: usize = 256;
 /// Typical size of a decision request, bytes.
@@ -147,20 +148,23 @@ impl Subscriber {
         )
     }
 
-    /// A spectator that starts at an event (position from 0). The first message is in its outbox.
+    /// A spectator that starts at an event (position from 0) or with a snapshot, which also stands for
+    /// events that are gone. The first message is in its outbox.
     pub fn spectator(
         core: &Core,
         outbox: Arc<Outbox>,
         on_space: Arc<dyn OnSpace>,
-        from: usize,
-        with_snapshot: bool,
+        (from, snapshot): (usize, bool),
         counted: (Counted, Permit),
     ) -> Self {
-        let visible = core.visible_to_spectators();
-        let position = if with_snapshot {
-            visible
-        } else {
-            from.min(visible)
+        let (first, visible) = (core.log().first(), core.visible_to_spectators());
+        // A snapshot shows the present, and has no result.
+        let is_delayed = core.header().policy.spectator_delay_decisions > 0;
+        let may_skip = !is_delayed && !core.state().is_over();
+        let with_snapshot = snapshot || (from < first && may_skip);
+        let position = match with_snapshot {
+            true => visible,
+            false => from.clamp(first, visible),
         };
         let role = Role::Spectator {
             _counted: counted,
@@ -265,6 +269,10 @@ impl Subscriber {
         let snapshot = convert::snapshot(core, Viewer::Seat(connection.seat));
         self.pending
             .add(connection.handle, Update::Snapshot(Box::new(snapshot)));
+        if core.standing(connection.seat).substituted {
+            let substitution = Update::Substitution(v1::Substitution { active: true });
+            self.pending.add(connection.handle, substitution);
+        }
     }
 
     /// Sends the result of an answer: with the next flush if it was accepted and the seat receives
@@ -555,7 +563,7 @@ impl PublicEvents {
     pub fn drop_before(&mut self, position: usize) {
         if position >= self.events.end() {
             self.restart_at(position);
-        } else if position >= self.events.first() + MAX_READ_ENCODED {
+        } else if position >= self.events.first() + MAX_ENCODED_GONE {
             self.events.drop_before(position);
         }
     }

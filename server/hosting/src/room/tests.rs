@@ -228,16 +228,34 @@ async fn attach_from(room: &Handle, ticket: Token, charged: Key) -> AttachedSeat
     }
 }
 
+/// The next updates of a seat.
+async fn received(seat: &mut AttachedSeat) -> Option<impl Iterator<Item = Update> + use<>> {
+    let updates = seat.updates.next().await?;
+    let written = updates.expect("no error").encode_to_vec();
+    let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
+    let updates = response.updates.into_iter();
+    Some(updates.map(|update| update.update.expect("an update")))
+}
+
 /// Reads until the end of the game; answers decisions with their first legal action if `answering`.
 /// Returns the numbers of all events, also of those that a snapshot stood for, and the number of
 /// snapshots.
 async fn read(room: &Handle, seat: &mut AttachedSeat, answering: bool) -> (Vec<u64>, usize) {
+    read_until(usize::MAX, room, seat, answering).await
+}
+
+/// The same, until there are this many events.
+async fn read_until(
+    most: usize,
+    room: &Handle,
+    seat: &mut AttachedSeat,
+    answering: bool,
+) -> (Vec<u64>, usize) {
     let (mut numbers, mut snapshots) = (Vec::new(), 0);
-    while let Some(updates) = seat.updates.next().await {
-        let written = updates.expect("no error").encode_to_vec();
-        let response = v1::PlayResponse::decode(written.as_slice()).expect("a response");
-        for update in response.updates {
-            match update.update.expect("an update") {
+    while numbers.len() < most {
+        let updates = (received(seat).await).expect("the stream ended before the game");
+        for update in updates {
+            match update {
                 Update::Events(batch) => {
                     numbers.extend(batch.events.iter().map(|event| event.sequence));
                 }
@@ -263,7 +281,7 @@ async fn read(room: &Handle, seat: &mut AttachedSeat, answering: bool) -> (Vec<u
             }
         }
     }
-    panic!("the stream ended before the game")
+    (numbers, snapshots)
 }
 
 fn first_legal(decision: &v1::DecisionRequest) -> u32 {
@@ -317,6 +335,62 @@ async fn a_stalled_stream_delays_nobody_and_receives_the_end() {
     };
     let (numbers, snapshots) = read(&room, &mut later, false).await;
     assert!(numbers == expected[from..] && snapshots == 0);
+}
+
+#[tokio::test(start_paused = true)]
+async fn who_is_too_far_behind_in_a_game_receives_a_snapshot() {
+    let policy = Policy {
+        abort: AbortPolicy::Never,
+        ..Policy::default()
+    };
+    let room = room(policy, 1_000).await;
+    let mut seats = Vec::new();
+    for _ in 0..4 {
+        seats.push(take_seat(&room).await);
+    }
+    let mut stalled = seats.pop().expect("there are four");
+    let enough = chefshat_wire::outbox::OUTBOX_CAPACITY + 2 * MAX_EVENTS_KEPT;
+    let playing = (seats.iter_mut()).map(|seat| read_until(enough, &room, seat, true));
+    futures::future::join_all(playing).await;
+    // The stream that has not been read until now: a substitute plays for its seat, which the events
+    // that it has lost would have said.
+    let mut next = 1;
+    let mut after_snapshot = None;
+    while after_snapshot.is_none() {
+        let mut updates = received(&mut stalled).await.expect("the game is played");
+        while let Some(update) = updates.next() {
+            match update {
+                Update::Events(batch) => next = batch.events.last().expect("one").sequence + 1,
+                Update::Snapshot(snapshot) => {
+                    assert!(snapshot.observation.is_some());
+                    assert!(snapshot.next_sequence > next);
+                    after_snapshot = Some(updates.next());
+                }
+                _ => {}
+            }
+        }
+    }
+    let substituted = Update::Substitution(v1::Substitution { active: true });
+    assert_eq!(after_snapshot, Some(Some(substituted)));
+    // A seat that attaches, and a spectator, from the beginning.
+    let mut late = attach(&room, stalled.ticket).await;
+    let updates: Vec<Update> = (received(&mut late).await).expect("updates").collect();
+    let is_snapshot = |update: &Update| matches!(update, Update::Snapshot(_));
+    assert!(updates.iter().any(is_snapshot), "{updates:?}");
+    let (outbox, mut watched) = Outbox::new();
+    let request = SpectateRequest {
+        outbox,
+        from: 0,
+        snapshot: false,
+        is_owner: false,
+        charged: Key::Local,
+    };
+    let spectating = room.spectate(request).await.expect("the room exists");
+    spectating.expect("spectators are admitted");
+    let first = watched.next().await.expect("a message").expect("no error");
+    let first = v1::SpectatorServiceWatchResponse::decode(first.encode_to_vec().as_slice());
+    let snapshot = first.expect("a response").snapshot.expect("a snapshot");
+    assert!(snapshot.observation.is_some() && snapshot.next_sequence > next);
 }
 
 #[tokio::test(start_paused = true)]

@@ -218,6 +218,8 @@ class AsyncCalls(ABC):
     async def watch(self, room_id: str, *, from_sequence: int = 0) -> AsyncIterator[pb.GameEvent]:
         """Iterates over a room's public events until its game is over. Reconnects; each event arrives once and in order.
 
+        Where numbers are missing, the room no longer has these events: of a long game it keeps the last ones alone.
+
         Args:
             room_id: the room.
             from_sequence: number of the first event wanted; 0: all.
@@ -228,6 +230,8 @@ class AsyncCalls(ABC):
             call = self._spectators.Watch(requests.watch_request(room_id, last))
             try:
                 async for response in call:
+                    if response.HasField("snapshot"):
+                        last = max(last, response.snapshot.next_sequence - 1)
                     for event in response.events:
                         last = event.sequence
                         failures = 0

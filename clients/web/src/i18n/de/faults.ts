@@ -61,7 +61,6 @@ export const faults: Texts["faults"] = {
     TOO_MANY_FOLLOWERS: "Gerade verfolgen zu viele Leute Turniere.",
     TOO_MANY_WRONG_CODES: "Es wurden zu viele falsche Codes eingegeben. Prüfe den Code.",
     READER_TOO_SLOW: "Deine Verbindung ist zu langsam, um diese Partie zu laden. Versuche es mit einer besseren.",
-    EVENTS_GONE: "Der Anfang dieser Partie wird nicht mehr gezeigt. Ihr Replay gibt es, wenn sie zu Ende ist.",
     DISK_NEARLY_FULL:
       "Die Festplatte des Servers ist fast voll: Es kann nichts Neues beginnen. Die Person, die ihn betreibt, muss Platz schaffen. Laufende Partien gehen weiter.",
     STORE_FAILED:

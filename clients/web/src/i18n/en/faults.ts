@@ -57,7 +57,6 @@ export const faults = {
     TOO_MANY_FOLLOWERS: "Too many people follow tournaments at the moment.",
     TOO_MANY_WRONG_CODES: "Too many wrong codes were entered. Check the code.",
     READER_TOO_SLOW: "Your connection is too slow to load this game. Try again with a better one.",
-    EVENTS_GONE: "The beginning of this game is no longer shown. Its replay is available when it ends.",
     DISK_NEARLY_FULL:
       "The server’s disk is nearly full: nothing new can start. Its host has to free some space. Running games continue.",
     STORE_FAILED:

@@ -248,7 +248,8 @@ impl App {
             Update::Refused(refused) => {
                 self.notice = crate::narration::clean(&refused.message, 76);
             }
-            Update::Snapshot(_) | Update::Detached(_) | Update::Entered(_) => {}
+            Update::Snapshot(snapshot) => self.table.restore(&snapshot, self.me),
+            Update::Detached(_) | Update::Entered(_) => {}
         }
         None
     }

@@ -157,6 +157,7 @@ async fn show(mut reel: Reel, live: Option<Spectator>) -> Result<ExitCode, Comma
                 dirty = true;
                 match event {
                     Some(Ok(Watched::Event(event))) => reel.push(*event),
+                    Some(Ok(Watched::Snapshot(snapshot))) => reel.restore(&snapshot),
                     Some(Ok(Watched::Awaited(awaited))) => {
                         reel.wait_for(&awaited, screen.now_ms());
                     }

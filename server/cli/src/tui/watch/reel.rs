@@ -109,6 +109,15 @@ impl Reel {
         }
     }
 
+    /// Starts over from a snapshot in place of events that are gone.
+    pub(super) fn restore(&mut self, snapshot: &v1::Snapshot) {
+        self.start.clone_from(&self.table);
+        self.start.restore(snapshot, None);
+        self.table.clone_from(&self.start);
+        self.events.clear();
+        self.at = 0;
+    }
+
     /// Takes whom a live game waits for.
     pub(super) fn wait_for(&mut self, awaited: &v1::Awaited, now_ms: u64) {
         self.awaited = AwaitedSeat::new(awaited, now_ms);

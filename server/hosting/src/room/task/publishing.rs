@@ -29,17 +29,12 @@ impl Room {
         if request.snapshot && policy.spectator_delay_decisions > 0 {
             return Err(SpectateError::SnapshotDelayed);
         }
-        let first = self.core.log().first();
-        if !request.snapshot && request.from < first {
-            return Err(SpectateError::EventsGone(first));
-        }
         let place = (self.spectator_places.try_take(request.charged)).ok_or(SpectateError::Full)?;
         let spectator = Subscriber::spectator(
             &self.core,
             request.outbox,
             Arc::clone(&self.on_space),
-            request.from,
-            request.snapshot,
+            (request.from, request.snapshot),
             (self.context.metrics.spectator(), place),
         );
         let position = spectator.position();

@@ -66,7 +66,7 @@ class _DetachReasonEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_DetachRe
     DETACH_REASON_SUPERSEDED: _DetachReason.ValueType  # 2
     """A newer connection attached the seat."""
     DETACH_REASON_GAME_OVER: _DetachReason.ValueType  # 3
-    """The game is over and all its events have been sent."""
+    """The game is over and the events that the room still has have been sent, with its result."""
     DETACH_REASON_TOURNAMENT_OVER: _DetachReason.ValueType  # 5
     """The tournament is over, at least for the participant: it withdrew, was removed or replaced. It
     is not seated again.
@@ -88,7 +88,7 @@ or study.
 DETACH_REASON_SUPERSEDED: DetachReason.ValueType  # 2
 """A newer connection attached the seat."""
 DETACH_REASON_GAME_OVER: DetachReason.ValueType  # 3
-"""The game is over and all its events have been sent."""
+"""The game is over and the events that the room still has have been sent, with its result."""
 DETACH_REASON_TOURNAMENT_OVER: DetachReason.ValueType  # 5
 """The tournament is over, at least for the participant: it withdrew, was removed or replaced. It
 is not seated again.
@@ -384,7 +384,10 @@ Global___EventBatch: _TypeAlias = EventBatch  # noqa: Y015
 
 @_typing.final
 class Snapshot(_message.Message):
-    """The state of the game, in place of the past events."""
+    """The state of the game, in place of the past events: if the attachment asked for it, and, with or
+    without a new attachment, if the room no longer has the next event for the seat (it keeps only the
+    last ones of a long game). If a built-in agent plays for the seat then, Substitution follows.
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -440,9 +443,9 @@ Global___Detached: _TypeAlias = Detached  # noqa: Y015
 
 @_typing.final
 class Substitution(_message.Message):
-    """Whether a built-in agent plays for the seat, when that changes and no event says so: where a study
-    hides its participants, nobody else may learn that one was away, so that neither Substituted nor
-    Returned is sent. Not sent when attaching ends a substitution.
+    """Whether a built-in agent plays for the seat, when that changes and no event says so: after a
+    Snapshot, and where a study hides its participants. Nobody else may learn there that one was away,
+    so that neither Substituted nor Returned is sent. Not sent when attaching ends a substitution.
     """
 
     DESCRIPTOR: _descriptor.Descriptor

@@ -254,7 +254,10 @@ Global___ListRecordsResponse: _TypeAlias = ListRecordsResponse  # noqa: Y015
 
 @_typing.final
 class UnreadableRecord(_message.Message):
-    """A record that the server has but cannot read."""
+    """A record that the server has but cannot read; or, in a stream of a cluster, one whose tournament is
+    on a node that did not answer, so that nobody can say whether the caller may see it. Ask for that one
+    again later.
+    """
 
     DESCRIPTOR: _descriptor.Descriptor
 
@@ -263,7 +266,7 @@ class UnreadableRecord(_message.Message):
     game_id: _builtins.str
     """Identifies the game."""
     problem: _builtins.str
-    """The reason, in words; only for operators."""
+    """The reason, in words."""
     def __init__(
         self,
         *,
@@ -368,7 +371,7 @@ class StreamRecordsResponse(_message.Message):
 
     @_builtins.property
     def unreadable(self) -> Global___UnreadableRecord:
-        """Instead of lines: a record that cannot be read. The next one follows."""
+        """Instead of lines: a record that cannot be read or shown now. The next one follows."""
 
     def __init__(
         self,

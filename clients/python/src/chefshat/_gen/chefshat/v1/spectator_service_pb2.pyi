@@ -33,7 +33,10 @@ class SpectatorServiceWatchRequest(_message.Message):
     room_id: _builtins.str
     """Identifies the room."""
     from_sequence: _builtins.int
-    """Number of the first event to send; 0 and 1: all."""
+    """Number of the first event to send; 0 and 1: all. The room of a long game keeps only its last
+    events. In place of those that are gone the stream starts with a snapshot; in a room with a delay,
+    or whose game is over, with the first event that is left.
+    """
     snapshot: _builtins.bool
     """Start with a snapshot instead of the past events. Only in rooms without a delay, else
     FAILED_PRECONDITION (SNAPSHOT_DELAYED).
@@ -73,7 +76,9 @@ class SpectatorServiceWatchResponse(_message.Message):
 
     @_builtins.property
     def snapshot(self) -> _play_service_pb2.Snapshot:
-        """The state of the game; in the first message only, if requested."""
+        """The state of the game; in the first message only, if it was requested or stands for events that
+        the room no longer has.
+        """
 
     @_builtins.property
     def awaited(self) -> _containers.RepeatedCompositeFieldContainer[_room_pb2.Awaited]:

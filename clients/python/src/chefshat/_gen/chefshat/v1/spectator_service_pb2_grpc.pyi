@@ -37,8 +37,8 @@ class SpectatorServiceStub:
     """Streams the events of a room, as its policy allows, until the game is over. The owner, who shows
     the owner token of the room or of its study (`Visibility`), may also watch a room that admits no
     spectators. A message without events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
-    (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: the room of a long game keeps only its last events; metadata
-    `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
+    (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED
+    (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
     (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
     last one received.
     """
@@ -52,8 +52,8 @@ class SpectatorServiceAsyncStub(SpectatorServiceStub):
     """Streams the events of a room, as its policy allows, until the game is over. The owner, who shows
     the owner token of the room or of its study (`Visibility`), may also watch a room that admits no
     spectators. A message without events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
-    (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: the room of a long game keeps only its last events; metadata
-    `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
+    (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED
+    (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
     (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
     last one received.
     """
@@ -70,8 +70,8 @@ class SpectatorServiceServicer(metaclass=_abc_1.ABCMeta):
         """Streams the events of a room, as its policy allows, until the game is over. The owner, who shows
         the owner token of the room or of its study (`Visibility`), may also watch a room that admits no
         spectators. A message without events is a heartbeat. NOT_FOUND (ROOM_UNKNOWN), also for a private room without a secret of it
-        (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); OUT_OF_RANGE (EVENTS_GONE: the room of a long game keeps only its last events; metadata
-        `first_sequence`); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
+        (`Visibility`); PERMISSION_DENIED (SPECTATORS_NOT_ADMITTED); RESOURCE_EXHAUSTED
+        (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
         (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
         last one received.
         """
