@@ -129,12 +129,17 @@ test("a lost connection is replaced by one that resumes after the last event see
     },
     async (stream, read) => {
       await attach(read);
-      stream.write({ updates: [attached, events({ sequence: 3 }, ended(4)), detached("GAME_OVER")] });
+      stream.write({ updates: [attached, { handle: 0, snapshot: { next_sequence: 40 } }] }); // The room no longer has the events before.
+      stream.end();
+    },
+    async (stream, read) => {
+      await attach(read);
+      stream.write({ updates: [attached, events({ sequence: 40 }, ended(41)), detached("GAME_OVER")] });
     },
   );
   const outcome = await play({ address: server.address, code: "TABLE", name: "Ada" });
   assert.deepEqual(outcome, { seat: 2, standings: STANDINGS });
-  assert.deepEqual(from, [0, 3, 3]);
+  assert.deepEqual(from, [0, 3, 3, 40]);
   assert.equal(server.remaining.length, 0);
 });
 

@@ -52,6 +52,9 @@ class FakeServer(
         self.created: list[pb.CreateRoomRequest] = []
         self.streams = 0
         self.broke_markers = False
+        # Events that spectators no longer get, and from which event each stream was asked for.
+        self.gone = 0
+        self.watched_from: list[int] = []
         self.samples: list[pb.SampleChunk] = []
         self.questions = QUESTIONS
         self.fault: Callable[[FakeGame, FakeSeat, pb.Answer], str] = lambda game, seat, answer: ""
@@ -351,6 +354,10 @@ class _Spectators(spectator_grpc.SpectatorServiceServicer):
     def Watch(self, request: pb.SpectatorServiceWatchRequest, context: Context) -> Iterator[pb.SpectatorServiceWatchResponse]:
         game = self._server.game(request.room_id, context)
         sent = max(request.from_sequence - 1, 0)
+        self._server.watched_from.append(request.from_sequence)
+        if sent < self._server.gone:
+            yield pb.SpectatorServiceWatchResponse(room=game.room, snapshot=pb.Snapshot(next_sequence=self._server.gone + 1))
+            context.abort(grpc.StatusCode.UNAVAILABLE, "the connection is lost")
         yield pb.SpectatorServiceWatchResponse(room=game.room)
         while context.is_active():
             with game.lock:

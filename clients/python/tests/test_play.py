@@ -311,6 +311,9 @@ def test_the_rest_of_the_blocking_client(fake: FakeServer) -> None:
         watched = [event.sequence for event in client.watch(room.room.room_id)]
         assert watched == list(range(1, len(watched) + 1))
         assert [event.sequence for event in client.watch(room.room.room_id, from_sequence=4)] == watched[3:]
+        fake.gone = 2
+        assert [event.sequence for event in client.watch(room.room.room_id)] == watched[2:]
+        assert fake.watched_from[-2:] == [0, 3]
         lines = list(client.record(room.room.game_id))
         assert len(lines) == len(watched) + 2
         assert lines[1].event.HasField("expression_shown")
@@ -336,6 +339,9 @@ def test_the_rest_of_the_asyncio_client(fake: FakeServer) -> None:
             watched = [event.sequence async for event in client.watch(room.room.room_id)]
             assert watched == list(range(1, len(watched) + 1))
             assert [event.sequence async for event in client.watch(room.room.room_id, from_sequence=4)] == watched[3:]
+            fake.gone = 2
+            assert [event.sequence async for event in client.watch(room.room.room_id)] == watched[2:]
+            assert fake.watched_from[-2:] == [0, 3]
             assert len([line async for line in client.record(room.room.game_id)]) == len(watched) + 2
             names = [summary.room_name async for summary in client.records()]
             assert names == [f"room {number}" for number in range(5)] + [""]
