@@ -16,9 +16,9 @@ use chefshat_cli::progress;
 
 const HELP: &str = "\
 The directory contains the tables `decisions`, `expressions`, `markers` and `samples` in every requested format, a dataset card (README.md) and SHA256SUMS. \
-It is written atomically. Every record is replayed first. A damaged one is left out and named.
+It is written atomically. Every record is replayed first. A damaged one is left out and named, and so is what cannot be read of the samples beside it.
 
-Exit code 0: all records are in the dataset, or excluded by a filter. 1: some are damaged (0 with --skip-damaged), or nothing was written.
+Exit code 0: all records are in the dataset with their samples, or excluded by a filter. 1: some are damaged (0 with --skip-damaged), or nothing was written.
 
 Examples:
   chefshat export --out dataset
@@ -56,7 +56,7 @@ pub(super) struct Export {
     /// Only games with at least one player of this kind.
     #[arg(long, value_name = "KIND", value_parser = PossibleValuesParser::new(KINDS))]
     with: Option<String>,
-    /// End with exit code 0 although damaged records were left out.
+    /// End with exit code 0 although damaged records or samples were left out.
     #[arg(long)]
     skip_damaged: bool,
     /// Licence of the dataset, for its card.
@@ -112,8 +112,10 @@ impl Export {
             self.write_report(&mut out, &exported)?;
         }
         if exported.damaged > 0 && !self.skip_damaged {
-            let damaged = counted(exported.damaged, "damaged record");
-            anstream::eprintln!("{damaged} left out; with --skip-damaged this is no failure");
+            let damaged = counted(exported.damaged, "damaged file");
+            anstream::eprintln!(
+                "{damaged} left out in whole or part; with --skip-damaged this is no failure"
+            );
             return Ok(ExitCode::FAILURE);
         }
         Ok(ExitCode::SUCCESS)
