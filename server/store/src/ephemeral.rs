@@ -1,9 +1,8 @@
 //! The journal of a game that a database stores when it ends. Until then its entries are encoded in
-//! memory, which takes a small part of the space, and those of a long game in a file without a name,
-//! which is gone with the server.
+//! memory, which takes a small part of the space, and those of a long game in a file.
 
 use std::collections::BTreeSet;
-use std::fs::File;
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -11,6 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use chefshat_proto::v1;
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
+use tempfile::TempPath;
 use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 use tracing::{error, warn};
@@ -69,19 +69,52 @@ pub(super) trait StoreFinished: Send + Sync + 'static {
     ) -> BoxFuture<'a, Result<(), StoreError>>;
 }
 
-/// Where long games keep their entries until they end.
-#[derive(Debug, Clone)]
+/// Where long games keep their entries until they end: in a file each, which is open only while it is
+/// written or read.
+#[derive(Clone)]
 pub(super) struct Scratch {
     folder: PathBuf,
+    /// What the names of the files begin with.
+    prefix: &'static str,
+    /// Whether there is space besides what others need.
+    has_space: Arc<dyn Fn() -> bool + Send + Sync>,
     /// Complete games in memory, on their way into the database.
     loaded: Arc<Semaphore>,
 }
 
 impl Scratch {
-    /// Files without a name in a folder.
-    pub(super) fn in_folder(folder: PathBuf) -> Self {
-        let loaded = Arc::new(Semaphore::new(MAX_CONCURRENT_RECORDS));
-        Self { folder, loaded }
+    /// Files in a folder, written while there is space.
+    pub(super) fn new(
+        folder: PathBuf,
+        prefix: &'static str,
+        has_space: impl Fn() -> bool + Send + Sync + 'static,
+    ) -> Self {
+        Self {
+            folder,
+            prefix,
+            has_space: Arc::new(has_space),
+            loaded: Arc::new(Semaphore::new(MAX_CONCURRENT_RECORDS)),
+        }
+    }
+
+    /// Deletes the files that a process has left that was killed.
+    pub(super) fn delete_left_over(&self) -> io::Result<()> {
+        for entry in fs::read_dir(&self.folder)? {
+            let entry = entry?;
+            let name = entry.file_name();
+            if name.as_encoded_bytes().starts_with(self.prefix.as_bytes()) {
+                fs::remove_file(entry.path())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Creates a file, deleted when the path is dropped.
+    fn create(&self) -> io::Result<TempPath> {
+        let named = tempfile::Builder::new()
+            .prefix(self.prefix)
+            .tempfile_in(&self.folder)?;
+        Ok(named.into_temp_path())
     }
 }
 
@@ -93,7 +126,7 @@ pub(super) struct EphemeralJournal<W> {
     filed: Filed,
     /// The entries after them.
     encoded: Vec<u8>,
-    /// So many bytes of them are moved to the file.
+    /// The size at which they are moved to the file, bytes.
     most_in_memory: usize,
     whole: W,
 }
@@ -101,17 +134,21 @@ pub(super) struct EphemeralJournal<W> {
 /// What of a journal is in its file.
 #[derive(Debug, Clone, Default)]
 struct Filed {
-    file: Option<Arc<File>>,
+    file: Option<Arc<TempPath>>,
     bytes: u64,
 }
 
 impl Filed {
     /// Adds encoded entries. After an error it has what it had before.
     fn add(&mut self, encoded: &[u8], scratch: &Scratch) -> io::Result<()> {
-        let mut file: &File = match &mut self.file {
-            Some(file) => file,
-            none => none.insert(Arc::new(tempfile::tempfile_in(&scratch.folder)?)),
+        if !(scratch.has_space)() {
+            return Err(io::ErrorKind::StorageFull.into());
+        }
+        let path = match &mut self.file {
+            Some(path) => path,
+            none => none.insert(Arc::new(scratch.create()?)),
         };
+        let mut file = OpenOptions::new().write(true).open(&**path)?;
         file.seek(SeekFrom::Start(self.bytes))?;
         file.write_all(encoded)?;
         self.bytes += encoded.len() as u64;
@@ -121,13 +158,26 @@ impl Filed {
     /// All entries, with those that are not in the file.
     fn followed_by(&self, encoded: &[u8]) -> io::Result<Vec<u8>> {
         let mut all = Vec::new();
-        if let Some(file) = &self.file {
-            let mut file = &**file;
-            file.seek(SeekFrom::Start(0))?;
-            file.take(self.bytes).read_to_end(&mut all)?;
+        if let Some(path) = &self.file {
+            File::open(&**path)?
+                .take(self.bytes)
+                .read_to_end(&mut all)?;
         }
         all.extend_from_slice(encoded);
         Ok(all)
+    }
+
+    /// Works on all entries, with those that are not in the file.
+    async fn with_all<T: Send + 'static>(
+        self,
+        encoded: Vec<u8>,
+        work: impl FnOnce(Vec<u8>) -> T + Send + 'static,
+    ) -> Result<T, StoreError> {
+        if self.file.is_none() {
+            return Ok(work(encoded));
+        }
+        let reading = spawn_blocking(move || self.followed_by(&encoded).map(work));
+        reading.await.map_err(failed)?.map_err(failed)
     }
 }
 
@@ -164,36 +214,21 @@ impl<W> EphemeralJournal<W> {
             let written = filed.add(&encoded, &scratch);
             (filed, encoded, written)
         });
-        let (filed, mut encoded, written) = writing.await.map_err(unread)?;
+        let (filed, encoded, written) = writing.await.map_err(failed)?;
         self.filed = filed;
+        self.most_in_memory = MAX_IN_MEMORY;
         if let Err(problem) = written {
             let (game, bytes) = (self.header.game_id, encoded.len());
             let folder = self.scratch.folder.display();
             warn!(%game, bytes, %problem, %folder, "a long game that is stored when it ends stays in memory");
             self.most_in_memory = 2 * bytes;
-        } else {
-            encoded.clear();
-            self.most_in_memory = MAX_IN_MEMORY;
+            self.encoded = encoded;
         }
-        self.encoded = encoded;
         Ok(())
-    }
-
-    /// Works on all encoded entries.
-    async fn with_all<T: Send + 'static>(
-        &self,
-        work: impl FnOnce(Vec<u8>) -> T + Send + 'static,
-    ) -> Result<T, StoreError> {
-        let (filed, encoded) = (self.filed.clone(), self.encoded.clone());
-        if filed.file.is_none() {
-            return Ok(work(encoded));
-        }
-        let reading = spawn_blocking(move || filed.followed_by(&encoded).map(work));
-        reading.await.map_err(unread)?.map_err(unread)
     }
 }
 
-fn unread(problem: impl std::fmt::Display) -> StoreError {
+fn failed(problem: impl std::fmt::Display) -> StoreError {
     StoreError::Failed(format!("the file of an unfinished game: {problem}"))
 }
 
@@ -212,10 +247,10 @@ impl<W: StoreFinished> Journal for EphemeralJournal<W> {
     ) -> BoxFuture<'a, Result<(), StoreError>> {
         form::put_entries(entries, &mut self.encoded);
         async move {
-            match self.encoded.len() < self.most_in_memory {
-                true => Ok(()),
-                false => self.file_entries().await,
+            if self.encoded.len() >= self.most_in_memory {
+                self.file_entries().await?;
             }
+            Ok(())
         }
         .boxed()
     }
@@ -226,7 +261,8 @@ impl<W: StoreFinished> Journal for EphemeralJournal<W> {
             form::read_entries(&encoded, &mut entries).map(|()| entries)
         };
         async move {
-            let decoded = self.with_all(decode).await?;
+            let (filed, encoded) = (self.filed.clone(), self.encoded.clone());
+            let decoded = filed.with_all(encoded, decode).await?;
             decoded.map_err(|problem| StoreError::Failed(problem.to_string()))
         }
         .boxed()
@@ -237,13 +273,15 @@ impl<W: StoreFinished> Journal for EphemeralJournal<W> {
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
+        let filed = std::mem::take(&mut self.filed);
+        let encoded = std::mem::take(&mut self.encoded);
         let signature = signature.as_ref().map(form::signature_to_bytes);
         async move {
-            let _loaded = match self.filed.file {
-                Some(_) => Some(self.scratch.loaded.acquire().await.map_err(unread)?),
+            let _loaded = match filed.file {
+                Some(_) => Some(self.scratch.loaded.acquire().await.map_err(failed)?),
                 None => None,
             };
-            let entries = self.with_all(|encoded| encoded).await?;
+            let entries = filed.with_all(encoded, |all| all).await?;
             let stored = (self.whole).store_finished(&self.header, entries, summary, signature);
             match stored.await {
                 // The game was played anyway; the record that was stored first stays.

@@ -65,6 +65,9 @@ struct HeaderForm {
 
 /// The tag of `HeaderForm::owner`.
 const OWNER: u32 = 13;
+/// Bytes of a header that are enough to read its owner: what may be long, the actions of a branch,
+/// comes after it.
+pub(crate) const OWNER_WITHIN: i32 = 8 * 1024;
 
 /// The version of the server whose headers do not name it.
 const FIRST_VERSION: &str = "0.1.0";
@@ -253,8 +256,7 @@ pub(crate) fn stored_unit(form: i64, header: Option<&[u8]>) -> Result<Option<Id>
     }
 }
 
-/// The owner's hash in a header, of which no more than the first 8 KiB are needed: what may be long, the
-/// actions of a branch, comes after it. `None` if it cannot be read.
+/// The owner's hash in a header, or in its first [`OWNER_WITHIN`] bytes. `None` if it cannot be read.
 pub(crate) fn stored_owner(mut header: &[u8]) -> Option<SecretHash> {
     let context = DecodeContext::default();
     loop {

@@ -20,7 +20,7 @@ use prost::Message as _;
 pub(super) use entry::put_entry;
 pub(super) use entry::{entries_to_bytes, put_entries, read_entries};
 pub(super) use header::{
-    header_from_bytes, header_to_bytes, stored_header, stored_owner, stored_unit,
+    OWNER_WITHIN, header_from_bytes, header_to_bytes, stored_header, stored_owner, stored_unit,
 };
 pub(super) use signature::{signature_from_bytes, signature_to_bytes};
 pub use study::changes_to_bytes;

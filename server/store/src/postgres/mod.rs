@@ -24,7 +24,6 @@ mod values;
 mod writer;
 
 use std::collections::HashMap;
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
@@ -74,6 +73,8 @@ const READERS: u32 = 6;
 const CONTROLLERS: u32 = 2;
 /// Connections for beats, which wait for nothing else. One is enough, unless it hangs.
 const BEATERS: u32 = 2;
+/// What the names of files of unfinished games begin with.
+const UNFINISHED: &str = "chefshat-unfinished-";
 /// How long a read waits for a connection.
 const ACQUIRE_LIMIT: Duration = Duration::from_secs(5);
 
@@ -92,8 +93,6 @@ pub struct PostgresOptions {
     /// Whether records are written to files, so that only games whose record has been written may
     /// be deleted.
     pub record_files: bool,
-    /// Where long games that are stored when they end have a file until then.
-    pub scratch: PathBuf,
 }
 
 impl Default for PostgresOptions {
@@ -104,7 +103,6 @@ impl Default for PostgresOptions {
             lock_limit: Duration::from_secs(1),
             retention: Duration::from_secs(600),
             record_files: true,
-            scratch: std::env::temp_dir(),
         }
     }
 }
@@ -178,7 +176,8 @@ impl PostgresStore {
         };
         let mut writing = Vec::new();
         Ok(Self {
-            scratch: Scratch::in_folder(options.scratch.clone()),
+            // The data directory of a node has only keys, and may be read-only.
+            scratch: Scratch::new(std::env::temp_dir(), UNFINISHED, || true),
             options,
             reader: readers,
             control,

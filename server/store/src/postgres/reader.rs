@@ -18,7 +18,7 @@ use super::errors::failure;
 use super::retained::{divided, old};
 use super::values::{integer, text};
 use crate::decode_pool::DecodePool;
-use crate::form::{self, Unreadable, check_form, stored_header};
+use crate::form::{self, OWNER_WITHIN, Unreadable, check_form, stored_header};
 use crate::{Keep, Listed, Part, StoreError, StoredGame, listed};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::Id;
@@ -35,7 +35,7 @@ const RETURN_LIMIT: Duration = Duration::from_secs(1);
 macro_rules! list_query {
     ($part:literal, $order:literal) => {
         concat!(
-            "SELECT listed, summary, game_id, substr(header, 1, 8192) FROM games
+            "SELECT listed, summary, game_id, substr(header, 1, $11) FROM games
              WHERE summary IS NOT NULL AND ",
             $part,
             " AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)
@@ -295,7 +295,8 @@ impl Reader {
             .bind(filter.kind)
             .bind(text(&filter.participant).into_owned())
             .bind(filter.hosted_here)
-            .bind(integer(count as u64));
+            .bind(integer(count as u64))
+            .bind(OWNER_WITHIN);
         let rows = self.read(|connection| query.fetch_all(connection).boxed());
         let rows = rows.await?;
         Ok(rows

@@ -61,6 +61,10 @@ use reader::Reader;
 use space::{Disk, Space};
 use writer::WriteCommand;
 
+/// What the names of files of unfinished games begin with. It begins with that of the database, so no
+/// backup has them.
+const UNFINISHED: &str = "games.sqlite3.unfinished-";
+
 /// Stores games in the database of a data directory.
 pub struct SqliteStore {
     data_dir: PathBuf,
@@ -134,6 +138,11 @@ impl SqliteStore {
         let decoding = DecodePool::new();
         let metrics = StoreMetrics::default();
         let space = Space::new(data_dir);
+        let spare = Arc::clone(&space);
+        let scratch = Scratch::new(data_dir.to_path_buf(), UNFINISHED, move || spare.has_some());
+        if let Err(problem) = scratch.delete_left_over() {
+            warn!(%problem, "files of unfinished games of the last run could not be deleted");
+        }
         if space.has_some() {
             space::keep_ballast(data_dir);
         } else {
@@ -167,7 +176,7 @@ impl SqliteStore {
             failed,
             numbers: Arc::new(AtomicI64::new(last + 1)),
             reserved: Reservations::default(),
-            scratch: Scratch::in_folder(data_dir.to_path_buf()),
+            scratch,
             writing: Mutex::new(Some(writing)),
             closed: Arc::new(AtomicBool::new(false)),
             metrics,

@@ -16,7 +16,7 @@ use super::retained::Units;
 use super::rows::{self, Read};
 use crate::Keep;
 use crate::decode_pool::DecodePool;
-use crate::form::{self, Unreadable, check_form, stored_header};
+use crate::form::{self, OWNER_WITHIN, Unreadable, check_form, stored_header};
 use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitId, UnitKind};
 use crate::{Listed, Part, ResumableGame, StoreError, StoredGame, listed};
 use chefshat_room::ids::Id;
@@ -31,7 +31,7 @@ const MAX_PRUNABLE_READ: usize = 1_024;
 macro_rules! list_query {
     ($part:literal, $order:literal) => {
         concat!(
-            "SELECT listed, summary, game_id, substr(header, 1, 8192) FROM games
+            "SELECT listed, summary, game_id, substr(header, 1, $11) FROM games
              WHERE summary IS NOT NULL AND ",
             $part,
             " AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)
@@ -283,6 +283,7 @@ impl Reader {
             .bind(filter.participant.as_str())
             .bind(filter.hosted_here)
             .bind(i64::try_from(count).unwrap_or(i64::MAX))
+            .bind(OWNER_WITHIN)
             .fetch_all(&self.pool)
             .await
             .map_err(failure)?;
