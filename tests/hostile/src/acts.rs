@@ -11,6 +11,7 @@ use chefshat_proto::v1::{
     play_service_client::PlayServiceClient, record_service_client::RecordServiceClient,
     room_service_client::RoomServiceClient, study_service_client::StudyServiceClient,
 };
+use futures::future::join_all;
 use futures::{StreamExt as _, stream};
 use prost::Message as _;
 use rand::RngExt as _;
@@ -216,6 +217,54 @@ pub(crate) async fn games(target: &Target, rooms: u32, annotation: usize) -> Res
         });
     }
     let _ = timeout_at(until + CLOSING_LIMIT, playing.join_all()).await;
+    Ok(())
+}
+
+/// Plays long games in rooms whose agents read a byte a second: substitutes soon play for them, and
+/// everything waits for them in the server.
+pub(crate) async fn unread_games(target: &Target, rooms: u32) -> Result<(), Status> {
+    let client = target.client().await?;
+    let mut reading = JoinSet::new();
+    for _ in 0..target.count(rooms) {
+        let (client, target) = (client.clone(), target.clone());
+        reading.spawn(async move {
+            let mut rooms = RoomServiceClient::new(client.channel());
+            let request = v1::CreateRoomRequest {
+                policy: Some(v1::RoomPolicy {
+                    decision_time_ms: Some(100),
+                    bank_ms: Some(0),
+                    max_timeouts: Some(1),
+                    abort: v1::AbortPolicy::Never.into(),
+                    ..v1::RoomPolicy::default()
+                }),
+                ..room(false, LONG)
+            };
+            let created = rooms.create_room(request).await?.into_inner();
+            let tickets = seats(&mut rooms, &created).await?;
+            let connected = raw::http2(target.address, ATTACKER, 1).await;
+            let sender = connected.map_err(|error| Status::unavailable(error.to_string()))?;
+            let streams = tickets.into_iter().map(async |ticket| {
+                let attach = v1::Attach {
+                    ticket,
+                    delivery: v1::EventDelivery::AtOnce.into(),
+                    ..v1::Attach::default()
+                };
+                let seats = v1::PlayServiceWatchRequest {
+                    seats: vec![attach],
+                };
+                let body = Some(raw::framed(&seats));
+                let opened = raw::open(&sender, "PlayService/Watch", body, &target.tally);
+                if let Some(stream) = opened.await {
+                    stream.read_slowly().await;
+                }
+            });
+            let _ = timeout_at(target.until, join_all(streams)).await;
+            Ok::<_, Status>(())
+        });
+    }
+    for read in reading.join_all().await {
+        read?;
+    }
     Ok(())
 }
 

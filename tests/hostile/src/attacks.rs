@@ -216,6 +216,12 @@ pub(crate) static ATTACKS: &[Attack] = &[
         |target| acts::games(&target, 251, 0).await?
     ),
     attack!(
+        "unread-games",
+        "251 rooms, 1,000 Shifts a game, whose agents read a byte a second and never answer",
+        ListRooms,
+        |target| acts::unread_games(&target, 251).await?
+    ),
+    attack!(
         "list-rooms-stalled",
         "ListRooms with 100 rooms on 20 connections x 1,000 streams with a window of 0",
         ListRooms,

@@ -2,6 +2,7 @@
 
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
+use std::time::Duration;
 
 use bytes::{BufMut as _, Bytes, BytesMut};
 use h2::client::SendRequest;
@@ -11,6 +12,7 @@ use http::{HeaderMap, Method, Request, StatusCode};
 use prost::Message;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::{TcpSocket, TcpStream};
+use tokio::time::sleep;
 
 use crate::tally::Tally;
 
@@ -63,7 +65,20 @@ pub(crate) async fn http2(
 /// A stream that is open for as long as this value exists.
 pub(crate) struct OpenStream {
     _sending: SendStream<Bytes>,
-    _receiving: Option<RecvStream>,
+    receiving: Option<RecvStream>,
+}
+
+impl OpenStream {
+    /// Reads what arrives, a window a second, until the stream ends.
+    pub(crate) async fn read_slowly(mut self) {
+        while let Some(receiving) = &mut self.receiving
+            && let Some(Ok(bytes)) = receiving.data().await
+        {
+            sleep(Duration::from_secs(1)).await;
+            // It ends with the stream.
+            let _ = receiving.flow_control().release_capacity(bytes.len());
+        }
+    }
 }
 
 /// Opens a stream for a method. Sends `body`, if any, and half-closes then; otherwise stays silent.
@@ -92,7 +107,7 @@ pub(crate) async fn open(
             }
             Some(OpenStream {
                 _sending: sending,
-                _receiving: Some(response.into_body()),
+                receiving: Some(response.into_body()),
             })
         }
         Err(error) => {
