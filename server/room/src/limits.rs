@@ -42,7 +42,7 @@ pub(crate) const SLOW_STORE: Duration = Duration::from_millis(100);
 pub(crate) const RECHECK_INTERVAL: Duration = Duration::from_millis(20);
 /// Most events that a room keeps for those who come late or come back. The record has all of them;
 /// a physical table, whose reports are few, keeps them too.
-pub const MAX_EVENTS_KEPT: usize = 4_096;
+pub const MAX_EVENTS_KEPT: usize = 2_048;
 /// The same, once its game is over and everybody has left.
 pub const MAX_EVENTS_KEPT_AFTERWARDS: usize = 1_024;
 /// Most expressions of one seat in one game.
