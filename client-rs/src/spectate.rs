@@ -29,6 +29,8 @@ pub struct Spectator {
     client: SpectatorServiceClient<Connection>,
     room_id: String,
     next_event: u64,
+    /// The first event that the latest connection has asked for.
+    asked_from: u64,
     backoff: Backoff,
     outage: Outage,
     stream: Option<(Streaming<v1::SpectatorServiceWatchResponse>, Instant)>,
@@ -46,6 +48,7 @@ impl Spectator {
                 .max_decoding_message_size(MAX_RESPONSE_BYTES),
             room_id,
             next_event: from_sequence,
+            asked_from: from_sequence,
             backoff: Backoff::default(),
             outage: Outage::default(),
             stream: None,
@@ -72,7 +75,8 @@ impl Spectator {
     pub fn next_sequence(&self) -> u64 {
         let first = self.ready.iter().find_map(|watched| match watched {
             Watched::Event(event) => Some(event.sequence),
-            Watched::Snapshot(snapshot) => Some(snapshot.next_sequence),
+            // What was asked for: another process needs the snapshot, too.
+            Watched::Snapshot(_) => Some(self.asked_from),
             Watched::Awaited(_) => None,
         });
         first.unwrap_or(self.next_event).max(1)
@@ -126,6 +130,7 @@ impl Spectator {
 
     async fn receive(&mut self) -> Result<Option<v1::SpectatorServiceWatchResponse>, Status> {
         if self.stream.is_none() {
+            self.asked_from = self.next_event;
             let request = v1::SpectatorServiceWatchRequest {
                 room_id: self.room_id.clone(),
                 from_sequence: self.next_event,

@@ -622,7 +622,7 @@ pub enum Durability {
     /// A crash of the server: decisions are published only after they are committed, and the game
     /// resumes when the server is back.
     Durable = 1,
-    /// Nothing: the game is in memory only, which is faster. Its record is stored when it ends.
+    /// Nothing: the game is not stored until it ends, which is faster. Its record is stored then.
     Ephemeral = 2,
 }
 impl Durability {
@@ -5056,7 +5056,8 @@ pub struct Attach {
     pub request_id: u32,
     /// Number of the first event to send; 0 and 1: all. After a lost connection: the number of the
     /// last event received, plus one. If the room of a long game no longer has it, a Snapshot is sent
-    /// instead; so it is to a seat that reads so slowly that its next event is gone.
+    /// instead; so it is to a seat that reads so slowly that its next event is gone. Once the game is
+    /// over, the events that the room still has are sent.
     #[prost(uint64, tag = "3")]
     pub from_sequence: u64,
     /// Send one Snapshot instead of the past events.

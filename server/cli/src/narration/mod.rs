@@ -47,8 +47,10 @@ pub struct Narrator {
 impl Narrator {
     /// Narrates the game of a room.
     pub fn of_room(room: &v1::Room) -> Self {
+        let view = GameView::of_room(room);
         Self {
-            view: GameView::of_room(room),
+            chain: Chain::new(&view),
+            view,
             ..Self::default()
         }
     }
@@ -98,7 +100,7 @@ impl Narrator {
         self.remarks(line.as_slice(), DIM)
     }
 
-    /// Goes on after a snapshot in place of events that are gone.
+    /// Resumes from a snapshot in place of events that are gone.
     pub fn restore(&mut self, snapshot: &v1::Snapshot) -> String {
         let broken_off = self.break_off();
         self.exchanges.clear();

@@ -439,10 +439,6 @@ fn a_snapshot_has_what_the_events_have_shown() {
         }
         seen = events.len();
         let observation = game.observe(viewer);
-        // Of an exchange in progress a snapshot shows the cards that are given already.
-        if observation.pizza == 0 {
-            return;
-        }
         let snapshot = v1::Snapshot {
             game_started: Some(*start.clone()),
             observation: Some(observation_to_proto(&observation)),
@@ -458,6 +454,12 @@ fn a_snapshot_has_what_the_events_have_shown() {
         for view in [&mut known, &mut restored] {
             view.board.iter_mut().for_each(|board| board.golden = false);
             for place in &mut view.seats {
+                // In the exchange, whether it is the Golden card that is given.
+                if observation.pizza == 0
+                    && let Some(hand) = &mut place.hand
+                {
+                    hand.golden = false;
+                }
                 // With the place in the Shift the events show no more of who has passed.
                 place.passed &= place.finished.is_none();
             }

@@ -114,6 +114,7 @@ impl GameView {
             rules: room.rules.as_ref().and_then(|it| rules_from_proto(it).ok()),
             ..Self::default()
         };
+        view.hand_size = view.rules.map_or(0, |rules| rules.hand_size().into());
         view.seat_all(&room.seats);
         if room.origin() == v1::GameOrigin::Physical {
             view.history = Some(Box::new(History {
@@ -144,8 +145,8 @@ impl GameView {
         });
     }
 
-    /// Takes a snapshot in place of the events so far. It does not say whose turn it is, nor, of the
-    /// turns of this Shift, more than whether there were any.
+    /// Takes a snapshot in place of the events so far. It does not say whose turn it is, and of the
+    /// turns of this Shift only whether there were any.
     pub fn restore(&mut self, snapshot: &v1::Snapshot, me: Option<u32>) {
         let (Some(start), Some(seen)) = (&snapshot.game_started, &snapshot.observation) else {
             return;
@@ -155,19 +156,27 @@ impl GameView {
         self.pizza = seen.pizza.max(1);
         self.turns = u32::from(self.pizza > 1 || seen.played.iter().any(|count| *count > 0));
         self.turn = None;
+        self.last_order.clear();
         self.board = seen.board_owner.map(|seat| OnBoard {
             seat,
             face: seen.board_face,
-            quantity: match seen.board_face > self.faces() {
-                true => 0,
-                false => seen.board_size.saturating_sub(seen.board_jokers),
+            quantity: if seen.board_face > self.faces() {
+                0
+            } else {
+                seen.board_size.saturating_sub(seen.board_jokers)
             },
             jokers: seen.board_jokers,
             golden: false,
         });
+        // The events of an exchange come when it is complete, and take what is given already.
+        let is_exchange = seen.pizza == 0;
         let of = |counts: &[u8], index: usize| counts.get(index).copied().unwrap_or_default();
         for (index, place) in self.seats.iter_mut().enumerate() {
-            place.cards = of(&seen.cards_left, index).into();
+            place.cards = if is_exchange {
+                start.hand_size
+            } else {
+                of(&seen.cards_left, index).into()
+            };
             place.passed = of(&seen.passed, index) > 0;
             place.finished = Some(of(&seen.places, index).into()).filter(|place| *place > 0);
             place.role = i32::from(of(&seen.roles, index))
@@ -176,8 +185,12 @@ impl GameView {
             place.points = seen.points.get(index).copied().unwrap_or_default();
         }
         if let Some(me) = me.filter(|_| !seen.hand.is_empty()) {
+            let given = if is_exchange { &*seen.gave } else { &[] };
+            let held = seen.hand.iter().enumerate();
             let hand = Hand {
-                counts: seen.hand.to_vec(),
+                counts: held
+                    .map(|(index, count)| count + of(given, index))
+                    .collect(),
                 golden: seen.golden,
             };
             self.with(me, |place| place.hand = Some(hand));
@@ -339,6 +352,8 @@ impl GameView {
     }
 
     fn shift_started(&mut self, start: &v1::ShiftStarted) {
+        // The events of a long game may begin in its middle.
+        self.started = true;
         self.shift = start.shift;
         self.pizza = 1;
         self.turns = 0;

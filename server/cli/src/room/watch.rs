@@ -27,7 +27,8 @@ pub(super) struct Watch {
     server: ServerArg,
     #[command(flatten)]
     secrets: SecretArgs,
-    /// Print each event, and whom the game waits for when that changes, as JSON lines.
+    /// Print each event, a snapshot in place of events that are gone, and whom the game waits for when
+    /// that changes, as JSON lines.
     #[arg(long)]
     json: bool,
 }

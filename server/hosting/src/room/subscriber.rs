@@ -1,8 +1,8 @@
 //! Subscribers of a room: the connections of its seats, and its spectators. Each has a viewer, a
 //! position in the log and an outbox. Events after the position are sent when they are due. A room
 //! never waits for a full outbox: the position stays, and delivery resumes when there is space. Of a
-//! long game the log has only the last events: whoever is further behind is sent a snapshot, but a
-//! spectator that falls too far behind while connected is disconnected.
+//! long game the log has only the last events: a seat that is further behind is sent a snapshot. A
+//! spectator that falls too far behind is disconnected.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
@@ -154,7 +154,8 @@ impl Subscriber {
         core: &Core,
         outbox: Arc<Outbox>,
         on_space: Arc<dyn OnSpace>,
-        (from, snapshot): (usize, bool),
+        from: usize,
+        snapshot: bool,
         counted: (Counted, Permit),
     ) -> Self {
         let (first, visible) = (core.log().first(), core.visible_to_spectators());
@@ -162,9 +163,10 @@ impl Subscriber {
         let is_delayed = core.header().policy.spectator_delay_decisions > 0;
         let may_skip = !is_delayed && !core.state().is_over();
         let with_snapshot = snapshot || (from < first && may_skip);
-        let position = match with_snapshot {
-            true => visible,
-            false => from.clamp(first, visible),
+        let position = if with_snapshot {
+            visible
+        } else {
+            from.clamp(first, visible)
         };
         let role = Role::Spectator {
             _counted: counted,
@@ -269,7 +271,8 @@ impl Subscriber {
         let snapshot = convert::snapshot(core, Viewer::Seat(connection.seat));
         self.pending
             .add(connection.handle, Update::Snapshot(Box::new(snapshot)));
-        if core.standing(connection.seat).substituted {
+        let is_substituted = core.standing(connection.seat).substituted;
+        if is_substituted && !core.state().is_over() {
             let substitution = Update::Substitution(v1::Substitution { active: true });
             self.pending.add(connection.handle, substitution);
         }

@@ -335,6 +335,9 @@ async fn a_stalled_stream_delays_nobody_and_receives_the_end() {
     };
     let (numbers, snapshots) = read(&room, &mut later, false).await;
     assert!(numbers == expected[from..] && snapshots == 0);
+    // And a spectator, whom no snapshot could tell the result.
+    let (snapshot, events) = watched_from_the_beginning(&room).await;
+    assert!(snapshot.is_none() && (2..=expected[from]).contains(&events[0].sequence));
 }
 
 #[tokio::test(start_paused = true)]
@@ -377,6 +380,13 @@ async fn who_is_too_far_behind_in_a_game_receives_a_snapshot() {
     let updates: Vec<Update> = (received(&mut late).await).expect("updates").collect();
     let is_snapshot = |update: &Update| matches!(update, Update::Snapshot(_));
     assert!(updates.iter().any(is_snapshot), "{updates:?}");
+    let (snapshot, _) = watched_from_the_beginning(&room).await;
+    let snapshot = snapshot.expect("in place of what is gone");
+    assert!(snapshot.observation.is_some() && snapshot.next_sequence > next);
+}
+
+/// What a spectator receives who asks for all events: a snapshot, or else the first events.
+async fn watched_from_the_beginning(room: &Handle) -> (Option<v1::Snapshot>, Vec<v1::GameEvent>) {
     let (outbox, mut watched) = Outbox::new();
     let request = SpectateRequest {
         outbox,
@@ -387,10 +397,33 @@ async fn who_is_too_far_behind_in_a_game_receives_a_snapshot() {
     };
     let spectating = room.spectate(request).await.expect("the room exists");
     spectating.expect("spectators are admitted");
-    let first = watched.next().await.expect("a message").expect("no error");
-    let first = v1::SpectatorServiceWatchResponse::decode(first.encode_to_vec().as_slice());
-    let snapshot = first.expect("a response").snapshot.expect("a snapshot");
-    assert!(snapshot.observation.is_some() && snapshot.next_sequence > next);
+    loop {
+        let message = watched.next().await.expect("a message").expect("no error");
+        let message = v1::SpectatorServiceWatchResponse::decode(message.encode_to_vec().as_slice());
+        let message = message.expect("a response");
+        if message.snapshot.is_some() || !message.events.is_empty() {
+            return (message.snapshot, message.events);
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_delayed_spectator_receives_no_snapshot_but_the_events_that_are_left() {
+    let policy = Policy {
+        spectator_delay_decisions: 100,
+        ..Policy::default()
+    };
+    let room = room(policy, 1_000).await;
+    let mut seats = Vec::new();
+    for _ in 0..4 {
+        seats.push(take_seat(&room).await);
+    }
+    let enough = 2 * MAX_EVENTS_KEPT;
+    let playing = (seats.iter_mut()).map(|seat| read_until(enough, &room, seat, true));
+    futures::future::join_all(playing).await;
+    let (snapshot, events) = watched_from_the_beginning(&room).await;
+    assert_eq!(snapshot, None);
+    assert!(events[0].sequence > 1);
 }
 
 #[tokio::test(start_paused = true)]

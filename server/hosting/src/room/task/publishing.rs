@@ -34,7 +34,8 @@ impl Room {
             &self.core,
             request.outbox,
             Arc::clone(&self.on_space),
-            (request.from, request.snapshot),
+            request.from,
+            request.snapshot,
             (self.context.metrics.spectator(), place),
         );
         let position = spectator.position();

@@ -129,7 +129,8 @@ class Attach(_message.Message):
     from_sequence: _builtins.int
     """Number of the first event to send; 0 and 1: all. After a lost connection: the number of the
     last event received, plus one. If the room of a long game no longer has it, a Snapshot is sent
-    instead; so it is to a seat that reads so slowly that its next event is gone.
+    instead; so it is to a seat that reads so slowly that its next event is gone. Once the game is
+    over, the events that the room still has are sent.
     """
     snapshot: _builtins.bool
     """Send one Snapshot instead of the past events."""

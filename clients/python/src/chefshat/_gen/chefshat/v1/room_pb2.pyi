@@ -65,7 +65,7 @@ class _DurabilityEnumTypeWrapper(_enum_type_wrapper._EnumTypeWrapper[_Durability
     resumes when the server is back.
     """
     DURABILITY_EPHEMERAL: _Durability.ValueType  # 2
-    """Nothing: the game is in memory only, which is faster. Its record is stored when it ends."""
+    """Nothing: the game is not stored until it ends, which is faster. Its record is stored then."""
 
 class Durability(_Durability, metaclass=_DurabilityEnumTypeWrapper):
     """What a game survives."""
@@ -77,7 +77,7 @@ DURABILITY_DURABLE: Durability.ValueType  # 1
 resumes when the server is back.
 """
 DURABILITY_EPHEMERAL: Durability.ValueType  # 2
-"""Nothing: the game is in memory only, which is faster. Its record is stored when it ends."""
+"""Nothing: the game is not stored until it ends, which is faster. Its record is stored then."""
 Global___Durability: _TypeAlias = Durability  # noqa: Y015
 
 class _Visibility:
