@@ -184,6 +184,18 @@ test("a viewer who joins in the middle of a Shift does not take the next turn fo
   expect(playElevens(table, 1, 2).board).toEqual([ELEVEN, ELEVEN]);
 });
 
+test("a snapshot in an exchange has the cards that are given, whose event is still to come", () => {
+  const counts = { hand: [0, 1], gave: [0, 1], cardsLeft: [2, 3], played: [0, 0] };
+  const observation = Object.fromEntries(Object.entries(counts).map(([name, list]) => [name, Uint8Array.from(list)]));
+  const gameStarted = { rules: {}, seats: [{ seat: 0 }, { seat: 1 }] };
+  const snapshot = create(SnapshotSchema, { nextSequence: 40n, gameStarted, observation });
+  const before = { ...emptyTable(), next: 1, toppings: [3], nextSequence: 9 };
+  const table = applySnapshot(before, snapshot, 0);
+  expect(table.seats.map(({ cardsLeft }) => cardsLeft)).toEqual([3, 3]);
+  expect(table.seats[0]?.hand).toHaveLength(2);
+  expect(table).toMatchObject({ next: undefined, toppings: [], nextSequence: 40 });
+});
+
 test("an event that was already applied changes nothing", () => {
   const [first, second] = recorded("fixed").flatMap(({ line }) => (line.case === "event" ? [line.value] : []));
   if (!first || !second) throw new Error("the fixture has no events");

@@ -13,9 +13,18 @@ export function applySnapshot(table: TableState, snapshot: Snapshot, own: number
   if (!start || !observation) return { ...table, nextSequence };
   const { gameId, policy } = start;
   const seats = start.seats.map(seatFromParticipant);
-  const begun = { ...table, ...fromRules(start.rules), gameId, policy, seats, log: [], nextSequence };
-  const seen = applyObservation(begun, observation, own);
+  const unknown = { log: [], next: undefined, toppings: [], result: undefined };
+  const begun = { ...table, ...unknown, ...fromRules(start.rules), gameId, policy, seats, nextSequence };
+  const seen = applyObservation(begun, beforeGifts(observation), own);
   return table.history ? withHistory(seen) : seen;
+}
+
+/** The observation without the gifts of an exchange in progress, whose events are still to come. */
+function beforeGifts(seen: Observation): Observation {
+  if (seen.pizza > 0) return seen;
+  const handSize = Math.max(0, ...seen.cardsLeft);
+  const hand = seen.hand.map((count, face) => count + (seen.gave[face] ?? 0));
+  return { ...seen, hand, cardsLeft: seen.cardsLeft.map(() => handSize) };
 }
 
 /** The table with everything in an observation. */
