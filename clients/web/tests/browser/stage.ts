@@ -120,6 +120,8 @@ export async function person(
   const context = await browser.newContext({
     locale: "en-GB",
     viewport: { width: 1280, height: 800 },
+    // Drawn without a graphics processor, every frame of an animation takes time from all tests.
+    reducedMotion: "reduce",
     ...options,
   });
   context.setDefaultTimeout(PATIENCE_MS);
