@@ -166,6 +166,8 @@ DISTURBANCES: dict[str, Difficulty] = {
 }
 
 
+# All of them at once are in the first pizzas of the hard table.
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(DISTURBANCES))
 def test_each_disturbance_alone(name: str) -> None:
     table = SyntheticTable(ROUND, DISTURBANCES[name], seed=3)

@@ -40,6 +40,7 @@ async def _page(client: aio.Client, ticket: str, answered: list[str], rehearsal:
 
 
 @pytest.mark.server
+@pytest.mark.slow
 def test_people_a_robot_and_a_remote_agent_play_a_game_at_a_synthetic_table(server_address: str, tmp_path: Path) -> None:
     robot = ScriptedRobot()
     answered: list[str] = []

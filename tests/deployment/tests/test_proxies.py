@@ -40,6 +40,13 @@ def test_a_game_resumes_after_the_server_behind_the_proxy_was_killed(proxy: Prox
     assert kinds.count("server_restarted") == 2
 
 
+# Of the others, agents and the calls of the page show that they pass everything on.
+@pytest.mark.parametrize(
+    "proxy",
+    [Nginx, *(pytest.param(kind, marks=pytest.mark.slow) for kind in (HAProxy, Envoy))],
+    ids=lambda kind: kind.program,
+    indirect=True,
+)
 def test_people_play_on_the_page(proxy: Proxy, server: GuardedServer) -> None:
     people_play(server, proxy.url)
 

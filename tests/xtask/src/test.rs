@@ -226,7 +226,7 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
             };
             lanes.push(Box::new(move |steps| {
                 let mut runs = vec![pytest(places, package, processes)];
-                if slow && package == CLIENTS {
+                if slow {
                     runs.push(pytest(places, package, &["-m", "slow"]));
                 }
                 of_all(steps, runs)
