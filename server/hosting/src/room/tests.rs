@@ -33,7 +33,7 @@ use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::{Change, Entry, Fill, GameHeader, GameStart};
 use chefshat_room::policy::{AbortPolicy, Policy};
 use chefshat_room::{
-    Answer, ConnectionId, Core, JoinError, MAX_EVENTS_KEPT, MAX_EVENTS_KEPT_AFTERWARDS,
+    Answer, ConnectionId, Core, JoinError, MAX_EVENTS_KEPT,
 };
 use chefshat_store::{Journal, MemoryStore, Store as _, StoreError, StoredGame};
 use chefshat_wire::outbox::StreamEnd;
@@ -300,7 +300,7 @@ async fn a_stalled_stream_delays_nobody_and_receives_the_end() {
         abort: AbortPolicy::Never,
         ..Policy::default()
     };
-    let room = room(policy, 120).await;
+    let room = room(policy, 30).await;
     let mut seats = Vec::new();
     for _ in 0..4 {
         seats.push(take_seat(&room).await);
@@ -315,13 +315,13 @@ async fn a_stalled_stream_delays_nobody_and_receives_the_end() {
     assert!(played.iter().all(|played| *played == (expected.clone(), 0)));
     // The stalled stream reads at last: its pending updates, then the last events.
     let behind = read(&room, &mut stalled, false).await;
-    let last = &expected[expected.len() - MAX_EVENTS_KEPT_AFTERWARDS..];
+    let last = &expected[expected.len() - MAX_EVENTS_KEPT..];
     assert!(behind.0.ends_with(last) && behind.1 == 0);
     // And seats that attach only now, from the beginning and from what everybody has left is kept.
     let mut late = attach(&room, stalled.ticket).await;
     let late = read(&room, &mut late, false).await;
     assert!(late.0.ends_with(last) && late.1 == 0);
-    let from = expected.len() - MAX_EVENTS_KEPT_AFTERWARDS;
+    let from = expected.len() - MAX_EVENTS_KEPT;
     let (outbox, updates) = Outbox::new();
     let mut attachment = attachment(&stalled.ticket, outbox);
     attachment.options.from = from;
@@ -609,7 +609,7 @@ async fn a_full_outbox_has_space_for_the_last_update() {
         abort: AbortPolicy::Never,
         ..Policy::default()
     };
-    let room = room(policy, 120).await;
+    let room = room(policy, 30).await;
     let mut seats = Vec::new();
     for _ in 0..4 {
         seats.push(take_seat(&room).await);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use chefshat_room::journal::ParticipantKind;
-use chefshat_room::{ConnectionId, MAX_EVENTS_KEPT, MAX_EVENTS_KEPT_AFTERWARDS};
+use chefshat_room::{ConnectionId, MAX_EVENTS_KEPT};
 use tokio::sync::oneshot;
 
 use super::{AfterCommit, Room, answer, is_connection};
@@ -84,13 +84,9 @@ impl Room {
     fn forget_events(&mut self) {
         let length = self.core.log().len();
         let is_left = self.core.state().is_over() && self.is_left();
-        let most = match is_left {
-            true => MAX_EVENTS_KEPT_AFTERWARDS,
-            false => MAX_EVENTS_KEPT,
-        };
-        if self.core.log().kept() > most {
+        if self.core.log().kept() > MAX_EVENTS_KEPT {
             let read_by_spectators = self.spectators.iter().map(Subscriber::position).min();
-            let keep_from = (length - most).min(read_by_spectators.unwrap_or(length));
+            let keep_from = (length - MAX_EVENTS_KEPT).min(read_by_spectators.unwrap_or(length));
             self.core.drop_log_before(keep_from);
         }
         // While nobody watches a game that nobody plays, or that is over, none are encoded.
