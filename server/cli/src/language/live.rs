@@ -7,6 +7,7 @@ use chefshat_engine::ActionSpace;
 use super::events::{self, EventText};
 use crate::narration::awaited::AwaitedSeat;
 use crate::narration::hand::Hand;
+use crate::narration::story;
 use crate::narration::view::GameView;
 
 /// An open decision.
@@ -122,7 +123,7 @@ impl Live {
                 }
                 self.events.push(EventText {
                     sequence: snapshot.next_sequence.saturating_sub(1),
-                    words: "What happened before is no longer known".to_owned(),
+                    words: story::unknown_before().words,
                     begins_shift: true,
                 });
             }

@@ -106,12 +106,7 @@ impl Narrator {
         self.exchanges.clear();
         self.view.restore(snapshot, None);
         self.chain = Chain::new(&self.view);
-        let line = Line {
-            seat: None,
-            words: "what happened before is no longer known".to_owned(),
-            heading: false,
-        };
-        broken_off.to_owned() + &self.remarks(&[line], DIM)
+        broken_off.to_owned() + &self.remarks(&[story::unknown_before()], DIM)
     }
 
     /// Ends an open line when no more events will come.

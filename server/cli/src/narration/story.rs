@@ -23,6 +23,29 @@ pub struct Line {
     pub heading: bool,
 }
 
+/// That a substitute plays for a seat from now on, or no longer, where no event says so.
+pub fn substitution(seat: u32, active: bool) -> Line {
+    let words = if active {
+        "is replaced by a substitute"
+    } else {
+        "is back"
+    };
+    Line {
+        seat: Some(seat),
+        words: words.to_owned(),
+        heading: false,
+    }
+}
+
+/// That a snapshot stands for what happened before.
+pub fn unknown_before() -> Line {
+    Line {
+        seat: None,
+        words: "what happened before is no longer known".to_owned(),
+        heading: false,
+    }
+}
+
 /// Applies an event and returns its lines.
 pub fn advance(view: &mut GameView, event: &v1::GameEvent) -> Vec<Line> {
     // The lines first: they need the state before the event.

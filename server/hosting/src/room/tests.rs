@@ -32,9 +32,7 @@ use chefshat_base::metrics::{Metrics, SearchOutcome};
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::{Change, Entry, Fill, GameHeader, GameStart};
 use chefshat_room::policy::{AbortPolicy, Policy};
-use chefshat_room::{
-    Answer, ConnectionId, Core, JoinError, MAX_EVENTS_KEPT,
-};
+use chefshat_room::{Answer, ConnectionId, Core, JoinError, MAX_EVENTS_KEPT};
 use chefshat_store::{Journal, MemoryStore, Store as _, StoreError, StoredGame};
 use chefshat_wire::outbox::StreamEnd;
 use chefshat_wire::outbox::{Outbox, OutboxStream};

@@ -7,6 +7,7 @@ use ratatui::crossterm::event::KeyCode;
 use super::keys::{key_of, names_cards, not_held};
 use super::pick::Decision;
 use crate::narration::awaited::AwaitedSeat;
+use crate::narration::story;
 use crate::narration::view::GameView;
 use crate::narration::words;
 use crate::tui::log::Log;
@@ -233,6 +234,8 @@ impl App {
             Update::Substitution(substitution) => {
                 if let Some(me) = self.me {
                     self.table.substitute(me, substitution.active.then_some(""));
+                    let line = story::substitution(me, substitution.active);
+                    self.log.add(vec![line]);
                 }
             }
             Update::Awaited(awaited) => self.awaited = AwaitedSeat::new(&awaited, now_ms),
@@ -248,7 +251,10 @@ impl App {
             Update::Refused(refused) => {
                 self.notice = crate::narration::clean(&refused.message, 76);
             }
-            Update::Snapshot(snapshot) => self.table.restore(&snapshot, self.me),
+            Update::Snapshot(snapshot) => {
+                self.table.restore(&snapshot, self.me);
+                self.log.add(vec![story::unknown_before()]);
+            }
             Update::Detached(_) | Update::Entered(_) => {}
         }
         None

@@ -275,4 +275,12 @@ fn expressions_and_resuming_have_keys() {
     session.receive(Update::Events(v1::EventBatch { events }));
     assert!(session.screen().contains("Press r"));
     assert_eq!(session.press(KeyCode::Char('r')), Some(Do::Resume));
+    // Where no event says so.
+    let substitution = |active| Update::Substitution(v1::Substitution { active });
+    session.receive(substitution(false));
+    assert!(!session.screen().contains("Press r"));
+    session.receive(substitution(true));
+    let screen = session.screen();
+    assert!(screen.contains("Press r"), "{screen}");
+    assert!(screen.contains("Ada is replaced by a "), "{screen}");
 }

@@ -114,6 +114,8 @@ impl Reel {
         self.start.clone_from(&self.table);
         self.start.restore(snapshot, None);
         self.table.clone_from(&self.start);
+        self.log = Log::default();
+        self.log.add(vec![story::unknown_before()]);
         self.events.clear();
         self.at = 0;
     }
