@@ -297,6 +297,7 @@ impl Serve {
             retention: ServerConfig::default().retention,
             record_files: false,
             lease: settings.node.lease.unwrap_or(LeaseTimes::DEFAULT),
+            scratch: data_dir.clone().unwrap_or_else(std::env::temp_dir),
             ..PostgresOptions::default()
         };
         let storage = match settings.node.open(settings.max_rooms, options).await? {

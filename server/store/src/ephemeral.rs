@@ -2,7 +2,7 @@
 //! memory, which takes a small part of the space, and those of a long game in a file.
 
 use std::collections::BTreeSet;
-use std::fs::{self, File, OpenOptions};
+use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -10,7 +10,6 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use chefshat_proto::v1;
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
-use tempfile::TempPath;
 use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 use tracing::{error, warn};
@@ -21,8 +20,8 @@ use super::{Journal, StoreError};
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Entry, GameHeader};
 
-/// Most encoded entries of a game that stay in memory, bytes, if its file can be written.
-pub(super) const MAX_IN_MEMORY: usize = 64 * 1024;
+/// Bytes of a block of the file. As many encoded entries of a game stay in memory.
+pub(super) const BLOCK: usize = 64 * 1024;
 
 /// The ids of games that are stored when they end, of records that are being imported, and of games
 /// that are being created. Nothing else can take them meanwhile.
@@ -69,116 +68,149 @@ pub(super) trait StoreFinished: Send + Sync + 'static {
     ) -> BoxFuture<'a, Result<(), StoreError>>;
 }
 
-/// Where long games keep their entries until they end: in a file each, which is open only while it is
-/// written or read.
+/// Where long games keep their entries until they end: one file without a name for all of them, in
+/// blocks of [`BLOCK`] bytes.
 #[derive(Clone)]
-pub(super) struct Scratch {
+pub(super) struct Scratch(Arc<Blocks>);
+
+struct Blocks {
     folder: PathBuf,
-    /// What the names of the files begin with.
-    prefix: &'static str,
     /// Whether there is space besides what others need.
-    has_space: Arc<dyn Fn() -> bool + Send + Sync>,
+    has_space: Box<dyn Fn() -> bool + Send + Sync>,
+    used: Mutex<Used>,
     /// Complete games in memory, on their way into the database.
-    loaded: Arc<Semaphore>,
+    loaded: Semaphore,
+}
+
+#[derive(Default)]
+struct Used {
+    /// Created with the first block.
+    file: Option<File>,
+    free: Vec<u64>,
+    /// Number of blocks of the file.
+    count: u64,
 }
 
 impl Scratch {
-    /// Files in a folder, written while there is space.
+    /// A file in a folder, or in that for temporary files if the folder cannot be written. Blocks are
+    /// added while there is space.
     pub(super) fn new(
         folder: PathBuf,
-        prefix: &'static str,
         has_space: impl Fn() -> bool + Send + Sync + 'static,
     ) -> Self {
-        Self {
+        Self(Arc::new(Blocks {
             folder,
-            prefix,
-            has_space: Arc::new(has_space),
-            loaded: Arc::new(Semaphore::new(MAX_CONCURRENT_RECORDS)),
-        }
+            has_space: Box::new(has_space),
+            used: Mutex::default(),
+            loaded: Semaphore::new(MAX_CONCURRENT_RECORDS),
+        }))
     }
 
-    /// Deletes the files that a process has left that was killed.
-    pub(super) fn delete_left_over(&self) -> io::Result<()> {
-        for entry in fs::read_dir(&self.folder)? {
-            let entry = entry?;
-            let name = entry.file_name();
-            if name.as_encoded_bytes().starts_with(self.prefix.as_bytes()) {
-                fs::remove_file(entry.path())?;
+    fn used(&self) -> MutexGuard<'_, Used> {
+        (self.0.used.lock()).expect("no code that holds this lock can panic")
+    }
+
+    /// Writes one block; its number.
+    fn write(&self, block: &[u8]) -> io::Result<u64> {
+        let mut used = self.used();
+        let Used { file, free, count } = &mut *used;
+        let number = match free.last() {
+            Some(number) => *number,
+            None if (self.0.has_space)() => *count,
+            None => return Err(io::ErrorKind::StorageFull.into()),
+        };
+        let file = match file {
+            Some(file) => file,
+            none => {
+                let created = tempfile::tempfile_in(&self.0.folder);
+                none.insert(created.or_else(|_| tempfile::tempfile())?)
             }
+        };
+        file.seek(SeekFrom::Start(number * BLOCK as u64))?;
+        file.write_all(block)?;
+        if free.pop().is_none() {
+            *count += 1;
         }
-        Ok(())
+        Ok(number)
     }
 
-    /// Creates a file, deleted when the path is dropped.
-    fn create(&self) -> io::Result<TempPath> {
-        let named = tempfile::Builder::new()
-            .prefix(self.prefix)
-            .tempfile_in(&self.folder)?;
-        Ok(named.into_temp_path())
+    fn read(&self, number: u64, block: &mut [u8]) -> io::Result<()> {
+        let mut used = self.used();
+        let file = used.file.as_mut().ok_or(io::ErrorKind::NotFound)?;
+        file.seek(SeekFrom::Start(number * BLOCK as u64))?;
+        file.read_exact(block)
+    }
+
+    /// Number of blocks that a game has.
+    #[cfg(test)]
+    pub(super) fn in_use(&self) -> u64 {
+        let used = self.used();
+        used.count - used.free.len() as u64
+    }
+}
+
+/// The blocks of one game, free again when this is dropped.
+struct Filed {
+    scratch: Scratch,
+    blocks: Mutex<Vec<u64>>,
+}
+
+impl Drop for Filed {
+    fn drop(&mut self) {
+        let mut used = self.scratch.used();
+        used.free.append(&mut self.blocks());
+        // The disk has the space back when no long game is left.
+        if used.free.len() as u64 == used.count {
+            *used = Used::default();
+        }
+    }
+}
+
+impl Filed {
+    fn none(scratch: Scratch) -> Arc<Self> {
+        let blocks = Mutex::default();
+        Arc::new(Self { scratch, blocks })
+    }
+
+    fn blocks(&self) -> MutexGuard<'_, Vec<u64>> {
+        (self.blocks.lock()).expect("no code that holds this lock can panic")
+    }
+
+    /// Moves whole blocks of encoded entries to the file. What it could not write stays.
+    fn add(&self, encoded: &mut Vec<u8>) -> io::Result<()> {
+        let mut written = 0;
+        let outcome = encoded.chunks_exact(BLOCK).try_for_each(|block| {
+            let number = self.scratch.write(block)?;
+            self.blocks().push(number);
+            written += BLOCK;
+            Ok(())
+        });
+        encoded.drain(..written);
+        outcome
+    }
+
+    /// All entries, with those that are not in the file.
+    fn followed_by(&self, encoded: &[u8]) -> io::Result<Vec<u8>> {
+        let blocks = self.blocks();
+        let mut all = vec![0; blocks.len() * BLOCK];
+        for (number, block) in blocks.iter().zip(all.chunks_exact_mut(BLOCK)) {
+            self.scratch.read(*number, block)?;
+        }
+        all.extend_from_slice(encoded);
+        Ok(all)
     }
 }
 
 /// The journal of a game that is stored by `whole`.
 pub(super) struct EphemeralJournal<W> {
     header: Arc<GameHeader>,
-    scratch: Scratch,
-    /// The first entries, in a file.
-    filed: Filed,
+    /// The first entries.
+    filed: Arc<Filed>,
     /// The entries after them.
     encoded: Vec<u8>,
     /// The size at which they are moved to the file, bytes.
     most_in_memory: usize,
     whole: W,
-}
-
-/// What of a journal is in its file.
-#[derive(Debug, Clone, Default)]
-struct Filed {
-    file: Option<Arc<TempPath>>,
-    bytes: u64,
-}
-
-impl Filed {
-    /// Adds encoded entries. After an error it has what it had before.
-    fn add(&mut self, encoded: &[u8], scratch: &Scratch) -> io::Result<()> {
-        if !(scratch.has_space)() {
-            return Err(io::ErrorKind::StorageFull.into());
-        }
-        let path = match &mut self.file {
-            Some(path) => path,
-            none => none.insert(Arc::new(scratch.create()?)),
-        };
-        let mut file = OpenOptions::new().write(true).open(&**path)?;
-        file.seek(SeekFrom::Start(self.bytes))?;
-        file.write_all(encoded)?;
-        self.bytes += encoded.len() as u64;
-        Ok(())
-    }
-
-    /// All entries, with those that are not in the file.
-    fn followed_by(&self, encoded: &[u8]) -> io::Result<Vec<u8>> {
-        let mut all = Vec::new();
-        if let Some(path) = &self.file {
-            File::open(&**path)?
-                .take(self.bytes)
-                .read_to_end(&mut all)?;
-        }
-        all.extend_from_slice(encoded);
-        Ok(all)
-    }
-
-    /// Works on all entries, with those that are not in the file.
-    async fn with_all<T: Send + 'static>(
-        self,
-        encoded: Vec<u8>,
-        work: impl FnOnce(Vec<u8>) -> T + Send + 'static,
-    ) -> Result<T, StoreError> {
-        if self.file.is_none() {
-            return Ok(work(encoded));
-        }
-        let reading = spawn_blocking(move || self.followed_by(&encoded).map(work));
-        reading.await.map_err(failed)?.map_err(failed)
-    }
 }
 
 impl<W> EphemeralJournal<W> {
@@ -191,10 +223,9 @@ impl<W> EphemeralJournal<W> {
     ) -> Self {
         Self {
             header,
-            scratch,
-            filed: Filed::default(),
+            filed: Filed::none(scratch),
             encoded,
-            most_in_memory: MAX_IN_MEMORY,
+            most_in_memory: BLOCK,
             whole,
         }
     }
@@ -208,24 +239,35 @@ impl<W> EphemeralJournal<W> {
     /// Moves the entries in memory to the file. If it cannot be written, they stay in memory, and it
     /// is tried again when they are twice as many.
     async fn file_entries(&mut self) -> Result<(), StoreError> {
-        let encoded = std::mem::take(&mut self.encoded);
-        let (mut filed, scratch) = (self.filed.clone(), self.scratch.clone());
+        let filed = Arc::clone(&self.filed);
+        let mut encoded = std::mem::take(&mut self.encoded);
         let writing = spawn_blocking(move || {
-            let written = filed.add(&encoded, &scratch);
-            (filed, encoded, written)
+            let written = filed.add(&mut encoded);
+            (encoded, written)
         });
-        let (filed, encoded, written) = writing.await.map_err(failed)?;
-        self.filed = filed;
-        self.most_in_memory = MAX_IN_MEMORY;
+        let (encoded, written) = writing.await.map_err(failed)?;
+        self.encoded = encoded;
+        self.most_in_memory = BLOCK;
         if let Err(problem) = written {
-            let (game, bytes) = (self.header.game_id, encoded.len());
-            let folder = self.scratch.folder.display();
-            warn!(%game, bytes, %problem, %folder, "a long game that is stored when it ends stays in memory");
+            let (game, bytes) = (self.header.game_id, self.encoded.len());
+            warn!(%game, bytes, %problem, "a long game that is stored when it ends stays in memory");
             self.most_in_memory = 2 * bytes;
-            self.encoded = encoded;
         }
         Ok(())
     }
+}
+
+/// Works on all encoded entries of a game.
+async fn with_all<T: Send + 'static>(
+    filed: Arc<Filed>,
+    encoded: Vec<u8>,
+    work: impl FnOnce(Vec<u8>) -> T + Send + 'static,
+) -> Result<T, StoreError> {
+    if filed.blocks().is_empty() {
+        return Ok(work(encoded));
+    }
+    let reading = spawn_blocking(move || filed.followed_by(&encoded).map(work));
+    reading.await.map_err(failed)?.map_err(failed)
 }
 
 fn failed(problem: impl std::fmt::Display) -> StoreError {
@@ -261,8 +303,8 @@ impl<W: StoreFinished> Journal for EphemeralJournal<W> {
             form::read_entries(&encoded, &mut entries).map(|()| entries)
         };
         async move {
-            let (filed, encoded) = (self.filed.clone(), self.encoded.clone());
-            let decoded = filed.with_all(encoded, decode).await?;
+            let (filed, encoded) = (Arc::clone(&self.filed), self.encoded.clone());
+            let decoded = with_all(filed, encoded, decode).await?;
             decoded.map_err(|problem| StoreError::Failed(problem.to_string()))
         }
         .boxed()
@@ -273,15 +315,18 @@ impl<W: StoreFinished> Journal for EphemeralJournal<W> {
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        let filed = std::mem::take(&mut self.filed);
+        let scratch = self.filed.scratch.clone();
+        let filed = std::mem::replace(&mut self.filed, Filed::none(scratch.clone()));
         let encoded = std::mem::take(&mut self.encoded);
         let signature = signature.as_ref().map(form::signature_to_bytes);
         async move {
-            let _loaded = match filed.file {
-                Some(_) => Some(self.scratch.loaded.acquire().await.map_err(failed)?),
-                None => None,
+            let is_long = !filed.blocks().is_empty();
+            let _loaded = if is_long {
+                Some(scratch.0.loaded.acquire().await.map_err(failed)?)
+            } else {
+                None
             };
-            let entries = filed.with_all(encoded, |all| all).await?;
+            let entries = with_all(filed, encoded, |all| all).await?;
             let stored = (self.whole).store_finished(&self.header, entries, summary, signature);
             match stored.await {
                 // The game was played anyway; the record that was stored first stays.

@@ -24,6 +24,7 @@ mod values;
 mod writer;
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
@@ -73,8 +74,6 @@ const READERS: u32 = 6;
 const CONTROLLERS: u32 = 2;
 /// Connections for beats, which wait for nothing else. One is enough, unless it hangs.
 const BEATERS: u32 = 2;
-/// What the names of files of unfinished games begin with.
-const UNFINISHED: &str = "chefshat-unfinished-";
 /// How long a read waits for a connection.
 const ACQUIRE_LIMIT: Duration = Duration::from_secs(5);
 
@@ -93,6 +92,9 @@ pub struct PostgresOptions {
     /// Whether records are written to files, so that only games whose record has been written may
     /// be deleted.
     pub record_files: bool,
+    /// Where long games that are stored when they end are until then, if this folder can be written;
+    /// else in that for temporary files.
+    pub scratch: PathBuf,
 }
 
 impl Default for PostgresOptions {
@@ -103,6 +105,7 @@ impl Default for PostgresOptions {
             lock_limit: Duration::from_secs(1),
             retention: Duration::from_secs(600),
             record_files: true,
+            scratch: std::env::temp_dir(),
         }
     }
 }
@@ -176,8 +179,7 @@ impl PostgresStore {
         };
         let mut writing = Vec::new();
         Ok(Self {
-            // The data directory of a node has only keys, and may be read-only.
-            scratch: Scratch::new(std::env::temp_dir(), UNFINISHED, || true),
+            scratch: Scratch::new(options.scratch.clone(), || true),
             options,
             reader: readers,
             control,

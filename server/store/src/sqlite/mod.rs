@@ -61,10 +61,6 @@ use reader::Reader;
 use space::{Disk, Space};
 use writer::WriteCommand;
 
-/// What the names of files of unfinished games begin with. It begins with that of the database, so no
-/// backup has them.
-const UNFINISHED: &str = "games.sqlite3.unfinished-";
-
 /// Stores games in the database of a data directory.
 pub struct SqliteStore {
     data_dir: PathBuf,
@@ -139,10 +135,7 @@ impl SqliteStore {
         let metrics = StoreMetrics::default();
         let space = Space::new(data_dir);
         let spare = Arc::clone(&space);
-        let scratch = Scratch::new(data_dir.to_path_buf(), UNFINISHED, move || spare.has_some());
-        if let Err(problem) = scratch.delete_left_over() {
-            warn!(%problem, "files of unfinished games of the last run could not be deleted");
-        }
+        let scratch = Scratch::new(data_dir.to_path_buf(), move || spare.has_some());
         if space.has_some() {
             space::keep_ballast(data_dir);
         } else {

@@ -21,7 +21,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{Connection as _, Executor as _};
 
 use super::{OpenError, SqliteStore};
-use crate::ephemeral::{EphemeralJournal, MAX_IN_MEMORY, Scratch, StoreFinished};
+use crate::ephemeral::{BLOCK, EphemeralJournal, Scratch, StoreFinished};
 use crate::form;
 use crate::testing::{TypedUnits as _, cup};
 use crate::tournaments::TournamentEntry;
@@ -358,14 +358,7 @@ async fn a_long_ephemeral_game_is_in_a_file_until_it_ends() {
     let mut journal = (store.create(Arc::clone(&header), entries()).await).expect("begun");
     let mut all = entries();
     all.extend(append_many(&mut *journal).await);
-    let files = || {
-        let names = std::fs::read_dir(folder.path()).expect("readable");
-        let names = names.map(|entry| entry.expect("readable").file_name());
-        names
-            .filter(|name| name.to_string_lossy().starts_with(super::UNFINISHED))
-            .count()
-    };
-    assert_eq!(files(), 1);
+    assert!(store.scratch.in_use() > 0);
     let read = journal.entries().await.expect("readable");
     assert_eq!(shown(&read), shown(&all));
     // And what comes after it was read.
@@ -373,17 +366,9 @@ async fn a_long_ephemeral_game_is_in_a_file_until_it_ends() {
     let end = journal.finish(Some(summary(&header)), None).await;
     end.expect("committed");
     // Its room has the journal for a while.
-    assert_eq!(files(), 0);
+    assert_eq!(store.scratch.in_use(), 0);
     let stored = finished_journal(&store, header.game_id).await;
     assert_eq!(shown(&stored), shown(&all));
-    // The file of a process that was killed is deleted.
-    let left_over = folder.path().join(format!("{}x", super::UNFINISHED));
-    std::fs::write(left_over, "left over").expect("writable");
-    drop(journal);
-    store.close().await;
-    drop(store);
-    drop(opened(folder.path()).await);
-    assert_eq!(files(), 0);
 }
 
 /// Stores nothing but how many bytes arrive.
@@ -406,11 +391,11 @@ impl StoreFinished for Arc<Counted> {
 #[tokio::test]
 async fn a_file_that_cannot_be_written_costs_memory_and_no_game() {
     let folder = tempfile::tempdir().expect("a folder");
-    for path in [folder.path().to_path_buf(), folder.path().join("missing")] {
-        let is_writable = path.exists();
+    for is_writable in [true, false] {
+        let path = folder.path().to_path_buf();
         let header = Arc::new(header(1, Durability::Ephemeral));
         let counted = Arc::new(Counted::default());
-        let scratch = Scratch::new(path, "unfinished-", || true);
+        let scratch = Scratch::new(path, move || is_writable);
         let mut journal = EphemeralJournal::new(
             Arc::clone(&header),
             Vec::new(),
@@ -419,10 +404,10 @@ async fn a_file_that_cannot_be_written_costs_memory_and_no_game() {
         );
         let mut all = append_many(&mut journal).await;
         let encoded = form::entries_to_bytes(&mut all).len();
-        assert!(encoded > 4 * MAX_IN_MEMORY);
+        assert!(encoded > 4 * BLOCK);
         if is_writable {
             // A room commits little at a time.
-            assert!(journal.in_memory() < 2 * MAX_IN_MEMORY);
+            assert!(journal.in_memory() < 2 * BLOCK);
         } else {
             assert_eq!(journal.in_memory(), encoded);
         }
