@@ -239,7 +239,10 @@ pub(crate) async fn unread_games(target: &Target, rooms: u32) -> Result<(), Stat
                 }),
                 ..room(false, LONG)
             };
-            let created = rooms.create_room(request).await?.into_inner();
+            target.tally.tried(1);
+            let created = rooms.create_room(request).await;
+            target.tally.outcome(&created);
+            let created = created?.into_inner();
             let tickets = seats(&mut rooms, &created).await?;
             let connected = raw::http2(target.address, ATTACKER, 1).await;
             let sender = connected.map_err(|error| Status::unavailable(error.to_string()))?;
@@ -262,9 +265,7 @@ pub(crate) async fn unread_games(target: &Target, rooms: u32) -> Result<(), Stat
             Ok::<_, Status>(())
         });
     }
-    for read in reading.join_all().await {
-        read?;
-    }
+    let _ = timeout_at(target.until + CLOSING_LIMIT, reading.join_all()).await;
     Ok(())
 }
 
