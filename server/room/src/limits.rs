@@ -40,9 +40,10 @@ pub(crate) const SLOW_STORE: Duration = Duration::from_millis(100);
 /// How often the room checks whether the transport has received a request whose deadline would have
 /// passed.
 pub(crate) const RECHECK_INTERVAL: Duration = Duration::from_millis(20);
-/// Most events that a room keeps for those who come late or come back: of two games by the standard
-/// rules. The record has all of them; a physical table, whose reports are few, keeps them too.
-pub const MAX_EVENTS_KEPT: usize = 1_024;
+/// Most events that a room keeps for those who come late or come back: more than a game by the
+/// standard rules has. The record has all of them; a physical table, whose reports are few, keeps
+/// them too.
+pub const MAX_EVENTS_KEPT: usize = 768;
 /// Most expressions of one seat in one game.
 pub const MAX_EXPRESSIONS_PER_SEAT: u32 = 10_000;
 /// Most markers in one game.

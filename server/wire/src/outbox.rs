@@ -17,14 +17,14 @@ use crate::encoded::Updates;
 use chefshat_base::clock::RoomClock;
 use chefshat_base::metrics::Queue;
 
-/// Capacity of an outbox, counted in updates and events. What does not fit waits in the logs of rooms.
-pub const OUTBOX_CAPACITY: usize = 2_048;
+/// Capacity of an outbox, counted in updates and events: one for each seat that a stream may have.
+pub const OUTBOX_CAPACITY: usize = 4_096;
 /// Capacity of a spectator's outbox. Small, because a room has many spectators: those that do not
 /// read soon cost it nothing, and what they miss is in its log.
 pub const SPECTATOR_CAPACITY: usize = 256;
 /// Capacity of a message, counted in updates and events. It keeps messages well below the 4 MiB
 /// that gRPC clients accept by default.
-pub const MESSAGE_CAPACITY: usize = 1_024;
+pub const MESSAGE_CAPACITY: usize = 2_048;
 
 /// Notified when a decision request is handed to the transport.
 pub trait OnHandover: Send + Sync {

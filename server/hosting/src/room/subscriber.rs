@@ -16,7 +16,7 @@ use chefshat_proto::v1::{self, seat_update::Update};
 use chefshat_record::convert::seat_number;
 use chefshat_room::ids::Token;
 use chefshat_room::log::RoomEvent;
-use chefshat_room::{Awaited, ConnectionId, Core};
+use chefshat_room::{Awaited, ConnectionId, Core, MAX_EVENTS_KEPT};
 
 use chefshat_admission::limits::{Payer, Permit};
 use chefshat_base::metrics::Counted;
@@ -29,7 +29,7 @@ pub const MAX_PENDING_EVENTS: usize = 128;
 /// Most updates and events pending for a full stream. Further results of commands are dropped.
 const MAX_PENDING_UPDATES: usize = 1_024;
 /// Most events that a spectator's stream may fall behind before it is disconnected.
-pub const MAX_SPECTATOR_LAG: usize = 4_096;
+pub const MAX_SPECTATOR_LAG: usize = MAX_EVENTS_KEPT;
 /// Encoded events that the log no longer has are dropped as soon as they are this many.
 const MAX_ENCODED_GONE: usize = 1_024;
 /// Most spectators of one room.
@@ -264,7 +264,7 @@ impl Subscriber {
 
     /// Sends a seat a snapshot in place of the events that it has not received.
     fn skip_events(&mut self, core: &Core) {
-        let Role::Seat(connection) = &self.role else {
+        let Role::Seat(connection) = &mut self.role else {
             return;
         };
         self.position = core.log().len();
@@ -275,6 +275,7 @@ impl Subscriber {
         if is_substituted && !core.state().is_over() {
             let substitution = Update::Substitution(v1::Substitution { active: true });
             self.pending.add(connection.handle, substitution);
+            connection.substituted = core.is_substituted_unseen(connection.seat);
         }
     }
 
@@ -391,6 +392,7 @@ impl Subscriber {
                 false => self.skip_events(core),
             }
         }
+        let substitution = self.new_substitution(core).filter(|_| !over);
         while self.position < visible {
             let end = (self.position + EVENTS_PER_BATCH).min(visible);
             self.add_events(core, public, end);

@@ -255,10 +255,13 @@ impl Table {
     /// Folding the journal again gives the same log and the same game.
     pub fn assert_replays(&self) {
         let replayed = Core::replay(Arc::clone(self.core.header()), &self.journal);
-        assert_eq!(
-            format!("{:?}", replayed.log()),
-            format!("{:?}", self.core.log())
-        );
+        // A long log has dropped its first events.
+        let first = replayed.log().first().max(self.core.log().first());
+        let kept = |core: &Core| {
+            let events: Vec<_> = core.log().since(first).collect();
+            format!("{} {events:?}", core.log().len())
+        };
+        assert_eq!(kept(&replayed), kept(&self.core));
         assert_eq!(replayed.state(), self.core.state());
         assert_eq!(replayed.decisions(), self.core.decisions());
         assert_eq!(
