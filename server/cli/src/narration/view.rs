@@ -189,7 +189,7 @@ impl GameView {
             let held = seen.hand.iter().enumerate();
             let hand = Hand {
                 counts: held
-                    .map(|(index, count)| count + of(given, index))
+                    .map(|(index, count)| count.saturating_add(of(given, index)))
                     .collect(),
                 golden: seen.golden,
             };
