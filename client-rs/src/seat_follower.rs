@@ -91,8 +91,9 @@ impl SeatFollower {
     }
 
     /// The next update; `None` when the game is over. Every connection begins with
-    /// [`Update::Attached`]; each event comes once and in order, a snapshot in place of those that the
-    /// room of a long game no longer has, and an open decision again after each connection. Cancel safe: dropping the future loses nothing.
+    /// [`Update::Attached`]; each event comes once and in order, a snapshot in place of those that
+    /// the room of a long game no longer has, and an open decision again after each connection.
+    /// Cancel safe: dropping the future loses nothing.
     ///
     /// # Errors
     /// See [`PlayError`]. After an error there are no more updates.

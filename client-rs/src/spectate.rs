@@ -82,8 +82,8 @@ impl Spectator {
         first.unwrap_or(self.next_event).max(1)
     }
 
-    /// The next event, or `None` when the game is over. Where numbers are missing, the room no longer
-    /// has these events. Cancel safe: dropping the future loses no event.
+    /// The next event, or `None` when the game is over. Where numbers are missing, the room no
+    /// longer has these events. Cancel safe: dropping the future loses no event.
     ///
     /// # Errors
     /// The server's refusal (`ROOM_UNKNOWN`, `SPECTATORS_NOT_ADMITTED`), or the last failure if the

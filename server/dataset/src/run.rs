@@ -236,8 +236,8 @@ impl<'a> Sink<'a> {
         }
     }
 
-    /// Adds the samples beside a record. Returns the number of values, and the files that cannot be read
-    /// to their end.
+    /// Adds the samples beside a record. Returns the number of values, and the files that cannot be
+    /// read to their end.
     fn add_samples(&mut self, record: &Path, game: &Game) -> io::Result<(u64, Vec<Skipped>)> {
         let (Self::Tables { samples: table, .. }, Game::Rows(rows)) = (self, game) else {
             return Ok((0, Vec::new()));

@@ -77,8 +77,8 @@ pub(super) fn columns() -> Vec<ColumnInfo> {
     COLUMNS.iter().map(Column::info).collect()
 }
 
-/// Passes the rows of a game to `write`, chunk by chunk: those of the files beside its record. Returns
-/// the files that cannot be read to their end, whose chunks before are passed on.
+/// Passes the rows of a game to `write`, chunk by chunk: those of the files beside its record.
+/// Returns the files that cannot be read to their end, whose chunks before are passed on.
 ///
 /// # Errors
 /// `write` fails.

@@ -92,8 +92,8 @@ struct Used {
 }
 
 impl Scratch {
-    /// A file in a folder, or in that for temporary files if the folder cannot be written. Blocks are
-    /// added while there is space.
+    /// A file in a folder, or in that for temporary files if the folder cannot be written. Blocks
+    /// are added while there is space.
     pub(super) fn new(
         folder: PathBuf,
         has_space: impl Fn() -> bool + Send + Sync + 'static,
@@ -236,8 +236,8 @@ impl<W> EphemeralJournal<W> {
         self.encoded.len()
     }
 
-    /// Moves the entries in memory to the file. If it cannot be written, they stay in memory, and it
-    /// is tried again when they are twice as many.
+    /// Moves the entries in memory to the file. If it cannot be written, they stay in memory, and
+    /// it is tried again when they are twice as many.
     async fn file_entries(&mut self) -> Result<(), StoreError> {
         let filed = Arc::clone(&self.filed);
         let mut encoded = std::mem::take(&mut self.encoded);

@@ -22,8 +22,8 @@ impl Pace {
         }
     }
 
-    /// Waits until these bytes have passed. If the future is dropped, what remains of their time is free
-    /// for others.
+    /// Waits until these bytes have passed. If the future is dropped, what remains of their time is
+    /// free for others.
     pub(super) async fn pass(&self, bytes: usize) {
         let time = Duration::from_secs_f64(bytes as f64 / self.per_second as f64);
         let passed = {

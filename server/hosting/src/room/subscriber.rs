@@ -1,8 +1,8 @@
 //! Subscribers of a room: the connections of its seats, and its spectators. Each has a viewer, a
 //! position in the log and an outbox. Events after the position are sent when they are due. A room
-//! never waits for a full outbox: the position stays, and delivery resumes when there is space. Of a
-//! long game the log has only the last events: a seat that is further behind is sent a snapshot. A
-//! spectator that falls too far behind is disconnected.
+//! never waits for a full outbox: the position stays, and delivery resumes when there is space. Of
+//! a long game the log has only the last events: a seat that is further behind is sent a snapshot.
+//! A spectator that falls too far behind is disconnected.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
@@ -148,8 +148,8 @@ impl Subscriber {
         )
     }
 
-    /// A spectator that starts at an event (position from 0) or with a snapshot, which also stands for
-    /// events that are gone. The first message is in its outbox.
+    /// A spectator that starts at an event (position from 0) or with a snapshot, which also stands
+    /// for events that are gone. The first message is in its outbox.
     pub fn spectator(
         core: &Core,
         outbox: Arc<Outbox>,

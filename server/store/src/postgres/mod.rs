@@ -92,8 +92,8 @@ pub struct PostgresOptions {
     /// Whether records are written to files, so that only games whose record has been written may
     /// be deleted.
     pub record_files: bool,
-    /// Where long games that are stored when they end are until then, if this folder can be written;
-    /// else in that for temporary files.
+    /// Where long games that are stored when they end are until then, if this folder can be
+    /// written; else in that for temporary files.
     pub scratch: PathBuf,
 }
 
