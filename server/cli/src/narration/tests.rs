@@ -470,7 +470,7 @@ fn a_snapshot_has_what_the_events_have_shown() {
     assert!(compared > 100, "{compared}");
 }
 
-/// How decisions of [`play_engine`] are told.
+/// The source and time of every decision of [`play_engine`].
 const BY: By = By {
     source: v1::DecisionSource::Disconnected,
     decision_time_us: 0,

@@ -1,6 +1,6 @@
 //! `chefshat room watch`: follows the public events of a room, as text or as JSON lines.
 
-use std::io::Write as _;
+use std::io::Write;
 use std::process::ExitCode;
 
 use chefshat_client::v1::game_event::Kind;
@@ -53,30 +53,24 @@ impl Watch {
             }
         }
         let mut narrator = Narrator::of_room(&room);
-        let mut spectator = client.spectate(self.room_id, 1).with_backoff(Backoff {
-            give_up_after: PATIENCE,
-            ..Backoff::default()
-        });
+        let mut spectator = client
+            .spectate(self.room_id.clone(), 1)
+            .with_backoff(Backoff {
+                give_up_after: PATIENCE,
+                ..Backoff::default()
+            });
         let mut end = None;
         loop {
             let event = match spectator.next_watched().await {
                 Ok(Some(Watched::Event(event))) => *event,
                 Ok(Some(Watched::Snapshot(snapshot))) => {
-                    if self.json {
-                        writeln!(out, "{}", json_line("snapshot", "snapshot", &snapshot)?)?;
-                    } else {
-                        write!(out, "{}", narrator.restore(&snapshot))?;
-                    }
-                    out.flush()?;
+                    let words = || narrator.restore(&snapshot);
+                    self.write(&mut out, "snapshot", "snapshot", &snapshot, words)?;
                     continue;
                 }
                 Ok(Some(Watched::Awaited(awaited))) => {
-                    if self.json {
-                        writeln!(out, "{}", json_line("awaited", "awaited", &awaited)?)?;
-                    } else {
-                        write!(out, "{}", narrator.wait_for(&awaited))?;
-                    }
-                    out.flush()?;
+                    let words = || narrator.wait_for(&awaited);
+                    self.write(&mut out, "awaited", "awaited", &awaited, words)?;
                     continue;
                 }
                 Ok(None) if end.is_some() => break,
@@ -93,14 +87,29 @@ impl Watch {
                 Some(Kind::GameAborted(_)) => end = Some(ExitCode::FAILURE),
                 _ => {}
             }
-            if self.json {
-                writeln!(out, "{}", json_line("game", "game_event", &event)?)?;
-            } else {
-                write!(out, "{}", narrator.narrate(&event))?;
-            }
-            out.flush()?;
+            let words = || narrator.narrate(&event);
+            self.write(&mut out, "game", "game_event", &event, words)?;
         }
         Ok(end.unwrap_or(ExitCode::FAILURE))
+    }
+
+    /// Writes what is learnt of the room at once: as a line of JSON, its event and field with the
+    /// message, or in words.
+    fn write(
+        &self,
+        out: &mut impl Write,
+        event: &str,
+        field: &str,
+        message: &impl Serialize,
+        words: impl FnOnce() -> String,
+    ) -> Result<(), CommandError> {
+        if self.json {
+            writeln!(out, "{}", json_line(event, field, message)?)?;
+        } else {
+            write!(out, "{}", words())?;
+        }
+        out.flush()?;
+        Ok(())
     }
 }
 

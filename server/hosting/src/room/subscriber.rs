@@ -367,7 +367,6 @@ impl Subscriber {
         let awaited = self.awaited_of(news);
         let key = awaited.map(|it| it.key());
         let awaits_another = !over && key != self.awaited;
-        let substitution = self.new_substitution(core).filter(|_| !over);
         let backlog = visible - self.position;
         let at_once = (self.connection()).is_none_or(|connection| connection.options.at_once);
         let due = decision.is_some()
@@ -375,7 +374,7 @@ impl Subscriber {
             || over
             || self.stalled
             || awaits_another
-            || substitution.is_some()
+            || self.new_substitution(core).is_some()
             || backlog >= MAX_PENDING_EVENTS
             || (at_once && (backlog > 0 || !self.pending.is_empty()));
         if !due {

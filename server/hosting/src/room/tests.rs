@@ -171,6 +171,14 @@ async fn take_seat(room: &Handle) -> AttachedSeat {
     take_seat_from(room, Key::Local).await
 }
 
+async fn take_all_seats(room: &Handle) -> Vec<AttachedSeat> {
+    let mut seats = Vec::new();
+    for _ in 0..4 {
+        seats.push(take_seat(room).await);
+    }
+    seats
+}
+
 /// Takes a seat from an address.
 async fn take_seat_from(room: &Handle, charged: Key) -> AttachedSeat {
     let joined = room
@@ -299,10 +307,7 @@ async fn a_stalled_stream_delays_nobody_and_receives_the_end() {
         ..Policy::default()
     };
     let room = room(policy, 30).await;
-    let mut seats = Vec::new();
-    for _ in 0..4 {
-        seats.push(take_seat(&room).await);
-    }
+    let mut seats = take_all_seats(&room).await;
     let mut stalled = seats.pop().expect("there are four");
     let played = futures::future::join_all(seats.iter_mut().map(|seat| read(&room, seat, true)));
     let played = played.await;
@@ -345,10 +350,7 @@ async fn who_is_too_far_behind_in_a_game_receives_a_snapshot() {
         ..Policy::default()
     };
     let room = room(policy, 1_000).await;
-    let mut seats = Vec::new();
-    for _ in 0..4 {
-        seats.push(take_seat(&room).await);
-    }
+    let mut seats = take_all_seats(&room).await;
     let mut stalled = seats.pop().expect("there are four");
     let enough = chefshat_wire::outbox::OUTBOX_CAPACITY + 2 * MAX_EVENTS_KEPT;
     let playing = (seats.iter_mut()).map(|seat| read_until(enough, &room, seat, true));
@@ -412,10 +414,7 @@ async fn a_delayed_spectator_receives_no_snapshot_but_the_events_that_are_left()
         ..Policy::default()
     };
     let room = room(policy, 1_000).await;
-    let mut seats = Vec::new();
-    for _ in 0..4 {
-        seats.push(take_seat(&room).await);
-    }
+    let mut seats = take_all_seats(&room).await;
     let enough = 2 * MAX_EVENTS_KEPT;
     let playing = (seats.iter_mut()).map(|seat| read_until(enough, &room, seat, true));
     futures::future::join_all(playing).await;
@@ -428,10 +427,7 @@ async fn a_delayed_spectator_receives_no_snapshot_but_the_events_that_are_left()
 async fn a_seat_that_is_given_up_in_the_batch_of_its_attachment_is_not_attached() {
     // By the tournament, while the game is played.
     let room = room(Policy::default(), 1).await;
-    let mut seats = Vec::new();
-    for _ in 0..4 {
-        seats.push(take_seat(&room).await);
-    }
+    let seats = take_all_seats(&room).await;
     let removed = &seats[0];
     let (outbox, mut updates) = Outbox::new();
     let again = room.attach(attachment(&removed.ticket, outbox));
@@ -464,10 +460,7 @@ async fn deadlines_fire_without_any_input() {
     };
     let begun = Instant::now();
     let room = room(policy, 1).await;
-    let mut seats = Vec::new();
-    for _ in 0..4 {
-        seats.push(take_seat(&room).await);
-    }
+    let mut seats = take_all_seats(&room).await;
     // No seat answers: each one uses up its bank and three decisions, then substitutes end the
     // game.
     let read = futures::future::join_all(seats.iter_mut().map(|seat| read(&room, seat, false)));
@@ -608,10 +601,7 @@ async fn a_full_outbox_has_space_for_the_last_update() {
         ..Policy::default()
     };
     let room = room(policy, 30).await;
-    let mut seats = Vec::new();
-    for _ in 0..4 {
-        seats.push(take_seat(&room).await);
-    }
+    let mut seats = take_all_seats(&room).await;
     let mut stalled = seats.pop().expect("there are four");
     let played = futures::future::join_all(seats.iter_mut().map(|seat| read(&room, seat, true)));
     played.await;
@@ -721,10 +711,7 @@ async fn check_streams_end_after_panic(at_once: bool) {
         })
     })
     .await;
-    let mut seats = Vec::new();
-    for _ in 0..4 {
-        seats.push(take_seat(&room).await);
-    }
+    let mut seats = take_all_seats(&room).await;
     let (outbox, mut watched) = Outbox::new();
     room.spectate(SpectateRequest {
         outbox,
@@ -839,10 +826,7 @@ async fn a_game_that_cannot_be_read_back_ends_unsigned() {
 #[tokio::test(start_paused = true)]
 async fn answers_are_handled_in_place_while_the_task_waits_and_the_mailbox_is_empty() {
     let room = room(Policy::default(), 1).await;
-    let mut seats = Vec::new();
-    for _ in 0..4 {
-        seats.push(take_seat(&room).await);
-    }
+    let mut seats = take_all_seats(&room).await;
     let (mut in_place, mut through_mailbox) = (0, 0);
     loop {
         // The task of the room runs and then waits.
