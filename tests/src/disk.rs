@@ -105,6 +105,16 @@ impl SmallDisk {
         while file.write_all(&piece).is_ok() {}
     }
 
+    /// Shortens a file by this number of bytes, which are free then.
+    pub fn shorten(&self, name: &str, bytes: u64) {
+        let file = std::fs::File::options()
+            .write(true)
+            .open(self.path().join(name))
+            .expect("a file");
+        let length = file.metadata().expect("its length").len();
+        file.set_len(length - bytes).expect("a shorter file");
+    }
+
     /// Makes it read-only.
     pub async fn make_read_only(&self) {
         let mut enter = self.enter().into_iter();

@@ -52,7 +52,8 @@ impl RecordWriter {
     }
 
     /// Queues the record of a finished game, charged to its creator, and marks it as written in the
-    /// store. A record that fails is tried again at the next start of the server.
+    /// store. It waits while the disk is nearly full. A record that fails, or still waits when the
+    /// server stops, is tried again at its next start.
     pub fn write_record(&self, game: Id, charged: Key) {
         if let Some(data_dir) = self.data_dir.clone() {
             let writer = self.clone();
@@ -62,8 +63,19 @@ impl RecordWriter {
     }
 
     async fn write(self, game: Id, charged: Key, data_dir: PathBuf) {
-        // Before it is read: a long record takes much memory.
-        let _slice = self.background.slice(charged).await;
+        // Before it is read: a long record takes much memory. The database has it already, so its
+        // file takes nothing of what is kept for running games.
+        let _slice = loop {
+            let slice = self.background.slice(charged).await;
+            if self.store.has_space() {
+                break slice;
+            }
+            drop(slice);
+            info!(%game, "the record is written to a file as soon as the disk has space for it");
+            if !self.store.space().await {
+                return;
+            }
+        };
         let _writing = self.writing.read().await;
         let stored = match self.store.finished(game).await {
             Ok(Some(stored)) => stored,

@@ -232,6 +232,10 @@ pub trait Store: Send + Sync + 'static {
     fn has_space(&self) -> bool {
         true
     }
+    /// Waits until there is, as `has_space` says; `false` if the server stops before.
+    fn space(&self) -> BoxFuture<'_, bool> {
+        ready(true).boxed()
+    }
     /// The server stops: what waits for space on the disk fails.
     fn stop_waiting(&self) {}
     /// The metrics of its writer, if it has one.

@@ -431,7 +431,7 @@ pub(crate) static ATTACKS: &[Attack] = &[
         "251 rooms with 4 KB of annotations for each decision on a disk of 110 MiB",
         ListRooms,
         |target| acts::games(&target, 251, acts::ANNOTATION_BYTES).await?,
-        setup: Setup { disk_mib: Some(110), ..PLAIN }
+        setup: Setup { disk_mib: Some(110), one_game: true, ..PLAIN }
     ),
     attack!(
         "samples",

@@ -27,6 +27,8 @@ const THINKING: Duration = Duration::from_millis(5);
 pub(crate) const SHORT: u32 = 2;
 /// Shifts of a game that outlasts a measurement.
 pub(crate) const LONG: u32 = 1_000;
+/// Most Shifts that agents who think this long play in a second.
+const SHIFTS_PER_SECOND: u64 = 3;
 /// How long a call or a new connection may take before the room counts it as not served.
 const CALL_LIMIT: Duration = Duration::from_secs(5);
 /// How often somebody who waits for a decision looks.
@@ -111,6 +113,11 @@ impl Noticed {
     pub(crate) fn percentile_ms(&self, percentile: f64) -> f64 {
         self.latencies.value_at_percentile(percentile) as f64 / 1e3
     }
+}
+
+/// Shifts of a game that lasts this long and ends soon after.
+pub(crate) fn shifts_within(time: Duration) -> u32 {
+    u32::try_from(time.as_secs().max(1) * SHIFTS_PER_SECOND).unwrap_or(LONG)
 }
 
 /// The room while it plays.

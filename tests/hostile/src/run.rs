@@ -12,7 +12,7 @@ use tokio::time::Instant;
 use crate::attacks::{Act, Attack};
 use crate::error::HostileError;
 use crate::gauge::{self, Memory, Watched, folder_bytes};
-use crate::honest::{Access, HonestRoom, SHORT};
+use crate::honest::{Access, HonestRoom, SHORT, shifts_within};
 use crate::options::Options;
 use crate::probe::{self, Called};
 use crate::report::{Burden, MEMORY_GROWTH, Phases, Row};
@@ -103,8 +103,12 @@ async fn attacked(
             other => return Err(HostileError::Prepare(format!("{other:?}"))),
         }
     }
-    let honest = HonestRoom::start(server.access.clone(), SHORT);
-    let control = HonestRoom::start(spared.access.clone(), SHORT);
+    let shifts = match attack.setup.one_game {
+        true => shifts_within(options.quiet + options.seconds),
+        false => SHORT,
+    };
+    let honest = HonestRoom::start(server.access.clone(), shifts);
+    let control = HonestRoom::start(spared.access.clone(), shifts);
     let quiet_begun = Instant::now();
     tokio::time::sleep(options.quiet).await;
     for room in [&honest, &control] {

@@ -46,6 +46,8 @@ pub(crate) struct Setup {
     pub(crate) mcp: bool,
     /// Number of nodes of its cluster; 0: it is none.
     pub(crate) nodes: usize,
+    /// Whether the honest room plays one game all the time, because new ones are refused.
+    pub(crate) one_game: bool,
 }
 
 /// A server as most attacks have it.
@@ -58,6 +60,7 @@ pub(crate) const PLAIN: Setup = Setup {
     webhooks: false,
     mcp: false,
     nodes: 0,
+    one_game: false,
 };
 
 /// A server that runs.

@@ -25,6 +25,12 @@ use tonic_types::StatusExt as _;
 const DATABASE: &str = "games.sqlite3";
 /// Size of a disk that the write-ahead log of a few games does not fill, KiB.
 const DISK_KIB: u32 = 16 * 1024;
+/// Rooms that reserve more space than is left then.
+const WAITING_ROOMS: usize = 24;
+/// What is left of a disk that is nearly full, bytes: running games go on.
+const LEFT_BYTES: u64 = 4 * 1024 * 1024;
+/// How often a test looks for a file.
+const LOOK_AGAIN: Duration = Duration::from_millis(50);
 /// How long another program locks the database.
 const LOCKED_FOR: Duration = Duration::from_secs(3);
 /// Decision time while it is locked.
@@ -267,6 +273,45 @@ async fn a_nearly_full_disk_is_reserved_for_running_games() {
         .expect("there is space again");
     let ended = server.stop().await;
     assert!(ended.status.success(), "{ended:?}");
+}
+
+/// The files of records are copies of what the database has: they take nothing of what is kept for
+/// running games, and are written once there is space.
+#[tokio::test(flavor = "multi_thread")]
+async fn record_files_wait_while_the_disk_is_nearly_full() {
+    let disk = match SmallDisk::new(DISK_KIB).await {
+        Ok(disk) => disk,
+        Err(why) => return skip("record_files_wait_while_the_disk_is_nearly_full", &why),
+    };
+    let mut launch = Launch::new(disk.mounted_at()).through(disk.enter());
+    let server = launch.start().await.expect("the server starts");
+    let busy_rooms = BusyRooms::start(&launch.url(), rooms(1, unhurried()));
+    patiently("decisions", busy_rooms.ledger.reaches(10)).await;
+    let client = connected(&launch).await;
+    for _ in 0..WAITING_ROOMS {
+        let created = client.create_room(v1::CreateRoomRequest::default()).await;
+        created.expect("there is space");
+    }
+    disk.fill("filler");
+    disk.shorten("filler", LEFT_BYTES);
+    assert_refuses_rooms(&client).await;
+    let games = busy_rooms.finish().await;
+    let record = jsonl::path_of(&disk.path(), &games[0]);
+    let ended = server.stop().await;
+    assert!(ended.status.success(), "{ended:?}");
+    assert!(!record.exists(), "{}", ended.said);
+
+    let server = launch.start().await.expect("the server restarts");
+    assert_refuses_rooms(&connected(&launch).await).await;
+    std::fs::remove_file(disk.path().join("filler")).expect("removed");
+    let written = async {
+        while !record.exists() {
+            tokio::time::sleep(LOOK_AGAIN).await;
+        }
+    };
+    patiently("the record's file", written).await;
+    jsonl::read(&record).expect("a record");
+    server.kill().await;
 }
 
 /// Each running game reserves what it may still write, so that rooms are refused long before the disk

@@ -188,6 +188,10 @@ impl Store for SqliteStore {
         self.space.has_some()
     }
 
+    fn space(&self) -> BoxFuture<'_, bool> {
+        self.space.some().boxed()
+    }
+
     fn stop_waiting(&self) {
         self.space.stop();
     }

@@ -27,6 +27,8 @@ pub(super) const BYTES_PER_GAME: u64 = 256 * 1024;
 const NO_SPACE_BYTES: u64 = 1024 * 1024;
 /// How often a commit that found the disk full is tried again.
 const RETRY: Duration = Duration::from_secs(1);
+/// How often what needs no space at once looks whether there is some.
+const LOOK_AGAIN: Duration = Duration::from_secs(5);
 /// How often the operator is reminded of it.
 const REMINDER: Duration = Duration::from_secs(60);
 /// A file that only takes space: it is given up if the disk is full when the server starts, because
@@ -118,6 +120,17 @@ impl Space {
             // If the free space is unknown, try.
             Err(_) => true,
         }
+    }
+
+    /// Waits until there is some, as `has_some` says; `false` if the server stops before.
+    pub(super) async fn some(&self) -> bool {
+        while !self.has_some() {
+            tokio::select! {
+                () = sleep(LOOK_AGAIN) => {}
+                () = self.stopping.cancelled() => return false,
+            }
+        }
+        true
     }
 
     /// Whether an error of a commit means that the disk is full.
@@ -231,10 +244,15 @@ mod tests {
         let since = Instant::now();
         assert!(space.wait(since).await);
         assert!(space.is_full() && !space.has_some());
-        space.found();
-        assert!(!space.is_full());
+        let found = async {
+            sleep(RETRY).await;
+            space.found();
+        };
+        let (has_some, ()) = tokio::join!(space.some(), found);
+        assert!(has_some && !space.is_full());
+        assert!(space.wait(since).await);
         space.stop();
-        assert!(!space.wait(since).await);
+        assert!(!space.wait(since).await && !space.some().await);
     }
 
     #[test]
