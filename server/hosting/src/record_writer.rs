@@ -9,6 +9,7 @@ use tracing::{error, info};
 
 use chefshat_admission::limits::{Background, Key};
 use chefshat_base::tasks::short;
+use chefshat_record::atomic_file;
 use chefshat_room::ids::Id;
 use chefshat_store::{Store, StoredGame};
 
@@ -103,6 +104,14 @@ impl RecordWriter {
         });
         match writing.await {
             Some(Ok(path)) => {
+                // It may have been deleted meanwhile, and its files before this one was there.
+                if let Ok(None) = self.store.summary(game).await {
+                    let removing = tokio::task::spawn_blocking(move || atomic_file::remove(&path));
+                    if !matches!(removing.await, Ok(Ok(()))) {
+                        error!(%game, "the record file of a deleted game was not removed");
+                    }
+                    return;
+                }
                 info!(%game, path = %path.display(), "record written");
                 if let Err(error) = self.store.mark_record_written(game).await {
                     error!(%game, %error, "a record was written but not marked as written");

@@ -286,8 +286,9 @@ pub trait Store: Send + Sync + 'static {
     /// Number of finished games.
     fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>>;
     /// At most `count` finished games that need not be kept, by a number that orders them, after a
-    /// number. Never the newest game, one whose record is still to be written, one of a study, one
-    /// of a tournament that is not over or cannot be read, or one that does not say of which it is.
+    /// number. Never the newest game, one whose record is still to be written (unless it waits for
+    /// space), one of a study, one of a tournament that is not over or cannot be read, or one that
+    /// does not say of which it is.
     /// A store that keeps everything returns none.
     fn prunable(
         &self,

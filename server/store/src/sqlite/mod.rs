@@ -324,7 +324,11 @@ impl Store for SqliteStore {
         after: u64,
         count: usize,
     ) -> BoxFuture<'_, Result<Vec<(u64, Id)>, StoreError>> {
-        self.reader.prunable(keep, after, count).boxed()
+        // What waits for space must not keep what frees some.
+        let unwritten = !self.space.has_some();
+        (self.reader)
+            .prunable(keep, after, count, unwritten)
+            .boxed()
     }
 
     fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {

@@ -302,12 +302,14 @@ impl Reader {
         Ok(u64::try_from(count).unwrap_or_default())
     }
 
-    /// See `Store::prunable`. Games without a record are none of the newest ones.
+    /// See `Store::prunable`. Games without a record are none of the newest ones. `unwritten`: also
+    /// those whose record is still to be written to a file.
     pub(super) async fn prunable(
         &self,
         keep: Keep,
         mut after: u64,
         count: usize,
+        unwritten: bool,
     ) -> Result<Vec<(u64, Id)>, StoreError> {
         let integer = |number: u64| i64::try_from(number).unwrap_or(i64::MAX);
         let mut connection = self.pool.acquire().await.map_err(failure)?;
@@ -320,14 +322,16 @@ impl Reader {
                 "SELECT number, game_id, form, header FROM games
                  WHERE state <> 0 AND number > $1 AND coalesce(ended_at_ms, created_at_ms, 0) < $3
                    AND (summary IS NULL
-                        OR filed = 1 AND listed <= (SELECT listed FROM games WHERE listed IS NOT NULL
-                                                    ORDER BY listed DESC LIMIT 1 OFFSET $2))
+                        OR (filed = 1 OR $5)
+                           AND listed <= (SELECT listed FROM games WHERE listed IS NOT NULL
+                                          ORDER BY listed DESC LIMIT 1 OFFSET $2))
                  ORDER BY number LIMIT $4",
             )
             .bind(integer(after))
             .bind(integer(keep.newest.unwrap_or_default().max(1)))
             .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
             .bind(integer(page as u64))
+            .bind(unwritten)
             .fetch_all(&mut *connection)
             .await
             .map_err(failure)?;
