@@ -1,9 +1,10 @@
 //! Writes the records of finished games to files, in the background, those of each caller in turns.
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use tokio::sync::{OwnedRwLockWriteGuard, RwLock};
+use tokio::sync::{Mutex, OwnedRwLockWriteGuard, RwLock};
 use tokio_util::task::TaskTracker;
 use tracing::{error, info};
 
@@ -12,6 +13,9 @@ use chefshat_base::tasks::short;
 use chefshat_record::atomic_file;
 use chefshat_room::ids::Id;
 use chefshat_store::{Store, StoredGame};
+
+/// Lines of a record after which the disk may have become nearly full.
+const LINES_PER_CHECK: usize = 256;
 
 /// Writes records to the folder of records of a data directory.
 #[derive(Clone)]
@@ -23,6 +27,8 @@ pub struct RecordWriter {
     background: Arc<Background>,
     /// Locked for reading while a record is written.
     writing: Arc<RwLock<()>>,
+    /// Locked by the record that waits for space.
+    first: Arc<Mutex<()>>,
 }
 
 impl RecordWriter {
@@ -39,6 +45,7 @@ impl RecordWriter {
             tracker,
             background,
             writing: Arc::default(),
+            first: Arc::default(),
         }
     }
 
@@ -53,8 +60,8 @@ impl RecordWriter {
     }
 
     /// Queues the record of a finished game, charged to its creator, and marks it as written in the
-    /// store. It waits while the disk is nearly full. A record that fails, or still waits when the
-    /// server stops, is tried again at its next start.
+    /// store. The file waits while the disk is nearly full. A record that fails, or still waits
+    /// when the server stops, is tried again at its next start.
     pub fn write_record(&self, game: Id, charged: Key) {
         if let Some(data_dir) = self.data_dir.clone() {
             let writer = self.clone();
@@ -72,8 +79,12 @@ impl RecordWriter {
                 break slice;
             }
             drop(slice);
-            info!(%game, "the record is written to a file as soon as the disk has space for it");
-            if !self.store.space().await {
+            // The first one waits for space, and the others for it.
+            let _first = self.first.lock().await;
+            if !self.store.has_space() {
+                info!("records are written to files as soon as the disk has space for them");
+            }
+            if !self.store.wait_for_space().await {
                 return;
             }
         };
@@ -95,17 +106,30 @@ impl RecordWriter {
             }
             return;
         }
+        let store = Arc::clone(&self.store);
         let writing = self.background.run(move || {
             let path = chefshat_record::jsonl::path_of(&data_dir, &game.to_string());
             let written = chefshat_record::jsonl::write_private(&path, |write| {
-                stored.each_line(|line| write(&line));
+                let (mut count, mut written) = (0_usize, Ok(()));
+                stored.each_line(|line| {
+                    if count.is_multiple_of(LINES_PER_CHECK) && !store.has_space() {
+                        written = Err(io::ErrorKind::StorageFull.into());
+                    }
+                    count += 1;
+                    if written.is_ok() {
+                        write(&line);
+                    }
+                });
+                written
             });
             written.map(|()| path)
         });
         match writing.await {
             Some(Ok(path)) => {
                 // It may have been deleted meanwhile, and its files before this one was there.
-                if let Ok(None) = self.store.summary(game).await {
+                if self.store.outlives_server()
+                    && let Ok(None) = self.store.summary(game).await
+                {
                     let removing = tokio::task::spawn_blocking(move || atomic_file::remove(&path));
                     if !matches!(removing.await, Ok(Ok(()))) {
                         error!(%game, "the record file of a deleted game was not removed");

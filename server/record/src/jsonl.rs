@@ -126,7 +126,10 @@ pub fn write(path: &Path, lines: &[RecordLine]) -> Result<(), RecordFileError> {
         std::fs::create_dir_all(folder).map_err(|source| io_error(path, source))?;
     }
     let file = AtomicFile::create(path)?;
-    write_to(file, path, |write| lines.iter().for_each(write))
+    write_to(file, path, |write| {
+        lines.iter().for_each(write);
+        Ok(())
+    })
 }
 
 /// Copies the text of a record atomically, creating parent folders.
@@ -148,10 +151,10 @@ pub fn copy(from: &Path, to: &Path) -> Result<(), RecordFileError> {
 /// not public.
 ///
 /// # Errors
-/// The first error of the file system; the record is then unchanged.
+/// The first error of the file system, or that of `lines`; the record is then unchanged.
 pub fn write_private(
     path: &Path,
-    lines: impl FnOnce(&mut dyn FnMut(&RecordLine)),
+    lines: impl FnOnce(&mut dyn FnMut(&RecordLine)) -> io::Result<()>,
 ) -> Result<(), RecordFileError> {
     if let Some(folder) = path.parent() {
         private::create_folder(folder).map_err(|source| io_error(path, source))?;
@@ -162,15 +165,17 @@ pub fn write_private(
 fn write_to(
     mut file: AtomicFile,
     path: &Path,
-    lines: impl FnOnce(&mut dyn FnMut(&RecordLine)),
+    lines: impl FnOnce(&mut dyn FnMut(&RecordLine)) -> io::Result<()>,
 ) -> Result<(), RecordFileError> {
     let mut written = Ok(());
-    lines(&mut |line| {
+    let passed_on = lines(&mut |line| {
         if written.is_ok() {
             written = write_line(&mut file, line);
         }
     });
-    written.map_err(|source| io_error(path, source))?;
+    written
+        .and(passed_on)
+        .map_err(|source| io_error(path, source))?;
     Ok(file.finish()?)
 }
 

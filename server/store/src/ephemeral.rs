@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use chefshat_proto::v1;
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
-use tokio::sync::{Semaphore, SemaphorePermit};
+use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 use tracing::{error, warn};
 
@@ -257,16 +257,6 @@ impl<W> EphemeralJournal<W> {
     }
 }
 
-/// The right to read a game into memory; `None` for one that is there already.
-async fn loading(filed: &Filed) -> Result<Option<SemaphorePermit<'_>>, StoreError> {
-    let is_in_memory = filed.blocks().is_empty();
-    if is_in_memory {
-        return Ok(None);
-    }
-    let loading = filed.scratch.0.loaded.acquire().await;
-    loading.map(Some).map_err(failed)
-}
-
 /// Works on all encoded entries of a game.
 async fn with_all<T: Send + 'static>(
     filed: Arc<Filed>,
@@ -313,7 +303,6 @@ impl<W: StoreFinished> Journal for EphemeralJournal<W> {
             form::read_entries(&encoded, &mut entries).map(|()| entries)
         };
         async move {
-            let _loading = loading(&self.filed).await?;
             let (filed, encoded) = (Arc::clone(&self.filed), self.encoded.clone());
             let decoded = with_all(filed, encoded, decode).await?;
             decoded.map_err(|problem| StoreError::Failed(problem.to_string()))
@@ -326,13 +315,18 @@ impl<W: StoreFinished> Journal for EphemeralJournal<W> {
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
-        let none = Filed::none(self.filed.scratch.clone());
-        let filed = std::mem::replace(&mut self.filed, none);
+        let scratch = self.filed.scratch.clone();
+        let filed = std::mem::replace(&mut self.filed, Filed::none(scratch.clone()));
         let encoded = std::mem::take(&mut self.encoded);
         let signature = signature.as_ref().map(form::signature_to_bytes);
         async move {
-            let _loading = loading(&filed).await?;
-            let entries = with_all(Arc::clone(&filed), encoded, |all| all).await?;
+            let is_long = !filed.blocks().is_empty();
+            let _loaded = if is_long {
+                Some(scratch.0.loaded.acquire().await.map_err(failed)?)
+            } else {
+                None
+            };
+            let entries = with_all(filed, encoded, |all| all).await?;
             let stored = (self.whole).store_finished(&self.header, entries, summary, signature);
             match stored.await {
                 // The game was played anyway; the record that was stored first stays.

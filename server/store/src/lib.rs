@@ -232,8 +232,8 @@ pub trait Store: Send + Sync + 'static {
     fn has_space(&self) -> bool {
         true
     }
-    /// Waits until there is, as `has_space` says; `false` if the server stops before.
-    fn space(&self) -> BoxFuture<'_, bool> {
+    /// Waits until `has_space` is true; `false` if the server stops first.
+    fn wait_for_space(&self) -> BoxFuture<'_, bool> {
         ready(true).boxed()
     }
     /// The server stops: what waits for space on the disk fails.

@@ -117,7 +117,8 @@ impl Noticed {
 
 /// Shifts of a game that lasts this long and ends soon after.
 pub(crate) fn shifts_within(time: Duration) -> u32 {
-    u32::try_from(time.as_secs().max(1) * SHIFTS_PER_SECOND).unwrap_or(LONG)
+    let shifts = time.as_secs().max(1) * SHIFTS_PER_SECOND;
+    u32::try_from(shifts).map_or(LONG, |shifts| shifts.min(LONG))
 }
 
 /// The room while it plays.

@@ -103,9 +103,10 @@ async fn attacked(
             other => return Err(HostileError::Prepare(format!("{other:?}"))),
         }
     }
-    let shifts = match attack.setup.one_game {
-        true => shifts_within(options.quiet + options.seconds),
-        false => SHORT,
+    let shifts = if attack.setup.one_game {
+        shifts_within(options.quiet + options.seconds)
+    } else {
+        SHORT
     };
     let honest = HonestRoom::start(server.access.clone(), shifts);
     let control = HonestRoom::start(spared.access.clone(), shifts);

@@ -188,8 +188,8 @@ impl Store for SqliteStore {
         self.space.has_some()
     }
 
-    fn space(&self) -> BoxFuture<'_, bool> {
-        self.space.some().boxed()
+    fn wait_for_space(&self) -> BoxFuture<'_, bool> {
+        self.space.wait_for_some().boxed()
     }
 
     fn stop_waiting(&self) {

@@ -19,7 +19,8 @@ use super::errors::is_full;
 /// disk this part of the reserve is a share of its size.
 const MAX_RESERVE_BYTES: u64 = 64 * 1024 * 1024;
 const RESERVE_SHARE: u64 = 50;
-/// What is reserved for each running game besides: its journal and its record. Decisions alone, with
+/// What is reserved for each running game besides: its journal and the file of its record, which
+/// waits if it needs more. Decisions alone, with
 /// their times, take about half of it in a long game of the standard rules. Annotations,
 /// expressions, markers and samples are not in it: they are refused before the reserve is used.
 pub(super) const BYTES_PER_GAME: u64 = 256 * 1024;
@@ -27,7 +28,7 @@ pub(super) const BYTES_PER_GAME: u64 = 256 * 1024;
 const NO_SPACE_BYTES: u64 = 1024 * 1024;
 /// How often a commit that found the disk full is tried again.
 const RETRY: Duration = Duration::from_secs(1);
-/// How often what needs no space at once looks whether there is some.
+/// How often background work checks for space.
 const LOOK_AGAIN: Duration = Duration::from_secs(5);
 /// How often the operator is reminded of it.
 const REMINDER: Duration = Duration::from_secs(60);
@@ -122,8 +123,8 @@ impl Space {
         }
     }
 
-    /// Waits until there is some, as `has_some` says; `false` if the server stops before.
-    pub(super) async fn some(&self) -> bool {
+    /// Waits until `has_some` is true; `false` if the server stops first.
+    pub(super) async fn wait_for_some(&self) -> bool {
         while !self.has_some() {
             tokio::select! {
                 () = sleep(LOOK_AGAIN) => {}
@@ -248,11 +249,11 @@ mod tests {
             sleep(RETRY).await;
             space.found();
         };
-        let (has_some, ()) = tokio::join!(space.some(), found);
+        let (has_some, ()) = tokio::join!(space.wait_for_some(), found);
         assert!(has_some && !space.is_full());
         assert!(space.wait(since).await);
         space.stop();
-        assert!(!space.wait(since).await && !space.some().await);
+        assert!(!space.wait(since).await && !space.wait_for_some().await);
     }
 
     #[test]
