@@ -18,11 +18,12 @@ mod seat;
 mod server;
 
 pub use busy_rooms::{BusyRooms, RoomKind};
+pub use chefshat_postgres::own_address;
 pub use disk::{SmallDisk, skip};
 pub use ledger::{Ledger, Recorded};
 pub use link::{Held, Link, Way};
 pub use nodes::{TestNode, TestNodes};
-pub use process::{Ended, Launch, Process, own_address, set_up};
+pub use process::{Ended, Launch, Process, set_up};
 pub use scores::scores;
 pub use seat::{StreamSeat, attach_all, first_legal, first_update, is_legal, play_on};
 pub use server::{

@@ -2,17 +2,15 @@
 //! `server` runs one in the test's process.
 
 use std::ffi::OsString;
-use std::net::Ipv4Addr;
 use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
-use std::sync::atomic::{AtomicU8, Ordering};
 
 use serde_json::Value;
 use tokio::io::{AsyncBufReadExt as _, AsyncReadExt as _, BufReader};
 use tokio::process::{Child, Command};
 use tokio::task::JoinHandle;
 
-use crate::patiently;
+use crate::{own_address, patiently};
 
 /// A path that `cargo xtask test` prepares and passes in the environment: the binary, an
 /// interpreter, a folder.
@@ -209,14 +207,4 @@ impl Process {
             .expect("reading does not panic");
         Ended { status, said }
     }
-}
-
-/// A loopback address that no other test of this machine listens on. Connections come from
-/// 127.0.0.1, so a client that tries to connect while the server is down never gets the server's
-/// port.
-pub fn own_address() -> Ipv4Addr {
-    static NEXT: AtomicU8 = AtomicU8::new(1);
-    let [_, _, high, low] = std::process::id().to_be_bytes();
-    let number = NEXT.fetch_add(1, Ordering::Relaxed);
-    Ipv4Addr::new(127, 100 + number % 100, high, low)
 }

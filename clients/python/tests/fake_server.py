@@ -44,10 +44,11 @@ class FakeServer(
     `fault` is called with a game, a seat and an answer before the answer is taken. If it returns "before", the stream breaks
     without the answer having been taken; if "after", the answer is taken and the stream breaks before the acknowledgement.
 
-    With a `token` it uses TLS and refuses every call without this token. `port` 0 is a free one.
+    With a `token` it uses TLS and refuses every call without this token. `host` is where one
+    without listens; `port` 0 is a free one.
     """
 
-    def __init__(self, token: str = "", port: int = 0) -> None:
+    def __init__(self, token: str = "", host: str = "127.0.0.1", port: int = 0) -> None:
         self.games: list[FakeGame] = []
         self.created: list[pb.CreateRoomRequest] = []
         self.streams = 0
@@ -80,7 +81,7 @@ class FakeServer(
             port = self._server.add_secure_port("127.0.0.1:0", grpc.ssl_server_credentials([files]))
             self.address = f"https://127.0.0.1:{port}"
         else:
-            self.address = f"127.0.0.1:{self._server.add_insecure_port(f'127.0.0.1:{port}')}"
+            self.address = f"{host}:{self._server.add_insecure_port(f'{host}:{port}')}"
 
     def __enter__(self) -> Self:
         self._server.start()

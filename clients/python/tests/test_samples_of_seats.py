@@ -2,7 +2,7 @@
 
 import itertools
 import math
-import socket
+import os
 import time
 from collections.abc import Callable
 
@@ -93,9 +93,10 @@ def test_a_refusal_in_the_thread_is_raised_by_a_push(fake: FakeServer) -> None:
 def test_an_outage_loses_no_sample_and_moves_none() -> None:
     begun = time.monotonic()
     taken = [begun + number / 100 for number in range(1_200)]
-    with chefshat.Client(f"127.0.0.1:{free_port()}", timeout=1.0) as client:
-        port = int(client.address.rsplit(":", 1)[1])
-        with FakeServer(port=port) as before:
+    # No other server of a test listens there, also while this one is away.
+    host, port = f"127.195.{(os.getpid() >> 8) & 255}.{os.getpid() & 255}", 50_051
+    with chefshat.Client(f"{host}:{port}", timeout=1.0) as client:
+        with FakeServer(host=host, port=port) as before:
             room_id, ticket = seated(client)
             stream = SampleStream(client, ticket, room_id, "affect", ["valence"], interval_s=0.01)
             for at in taken[:100]:
@@ -105,7 +106,7 @@ def test_an_outage_loses_no_sample_and_moves_none() -> None:
             stream.push([at - begun], at)
         with pytest.raises(ChefsHatError, match="UNAVAILABLE"):
             stream.flush()
-        with FakeServer(port=port) as after:
+        with FakeServer(host=host, port=port) as after:
             after.games.extend(before.games)
             for at in taken[1_100:]:
                 stream.push([at - begun], at)
@@ -126,9 +127,3 @@ def wait_for(condition: Callable[[], bool]) -> None:
     """Waits until a condition holds."""
     while not condition():
         time.sleep(0.01)
-
-
-def free_port() -> int:
-    """A port that is free now."""
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        return int(listener.getsockname()[1])

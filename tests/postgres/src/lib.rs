@@ -1,15 +1,15 @@
-//! A PostgreSQL server for tests: Debian's, in a temporary folder, on a free port of loopback. All
-//! tests of a process share one server and have a database each; a test that stops its server has
+//! A PostgreSQL server for tests: Debian's, in a temporary folder, on an address of its own. All tests
+//! of a process share one server and have a database each; a test that stops its server has
 //! one of its own. The server ends with the process that started it, however that ends.
 
 use std::fs;
 use std::io::{self, Write as _};
-use std::net::TcpListener;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, chown};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -17,6 +17,8 @@ use tempfile::TempDir;
 
 /// Where Debian's packages have the programs, in a folder for each version.
 const PROGRAMS: &str = "/usr/lib/postgresql";
+/// PostgreSQL's port.
+const PORT: u16 = 5432;
 /// The user that owns all databases.
 const USER: &str = "chefshat";
 /// The system's user `nobody`: PostgreSQL refuses to run as root.
@@ -26,8 +28,7 @@ const LIMIT: Duration = Duration::from_secs(60);
 /// The settings of a server of which nothing is to survive a crash of the machine.
 const FAST: &[&str] = &["fsync=off", "full_page_writes=off"];
 /// The settings of every server.
-const SETTINGS: [&str; 4] = [
-    "listen_addresses=127.0.0.1",
+const SETTINGS: [&str; 3] = [
     "max_connections=500",
     "shared_buffers=32MB",
     "unix_socket_directories=",
@@ -48,7 +49,7 @@ wait $server
 pub struct Server {
     folder: TempDir,
     programs: PathBuf,
-    port: u16,
+    address: SocketAddr,
     settings: &'static [&'static str],
     keeper: Option<Child>,
 }
@@ -98,7 +99,7 @@ impl Server {
             chown(folder.path(), Some(NOBODY), Some(NOBODY)).expect("root may change owners");
         }
         let mut server = Self {
-            port: free_port(),
+            address: (own_address(), PORT).into(),
             programs,
             folder,
             settings,
@@ -134,14 +135,14 @@ impl Server {
 
     fn with_url(&self, name: &str) -> Database {
         Database {
-            url: format!("postgres://{USER}@127.0.0.1:{}/{name}", self.port),
+            url: format!("postgres://{USER}@{}/{name}", self.address),
             programs: self.programs.clone(),
         }
     }
 
-    /// Its port on 127.0.0.1.
-    pub fn port(&self) -> u16 {
-        self.port
+    /// Where it listens, also when it runs again after a stop.
+    pub fn address(&self) -> SocketAddr {
+        self.address
     }
 
     /// Ends the server at once, as a crash does.
@@ -177,7 +178,8 @@ impl Server {
                     .replace('\n', "'\n")
             })
             .collect();
-        let settings = format!("{settings}port = {}\n", self.port);
+        let (ip, port) = (self.address.ip(), self.address.port());
+        let settings = format!("{settings}listen_addresses = '{ip}'\nport = {port}\n");
         let file = self.data().join("postgresql.auto.conf");
         fs::write(file, settings).expect("the folder of the database is writable");
         let log = fs::File::create(self.log()).expect("the folder is writable");
@@ -224,9 +226,12 @@ impl Server {
     }
 
     fn is_ready(&self) -> bool {
-        let port = self.port.to_string();
+        let (ip, port) = (
+            self.address.ip().to_string(),
+            self.address.port().to_string(),
+        );
         Command::new(self.programs.join("pg_isready"))
-            .args(["--quiet", "--host=127.0.0.1", "--port", &port])
+            .args(["--quiet", "--host", &ip, "--port", &port])
             .status()
             .is_ok_and(|status| status.success())
     }
@@ -296,9 +301,14 @@ fn as_nobody(program: &Path) -> Command {
     command
 }
 
-fn free_port() -> u16 {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("loopback has a free port");
-    listener.local_addr().expect("it is bound").port()
+/// A loopback address that no other test of this machine listens on: a free port may be another's
+/// by the time that its server listens, or listens again. Connections come from 127.0.0.1, so a
+/// client that tries to connect while the server is down never gets the server's port.
+pub fn own_address() -> Ipv4Addr {
+    static NEXT: AtomicU8 = AtomicU8::new(1);
+    let [_, _, high, low] = std::process::id().to_be_bytes();
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    Ipv4Addr::new(127, 100 + number % 100, high, low)
 }
 
 /// What a program printed.

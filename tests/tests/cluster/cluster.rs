@@ -1,7 +1,7 @@
 //! A cluster as it is operated: server processes as nodes on a PostgreSQL server, behind a proxy.
 //! Between each node and the database, and between each two nodes, is a way that can hold and break.
 
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -103,10 +103,9 @@ impl Cluster {
         let pairs = Arc::new(Pairs::new(count));
         let mut nodes = Vec::new();
         for number in 0..count {
-            let link = Link::to((Ipv4Addr::LOCALHOST, postgres.port()).into()).await;
-            let old_port = format!(":{}/", postgres.port());
-            let new_port = format!(":{}/", link.address.port());
-            let url = database.url().replace(&old_port, &new_port);
+            let link = Link::to(postgres.address()).await;
+            let (own, through) = (postgres.address().to_string(), link.address.to_string());
+            let url = database.url().replace(&own, &through);
             let folder = folder.path().join(format!("node{number}"));
             std::fs::create_dir(&folder).expect("a new folder");
             let certificate = authority.certificate(&folder);

@@ -277,13 +277,10 @@ async fn a_seat_is_attached_when_its_room_has_been_taken_over() {
 }
 
 /// A node to which nobody can connect.
-async fn unreachable_node() -> Location {
-    let closed = TcpListener::bind("127.0.0.1:0").await.expect("a port");
-    let endpoint = closed.local_addr().expect("bound").to_string();
-    drop(closed);
+fn unreachable_node() -> Location {
     Location::Node(Peer {
         node: "died".into(),
-        endpoint: endpoint.into(),
+        endpoint: "127.0.0.1:1".into(),
     })
 }
 
@@ -303,7 +300,7 @@ async fn stream_of_gateway(node: &Node, directory: &Arc<Says>) -> Stream {
 
 #[tokio::test(start_paused = true)]
 async fn a_client_whose_room_is_at_a_node_that_cannot_be_reached_from_here_tries_another() {
-    let directory = Says::only(unreachable_node().await);
+    let directory = Says::only(unreachable_node());
     let node = Node::start(&directory);
     let mut stream = stream_of_gateway(&node, &directory).await;
     stream.read(0, Command::Attach(elsewhere()));
@@ -318,7 +315,7 @@ async fn a_client_whose_room_is_at_a_node_that_cannot_be_reached_from_here_tries
 
 #[tokio::test]
 async fn an_attachment_to_a_node_that_has_just_died_ends_no_stream() {
-    let directory = Says::first(unreachable_node().await, Location::Nowhere);
+    let directory = Says::first(unreachable_node(), Location::Nowhere);
     let node = Node::start(&directory);
     let mut stream = stream_of_gateway(&node, &directory).await;
     stream.reader.attach(node.seat().await).await;
@@ -375,7 +372,7 @@ async fn a_participant_waits_for_the_seats_that_its_client_attached_before() {
 
 #[tokio::test]
 async fn a_participant_waits_for_a_seat_on_its_way_to_a_node_that_has_died() {
-    let directory = Says::first(unreachable_node().await, Location::Nowhere);
+    let directory = Says::first(unreachable_node(), Location::Nowhere);
     let node = Node::start(&directory);
     let mut stream = stream_of_gateway(&node, &directory).await;
     let seat = Token::random(Id([1; 16]));

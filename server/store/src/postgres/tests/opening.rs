@@ -2,6 +2,7 @@
 
 use chefshat_postgres::Server;
 
+use super::retrying::Line;
 use super::*;
 use crate::postgres::open::{IfEmpty, NEWEST};
 
@@ -104,7 +105,8 @@ async fn connections_are_encrypted_and_certificates_checked() {
     server.stop();
     server.encrypt(&text("localhost.pem"), &text("localhost.key"));
     server.resume();
-    let by_name = database.url().replace("127.0.0.1", "localhost");
+    let line = Line::to(&database).await;
+    let by_name = line.url.replace("127.0.0.1", "localhost");
     let options = PostgresOptions::default;
     let root = format!("sslrootcert={}", tls("localhost.pem"));
     let checked = format!("{by_name}?sslmode=verify-full&{root}");

@@ -22,29 +22,27 @@ enum Fault {
 }
 
 /// What is between a node and its database.
-struct Line {
-    url: String,
+pub(super) struct Line {
+    pub(super) url: String,
     faults: watch::Sender<Fault>,
 }
 
 impl Line {
-    async fn to(database: &Database) -> Self {
+    pub(super) async fn to(database: &Database) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a free port");
-        let own = listener.local_addr().expect("it is bound").port();
-        let port = open::address(database.url())
-            .expect("an address")
-            .get_port();
+        let own = listener.local_addr().expect("it is bound").to_string();
+        let address = open::address(database.url()).expect("an address");
+        let address = format!("{}:{}", address.get_host(), address.get_port());
+        let url = database.url().replacen(&address, &own, 1);
         let faults = watch::Sender::new(Fault::Cut);
         let line = faults.clone();
         tokio::spawn(async move {
             while let Ok((node, _)) = listener.accept().await {
-                let database = TcpStream::connect(("127.0.0.1", port)).await;
+                let database = TcpStream::connect(&address).await;
                 let database = database.expect("the database listens");
                 tokio::spawn(carry(node, database, line.subscribe()));
             }
         });
-        let (from, to) = (format!(":{port}/"), format!(":{own}/"));
-        let url = database.url().replacen(&from, &to, 1);
         Self { url, faults }
     }
 
