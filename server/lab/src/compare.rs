@@ -114,7 +114,7 @@ impl Compare {
             .map_err(|error| self.explained(error))?;
         let bar = progress::of_items(self.deals, "deals");
         let pool = threads::pool(self.threads, self.deals)?;
-        let comparison = pool.install(|| duplicate.run(|deals| bar.inc(deals)));
+        let comparison = pool.install(|| duplicate.run(&|deals| bar.inc(deals)));
         bar.finish_and_clear();
         let played = Played {
             compare: &self,

@@ -112,7 +112,7 @@ impl Mechanics {
         pool.install(|| {
             for row in &mut rows {
                 let play =
-                    |&shifts| MechanicsTable::play(row.rules, shifts, self.seed, |n| bar.inc(n));
+                    |&shifts| MechanicsTable::play(row.rules, shifts, self.seed, &|n| bar.inc(n));
                 row.tables = numbers.iter().map(play).collect();
             }
         });

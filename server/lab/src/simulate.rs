@@ -78,7 +78,7 @@ impl Simulate {
         let pool = threads::pool(self.threads, batch.games())?;
         let bar = progress::of_items(batch.games(), "games");
         let start = Instant::now();
-        let table = pool.install(|| batch.run(|games| bar.inc(games)));
+        let table = pool.install(|| batch.run(&|games| bar.inc(games)));
         bar.finish_and_clear();
         if !bar.is_hidden() {
             say_speed(&table, start.elapsed().as_secs_f64());

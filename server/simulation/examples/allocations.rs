@@ -102,7 +102,7 @@ fn compared(arguments: &Arguments) -> Comparison {
         arguments.seed,
     )
     .expect("valid contenders")
-    .run(|_| {})
+    .run(&|_| {})
 }
 
 /// Agents that share rollouts by PUCT.

@@ -65,7 +65,7 @@ fn rows(arguments: &Arguments) -> Vec<Row> {
     cases(arguments.seed)
         .into_iter()
         .map(|case| {
-            let measured = case.same_seat.measure(&checks, |_| {});
+            let measured = case.same_seat.measure(&checks, &|_| {});
             (case, measured)
         })
         .collect()

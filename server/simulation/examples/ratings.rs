@@ -71,7 +71,7 @@ fn rows(arguments: &Arguments) -> Vec<Row> {
         })
     });
     let measured = kinds.flat_map(|fields| {
-        let found = calibration(&fields, &ROUNDS, after_game);
+        let found = calibration(&fields, &ROUNDS, &after_game);
         found
             .into_iter()
             .zip(ROUNDS)

@@ -11,6 +11,7 @@ use chefshat_engine::{
 use thiserror::Error;
 
 use crate::BatchTable;
+use crate::Progress;
 use crate::fold::fold_in_order;
 use chefshat_agents::is_wrong_action;
 use chefshat_agents::{BuiltInAgent, Listener, NamedAgent, agent_seed, game_seed, play_agents};
@@ -146,7 +147,7 @@ impl Batch {
 
     /// Plays all games on the current rayon pool and returns the totals. `progress` is called from
     /// any thread with the number of games finished since its last call.
-    pub fn run(&self, progress: impl Fn(u64) + Sync) -> BatchTable {
+    pub fn run(&self, progress: Progress<'_>) -> BatchTable {
         self.fold(
             || BatchTable::empty(self.rules.players()),
             |table, index| {
@@ -159,7 +160,7 @@ impl Batch {
 
     /// Plays all games on the current rayon pool; returns how each ended, by its index. `progress`: as
     /// for [`Batch::run`].
-    pub fn results(&self, progress: impl Fn(u64) + Sync) -> Vec<Standings> {
+    pub fn results(&self, progress: Progress<'_>) -> Vec<Standings> {
         let add = |results: &mut Vec<Standings>, index| {
             results.push(self.play_game(index, &mut Silent));
             progress(1);

@@ -85,20 +85,19 @@ impl Calibration {
     }
 }
 
+/// Computes the ratings after a game from those before it, each with a place from 1.
+pub type Update = dyn Fn(&[(Rating, u32)]) -> Vec<Rating> + Sync;
+
 /// Plays the fields and compares after each of these numbers of rounds, which ascend. In a round
-/// everyone plays one game, except for those left over. `update` computes the ratings after a game,
-/// as [`after_game`](chefshat_tournament::ratings::after_game) does. Runs on the current rayon
-/// pool, which does not affect the result.
-pub fn calibration(
-    fields: &Fields,
-    rounds: &[u32],
-    update: impl Fn(&[(Rating, u32)]) -> Vec<Rating> + Sync,
-) -> Vec<Calibration> {
+/// everyone plays one game, except for those left over. `update` may be
+/// [`after_game`](chefshat_tournament::ratings::after_game). Runs on the current rayon pool, which
+/// does not affect the result.
+pub fn calibration(fields: &Fields, rounds: &[u32], update: &Update) -> Vec<Calibration> {
     fold_in_order(
         fields.fields,
         1,
         || vec![Calibration::default(); rounds.len()],
-        |sums, field| add_field(fields, field, rounds, &update, sums),
+        |sums, field| add_field(fields, field, rounds, update, sums),
         |all, more| {
             for (sums, more) in all.iter_mut().zip(more) {
                 sums.merge(&more);
@@ -111,7 +110,7 @@ fn add_field(
     fields: &Fields,
     field: u64,
     rounds: &[u32],
-    update: &impl Fn(&[(Rating, u32)]) -> Vec<Rating>,
+    update: &Update,
     sums: &mut [Calibration],
 ) {
     let mut generator = ChaCha8Rng::seed_from_u64(fields.seed);

@@ -2,6 +2,10 @@
 
 use rayon::prelude::*;
 
+/// Called from any thread with the number of items finished since its last call. Not generic: what
+/// runs on all cores would be compiled again for each caller.
+pub type Progress<'a> = &'a (dyn Fn(u64) + Sync);
+
 /// Chunks whose results are in memory at a time.
 const WAVE: u64 = 1024;
 

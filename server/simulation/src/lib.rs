@@ -10,7 +10,7 @@
 //!
 //! let rules = RuleSetSpec::default().validate()?;
 //! let agents = [AgentKind::Greedy, AgentKind::Random, AgentKind::Random, AgentKind::Random];
-//! let table = Batch::new(rules, &agents, 20, 7)?.run(|games| println!("{games} more games"));
+//! let table = Batch::new(rules, &agents, 20, 7)?.run(&|games| println!("{games} more games"));
 //! println!("greedy takes {:.2} points a Shift", table.points_per_shift(Seat::new(0)));
 //! # assert_eq!(table.games, 20);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -34,5 +34,6 @@ pub use duplicate::{
     Candidate, Comparison, Contender, Duplicate, DuplicateError, Figure, Measured, SameSeat,
     SeatPlan, Seating,
 };
+pub use fold::Progress;
 pub use rules_form::{OpeningName, PassScopeName, RulesForm, RulesFormError};
 pub use table::{BatchTable, SeatTable};

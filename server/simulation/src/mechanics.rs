@@ -10,7 +10,7 @@
 
 use chefshat_engine::{Event, MetricsRecorder, RuleSet, RuleSetSpec, ShiftMetrics, Stop};
 
-use crate::Batch;
+use crate::{Batch, Progress};
 use chefshat_agents::{AgentKind, Listener};
 use chefshat_tournament::statistics::{Interval, Moments, wilson95};
 
@@ -118,7 +118,7 @@ impl MechanicsTable {
     /// [`Condition::rules`], on the current rayon pool. Game i is game i of a [`Batch`] with this
     /// seed, so that conditions with the same deck have the same deals. `progress` is called from
     /// any thread with the number of Shifts finished since its last call.
-    pub fn play(rules: RuleSet, shifts: u64, seed: u64, progress: impl Fn(u64) + Sync) -> Self {
+    pub fn play(rules: RuleSet, shifts: u64, seed: u64, progress: Progress<'_>) -> Self {
         let games = shifts.div_ceil(u64::from(SHIFTS_PER_GAME));
         let agents = vec![AgentKind::Random; rules.players()];
         let batch = Batch::new(rules, &agents, games, seed)

@@ -9,6 +9,7 @@ use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use chefshat_tournament::statistics::{Interval, Moments, wilson95};
 
+use crate::Progress;
 use crate::chance::{index, normal};
 use crate::fold::fold_in_order;
 
@@ -127,7 +128,7 @@ pub fn power(
     alpha: f64,
     studies: u64,
     seed: u64,
-    progress: impl Fn(u64) + Sync,
+    progress: Progress<'_>,
 ) -> Power {
     let without = measure.without_effect();
     let is_within = design.is_within();

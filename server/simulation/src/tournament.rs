@@ -7,6 +7,7 @@ use chefshat_engine::{
 use rayon::prelude::*;
 use thiserror::Error;
 
+use crate::Progress;
 use chefshat_agents::is_wrong_action;
 use chefshat_agents::seating_agent_seed;
 use chefshat_agents::{BuiltInAgent, Listener, NamedAgent, game_seed, play_agents};
@@ -32,7 +33,7 @@ pub enum OfflineProblem {
 
 /// Plays a tournament that has begun to its end, on the current rayon pool. Game n is dealt as game
 /// n of a batch of this seed, or as game d if its deal has the number d. `progress` is called from
-/// any thread after every game.
+/// any thread with the number of games finished since its last call.
 ///
 /// # Errors
 /// If a participant is not a built-in agent, or the rule set is for another number of players.
@@ -40,7 +41,7 @@ pub fn play_offline(
     tournament: &mut Tournament,
     rules: RuleSet,
     seed: u64,
-    progress: impl Fn() + Sync,
+    progress: Progress<'_>,
 ) -> Result<(), OfflineProblem> {
     let (players, seats) = (rules.players(), tournament.settings().players);
     if players != seats {
@@ -56,7 +57,7 @@ pub fn play_offline(
     while tournament.state() == State::Playing {
         // Built-in agents never wait, so time stands still.
         let Some(change) = tournament.next(0) else {
-            play_called(tournament, &agents, rules, seed, &progress);
+            play_called(tournament, &agents, rules, seed, progress);
             continue;
         };
         tournament.fold(&change);
@@ -70,7 +71,7 @@ fn play_called(
     agents: &[NamedAgent],
     rules: RuleSet,
     seed: u64,
-    progress: &(impl Fn() + Sync),
+    progress: Progress<'_>,
 ) {
     let called: Vec<usize> = tournament.playing().collect();
     assert!(
@@ -81,7 +82,7 @@ fn play_called(
         .into_par_iter()
         .map(|index| {
             let ended = play_game(&tournament.games()[index], index, agents, rules, seed);
-            progress();
+            progress(1);
             tournament
                 .ended(index, ended)
                 .expect("it is one of the games being played")

@@ -188,7 +188,7 @@ impl Simulate {
                         self.alpha,
                         self.studies,
                         self.seed,
-                        count,
+                        &count,
                     )
                 };
                 let power = pool.install(simulate);

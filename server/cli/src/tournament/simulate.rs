@@ -89,7 +89,7 @@ impl Simulate {
         for change in tournament.begin()? {
             tournament.fold(&change);
         }
-        pool.install(|| play_offline(&mut tournament, rules, self.seed, || bar.inc(1)))?;
+        pool.install(|| play_offline(&mut tournament, rules, self.seed, &|games| bar.inc(games)))?;
         bar.finish_and_clear();
         eprintln!(
             "{} in {:.1} s",

@@ -99,7 +99,7 @@ impl Pool {
                 let plan = SeatPlan::One;
                 let duplicate =
                     Duplicate::new(rules, NonZeroU32::MIN, contenders, plan, self.deals, 0)?;
-                let points = duplicate.run(|deals| bar.inc(deals)).points;
+                let points = duplicate.run(&|deals| bar.inc(deals)).points;
                 pairs.push(Pair {
                     row,
                     column,

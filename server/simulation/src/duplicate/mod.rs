@@ -18,6 +18,7 @@ use chefshat_engine::{
 };
 use thiserror::Error;
 
+use crate::Progress;
 use crate::fold::fold_in_order;
 use chefshat_agents::seating_agent_seed;
 use chefshat_agents::{
@@ -205,7 +206,7 @@ impl Duplicate {
 
     /// Plays all games on the current rayon pool and returns the totals. `progress` is called from
     /// any thread with the number of deals finished since its last call.
-    pub fn run(&self, progress: impl Fn(u64) + Sync) -> Comparison {
+    pub fn run(&self, progress: Progress<'_>) -> Comparison {
         let empty = || Comparison::empty(self.seatings.len());
         fold_in_order(
             self.deals,

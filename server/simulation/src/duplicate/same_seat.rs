@@ -7,6 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
 use super::Contender;
+use crate::Progress;
 use crate::batch::Silent;
 use crate::fold::fold_in_order;
 use chefshat_agents::seating_agent_seed;
@@ -63,7 +64,7 @@ impl SameSeat {
     /// Plays as many games of each as the last of these ascending numbers, and returns the result
     /// after each of them. Runs on the current rayon pool, which does not affect the result.
     /// `progress` is called from any thread with the number of games finished since its last call.
-    pub fn measure(&self, games: &[u64], progress: impl Fn(u64) + Sync) -> Vec<Measured> {
+    pub fn measure(&self, games: &[u64], progress: Progress<'_>) -> Vec<Measured> {
         let all = games.last().copied().unwrap_or(0);
         let mut sums = Sums::default();
         let mut played = 0;

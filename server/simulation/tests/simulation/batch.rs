@@ -44,7 +44,7 @@ fn any_number_of_threads_gives_the_same_table() {
     let batch = Batch::new(standard(), &agents, 301, 7)
         .unwrap()
         .with_rewards(RewardScheme::Paper);
-    let tables = [1, 2, 3].map(|threads| on_threads(threads, || batch.run(|_| {})));
+    let tables = [1, 2, 3].map(|threads| on_threads(threads, || batch.run(&|_| {})));
     assert_eq!(tables[0].games, 301);
     assert!(
         tables[0]
@@ -54,7 +54,9 @@ fn any_number_of_threads_gives_the_same_table() {
     );
     assert_identical(&tables[0], &tables[1]);
     assert_identical(&tables[0], &tables[2]);
-    let other_seed = Batch::new(standard(), &agents, 301, 8).unwrap().run(|_| {});
+    let other_seed = Batch::new(standard(), &agents, 301, 8)
+        .unwrap()
+        .run(&|_| {});
     assert_ne!(tables[0].decisions, other_seed.decisions);
 }
 
@@ -79,7 +81,7 @@ fn a_fold_keeps_the_order_of_the_games() {
 fn progress_counts_every_game() {
     let finished = AtomicU64::new(0);
     let batch = Batch::new(standard(), &[Greedy; 4], 100, 3).unwrap();
-    batch.run(|games| {
+    batch.run(&|games| {
         finished.fetch_add(games, Ordering::Relaxed);
     });
     assert_eq!(finished.into_inner(), 100);
@@ -103,7 +105,7 @@ fn totals_are_complete() {
             let table = Batch::new(rules, &agents, 40, 11)
                 .unwrap()
                 .with_rewards(scheme)
-                .run(|_| {});
+                .run(&|_| {});
             let sum = |of: fn(&chefshat_simulation::SeatTable) -> u64| {
                 table.seats.values().map(of).sum::<u64>()
             };
@@ -178,7 +180,7 @@ impl Listener for Diary {
 #[test]
 fn a_game_played_alone_is_the_game_of_the_batch() {
     let batch = Batch::new(standard(), &[RandomUnmasked, Greedy, Random, Random], 25, 2).unwrap();
-    let table = batch.run(|_| {});
+    let table = batch.run(&|_| {});
     let mut diaries = Vec::new();
     for index in 0..25 {
         let (mut once, mut again) = (Diary::default(), Diary::default());
@@ -224,7 +226,7 @@ fn a_game_played_alone_is_the_game_of_the_batch() {
 fn a_limit_of_invalid_attempts_bounds_the_wrong_actions() {
     let limit = NonZeroU32::new(3).unwrap();
     let batch = Batch::new(standard(), &[RandomUnmasked; 4], 20, 4).unwrap();
-    let table = batch.with_max_invalid_attempts(limit).run(|_| {});
+    let table = batch.with_max_invalid_attempts(limit).run(&|_| {});
     let wrong: u64 = table.seats.values().map(|seat| seat.wrong).sum();
     assert!(
         wrong > 2 * table.turns && wrong <= 3 * table.turns,
@@ -232,7 +234,7 @@ fn a_limit_of_invalid_attempts_bounds_the_wrong_actions() {
         table.turns
     );
     let unlimited: u64 = batch
-        .run(|_| {})
+        .run(&|_| {})
         .seats
         .values()
         .map(|seat| seat.wrong)
@@ -277,7 +279,7 @@ fn results_of_seed_7_are_stable() {
         7,
     )
     .unwrap();
-    let table = batch.run(|_| {});
+    let table = batch.run(&|_| {});
     let wrong = table.seats[Seat::new(2)].wrong;
     assert_eq!(
         (
@@ -316,7 +318,7 @@ fn invalid_batches_are_refused() {
 fn greedy_beats_random_and_random_is_fair() {
     let rules = standard();
     let random = [Random; 4];
-    let fair = Batch::new(rules, &random, 1_000, 1).unwrap().run(|_| {});
+    let fair = Batch::new(rules, &random, 1_000, 1).unwrap().run(&|_| {});
     for seat in fair.seats.seats() {
         let (won, place) = (fair.seats[seat].games_won, fair.mean_place(seat));
         assert!(
@@ -331,7 +333,7 @@ fn greedy_beats_random_and_random_is_fair() {
     for favourite in fair.seats.seats() {
         let mut agents = random;
         agents[favourite.index()] = Greedy;
-        let table = Batch::new(rules, &agents, 200, 1).unwrap().run(|_| {});
+        let table = Batch::new(rules, &agents, 200, 1).unwrap().run(&|_| {});
         let won = table.seats[favourite].games_won;
         assert!(
             won > 180,

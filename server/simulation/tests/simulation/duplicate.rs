@@ -37,7 +37,7 @@ fn compared(a: AgentKind, b: AgentKind, plan: SeatPlan, players: u8, deals: u64)
     let contenders = [Contender::Kind(a), Contender::Kind(b)];
     duplicate(contenders, plan, players, deals)
         .unwrap()
-        .run(|_| {})
+        .run(&|_| {})
 }
 
 /// A network that plays turns by a fixed order of preference: the highest action first, which sheds
@@ -163,7 +163,7 @@ fn means_add_up_to_the_totals_of_a_shift() {
 #[test]
 fn duplicate_deals_reduce_the_error() {
     let contenders = [Contender::Kind(Greedy), careless()];
-    let comparison = duplicate(contenders, Half, 4, 200).unwrap().run(|_| {});
+    let comparison = duplicate(contenders, Half, 4, 200).unwrap().run(&|_| {});
     let points = &comparison.points;
     assert!(points.standard_error() > 0.0);
     assert!(
@@ -238,7 +238,7 @@ fn any_number_of_threads_gives_the_same_figures_and_progress_counts_every_deal()
         let finished = AtomicU64::new(0);
         let pool = ThreadPoolBuilder::new().num_threads(threads).build();
         let comparison = pool.unwrap().install(|| {
-            duplicate.run(|deals| {
+            duplicate.run(&|deals| {
                 finished.fetch_add(deals, Ordering::Relaxed);
             })
         });
@@ -287,6 +287,6 @@ fn the_trained_agent_is_stronger_than_greedy() {
     let rules = RuleSetSpec::default().validate().unwrap();
     let shifts = NonZeroU32::new(4).unwrap();
     let comparison = Duplicate::new(rules, shifts, contenders, Half, 40, 0);
-    let points = comparison.unwrap().run(|_| {}).points;
+    let points = comparison.unwrap().run(&|_| {}).points;
     assert!(points.interval95().low > 0.5, "{points:?}");
 }

@@ -78,7 +78,7 @@ const GOLDEN: [(&str, Condition, [u64; 4]); 8] = [
 fn the_paper_s_number_of_shifts_is_one_game_with_these_figures() {
     for (preset, condition, golden) in GOLDEN {
         let rules = condition.rules(preset).unwrap();
-        let table = MechanicsTable::play(rules, 250, 0, |_| {});
+        let table = MechanicsTable::play(rules, 250, 0, &|_| {});
         assert_eq!(table.shifts(), 250);
         let sum = |mean: f64| (250.0 * mean).round() as u64;
         let (laps, turns) = (sum(table.laps.mean()), sum(table.turns.mean()));
@@ -87,7 +87,7 @@ fn the_paper_s_number_of_shifts_is_one_game_with_these_figures() {
 
         let game = Batch::new(rules, &[AgentKind::Random; 4], 1, 0)
             .unwrap()
-            .run(|_| {});
+            .run(&|_| {});
         assert_eq!((game.shifts, game.laps, game.turns), (250, laps, turns));
         assert_eq!(game.starter_won, table.starter_won);
         assert_eq!(sum(table.pizzas.mean()), game.pizzas);
@@ -99,9 +99,9 @@ fn further_shifts_come_from_further_games_of_which_the_last_counts_in_part() {
     let rules = All.rules("paper").unwrap();
     let games = Batch::new(rules, &[AgentKind::Random; 4], 3, 5)
         .unwrap()
-        .run(|_| {});
+        .run(&|_| {});
     let played = AtomicU64::new(0);
-    let three = MechanicsTable::play(rules, 750, 5, |shifts| {
+    let three = MechanicsTable::play(rules, 750, 5, &|shifts| {
         played.fetch_add(shifts, Ordering::Relaxed);
     });
     assert_eq!(played.into_inner(), 750);
@@ -109,17 +109,17 @@ fn further_shifts_come_from_further_games_of_which_the_last_counts_in_part() {
         (three.shifts(), three.starter_won),
         (750, games.starter_won)
     );
-    let few = MechanicsTable::play(rules, 7, 5, |_| {});
+    let few = MechanicsTable::play(rules, 7, 5, &|_| {});
     let spec = RuleSetSpec {
         stop: Stop::Shifts(7),
         ..rules.spec()
     };
     let short = Batch::new(spec.validate().unwrap(), &[AgentKind::Random; 4], 1, 5).unwrap();
-    let short = short.run(|_| {});
+    let short = short.run(&|_| {});
     assert_eq!((few.shifts(), few.starter_won), (7, short.starter_won));
     assert_eq!((7.0 * few.turns.mean()).round() as u64, short.turns);
     for (shifts, more) in [(500, 250), (501, 249)] {
-        let table = MechanicsTable::play(rules, shifts, 5, |_| {});
+        let table = MechanicsTable::play(rules, shifts, 5, &|_| {});
         assert_eq!((table.shifts() + more), 750);
         assert!(table.starter_won < three.starter_won);
     }
@@ -128,7 +128,7 @@ fn further_shifts_come_from_further_games_of_which_the_last_counts_in_part() {
 #[test]
 fn any_number_of_threads_gives_the_same_table() {
     let rules = WithoutExchange.rules("original2020").unwrap();
-    let tables = [1, 3].map(|n| on_threads(n, || MechanicsTable::play(rules, 9_000, 2, |_| {})));
+    let tables = [1, 3].map(|n| on_threads(n, || MechanicsTable::play(rules, 9_000, 2, &|_| {})));
     assert_eq!(tables[0].shifts(), 9_000);
     assert_eq!(tables[0], tables[1]);
     let interval = tables[0].starter_wins_interval();

@@ -35,7 +35,14 @@ fn fine() -> Answers {
 }
 
 fn found(design: &Design, answers: Answers) -> Power {
-    power(design, &Measure::Answers(answers), 0.05, STUDIES, 7, |_| ())
+    power(
+        design,
+        &Measure::Answers(answers),
+        0.05,
+        STUDIES,
+        7,
+        &|_| (),
+    )
 }
 
 /// Whether a share of the simulated studies agrees with one that is known: within four standard errors.
@@ -116,7 +123,7 @@ fn games_are_drawn_from_those_that_were_played() {
         values: values.map(Vec::from).into(),
         count: 2,
     };
-    let of = |measure| power(&design(20, 1, false), &measure, 0.05, STUDIES, 7, |_| ());
+    let of = |measure| power(&design(20, 1, false), &measure, 0.05, STUDIES, 7, &|_| ());
     let apart = of(games([[3.0, 4.0, 5.0, 4.0], [0.0, 1.0, 2.0, 1.0]]));
     assert_eq!(apart.found, STUDIES);
     assert!((apart.difference.mean() - 3.0).abs() < 0.05, "{apart:?}");
@@ -131,7 +138,7 @@ fn the_same_seed_gives_the_same_power_on_any_number_of_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let measure = Measure::Answers(fine());
         let design = design(20, 1, false);
-        let simulate = || power(&design, &measure, 0.05, 300, seed, |_| ());
+        let simulate = || power(&design, &measure, 0.05, 300, seed, &|_| ());
         pool.expect("threads").install(simulate)
     };
     assert_eq!(of(1, 3), of(3, 3));

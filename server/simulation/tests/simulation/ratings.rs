@@ -1,6 +1,6 @@
 //! Ratings have the right order and honest uncertainties.
 
-use chefshat_simulation::calibration::{Calibration, Fields, calibration};
+use chefshat_simulation::calibration::{Calibration, Fields, Update, calibration};
 use chefshat_tournament::ratings::{
     GameProblem, Rated, Rating, Ratings, after_game, pair_weight, win_chance,
 };
@@ -45,10 +45,10 @@ fn library(players: &[(Rating, u32)]) -> Vec<Rating> {
 }
 
 /// Shares covered, for all kinds of fields and numbers of games.
-fn shares(update: impl Fn(&[(Rating, u32)]) -> Vec<Rating> + Sync) -> Vec<f64> {
+fn shares(update: &Update) -> Vec<f64> {
     let measured = many()
         .into_iter()
-        .flat_map(|fields| calibration(&fields, &ROUNDS, &update));
+        .flat_map(|fields| calibration(&fields, &ROUNDS, update));
     measured
         .map(|Calibration { covered, .. }| {
             assert!(covered.count() >= 320, "too few to say anything");
@@ -59,7 +59,7 @@ fn shares(update: impl Fn(&[(Rating, u32)]) -> Vec<Rating> + Sync) -> Vec<f64> {
 
 #[test]
 fn the_stated_uncertainty_covers_the_truth_as_often_as_it_claims() {
-    let shares = shares(after_game);
+    let shares = shares(&after_game);
     let mean = shares.iter().sum::<f64>() / shares.len() as f64;
     assert!((0.95..0.98).contains(&mean), "{mean}");
     assert!(shares.iter().all(|share| *share > 0.92), "{shares:?}");
@@ -68,7 +68,7 @@ fn the_stated_uncertainty_covers_the_truth_as_often_as_it_claims() {
 #[test]
 fn the_same_test_finds_the_library_overconfident() {
     // Shows that the test above can fail.
-    let shares = shares(library);
+    let shares = shares(&library);
     let worst = shares.iter().copied().fold(1.0, f64::min);
     assert!(worst < 0.9, "{shares:?}");
 }
@@ -82,7 +82,7 @@ fn more_games_make_ratings_better_and_surer() {
         players: 4,
         seed: 6,
     };
-    let measured = calibration(&fields, &[20, 100, 500], after_game);
+    let measured = calibration(&fields, &[20, 100, 500], &after_game);
     for two in measured.windows(2) {
         assert!(two[1].error.mean() < 0.7 * two[0].error.mean());
         assert!(two[1].deviation.mean() < 0.7 * two[0].deviation.mean());
@@ -101,7 +101,7 @@ fn uncertainty_is_honest_for_other_numbers_of_players() {
             players,
             seed: 7,
         };
-        for measured in calibration(&fields, &[30, 150], after_game) {
+        for measured in calibration(&fields, &[30, 150], &after_game) {
             let share = measured.covered.mean();
             assert!(share > 0.92, "{players} players: {share}");
         }

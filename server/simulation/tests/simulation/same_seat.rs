@@ -21,7 +21,7 @@ fn measured(random_percent: [u8; 2], seed: u64, games: &[u64]) -> Vec<Measured> 
         others: Contender::Kind(AgentKind::Greedy),
         seed,
     };
-    same_seat.measure(games, |_| {})
+    same_seat.measure(games, &|_| {})
 }
 
 #[test]
@@ -129,6 +129,6 @@ fn agents_see_the_events_of_the_game() {
         others: Contender::Made(Arc::new(Followers)),
         seed: 3,
     };
-    let measured = same_seat.measure(&[8], |_| {});
+    let measured = same_seat.measure(&[8], &|_| {});
     assert!(measured[0].duplicate_error > 0.0, "{measured:?}");
 }

@@ -132,7 +132,7 @@ fn easier_opponents_do_not_make_a_participant_look_better() {
     for deals in [Deals::Independent, Deals::SameAtAllTables] {
         for draw in 0..4 {
             let mut tournament = swiss(&agents, deals, draw);
-            play_offline(&mut tournament, rules(), 4, || {}).unwrap();
+            play_offline(&mut tournament, rules(), 4, &|_| {}).unwrap();
             for pair in tournament.order_confidence() {
                 // Agents of one kind play alike, whatever their opponents.
                 if agents[pair.upper] == agents[pair.lower] {
@@ -153,7 +153,7 @@ fn different_neighbours_are_told_apart_and_equal_ones_are_not() {
         Trained, Trained, Greedy, Greedy, Greedy, Random, Random, Random,
     ];
     let mut tournament = swiss(&agents, Deals::SameAtAllTables, 3);
-    play_offline(&mut tournament, rules(), 4, || {}).unwrap();
+    play_offline(&mut tournament, rules(), 4, &|_| {}).unwrap();
     let standings = tournament.standings();
     let neighbours = tournament.order_confidence();
     assert_eq!(neighbours.len(), 7);
