@@ -107,9 +107,10 @@ pub(super) fn sessions(address: PgConnectOptions) -> PgConnectOptions {
 }
 
 /// Sessions that write. A plan that was made while the tables were nearly empty still finds a row
-/// by its index when they are not.
+/// by its index when they are not. A plan that reads a whole table all the same then counts as so
+/// costly that PostgreSQL would compile it, at each execution.
 pub(super) fn writers(sessions: PgConnectOptions) -> PgConnectOptions {
-    sessions.options([("enable_seqscan", "off")])
+    sessions.options([("enable_seqscan", "off"), ("jit", "off")])
 }
 
 /// Sessions that wait this long for a lock.
