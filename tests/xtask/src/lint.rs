@@ -19,6 +19,11 @@ const RELEASED_PROTOCOL: &str = "proto/frozen/v1.binpb";
 /// What is off by default and still checked and tested, in one build with the rest.
 pub(crate) const OPTIONAL_FEATURES: &str = "chefshat/otlp";
 
+/// Everything that can be built. With `--all-targets`, libraries without tests would be built a second
+/// time, to be benchmarks.
+pub(crate) const ALL_TARGETS: [&str; 6] =
+    ["--lib", "--bins", "--tests", "--examples", "--bench", "*"];
+
 /// What Clippy is told: a warning is an error.
 const CLIPPY_ARGUMENTS: [&str; 2] = ["-D", "warnings"];
 
@@ -27,10 +32,10 @@ pub(crate) fn run(places: &Places, steps: &mut Steps) -> Result<(), Failure> {
     sources(places, steps)?;
     steps.beside(vec![
         Box::new(|steps| {
-            let what = ["clippy", "--workspace", "--all-targets"];
             let features = ["--features", OPTIONAL_FEATURES, "--"];
             let mut clippy = in_root(places, cargo());
-            clippy.args(what).args(features).args(CLIPPY_ARGUMENTS);
+            clippy.args(["clippy", "--workspace"]).args(ALL_TARGETS);
+            clippy.args(features).args(CLIPPY_ARGUMENTS);
             steps.program("cargo clippy", &mut clippy)
         }),
         Box::new(|steps| {

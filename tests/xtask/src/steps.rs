@@ -31,7 +31,7 @@ struct Step {
 
 /// How many lanes run at a time: most wait for downloads, servers and clocks, and two processors have
 /// something to compute until the last one ends.
-const LANES: usize = 6;
+const LANES: usize = 4;
 
 /// Steps that run beside those of other lanes.
 pub(crate) type Lane<'a> = Box<dyn FnOnce(&mut Steps) -> Result<(), Failure> + Send + 'a>;

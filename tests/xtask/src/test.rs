@@ -2,9 +2,11 @@
 //! in Rust, start agents in Python, JavaScript and C++; the tests of those start the server.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::process::Command;
 
 use clap::ValueEnum;
+use serde_json::Value;
 
 use crate::command::{cargo, git, python_command, read, with_environment};
 use crate::failure::Failure;
@@ -120,13 +122,9 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
         // Libraries, programs and tests together: otherwise hundreds of crates would be built twice,
         // with the features of the server and with those of its tests.
         Box::new(|steps| {
-            let what: &[&str] = match lint {
-                true => &["--all-targets"],
-                false => &["--lib", "--bins", "--tests", "--examples"],
-            };
             let mut build = cargo_command(places, lint);
             build.args(["build", "--workspace", "--features", OPTIONAL_FEATURES]);
-            steps.program("build", build.args(what))
+            steps.program("build", build.args(lint::ALL_TARGETS))
         }),
         Box::new(|steps| {
             if needs_python {
@@ -184,6 +182,10 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
     ])?;
 
     let mut lanes: Vec<Lane<'_>> = Vec::new();
+    let (of_sockets, mut of_units) = match wants(Part::Rust) {
+        true => tests_in_rust(places, *options)?,
+        false => <_>::default(),
+    };
     if wants(Part::Rust) {
         steps.run("PostgreSQL", setup::postgresql)?;
         steps.run("HAProxy", setup::haproxy)?;
@@ -197,15 +199,14 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
         if let Err(failure) = setup::tmux() {
             steps.skip("commands at a terminal", &failure.to_string());
         }
-        lanes.push(Box::new(|steps| {
-            let mut runs = vec![cargo_test(places, *options, &["--test", "*"])];
+        let mut runs = of_sockets;
+        if slow {
+            // The others that are ignored measure something.
+            let ignored = ["--test", "smoke", "--", "--ignored"];
+            runs.push(cargo_test(places, *options, &ignored));
+        }
+        lanes.push(Box::new(move |steps| {
             if slow {
-                // The others that are ignored measure something.
-                runs.push(cargo_test(
-                    places,
-                    *options,
-                    &["--test", "smoke", "--", "--ignored"],
-                ));
                 lint::platforms(places, steps)?;
             }
             of_all(steps, runs)
@@ -243,13 +244,8 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
         }
     }
     if wants(Part::Rust) {
-        lanes.push(Box::new(|steps| {
-            let kinds = [["--lib", "--bins", "--examples"].as_slice(), &["--doc"]];
-            of_all(
-                steps,
-                kinds.map(|kinds| cargo_test(places, *options, kinds)),
-            )
-        }));
+        of_units.push(cargo_test(places, *options, &["--doc"]));
+        lanes.push(Box::new(|steps| of_all(steps, of_units)));
     }
     if deployment {
         lanes.push(Box::new(|steps| test_deployment(places, steps, slow)));
@@ -278,27 +274,71 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
 }
 
 /// Runs programs as steps, one after another; each that fails is named.
-fn of_all(
-    steps: &mut Steps,
-    runs: impl IntoIterator<Item = (String, Command)>,
-) -> Result<(), Failure> {
-    let run = |(name, mut program): (String, Command)| steps.program(&name, &mut program);
+fn of_all(steps: &mut Steps, runs: impl IntoIterator<Item = Run>) -> Result<(), Failure> {
+    let run = |(name, mut program): Run| steps.program(&name, &mut program);
     Failure::of_any(runs.into_iter().map(run))
 }
 
-/// Tests in Rust of these kinds. They are of all packages, so that nothing is built again.
-fn cargo_test(places: &Places, options: Options, kinds: &[&str]) -> (String, Command) {
+/// A step that runs a program.
+type Run = (String, Command);
+
+/// The programs of the tests in Rust, which the build has made: those in folders of their own, and
+/// those of units. They are started here, since `cargo test --lib` builds also those of libraries
+/// without tests.
+fn tests_in_rust(places: &Places, options: Options) -> Result<(Vec<Run>, Vec<Run>), Failure> {
+    let mut build = cargo_tests(places, options);
+    build.args(["--tests", "--no-run", "--message-format", "json"]);
+    let mut found = (Vec::new(), Vec::new());
+    for message in read(&mut build)?.lines() {
+        let built: Value = serde_json::from_str(message).unwrap_or_default();
+        let path = |field: &str| built[field].as_str().map(Path::new);
+        let is_test = built["profile"]["test"] == true;
+        let (true, Some(program), Some(manifest)) =
+            (is_test, path("executable"), path("manifest_path"))
+        else {
+            continue;
+        };
+        let folder = manifest.parent().unwrap_or(&places.root);
+        let package = folder.strip_prefix(&places.root).unwrap_or(folder);
+        let target = built["target"]["name"].as_str().unwrap_or_default();
+        let mut tests = with_environment(places, Command::new(program));
+        with_extent(tests.current_dir(folder), options);
+        let step = (format!("{}, tests of {target}", package.display()), tests);
+        match built["target"]["kind"][0] == "test" {
+            true => found.0.push(step),
+            false => found.1.push(step),
+        }
+    }
+    match found.0.is_empty() || found.1.is_empty() {
+        true => Err(Failure::new("Cargo names no programs of tests")),
+        false => Ok(found),
+    }
+}
+
+/// Tests in Rust of these kinds.
+fn cargo_test(places: &Places, options: Options, kinds: &[&str]) -> Run {
+    let mut tests = cargo_tests(places, options);
+    with_extent(tests.arg("--no-fail-fast").args(kinds), options);
+    (format!("cargo test {}", kinds.join(" ")), tests)
+}
+
+/// Cargo for tests of all packages, so that nothing is built again.
+fn cargo_tests(places: &Places, options: Options) -> Command {
     let mut tests = cargo_command(places, options.lint);
     tests.args(["test", "--workspace", "--features", OPTIONAL_FEATURES]);
-    tests.arg("--no-fail-fast").args(kinds);
-    // Most tests wait for servers and clocks.
+    tests
+}
+
+/// How much tests in Rust do, and how many of a program at a time.
+fn with_extent(tests: &mut Command, options: Options) {
+    // Most wait for servers and clocks.
     tests.env("RUST_TEST_THREADS", "4");
     if options.slow {
         tests.env("CHEFSHAT_FAULTS", "200");
+        tests.env("CHEFSHAT_KILLS", "100");
         tests.env("CHEFSHAT_SIMULATIONS", "300");
         tests.env("CHEFSHAT_MODEL", "all");
     }
-    (format!("cargo test {}", kinds.join(" ")), tests)
 }
 
 /// The tests of docker/ and of what the documents tell to type.
@@ -322,7 +362,7 @@ fn test_deployment(places: &Places, steps: &mut Steps, slow: bool) -> Result<(),
 const VERSIONS: [&str; 2] = ["oldest", "newest"];
 
 /// Tests of the Python SDK that use each of its dependencies, with other versions of those.
-fn pytest_with(places: &Places, versions: &str) -> (String, Command) {
+fn pytest_with(places: &Places, versions: &str) -> Run {
     let mut pytest = Command::new(places.versions(versions).join("bin/python"));
     pytest.current_dir(places.root.join("clients/python"));
     pytest.env("PYTHONPATH", "src");
@@ -337,7 +377,7 @@ fn pytest_with(places: &Places, versions: &str) -> (String, Command) {
 }
 
 /// The tests of a Python package, with the name of the step.
-fn pytest(places: &Places, package: &str, options: &[&str]) -> (String, Command) {
+fn pytest(places: &Places, package: &str, options: &[&str]) -> Run {
     let cache = places.own.join("pytest").join(package);
     let cache = format!("cache_dir={}", cache.display());
     let mut pytest = python_command(places, package, "pytest");
