@@ -17,7 +17,7 @@ use tokio::task::JoinSet;
 use tonic::Code;
 
 /// Number of kills; `CHEFSHAT_KILLS` overrides it.
-const KILLS: u64 = 100;
+const KILLS: u64 = 25;
 /// Most decisions acknowledged between two kills.
 const MOST_BETWEEN: u64 = 40;
 /// Kills after which the next server is also killed while it starts.

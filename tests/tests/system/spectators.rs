@@ -16,13 +16,13 @@ async fn a_spectator_that_stops_reading_is_disconnected_and_the_game_continues()
     let server = TestServer::start().await;
     let client = server.client().await;
     let rules = v1::RuleSet {
-        stop: Some(v1::rule_set::Stop::TargetShifts(200)),
+        stop: Some(v1::rule_set::Stop::TargetShifts(40)),
         ..v1::RuleSet::default()
     };
     let (created, tickets) = room_of_four(&client, rules, v1::RoomPolicy::default()).await;
     let room_id = created.room.expect("a room").room_id;
     let mut not_reading = narrow_spectator(&server, room_id).await;
-    // It does not read while two hundred Shifts are played.
+    // It does not read while forty Shifts are played.
     play_out(&server, tickets).await;
     let mut events = 0;
     let status = loop {

@@ -109,7 +109,7 @@ async fn a_client_that_does_not_read_cannot_delay_a_shutdown() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let rules = v1::RuleSet {
-        stop: Some(v1::rule_set::Stop::TargetShifts(200)),
+        stop: Some(v1::rule_set::Stop::TargetShifts(40)),
         ..v1::RuleSet::default()
     };
     let (created, tickets) = room_of_four(&client, rules, v1::RoomPolicy::default()).await;
