@@ -94,6 +94,23 @@ async fn a_node_that_has_not_joined_creates_nothing() {
 }
 
 #[tokio::test]
+async fn plans_of_sessions_that_write_are_not_compiled() {
+    let database = chefshat_postgres::database();
+    database.run("CREATE TABLE dishes (name text)");
+    let address = open::address(database.url()).expect("an address");
+    let writer = open::writers(open::sessions(address));
+    let mut writer = open::connect_writer(&writer).await.expect("a session");
+    let explain = "EXPLAIN ANALYZE SELECT * FROM dishes WHERE name = 'pizza'";
+    let plan = sqlx::query_scalar::<_, String>(explain);
+    let plan = plan
+        .fetch_all(&mut writer)
+        .await
+        .expect("a plan")
+        .join("\n");
+    assert!(plan.contains("Seq Scan") && !plan.contains("JIT"), "{plan}");
+}
+
+#[tokio::test]
 async fn connections_are_encrypted_and_certificates_checked() {
     let tls = |file: &str| {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/fixtures/tls/");
