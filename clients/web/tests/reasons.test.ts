@@ -56,6 +56,7 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "ACTIONS_REFUSED",
     "ANALYSIS_REFUSED",
     "CALLS_NOT_TAKEN",
+    "UPDATES_NOT_TAKEN",
     "CLIENT_IDLE",
     "CLIENT_TOO_SLOW",
     "CLIENT_UNKNOWN",

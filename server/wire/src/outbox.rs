@@ -111,6 +111,8 @@ pub enum StreamEnd {
     SpectatorTooSlow,
     /// Calls to games of tournaments were not read.
     CallsNotTaken,
+    /// Replies to the stream's own commands were not read.
+    UpdatesNotTaken,
     /// The requests of the stream broke off or broke a rule; their reader has the reason.
     RequestsFailed,
 }

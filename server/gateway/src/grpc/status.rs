@@ -71,6 +71,16 @@ pub fn calls_not_taken() -> Status {
     )
 }
 
+/// Replies to commands wait for a stream that is not read.
+fn updates_not_taken() -> Status {
+    status(
+        Code::Unavailable,
+        "UPDATES_NOT_TAKEN",
+        "replies to commands wait, and the stream is not read; connect again, and read what it sends",
+        [],
+    )
+}
+
 /// Whether a status has this reason.
 pub fn has_reason(status: &Status, reason: &str) -> bool {
     (status.get_details_error_info()).is_some_and(|info| info.reason == reason)
@@ -269,6 +279,7 @@ pub fn stream_ended(end: StreamEnd) -> Status {
         StreamEnd::RoomGone => room_gone(),
         StreamEnd::SpectatorTooSlow => spectator_too_slow(),
         StreamEnd::CallsNotTaken => calls_not_taken(),
+        StreamEnd::UpdatesNotTaken => updates_not_taken(),
         StreamEnd::RequestsFailed => internal(),
     }
 }

@@ -37,7 +37,6 @@ impl Reader {
             participant: convert::number(participant),
         });
         if !self.send_update(handle, entered) {
-            // A client that does not read its stream is not attached.
             return;
         }
         let bound = BoundParticipant {

@@ -442,11 +442,16 @@ impl Reader {
         self.outbox.push_last(&mut last);
     }
 
-    /// Sends an update; `false` if the client does not read its stream.
+    /// Sends an update that nobody repeats. If the client does not read its stream, `false`: the
+    /// stream is ended, so that its client reconnects.
     pub(super) fn send_update(&self, handle: u32, update: Update) -> bool {
         let mut updates = Updates::default();
         updates.add(handle, update);
-        self.outbox.push(&mut updates, None, None)
+        let sent = self.outbox.push(&mut updates, None, None);
+        if !sent {
+            self.outbox.cut(StreamEnd::UpdatesNotTaken);
+        }
+        sent
     }
 }
 
@@ -481,30 +486,50 @@ mod tests {
     use super::*;
     use chefshat_hosting::config::ServerConfig;
     use chefshat_store::MemoryStore;
+    use chefshat_wire::outbox::OUTBOX_CAPACITY;
+
+    fn reader(outbox: &Arc<Outbox>) -> Reader {
+        let store = Arc::new(MemoryStore::default());
+        let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new());
+        let rooms = rooms.expect("threads");
+        let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
+        Reader::new(&rooms, &tournaments, Caller::default(), outbox, true)
+    }
+
+    /// Executes commands for a seat that there is not: each is refused.
+    async fn flood(reader: &mut Reader, commands: usize) {
+        for _ in 0..commands {
+            let command = v1::SeatCommand {
+                handle: 7,
+                command: Some(Command::Answer(v1::Answer::default())),
+            };
+            let commands = vec![command];
+            let request = v1::PlayRequest { commands };
+            let executed = request.execute(reader, Instant::now());
+            executed.await.expect("few commands");
+        }
+    }
 
     #[tokio::test]
     async fn a_flood_of_commands_yields_to_other_tasks() {
-        let store = Arc::new(MemoryStore::default());
-        let rooms =
-            Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
-        let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
         let (outbox, _updates) = Outbox::new();
-        let mut reader = Reader::new(&rooms, &tournaments, Caller::default(), &outbox, true);
-        let flood = tokio::spawn(async move {
-            for _ in 0..10_000 {
-                let command = v1::SeatCommand {
-                    handle: 7,
-                    command: Some(Command::Answer(v1::Answer::default())),
-                };
-                let commands = vec![command];
-                let request = v1::PlayRequest { commands };
-                let executed = request.execute(&mut reader, Instant::now());
-                executed.await.expect("few commands");
-            }
-        });
+        let mut reader = reader(&outbox);
+        let flooding = tokio::spawn(async move { flood(&mut reader, 10_000).await });
         // The only thread runs the flood until it yields.
         tokio::task::yield_now().await;
-        assert!(!flood.is_finished());
-        flood.abort();
+        assert!(!flooding.is_finished());
+        flooding.abort();
+    }
+
+    #[tokio::test]
+    async fn a_stream_whose_replies_are_not_read_ends() {
+        let (outbox, updates) = Outbox::new();
+        let mut reader = reader(&outbox);
+        flood(&mut reader, OUTBOX_CAPACITY).await;
+        assert!(outbox.is_open());
+        flood(&mut reader, 1).await;
+        let ends = updates.filter_map(async |it| it.err());
+        let ends: Vec<StreamEnd> = ends.collect().await;
+        assert_eq!(ends, [StreamEnd::UpdatesNotTaken]);
     }
 }

@@ -62,8 +62,8 @@ class PlayServiceServicer(object):
         first message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with
         DEADLINE_EXCEEDED (STREAM_SILENT) if nothing is sent within 10 s of its start, or with
         UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are
-        unfinished: reconnect and attach again. Do so too if it ends with OK, but you have not
-        half-closed.
+        unfinished, or (CALLS_NOT_TAKEN, UPDATES_NOT_TAKEN) if you do not read what it sends: reconnect
+        and attach again. Do so too if it ends with OK, but you have not half-closed.
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

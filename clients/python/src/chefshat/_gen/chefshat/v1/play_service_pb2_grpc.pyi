@@ -39,8 +39,8 @@ class PlayServiceStub:
     first message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with
     DEADLINE_EXCEEDED (STREAM_SILENT) if nothing is sent within 10 s of its start, or with
     UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are
-    unfinished: reconnect and attach again. Do so too if it ends with OK, but you have not
-    half-closed.
+    unfinished, or (CALLS_NOT_TAKEN, UPDATES_NOT_TAKEN) if you do not read what it sends: reconnect
+    and attach again. Do so too if it ends with OK, but you have not half-closed.
     """
     Watch: _grpc.UnaryStreamMultiCallable[_play_service_pb2.PlayServiceWatchRequest, _play_service_pb2.PlayServiceWatchResponse]
     """For clients without bidirectional streams (browsers): all updates of the given seats, until the
@@ -66,8 +66,8 @@ class PlayServiceAsyncStub(PlayServiceStub):
     first message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with
     DEADLINE_EXCEEDED (STREAM_SILENT) if nothing is sent within 10 s of its start, or with
     UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are
-    unfinished: reconnect and attach again. Do so too if it ends with OK, but you have not
-    half-closed.
+    unfinished, or (CALLS_NOT_TAKEN, UPDATES_NOT_TAKEN) if you do not read what it sends: reconnect
+    and attach again. Do so too if it ends with OK, but you have not half-closed.
     """
     Watch: _aio.UnaryStreamMultiCallable[_play_service_pb2.PlayServiceWatchRequest, _play_service_pb2.PlayServiceWatchResponse]  # type: ignore[assignment]
     """For clients without bidirectional streams (browsers): all updates of the given seats, until the
@@ -96,8 +96,8 @@ class PlayServiceServicer(metaclass=_abc_1.ABCMeta):
         first message. The stream ends with INVALID_ARGUMENT (TOO_MANY_COMMANDS), with
         DEADLINE_EXCEEDED (STREAM_SILENT) if nothing is sent within 10 s of its start, or with
         UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are
-        unfinished: reconnect and attach again. Do so too if it ends with OK, but you have not
-        half-closed.
+        unfinished, or (CALLS_NOT_TAKEN, UPDATES_NOT_TAKEN) if you do not read what it sends: reconnect
+        and attach again. Do so too if it ends with OK, but you have not half-closed.
         """
 
     @_abc_1.abstractmethod
