@@ -1,6 +1,5 @@
 // Runs the tests in tests/browser. Each file starts a server (CHEFSHAT_BIN) that serves the built
-// page, and a browser. The files run one after the other, so that they do not compete for the
-// processor.
+// page, and a browser. Two files run at a time: more would only compete for the processor.
 
 import { defineConfig } from "vitest/config";
 import { PATIENCE_MS } from "./tests/browser/patience";
@@ -9,7 +8,7 @@ export default defineConfig({
   test: {
     environment: "node",
     include: ["tests/browser/**/*.test.ts"],
-    fileParallelism: false,
+    maxWorkers: 2,
     testTimeout: 5 * PATIENCE_MS,
     hookTimeout: 5 * PATIENCE_MS,
     expect: { poll: { timeout: PATIENCE_MS } },
