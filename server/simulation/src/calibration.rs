@@ -86,13 +86,13 @@ impl Calibration {
 }
 
 /// Computes the ratings after a game from those before it, each with a place from 1.
-pub type Update = dyn Fn(&[(Rating, u32)]) -> Vec<Rating> + Sync;
+pub type Update<'a> = &'a (dyn Fn(&[(Rating, u32)]) -> Vec<Rating> + Sync);
 
 /// Plays the fields and compares after each of these numbers of rounds, which ascend. In a round
 /// everyone plays one game, except for those left over. `update` may be
 /// [`after_game`](chefshat_tournament::ratings::after_game). Runs on the current rayon pool, which
 /// does not affect the result.
-pub fn calibration(fields: &Fields, rounds: &[u32], update: &Update) -> Vec<Calibration> {
+pub fn calibration(fields: &Fields, rounds: &[u32], update: Update<'_>) -> Vec<Calibration> {
     fold_in_order(
         fields.fields,
         1,
@@ -110,7 +110,7 @@ fn add_field(
     fields: &Fields,
     field: u64,
     rounds: &[u32],
-    update: &Update,
+    update: Update<'_>,
     sums: &mut [Calibration],
 ) {
     let mut generator = ChaCha8Rng::seed_from_u64(fields.seed);

@@ -11,8 +11,8 @@ use std::str::FromStr;
 use chefshat_agents::NamedAgent;
 use chefshat_room::journal::Fill;
 use chefshat_server::convert::{ConditionPlan, StudyPlan, complete_settings, study_plan};
-use chefshat_simulation::Batch;
 use chefshat_simulation::power::{Answers, Design, Measure, Power, power};
+use chefshat_simulation::{Batch, Progress};
 use chefshat_study::{MAX_PARTICIPANTS, Order, Settings, Study, Task};
 use clap::Args;
 use serde_json::{Value, json};
@@ -357,7 +357,7 @@ impl Simulate {
         let bar = progress::of_items(GAMES * plan.conditions.len() as u64, "games");
         let values = (plan.conditions.iter().enumerate())
             .map(|(index, condition)| {
-                self.played(settings, index, condition, |games| bar.inc(games))
+                self.played(settings, index, condition, &|games| bar.inc(games))
             })
             .collect::<Result<_, _>>();
         bar.finish_and_clear();
@@ -373,7 +373,7 @@ impl Simulate {
         settings: &Settings,
         index: usize,
         condition: &ConditionPlan,
-        progress: impl Fn(u64) + Sync,
+        progress: Progress<'_>,
     ) -> Result<Vec<f64>, CommandError> {
         let core = &settings.conditions[index];
         let first: Vec<usize> = match core.participant_seat {
@@ -398,7 +398,7 @@ impl Simulate {
                 .collect::<Result<_, _>>()?;
             let games = GAMES / first.len() as u64;
             let batch = Batch::new(condition.rules, &agents, games, self.seed)?;
-            values.extend(batch.results(&progress).iter().map(|standings| {
+            values.extend(batch.results(progress).iter().map(|standings| {
                 let rows = standings
                     .iter()
                     .filter(|(_, seat, _)| own.contains(&seat.index()));

@@ -45,7 +45,7 @@ fn library(players: &[(Rating, u32)]) -> Vec<Rating> {
 }
 
 /// Shares covered, for all kinds of fields and numbers of games.
-fn shares(update: &Update) -> Vec<f64> {
+fn shares(update: Update<'_>) -> Vec<f64> {
     let measured = many()
         .into_iter()
         .flat_map(|fields| calibration(&fields, &ROUNDS, update));
