@@ -19,8 +19,8 @@ const RELEASED_PROTOCOL: &str = "proto/frozen/v1.binpb";
 /// What is off by default and still checked and tested, in one build with the rest.
 pub(crate) const OPTIONAL_FEATURES: &str = "chefshat/otlp";
 
-/// Everything that can be built. With `--all-targets`, libraries without tests would be built a second
-/// time, to be benchmarks.
+/// Everything that can be built. With `--all-targets`, libraries without tests would be built a
+/// second time, to be benchmarks.
 pub(crate) const ALL_TARGETS: [&str; 6] =
     ["--lib", "--bins", "--tests", "--examples", "--bench", "*"];
 
@@ -103,21 +103,26 @@ pub(crate) fn sources(places: &Places, steps: &mut Steps) -> Result<(), Failure>
     steps.run("tests that are not built", || not_built(places))
 }
 
-/// Refuses tests in the sources of libraries whose own tests Cargo does not build (`test = false`).
+/// Refuses tests in sources whose tests Cargo does not build (`test = false`, as of all examples).
 fn not_built(places: &Places) -> Result<(), Failure> {
     let metadata = arrows::metadata(places)?;
     let packages = metadata["packages"].as_array();
     let targets = packages.into_iter().flatten();
     let targets = targets.filter_map(|package| package["targets"].as_array());
     let untested = targets.flatten().filter(|target| target["test"] == false);
-    for library in untested.filter(|target| target["kind"][0] == "lib") {
-        let root = library["src_path"].as_str().map(Path::new);
-        let Some(folder) = root.and_then(Path::parent) else {
+    for target in untested {
+        let Some(root) = target["src_path"].as_str().map(Path::new) else {
             continue;
         };
-        if let Some(file) = with_tests(folder)? {
+        let found = match (target["kind"][0].as_str(), root.parent()) {
+            (Some("lib"), Some(folder)) => with_tests(folder)?,
+            // The folder may be that of a library, too.
+            (Some("bin" | "example"), _) if has_tests(root)? => Some(root.to_path_buf()),
+            _ => None,
+        };
+        if let Some(file) = found {
             let file = file.display();
-            let problem = format!("{file} has tests, but its library has `test = false`");
+            let problem = format!("{file} has tests, but Cargo.toml says `test = false`");
             return Err(Failure::new(problem));
         }
     }
@@ -131,16 +136,20 @@ fn with_tests(folder: &Path) -> Result<Option<PathBuf>, Failure> {
         let path = entry.map_err(|error| at(folder, &error))?.path();
         let found = match path.is_dir() {
             true => with_tests(&path)?,
-            false => {
-                let text = fs::read_to_string(&path).map_err(|error| at(&path, &error))?;
-                text.contains("#[cfg(test)]").then_some(path)
-            }
+            false => has_tests(&path)?.then_some(path),
         };
         if found.is_some() {
             return Ok(found);
         }
     }
     Ok(None)
+}
+
+fn has_tests(file: &Path) -> Result<bool, Failure> {
+    let text = fs::read_to_string(file).map_err(|error| at(file, &error))?;
+    Ok(["#[cfg(test)]", "#[test]"]
+        .iter()
+        .any(|it| text.contains(it)))
 }
 
 /// The checks of everything but programs: protocol, book, files of docker/. And the format of the agent

@@ -182,11 +182,12 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
     ])?;
 
     let mut lanes: Vec<Lane<'_>> = Vec::new();
-    let (of_sockets, mut of_units) = match wants(Part::Rust) {
-        true => tests_in_rust(places, *options)?,
-        false => <_>::default(),
-    };
+    let mut in_rust = TestsInRust::default();
     if wants(Part::Rust) {
+        steps.run("find the tests in Rust", || {
+            in_rust = TestsInRust::find(places, *options)?;
+            Ok(())
+        })?;
         steps.run("PostgreSQL", setup::postgresql)?;
         steps.run("HAProxy", setup::haproxy)?;
         // Tests that need something missing on this machine report that they are skipped.
@@ -199,7 +200,7 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
         if let Err(failure) = setup::tmux() {
             steps.skip("commands at a terminal", &failure.to_string());
         }
-        let mut runs = of_sockets;
+        let mut runs = in_rust.integration;
         if slow {
             // The others that are ignored measure something.
             let ignored = ["--test", "smoke", "--", "--ignored"];
@@ -244,8 +245,9 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
         }
     }
     if wants(Part::Rust) {
-        of_units.push(cargo_test(places, *options, &["--doc"]));
-        lanes.push(Box::new(|steps| of_all(steps, of_units)));
+        let mut runs = in_rust.units;
+        runs.push(cargo_test(places, *options, &["--doc"]));
+        lanes.push(Box::new(|steps| of_all(steps, runs)));
     }
     if deployment {
         lanes.push(Box::new(|steps| test_deployment(places, steps, slow)));
@@ -282,36 +284,46 @@ fn of_all(steps: &mut Steps, runs: impl IntoIterator<Item = Run>) -> Result<(), 
 /// A step that runs a program.
 type Run = (String, Command);
 
-/// The programs of the tests in Rust, which the build has made: those in folders of their own, and
-/// those of units. They are started here, since `cargo test --lib` builds also those of libraries
-/// without tests.
-fn tests_in_rust(places: &Places, options: Options) -> Result<(Vec<Run>, Vec<Run>), Failure> {
-    let mut build = cargo_tests(places, options);
-    build.args(["--tests", "--no-run", "--message-format", "json"]);
-    let mut found = (Vec::new(), Vec::new());
-    for message in read(&mut build)?.lines() {
-        let built: Value = serde_json::from_str(message).unwrap_or_default();
-        let path = |field: &str| built[field].as_str().map(Path::new);
-        let is_test = built["profile"]["test"] == true;
-        let (true, Some(program), Some(manifest)) =
-            (is_test, path("executable"), path("manifest_path"))
-        else {
-            continue;
-        };
-        let folder = manifest.parent().unwrap_or(&places.root);
-        let package = folder.strip_prefix(&places.root).unwrap_or(folder);
-        let target = built["target"]["name"].as_str().unwrap_or_default();
-        let mut tests = with_environment(places, Command::new(program));
-        with_extent(tests.current_dir(folder), options);
-        let step = (format!("{}, tests of {target}", package.display()), tests);
-        match built["target"]["kind"][0] == "test" {
-            true => found.0.push(step),
-            false => found.1.push(step),
+/// The programs of the tests in Rust.
+#[derive(Default)]
+struct TestsInRust {
+    integration: Vec<Run>,
+    units: Vec<Run>,
+}
+
+impl TestsInRust {
+    /// Finds the programs that the build has made. They are started here, since `cargo test --lib`
+    /// also builds libraries without tests once more.
+    fn find(places: &Places, options: Options) -> Result<Self, Failure> {
+        let mut build = cargo_tests(places, options);
+        build.args(["--tests", "--no-run", "--message-format", "json"]);
+        let mut found = Self::default();
+        for message in read(&mut build)?.lines() {
+            let built: Value = serde_json::from_str(message).unwrap_or_default();
+            if built["profile"]["test"] != true {
+                continue;
+            }
+            let path = |field: &str| built[field].as_str().map(Path::new);
+            let (Some(program), Some(manifest)) = (path("executable"), path("manifest_path"))
+            else {
+                continue;
+            };
+            let folder = manifest.parent().unwrap_or(&places.root);
+            let package = folder.strip_prefix(&places.root).unwrap_or(folder);
+            let target = built["target"]["name"].as_str().unwrap_or_default();
+            let mut tests = with_environment(places, Command::new(program));
+            with_extent(tests.current_dir(folder), options);
+            let run = (format!("{}, tests of {target}", package.display()), tests);
+            if built["target"]["kind"][0] == "test" {
+                found.integration.push(run);
+            } else {
+                found.units.push(run);
+            }
         }
-    }
-    match found.0.is_empty() || found.1.is_empty() {
-        true => Err(Failure::new("Cargo names no programs of tests")),
-        false => Ok(found),
+        if found.integration.is_empty() || found.units.is_empty() {
+            return Err(Failure::new("Cargo names no programs of tests"));
+        }
+        Ok(found)
     }
 }
 
@@ -329,7 +341,7 @@ fn cargo_tests(places: &Places, options: Options) -> Command {
     tests
 }
 
-/// How much tests in Rust do, and how many of a program at a time.
+/// Says how long the longest tests in Rust are, and how many of a program run at a time.
 fn with_extent(tests: &mut Command, options: Options) {
     // Most wait for servers and clocks.
     tests.env("RUST_TEST_THREADS", "4");
