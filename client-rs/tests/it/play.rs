@@ -261,15 +261,11 @@ async fn the_client_gives_up_after_a_long_outage() {
 
 #[tokio::test]
 async fn invalid_addresses_are_reported() {
-    let closed = {
-        let listener = listen();
-        listener.local_addr().unwrap().to_string()
-    };
     let table = [
         ("not an address", "ADDRESS_REFUSED"),
         ("grpc://localhost:50051", "ADDRESS_REFUSED"),
         ("localhost", "ADDRESS_REFUSED"),
-        (closed.as_str(), "CONNECT_FAILED"),
+        ("127.0.0.1:1", "CONNECT_FAILED"),
     ];
     for (url, reason) in table {
         let error = chefshat_client::Client::connect(url).await.unwrap_err();

@@ -44,8 +44,8 @@ class FakeServer(
     `fault` is called with a game, a seat and an answer before the answer is taken. If it returns "before", the stream breaks
     without the answer having been taken; if "after", the answer is taken and the stream breaks before the acknowledgement.
 
-    With a `token` it uses TLS and refuses every call without this token. `host` is where one
-    without listens; `port` 0 is a free one.
+    With a `token` it uses TLS and refuses every call without this token. Without one it listens on
+    `host`; `port` 0 is a free one.
     """
 
     def __init__(self, token: str = "", host: str = "127.0.0.1", port: int = 0) -> None:

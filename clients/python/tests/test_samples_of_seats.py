@@ -93,8 +93,8 @@ def test_a_refusal_in_the_thread_is_raised_by_a_push(fake: FakeServer) -> None:
 def test_an_outage_loses_no_sample_and_moves_none() -> None:
     begun = time.monotonic()
     taken = [begun + number / 100 for number in range(1_200)]
-    # No other server of a test listens there, also while this one is away.
-    host, port = f"127.195.{(os.getpid() >> 8) & 255}.{os.getpid() & 255}", 50_051
+    # Nobody else listens there, also while this server is away.
+    host, port = f"127.195.{(os.getpid() >> 8) & 255}.{os.getpid() & 255}", 25_051
     with chefshat.Client(f"{host}:{port}", timeout=1.0) as client:
         with FakeServer(host=host, port=port) as before:
             room_id, ticket = seated(client)

@@ -150,10 +150,8 @@ def test_the_robot_can_fail_hang_leave_and_come_back() -> None:
 
 def test_a_robot_that_is_not_there_is_named_with_its_address() -> None:
     async def test() -> None:
-        async with robot() as peer:
-            port = peer.port
-        driver = JsonLinesDriver(port=port)
-        with pytest.raises(RobotError, match=f"no robot listens at 127.0.0.1:{port}"):
+        driver = JsonLinesDriver(port=1)
+        with pytest.raises(RobotError, match=r"no robot listens at 127\.0\.0\.1:1"):
             await driver.connect()
         outcome = await attempt(driver, Say("anyone?"), FAR_S)
         assert isinstance(outcome, Failed)

@@ -159,9 +159,7 @@ def test_a_bridge_that_is_not_there_is_an_error_that_says_what_to_do(monkeypatch
     monkeypatch.setattr("chefshat_robot.drivers.rosbridge.CONNECT_S", 0.2)
 
     async def test() -> None:
-        async with server.serve(Rosbridge().serve, "127.0.0.1", 0) as listening:
-            port = listening.sockets[0].getsockname()[1]
-        with pytest.raises(RobotError, match=f"no rosbridge answers at 127.0.0.1:{port}: start it"):
-            await RosbridgeDriver(port=port).connect()
+        with pytest.raises(RobotError, match=r"no rosbridge answers at 127\.0\.0\.1:1: start it"):
+            await RosbridgeDriver(port=1).connect()
 
     run(test())

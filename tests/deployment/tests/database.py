@@ -33,17 +33,18 @@ class Database:
         self._user = _NOBODY if os.geteuid() == 0 else None
         if self._user is not None:
             os.chown(self._folder.name, _NOBODY, _NOBODY)
-        # No other server of a test listens there; a port that is free now need not be when PostgreSQL has made its files.
+        # Nobody else listens there. A port that is free now need not be once PostgreSQL has its files.
         self._host = f"127.196.{(os.getpid() >> 8) & 255}.{os.getpid() & 255}"
-        self.url = f"postgres://chefshat@{self._host}/postgres"
+        self._port = "25432"
+        self.url = f"postgres://chefshat@{self._host}:{self._port}/postgres"
 
     def __enter__(self) -> Self:
         initdb = [str(self._programs / "initdb"), "--auth=trust", "--no-sync", "--username=chefshat", f"--pgdata={self._data}"]
         subprocess.run(initdb, check=True, capture_output=True, user=self._user, cwd="/")
-        command = [str(self._programs / "postgres"), "-D", str(self._data), "-h", self._host, "-k", ""]
+        command = [str(self._programs / "postgres"), "-D", str(self._data), "-p", self._port, "-h", self._host, "-k", ""]
         self._process = subprocess.Popen(command, stderr=subprocess.DEVNULL, user=self._user, cwd="/")
         give_up_at = time.monotonic() + PATIENCE_S
-        while subprocess.run([self._programs / "pg_isready", "-q", "-h", self._host]).returncode != 0:
+        while subprocess.run([self._programs / "pg_isready", "-q", "-h", self._host, "-p", self._port]).returncode != 0:
             assert self._process.poll() is None, "PostgreSQL does not start"
             assert time.monotonic() < give_up_at, "PostgreSQL does not start"
             time.sleep(0.05)

@@ -1,5 +1,5 @@
-//! A PostgreSQL server for tests: Debian's, in a temporary folder, on an address of its own. All tests
-//! of a process share one server and have a database each; a test that stops its server has
+//! A PostgreSQL server for tests: Debian's, in a temporary folder, on an address of its own. All
+//! tests of a process share one server and have a database each; a test that stops its server has
 //! one of its own. The server ends with the process that started it, however that ends.
 
 use std::fs;
@@ -17,8 +17,9 @@ use tempfile::TempDir;
 
 /// Where Debian's packages have the programs, in a folder for each version.
 const PROGRAMS: &str = "/usr/lib/postgresql";
-/// PostgreSQL's port.
-const PORT: u16 = 5432;
+/// The port of every server: not PostgreSQL's own, on which one may listen at all addresses, and none
+/// that the system gives to clients.
+const PORT: u16 = 25_432;
 /// The user that owns all databases.
 const USER: &str = "chefshat";
 /// The system's user `nobody`: PostgreSQL refuses to run as root.
