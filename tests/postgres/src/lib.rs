@@ -50,7 +50,7 @@ wait $server
 pub struct Server {
     folder: TempDir,
     programs: PathBuf,
-    address: SocketAddr,
+    ip: Ipv4Addr,
     settings: &'static [&'static str],
     keeper: Option<Child>,
 }
@@ -100,7 +100,7 @@ impl Server {
             chown(folder.path(), Some(NOBODY), Some(NOBODY)).expect("root may change owners");
         }
         let mut server = Self {
-            address: (own_address(), PORT).into(),
+            ip: own_address(),
             programs,
             folder,
             settings,
@@ -136,14 +136,14 @@ impl Server {
 
     fn with_url(&self, name: &str) -> Database {
         Database {
-            url: format!("postgres://{USER}@{}/{name}", self.address),
+            url: format!("postgres://{USER}@{}/{name}", self.address()),
             programs: self.programs.clone(),
         }
     }
 
     /// Where it listens, also when it runs again after a stop.
     pub fn address(&self) -> SocketAddr {
-        self.address
+        (self.ip, PORT).into()
     }
 
     /// Ends the server at once, as a crash does.
@@ -179,8 +179,8 @@ impl Server {
                     .replace('\n', "'\n")
             })
             .collect();
-        let (ip, port) = (self.address.ip(), self.address.port());
-        let settings = format!("{settings}listen_addresses = '{ip}'\nport = {port}\n");
+        let ip = self.ip;
+        let settings = format!("{settings}listen_addresses = '{ip}'\nport = {PORT}\n");
         let file = self.data().join("postgresql.auto.conf");
         fs::write(file, settings).expect("the folder of the database is writable");
         let log = fs::File::create(self.log()).expect("the folder is writable");
@@ -227,12 +227,10 @@ impl Server {
     }
 
     fn is_ready(&self) -> bool {
-        let (ip, port) = (
-            self.address.ip().to_string(),
-            self.address.port().to_string(),
-        );
         Command::new(self.programs.join("pg_isready"))
-            .args(["--quiet", "--host", &ip, "--port", &port])
+            .arg("--quiet")
+            .arg(format!("--host={}", self.ip))
+            .arg(format!("--port={PORT}"))
             .status()
             .is_ok_and(|status| status.success())
     }
