@@ -27,9 +27,14 @@ const REGULARS: u32 = 6;
 /// present at some point even on a slow machine.
 const LIFE: Duration = Duration::from_millis(150);
 const LIVES_LONGER: Duration = Duration::from_millis(10);
-/// Messages per burst of the flooding agent, and the pause between bursts.
+/// Messages per burst of the flooding agent, and the pause between bursts. The tournament is long:
+/// more would only take the processors from the others.
 const FLOOD: u32 = 500;
-const BETWEEN_FLOODS: Duration = Duration::from_millis(100);
+const BETWEEN_FLOODS: Duration = Duration::from_millis(500);
+/// Until a lost server is tried again.
+const TRY_AGAIN: Duration = Duration::from_millis(100);
+/// Until the tournament is looked at again.
+const LOOK_AGAIN: Duration = Duration::from_millis(50);
 
 fn options() -> PlayOptions {
     PlayOptions {
@@ -83,7 +88,7 @@ fn regular(url: &str, ticket: String, seed: u64) -> JoinHandle<Result<Vec<Outcom
         let client = loop {
             match Client::connect(&url).await {
                 Ok(client) => break client,
-                Err(_) => tokio::time::sleep(BETWEEN_FLOODS).await,
+                Err(_) => tokio::time::sleep(TRY_AGAIN).await,
             }
         };
         let make = |_: &v1::Attached| RandomAgent::new(seed);
@@ -126,7 +131,7 @@ fn noisy(url: &str, ticket: String, at_a_time: u32) -> JoinHandle<()> {
                 // However it ends, it starts again.
                 let _ = make_noise(client, &ticket, at_a_time).await;
             }
-            tokio::time::sleep(BETWEEN_FLOODS).await;
+            tokio::time::sleep(TRY_AGAIN).await;
         }
     })
 }
@@ -220,7 +225,7 @@ async fn in_the_middle(client: &Client, tournament_id: &str, games_over: u32) {
             if now.games_over >= games_over && now.games_playing > 0 {
                 return;
             }
-            tokio::time::sleep(Duration::from_millis(5)).await;
+            tokio::time::sleep(LOOK_AGAIN).await;
         }
     };
     patiently("the middle", reached).await;
