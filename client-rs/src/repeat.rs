@@ -25,6 +25,8 @@ const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 /// Reason of a server that cannot reach the one that runs a room or tournament.
 const OWNER_UNREACHABLE: &str = "OWNER_UNREACHABLE";
+/// Reason of a server that has just joined others and is not reached by them yet.
+const NODE_NOT_REACHED: &str = "NODE_NOT_REACHED";
 /// Reason of a server that is stopping.
 const SHUTTING_DOWN: &str = "SHUTTING_DOWN";
 
@@ -43,7 +45,7 @@ pub(crate) fn identify(request_id: &mut Vec<u8>) {
 }
 
 /// Sends a request, and again if the connection is lost before its response arrives, the server of
-/// its room or tournament cannot be reached, or the server is stopping.
+/// its room or tournament cannot be reached, or the server is stopping or is not reached by others yet.
 pub(crate) async fn repeated<T, F>(send: impl Fn() -> F) -> Result<T, Error>
 where
     F: Future<Output = Result<Response<T>, Status>>,
@@ -57,7 +59,7 @@ where
         };
         let attempts = match error.reason() {
             None if may_retry(error.code()) => lost,
-            Some(OWNER_UNREACHABLE) => OWNER_ATTEMPTS,
+            Some(OWNER_UNREACHABLE | NODE_NOT_REACHED) => OWNER_ATTEMPTS,
             Some(SHUTTING_DOWN) => {
                 lost = RESTART_ATTEMPTS;
                 lost
@@ -153,6 +155,8 @@ mod tests {
         let found = repeated(answers(unreachable, OWNER_ATTEMPTS - 1)).await;
         assert_eq!(found.expect("the last attempt"), OWNER_ATTEMPTS - 1);
         assert!(began.elapsed() > Duration::from_secs(10), "a takeover");
+        let joins = repeated(answers(|_| Some(NODE_NOT_REACHED), OWNER_ATTEMPTS - 1)).await;
+        assert_eq!(joins.expect("the last attempt"), OWNER_ATTEMPTS - 1);
         let never = repeated(answers(unreachable, OWNER_ATTEMPTS)).await;
         let never = never.expect_err("given up");
         assert_eq!(never.reason(), Some(OWNER_UNREACHABLE));

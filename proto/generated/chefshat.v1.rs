@@ -7009,7 +7009,7 @@ pub mod room_service_client {
         /// SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; the errors of
         /// GetRecord for a recorded game in the request, which the caller must be allowed to read;
         /// RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN,
-        /// STORE_FAILED).
+        /// STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
         pub async fn create_room(
             &mut self,
             request: impl tonic::IntoRequest<super::CreateRoomRequest>,
@@ -7222,7 +7222,7 @@ pub mod room_service_server {
         /// SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; the errors of
         /// GetRecord for a recorded game in the request, which the caller must be allowed to read;
         /// RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN,
-        /// STORE_FAILED).
+        /// STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
         async fn create_room(
             &self,
             request: tonic::Request<super::CreateRoomRequest>,
@@ -10452,7 +10452,8 @@ pub mod study_service_client {
         }
         /// Creates a study without participants. INVALID_ARGUMENT (SETTINGS_REFUSED names the field,
         /// REQUEST_ID_REFUSED); ALREADY_EXISTS (REQUEST_ID_USED); RESOURCE_EXHAUSTED (TOO_MANY_STUDIES,
-        /// DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+        /// DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of
+        /// the cluster reaches this one).
         pub async fn create_study(
             &mut self,
             request: impl tonic::IntoRequest<super::CreateStudyRequest>,
@@ -10777,7 +10778,8 @@ pub mod study_service_server {
     pub trait StudyService: std::marker::Send + std::marker::Sync + 'static {
         /// Creates a study without participants. INVALID_ARGUMENT (SETTINGS_REFUSED names the field,
         /// REQUEST_ID_REFUSED); ALREADY_EXISTS (REQUEST_ID_USED); RESOURCE_EXHAUSTED (TOO_MANY_STUDIES,
-        /// DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+        /// DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of
+        /// the cluster reaches this one).
         async fn create_study(
             &self,
             request: tonic::Request<super::CreateStudyRequest>,
@@ -14048,7 +14050,7 @@ pub mod tournament_service_client {
         /// Creates a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED,
         /// NAME_REFUSED) names the field of the settings, which may be `rules` or `policy`; the message
         /// names the inner field; RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE
-        /// (SHUTTING_DOWN, STORE_FAILED).
+        /// (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
         pub async fn create_tournament(
             &mut self,
             request: impl tonic::IntoRequest<super::CreateTournamentRequest>,
@@ -14654,7 +14656,7 @@ pub mod tournament_service_server {
         /// Creates a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED,
         /// NAME_REFUSED) names the field of the settings, which may be `rules` or `policy`; the message
         /// names the inner field; RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE
-        /// (SHUTTING_DOWN, STORE_FAILED).
+        /// (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
         async fn create_tournament(
             &self,
             request: tonic::Request<super::CreateTournamentRequest>,

@@ -8,6 +8,7 @@ mod fuzz;
 mod health;
 #[cfg(test)]
 mod idle_tests;
+mod joining;
 
 use std::future::Future;
 use std::io;
@@ -45,8 +46,7 @@ use crate::metrics::Metrics;
 use crate::node::{ClusterNode, Hosted};
 use crate::participants::Participants;
 use crate::peers::{
-    CONNECTION_WINDOW, MAX_RESET_STREAMS, PING_INTERVAL, PING_TIMEOUT, PeerPort, Peers,
-    STREAM_WINDOW,
+    CONNECTION_WINDOW, MAX_RESET_STREAMS, PING_INTERVAL, PING_TIMEOUT, PeerPort, STREAM_WINDOW,
 };
 use crate::proxies::{TrustedProxies, TrustedProxy};
 use crate::retention::Retention;
@@ -55,7 +55,7 @@ use crate::scrape;
 use crate::store::cluster::{ClusterStore, NodeInfo};
 use crate::store::{Store, StoreError};
 use crate::studies::Studies;
-use crate::tasks::{LongTask, named, short};
+use crate::tasks::{LongTask, named};
 use crate::tls::{MaybeTls, Tls, TlsError};
 use crate::tournaments::Tournaments;
 use crate::web::{OriginLayer, Origins, PageLayer};
@@ -348,7 +348,7 @@ impl Server {
         .add_service(reflection());
         let following = health::report(
             health.clone(),
-            node.as_ref().map(ClusterNode::may_publish),
+            node.as_ref().map(ClusterNode::serves),
             store.metrics().cloned(),
         );
         let following = tracker.spawn(until_closing(LongTask::Health, following.boxed()));
@@ -369,30 +369,32 @@ impl Server {
             tracker.spawn(until_closing(LongTask::Certificates, follow.boxed()));
         }
         scrape::add_certificates(rooms.metrics(), shown);
-        let forwarding = (peers.as_ref()).map(|port| {
-            let directory = Arc::clone(rooms.directory());
-            let to_others = port.peers(rooms.metrics());
+        let directory = Arc::clone(rooms.directory());
+        let to_others = (peers.as_ref()).map(|port| port.peers(rooms.metrics()));
+        if let Some(lease) = rooms.lease() {
             let signing_key = rooms.signing_key().map(|key| key.to_string());
-            tracker.spawn(short(
-                "asks each node once, within a time limit",
-                closing.clone().run_until_cancelled_owned(look_at_others(
-                    Arc::clone(&directory),
-                    Arc::clone(&to_others),
-                    signing_key.unwrap_or_default(),
-                )),
-            ));
-            grpc::ForwardLayer::new(directory, to_others, Arc::clone(&calls))
+            let joining = joining::be_reached(
+                Arc::clone(lease),
+                Arc::clone(&directory),
+                to_others.clone(),
+                signing_key.unwrap_or_default(),
+            );
+            tracker.spawn(until_closing(LongTask::Joining, joining.boxed()));
+        }
+        let forwarding = to_others.clone().map(|to_others| {
+            grpc::ForwardLayer::new(Arc::clone(&directory), to_others, Arc::clone(&calls))
         });
         let play = grpc::Play::new(
             Arc::clone(&rooms),
             Arc::clone(&tournaments),
             closing.clone(),
         );
-        let peer_play = PeerServiceServer::new(play)
-            .max_decoding_message_size(longest("chefshat.peer.v1.PeerService"));
-        let peer_serving = match peers {
+        let peer_serving = match peers.zip(to_others) {
             None => Either::Left(std::future::ready(Ok(()))),
-            Some(port) => {
+            Some((port, to_others)) => {
+                let of_nodes = grpc::OfNodes::new(play, directory, to_others);
+                let of_nodes = PeerServiceServer::new(of_nodes)
+                    .max_decoding_message_size(longest("chefshat.peer.v1.PeerService"));
                 let closed = closing.clone();
                 Either::Right(
                     transport::Server::builder()
@@ -415,7 +417,7 @@ impl Server {
                         ))
                         .layer(grpc::LimitsLayer::new(Arc::clone(&calls)))
                         .layer(grpc::DecodingLayer::new(Arc::clone(&calls)))
-                        .add_routes(routes.clone().add_service(peer_play))
+                        .add_routes(routes.clone().add_service(of_nodes))
                         .serve_with_incoming_shutdown(
                             port.incoming(rooms.metrics())?,
                             async move { closed.cancelled().await },
@@ -529,14 +531,6 @@ impl Server {
             warn!("the database was not closed in time; what was acknowledged is stored");
         }
         Ok(())
-    }
-}
-
-/// Logs which of the other nodes do not fit to this one, which has just started.
-async fn look_at_others(directory: Arc<dyn Directory>, peers: Arc<Peers>, signing_key: String) {
-    let (_, others) = directory.nodes().await;
-    for (peer, misfit) in peers.misfits(others, &signing_key).await {
-        warn!(node = %peer.node, address = %peer.endpoint, %misfit, "another node does not fit to this one");
     }
 }
 

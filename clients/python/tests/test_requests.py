@@ -38,6 +38,12 @@ class Unreachable(Lost):
         return ((DETAILS_KEY, status.SerializeToString()),)
 
 
+class Joining(Unreachable):
+    """The answer of a server that has just joined others, which do not reach it yet."""
+
+    reason = "NODE_NOT_REACHED"
+
+
 class Stopping(Unreachable):
     """The answer of a server that stops."""
 
@@ -109,11 +115,14 @@ def test_a_refusal_and_the_last_attempt_are_raised(errors: list[grpc.RpcError]) 
 
 
 @pytest.mark.parametrize("request_", [pb.JoinRoomRequest(), pb.GetRoomRequest()])
-def test_a_room_that_changes_servers_is_awaited_but_not_for_ever(request_: pb.JoinRoomRequest | pb.GetRoomRequest) -> None:
+@pytest.mark.parametrize("error", [Unreachable(), Joining()])
+def test_a_room_that_changes_servers_is_awaited_but_not_for_ever(
+    request_: pb.JoinRoomRequest | pb.GetRoomRequest, error: Unreachable
+) -> None:
     attempts = 1 + len(requests.OWNER_PAUSES_S)
-    assert requests.called(Method(*[Unreachable()] * (attempts - 1)), request_) == "joined"
-    method = Method(*[Unreachable()] * attempts)
-    with pytest.raises(ChefsHatError, match="OWNER_UNREACHABLE"):
+    assert requests.called(Method(*[error] * (attempts - 1)), request_) == "joined"
+    method = Method(*[error] * attempts)
+    with pytest.raises(ChefsHatError, match=error.reason):
         requests.called(method, request_)
     assert len(method.ids) == attempts
 

@@ -184,6 +184,7 @@ pub struct Metrics {
     vector_decisions: Counter,
     vector_games: Gauge,
     node_lease: Gauge,
+    node_reached: Gauge,
     takeovers: Counter,
     not_resumed: Counter,
     peer_errors: Counter,
@@ -199,6 +200,10 @@ impl Default for Metrics {
         let help = "1 while the server may publish, 0 while a node of a cluster has no lease";
         let node_lease: Gauge = plain(all, "node_lease", help);
         node_lease.set(1);
+        let help =
+            "0 while no other node has reached a node of a cluster since it joined, otherwise 1";
+        let node_reached: Gauge = plain(all, "node_reached", help);
+        node_reached.set(1);
         Self {
             rooms: labelled(all, "rooms", "Listed rooms", "state", rooms),
             seats: labelled(
@@ -262,6 +267,7 @@ impl Default for Metrics {
             vector_decisions: plain(all, "vector_decisions", "Decisions of vector games"),
             vector_games: plain(all, "vector_games", "Games of open vector streams"),
             node_lease,
+            node_reached,
             takeovers: plain(
                 all,
                 "takeovers",
@@ -425,6 +431,11 @@ impl Metrics {
     /// Says whether the node of a cluster has a lease.
     pub fn leased(&self, has_lease: bool) {
         self.node_lease.set(has_lease.into());
+    }
+
+    /// Says whether the node of a cluster has been reached since it joined.
+    pub fn reached(&self, is_reached: bool) {
+        self.node_reached.set(is_reached.into());
     }
 
     /// Counts a unit that the node is about to resume.

@@ -28,6 +28,8 @@ long_tasks! {
     Study,
     /// A node of a cluster.
     Node,
+    /// Asks other nodes to reach one that has joined.
+    Joining,
     /// Notices pauses of the process.
     ProcessClock,
     /// Reports whether the server serves.

@@ -137,10 +137,11 @@ impl Status {
 
 /// What a node is doing.
 fn state(node: &NodeStatus) -> &'static str {
-    match (node.expired, node.drain) {
-        (true, _) => "lost",
-        (false, true) => "draining",
-        (false, false) => "serving",
+    match node {
+        NodeStatus { expired: true, .. } => "lost",
+        NodeStatus { drain: true, .. } => "draining",
+        NodeStatus { reached: false, .. } => "not reached",
+        _ => "serving",
     }
 }
 
@@ -151,6 +152,7 @@ fn as_json(node: &NodeStatus) -> serde_json::Value {
         "version": node.info.build,
         "state": state(node),
         "lease_expired": node.expired,
+        "reached": node.reached,
         "last_beat_ms": node.last_beat.as_millis(),
         "rooms": node.rooms,
         "tournaments": node.tournaments,

@@ -9,18 +9,21 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use chefshat_proto::v1;
+use futures::stream::FuturesUnordered;
 use futures::{Stream, StreamExt as _};
 use http::{Request, Response, Uri};
 use hyper_util::rt::TokioIo;
 use rayon::ThreadPoolBuildError;
 use rustls::pki_types::ServerName;
 use tokio::net::{TcpListener, TcpStream};
+use tokio::time::error::Elapsed;
 use tokio::time::{Instant, timeout};
 use tokio_rustls::TlsConnector;
 use tokio_rustls::client::TlsStream;
 use tokio_util::either::Either;
 use tonic::body::Body;
 use tonic::transport::{Channel, Endpoint};
+use tonic::{Code, Status};
 use tower::{ServiceExt as _, service_fn};
 use tracing::warn;
 use v1::server_service_client::ServerServiceClient;
@@ -33,6 +36,8 @@ use chefshat_base::metrics::Metrics;
 use chefshat_base::proxies::TrustedProxies;
 use chefshat_hosting::cluster::Peer;
 use chefshat_room::MAX_GATEWAY_DELAY;
+use chefshat_wire::encoded::peer::peer_service_client::PeerServiceClient;
+use chefshat_wire::encoded::peer::{IdentifyRequest, ReachRequest, ReachResponse};
 
 /// The name that the certificate of every node has.
 pub const PEER_NAME: &str = "chefshat-node";
@@ -274,6 +279,61 @@ impl Peers {
         let misfits = futures::future::join_all(asked).await;
         misfits.into_iter().flatten().collect()
     }
+
+    /// Asks other nodes to reach this one, which is called `own`. One that does is enough; those of an
+    /// earlier version, which cannot say, are enough if none says that it does not.
+    ///
+    /// # Errors
+    /// None does; says why, by node.
+    pub async fn reached_by(&self, others: &[Peer], own: &str) -> Result<(), Vec<(Peer, String)>> {
+        let asked = others.iter().map(async |peer| {
+            let mut service = PeerServiceClient::new(self.channel(peer));
+            let request = ReachRequest {
+                node: own.to_owned(),
+            };
+            let asked = timeout(ANSWER_TIMEOUT * 2, service.reach(request));
+            (peer, answered(asked.await))
+        });
+        let mut asked: FuturesUnordered<_> = asked.collect();
+        let (mut problems, mut is_any_earlier) = (Vec::new(), false);
+        while let Some((peer, asked)) = asked.next().await {
+            let problem = match asked {
+                Ok(ReachResponse { problem }) if problem.is_empty() => return Ok(()),
+                Ok(ReachResponse { problem }) => format!("it does not reach this node: {problem}"),
+                Err(status) if status.code() == Code::Unimplemented => {
+                    is_any_earlier = true;
+                    continue;
+                }
+                Err(status) => format!("this node does not reach it: {}", status.message()),
+            };
+            problems.push((peer.clone(), problem));
+        }
+        match is_any_earlier && problems.is_empty() {
+            true => Ok(()),
+            false => Err(problems),
+        }
+    }
+
+    /// Reaches another node.
+    ///
+    /// # Errors
+    /// Nobody, or another node, answers at its endpoint; says so.
+    pub(crate) async fn reach(&self, peer: &Peer) -> Result<(), String> {
+        let Peer { node, endpoint } = peer;
+        let mut service = PeerServiceClient::new(self.channel(peer));
+        let asked = timeout(ANSWER_TIMEOUT, service.identify(IdentifyRequest {}));
+        match answered(asked.await) {
+            Ok(answer) if *answer.node == **node => Ok(()),
+            Ok(answer) => Err(format!("node {:?} answers at {endpoint}", answer.node)),
+            Err(status) => Err(format!("{endpoint} does not answer: {}", status.message())),
+        }
+    }
+}
+
+/// The answer of another node, if it came in time.
+fn answered<T>(asked: Result<Result<tonic::Response<T>, Status>, Elapsed>) -> Result<T, Status> {
+    let asked = asked.unwrap_or_else(|late| Err(Status::deadline_exceeded(late.to_string())));
+    asked.map(tonic::Response::into_inner)
 }
 
 /// The stream of a connection to another node.
@@ -317,6 +377,7 @@ impl Opening {
 
 #[cfg(test)]
 mod tests {
+    use std::convert::Infallible;
     use std::path::Path;
 
     use chefshat_proto::v1::server_service_server::{ServerService, ServerServiceServer};
@@ -324,8 +385,16 @@ mod tests {
     use tokio::io::AsyncReadExt as _;
     use tokio::net::TcpSocket;
     use tokio_stream::wrappers::TcpListenerStream;
+    use tonic::Streaming;
+    use tonic::server::NamedService;
+    use tower::Service;
 
     use super::*;
+    use chefshat_wire::encoded::Updates;
+    use chefshat_wire::encoded::peer::peer_service_server::{PeerService, PeerServiceServer};
+    use chefshat_wire::encoded::peer::{
+        IdentifyResponse, PlayRequest, ShareRequest, ShareResponse,
+    };
 
     async fn port() -> (SocketAddr, PeerPort) {
         let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
@@ -366,23 +435,37 @@ mod tests {
         }
     }
 
+    fn peer(node: &str, address: SocketAddr) -> Peer {
+        Peer {
+            node: node.into(),
+            endpoint: address.to_string().into(),
+        }
+    }
+
+    /// A node with this service alone.
+    async fn serving<S>(node: &str, service: S) -> Peer
+    where
+        S: Service<Request<Body>, Response = Response<Body>, Error = Infallible>
+            + NamedService
+            + Clone
+            + Send
+            + Sync
+            + 'static,
+        S::Future: Send + 'static,
+    {
+        let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+        let address = listener.local_addr().expect("bound");
+        let incoming = TcpListenerStream::new(listener);
+        let serving = tonic::transport::Server::builder().add_service(service);
+        tokio::spawn(serving.serve_with_incoming(incoming));
+        peer(node, address)
+    }
+
     #[tokio::test]
     async fn nodes_that_do_not_answer_or_sign_with_another_key_do_not_fit() {
         let (_, port) = port().await;
         let peers = port.peers(&Arc::default());
-        let peer = |node: &str, address: SocketAddr| Peer {
-            node: node.into(),
-            endpoint: address.to_string().into(),
-        };
-        let other = async |node, key| {
-            let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
-            let address = listener.local_addr().expect("bound");
-            let service = ServerServiceServer::new(Other(key));
-            let incoming = TcpListenerStream::new(listener);
-            let serving = tonic::transport::Server::builder().add_service(service);
-            tokio::spawn(serving.serve_with_incoming(incoming));
-            peer(node, address)
-        };
+        let other = async |node, key| serving(node, ServerServiceServer::new(Other(key))).await;
         let (fits, differs) = (
             other("fits", "ours").await,
             other("differs", "theirs").await,
@@ -395,6 +478,97 @@ mod tests {
         assert_eq!(found, [&differs, &silent]);
         assert_eq!(misfits[0].1, Misfit::OtherKey);
         assert!(matches!(misfits[1].1, Misfit::Silent(_)), "{misfits:?}");
+    }
+
+    /// A node that answers those who ask to be reached.
+    #[derive(Clone)]
+    struct Asked(&'static str);
+
+    #[tonic::async_trait]
+    impl PeerService for Asked {
+        type PlayStream = futures::stream::Empty<Result<Updates, Status>>;
+
+        async fn play(
+            &self,
+            _: tonic::Request<Streaming<PlayRequest>>,
+        ) -> Result<tonic::Response<Self::PlayStream>, Status> {
+            unreachable!("nobody plays")
+        }
+
+        async fn share(
+            &self,
+            _: tonic::Request<Streaming<ShareRequest>>,
+        ) -> Result<tonic::Response<ShareResponse>, Status> {
+            unreachable!("nobody watches")
+        }
+
+        async fn reach(
+            &self,
+            request: tonic::Request<ReachRequest>,
+        ) -> Result<tonic::Response<ReachResponse>, Status> {
+            assert_eq!(request.into_inner().node, "own #1");
+            match self.0 {
+                "unknown" => Err(Status::not_found("no such node is known here yet")),
+                problem => Ok(tonic::Response::new(ReachResponse {
+                    problem: problem.to_owned(),
+                })),
+            }
+        }
+
+        async fn identify(
+            &self,
+            _: tonic::Request<IdentifyRequest>,
+        ) -> Result<tonic::Response<IdentifyResponse>, Status> {
+            let node = self.0.to_owned();
+            Ok(tonic::Response::new(IdentifyResponse { node }))
+        }
+    }
+
+    #[tokio::test]
+    async fn a_node_is_reached_if_it_answers_itself() {
+        let (_, port) = port().await;
+        let peers = port.peers(&Arc::default());
+        let one = serving("one", PeerServiceServer::new(Asked("one"))).await;
+        assert_eq!(peers.reach(&one).await, Ok(()));
+        // Its --peer-endpoint is that of another.
+        let other = Peer {
+            node: "other".into(),
+            ..one
+        };
+        let refused = peers.reach(&other).await.expect_err("another node");
+        assert!(refused.starts_with("node \"one\" answers at"), "{refused}");
+        let silent = peer("silent", SocketAddr::from(([127, 0, 0, 1], 1)));
+        let refused = peers.reach(&silent).await.expect_err("nobody");
+        assert!(refused.contains("does not answer"), "{refused}");
+    }
+
+    #[tokio::test]
+    async fn one_node_that_reaches_this_one_is_enough() {
+        let (_, port) = port().await;
+        let peers = port.peers(&Arc::default());
+        let reaches = serving("reaches", PeerServiceServer::new(Asked(""))).await;
+        let does_not = serving("does not", PeerServiceServer::new(Asked("refused"))).await;
+        let unknown = serving("unknown", PeerServiceServer::new(Asked("unknown"))).await;
+        // It has no such call.
+        let earlier = serving("earlier", ServerServiceServer::new(Other("ours"))).await;
+        let silent = peer("silent", SocketAddr::from(([127, 0, 0, 1], 1)));
+
+        let without = [does_not.clone(), unknown, silent];
+        let none = peers.reached_by(&without, "own #1").await;
+        let none: BTreeMap<Arc<str>, String> = (none.expect_err("none of them").into_iter())
+            .map(|(peer, problem)| (peer.node, problem))
+            .collect();
+        assert_eq!(none["does not"], "it does not reach this node: refused");
+        assert!(none["unknown"].contains("known here"), "{none:?}");
+        assert!(none["silent"].starts_with("this node does not"), "{none:?}");
+        let others = [without.as_slice(), &[reaches]].concat();
+        assert_eq!(peers.reached_by(&others, "own #1").await, Ok(()));
+        let earlier = std::slice::from_ref(&earlier);
+        assert_eq!(peers.reached_by(earlier, "own #1").await, Ok(()));
+        let others = [earlier, &[does_not]].concat();
+        let refused = peers.reached_by(&others, "own #1").await;
+        assert_eq!(refused.map_err(|problems| problems.len()), Err(1));
+        assert_eq!(peers.reached_by(&[], "own #1").await, Err(Vec::new()));
     }
 
     #[tokio::test(start_paused = true)]

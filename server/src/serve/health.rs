@@ -7,17 +7,17 @@ use tracing::warn;
 
 use crate::metrics::StoreMetrics;
 
-/// Reports whether the server serves: a node while it has a lease, and each while what it writes is
-/// committed.
+/// Reports whether the server serves: a node while it has a lease and once it has been reached, and
+/// each while what it writes is committed.
 pub(super) async fn report(
     health: HealthReporter,
-    mut lease: Option<watch::Receiver<bool>>,
+    mut node: Option<watch::Receiver<bool>>,
     written: Option<StoreMetrics>,
 ) {
     loop {
-        let has_lease = lease.as_mut().is_none_or(|it| *it.borrow_and_update());
+        let node_serves = node.as_mut().is_none_or(|it| *it.borrow_and_update());
         let is_stalled = written.as_ref().is_some_and(StoreMetrics::is_stalled);
-        let status = match has_lease && !is_stalled {
+        let status = match node_serves && !is_stalled {
             true => ServingStatus::Serving,
             false => ServingStatus::NotServing,
         };
@@ -25,10 +25,10 @@ pub(super) async fn report(
         if is_stalled {
             warn!("nothing has been committed for a while: health checks fail until something is");
         }
-        let lease_changes = async {
-            match &mut lease {
+        let node_changes = async {
+            match &mut node {
                 // Its node has ended otherwise.
-                Some(lease) => lease.changed().await.is_ok(),
+                Some(node) => node.changed().await.is_ok(),
                 None => std::future::pending().await,
             }
         };
@@ -39,7 +39,7 @@ pub(super) async fn report(
             }
         };
         tokio::select! {
-            has_node = lease_changes => if !has_node { return },
+            has_node = node_changes => if !has_node { return },
             () = stall_changes => {}
         }
     }

@@ -53,7 +53,7 @@ const OF_A_SERVER: [LongTask; 18] = [
 ];
 
 /// What only the node runs in [`the_tasks_of_a_node_sleep_while_nothing_is_due`].
-const OF_A_NODE: [LongTask; 2] = [LongTask::Node, LongTask::Certificates];
+const OF_A_NODE: [LongTask; 3] = [LongTask::Node, LongTask::Joining, LongTask::Certificates];
 
 /// What neither runs.
 const ELSEWHERE: [(LongTask, &str); 5] = [
@@ -427,12 +427,12 @@ async fn the_tasks_of_a_node_sleep_while_nothing_is_due() {
     let node = Server::joined(config, shared, NodeInfo::default()).await;
     let node = node.expect("the database is there");
     let rooms = Arc::clone(&node.rooms);
-    let mut leased = node.node.as_ref().expect("a node").may_publish();
+    let mut serves = node.node.as_ref().expect("a node").serves();
     let serving = tokio::spawn(node.serve_incoming(
         futures::stream::pending::<io::Result<tokio::io::DuplexStream>>(),
         std::future::pending(),
     ));
-    leased.wait_for(|it| *it).await.expect("it runs");
+    serves.wait_for(|it| *it).await.expect("it runs");
     let room = rooms.create(crate::rooms::NewRoom::for_tests()).await;
     let room = room.expect("a room").handle.id();
     sleep(Duration::from_secs(60)).await;

@@ -30,6 +30,17 @@ pub struct NodeInfo {
     pub capacity: u64,
 }
 
+/// A node that has a lease.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LivingNode {
+    /// Its id.
+    pub id: NodeId,
+    /// What it said when it joined.
+    pub info: NodeInfo,
+    /// Whether it has been reached since it joined.
+    pub reached: bool,
+}
+
 /// A node of the cluster.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NodeStatus {
@@ -43,6 +54,8 @@ pub struct NodeStatus {
     pub expired: bool,
     /// Whether it has been asked to hand over what it owns.
     pub drain: bool,
+    /// Whether it has been reached since it joined.
+    pub reached: bool,
     /// Rooms that it owns and that are not over.
     pub rooms: u64,
     /// Tournaments that it owns and that are not over.
@@ -123,9 +136,10 @@ pub trait ClusterStore: Store {
     /// was removed because it was away for long, it becomes a new node.
     fn join(&self, info: NodeInfo) -> BoxFuture<'_, Result<NodeId, StoreError>>;
 
-    /// Renews the lease of this node, even if it has expired, and returns what it owns at the same
-    /// moment. `None`: the node is not known (any more).
-    fn beat(&self) -> BoxFuture<'_, Result<Option<Beat>, StoreError>>;
+    /// Renews the lease of this node, even if it has expired, says whether it has been reached since
+    /// it joined, and returns what it owns at the same moment. `None`: the node is not known (any
+    /// more).
+    fn beat(&self, reached: bool) -> BoxFuture<'_, Result<Option<Beat>, StoreError>>;
 
     /// At most `count` units that nobody owns or whose owner's lease has expired, with their
     /// epochs, in an order of this node's own, so that several nodes share them; only such that this
@@ -185,7 +199,7 @@ pub trait ClusterStore: Store {
     fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>>;
 
     /// The nodes that have a lease.
-    fn alive(&self) -> BoxFuture<'_, Result<Vec<(NodeId, NodeInfo)>, StoreError>>;
+    fn alive(&self) -> BoxFuture<'_, Result<Vec<LivingNode>, StoreError>>;
 
     /// All nodes, in the order in which they joined. Counts what they own, so it takes longer than
     /// [`ClusterStore::alive`].

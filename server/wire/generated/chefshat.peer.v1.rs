@@ -73,6 +73,31 @@ pub struct ShareRequest {
 /// The answer when the call ends.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct ShareResponse {}
+/// Who asks to be reached.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct ReachRequest {
+    /// Its name, unique in the cluster: the name for people, ` #` and its number. The database knows
+    /// where it says that others reach it.
+    #[prost(string, tag = "1")]
+    pub node: ::prost::alloc::string::String,
+}
+/// Whether it was reached.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct ReachResponse {
+    /// Why it was not, in English; empty if it was.
+    #[prost(string, tag = "1")]
+    pub problem: ::prost::alloc::string::String,
+}
+/// Nothing is asked for.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct IdentifyRequest {}
+/// The node that answers.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct IdentifyResponse {
+    /// Its name, unique in the cluster; empty if it has not joined yet.
+    #[prost(string, tag = "1")]
+    pub node: ::prost::alloc::string::String,
+}
 /// Generated client implementations.
 pub mod peer_service_client {
     #![allow(
@@ -217,6 +242,55 @@ pub mod peer_service_client {
                 .insert(GrpcMethod::new("chefshat.peer.v1.PeerService", "Share"));
             self.inner.client_streaming(req, path, codec).await
         }
+        /// Reaches the node that asks, which has just joined and creates nothing and takes nothing over until
+        /// another node does. NOT_FOUND if no such node is known here (yet). An older version answers
+        /// UNIMPLEMENTED.
+        pub async fn reach(
+            &mut self,
+            request: impl tonic::IntoRequest<super::ReachRequest>,
+        ) -> std::result::Result<tonic::Response<super::ReachResponse>, tonic::Status> {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = crate::encoded::SmallBuffers::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/chefshat.peer.v1.PeerService/Reach",
+            );
+            let mut req = request.into_request();
+            req.extensions_mut()
+                .insert(GrpcMethod::new("chefshat.peer.v1.PeerService", "Reach"));
+            self.inner.unary(req, path, codec).await
+        }
+        /// Says which node this is.
+        pub async fn identify(
+            &mut self,
+            request: impl tonic::IntoRequest<super::IdentifyRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::IdentifyResponse>,
+            tonic::Status,
+        > {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = crate::encoded::SmallBuffers::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/chefshat.peer.v1.PeerService/Identify",
+            );
+            let mut req = request.into_request();
+            req.extensions_mut()
+                .insert(GrpcMethod::new("chefshat.peer.v1.PeerService", "Identify"));
+            self.inner.unary(req, path, codec).await
+        }
     }
 }
 /// Generated server implementations.
@@ -253,6 +327,21 @@ pub mod peer_service_server {
             &self,
             request: tonic::Request<tonic::Streaming<super::ShareRequest>>,
         ) -> std::result::Result<tonic::Response<super::ShareResponse>, tonic::Status>;
+        /// Reaches the node that asks, which has just joined and creates nothing and takes nothing over until
+        /// another node does. NOT_FOUND if no such node is known here (yet). An older version answers
+        /// UNIMPLEMENTED.
+        async fn reach(
+            &self,
+            request: tonic::Request<super::ReachRequest>,
+        ) -> std::result::Result<tonic::Response<super::ReachResponse>, tonic::Status>;
+        /// Says which node this is.
+        async fn identify(
+            &self,
+            request: tonic::Request<super::IdentifyRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::IdentifyResponse>,
+            tonic::Status,
+        >;
     }
     /// Streams between nodes.
     #[derive(Debug)]
@@ -420,6 +509,94 @@ pub mod peer_service_server {
                                 max_encoding_message_size,
                             );
                         let res = grpc.client_streaming(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
+                "/chefshat.peer.v1.PeerService/Reach" => {
+                    #[allow(non_camel_case_types)]
+                    struct ReachSvc<T: PeerService>(pub Arc<T>);
+                    impl<T: PeerService> tonic::server::UnaryService<super::ReachRequest>
+                    for ReachSvc<T> {
+                        type Response = super::ReachResponse;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::Response>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<super::ReachRequest>,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as PeerService>::reach(&inner, request).await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = ReachSvc(inner);
+                        let codec = crate::encoded::SmallBuffers::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.unary(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
+                "/chefshat.peer.v1.PeerService/Identify" => {
+                    #[allow(non_camel_case_types)]
+                    struct IdentifySvc<T: PeerService>(pub Arc<T>);
+                    impl<
+                        T: PeerService,
+                    > tonic::server::UnaryService<super::IdentifyRequest>
+                    for IdentifySvc<T> {
+                        type Response = super::IdentifyResponse;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::Response>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<super::IdentifyRequest>,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as PeerService>::identify(&inner, request).await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = IdentifySvc(inner);
+                        let codec = crate::encoded::SmallBuffers::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.unary(method, req).await;
                         Ok(res)
                     };
                     Box::pin(fut)

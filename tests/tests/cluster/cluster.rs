@@ -12,6 +12,10 @@ use chefshat_tests::{Ended, Held, Launch, Link, Process, Way, own_address, patie
 use futures::future::join_all;
 use procfs::process::{FDTarget, Process as Running};
 use tempfile::TempDir;
+use tonic::transport::Channel;
+use tonic_health::pb::HealthCheckRequest;
+use tonic_health::pb::health_check_response::ServingStatus;
+use tonic_health::pb::health_client::HealthClient;
 
 use crate::certificates::Authority;
 use crate::proxy::Proxy;
@@ -140,18 +144,25 @@ impl Cluster {
             });
         }
         join_all(nodes.iter_mut().map(Node::launch)).await;
+        *pairs.processes.lock().expect("no panic") = nodes.iter().map(Node::process_id).collect();
+        let serving = async {
+            for node in &nodes {
+                while node.health().await != ServingStatus::Serving {
+                    tokio::time::sleep(LOOK_AGAIN).await;
+                }
+            }
+        };
+        patiently("all nodes to be reached", serving).await;
         let addresses: Vec<SocketAddr> = nodes.iter().map(Node::address).collect();
         let proxy = Proxy::start(&addresses, folder.path()).await;
-        let cluster = Self {
+        Self {
             nodes,
             postgres,
             database,
             proxy,
             pairs,
             folder,
-        };
-        cluster.note_processes();
-        cluster
+        }
     }
 
     /// Where clients connect.
@@ -188,6 +199,21 @@ impl Cluster {
         for (from, to) in [(one, other), (other, one)] {
             self.pairs.ways[from][to].cut();
             self.pairs.ways[from][to].hold(Held::Nothing);
+        }
+    }
+
+    /// Holds everything that other nodes send to this one.
+    pub(crate) fn hide(&self, node: usize) {
+        for from in &self.pairs.ways {
+            from[node].hold(Held::Everything);
+        }
+    }
+
+    /// Ends what `hide` began; the connections of that time are lost.
+    pub(crate) fn show(&self, node: usize) {
+        for from in &self.pairs.ways {
+            from[node].cut();
+            from[node].hold(Held::Nothing);
         }
     }
 
@@ -233,6 +259,14 @@ impl Cluster {
             self.nodes[node].peers.address
         ));
         games.lines().map(str::to_owned).collect()
+    }
+
+    /// What stands in the database in this column of a node.
+    pub(crate) fn select_of(&self, column: &str, node: usize) -> String {
+        let endpoint = self.nodes[node].peers.address;
+        self.select(&format!(
+            "SELECT {column} FROM nodes WHERE peer_endpoint = '{endpoint}' ORDER BY beat_ms DESC LIMIT 1"
+        ))
     }
 
     /// The node that owns a room or tournament.
@@ -286,6 +320,19 @@ impl Node {
         let url = self.launch.url();
         let address = url.trim_start_matches("http://");
         address.parse().expect("an address")
+    }
+
+    /// What it has said at last.
+    pub(crate) fn said(&self) -> String {
+        end_of(&self.log)
+    }
+
+    /// What a health check says.
+    pub(crate) async fn health(&self) -> ServingStatus {
+        let channel = Channel::from_shared(self.url()).expect("an address");
+        let mut service = HealthClient::new(channel.connect_lazy());
+        let answer = service.check(HealthCheckRequest::default()).await;
+        answer.expect("it answers").into_inner().status()
     }
 
     /// Where clients connect that go past the proxy.

@@ -6,6 +6,7 @@ mod cluster;
 mod cup;
 mod cuts;
 mod faults;
+mod joining;
 mod measure;
 mod proxy;
 mod rounds;

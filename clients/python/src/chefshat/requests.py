@@ -53,6 +53,8 @@ PAUSES_S = (0.1, 0.2, 0.4)
 # The same while the server that runs its room or tournament cannot be reached: another one takes over within ten seconds.
 OWNER_PAUSES_S = (0.1, 0.2, 0.4, 0.8) + 15 * (1.0,)
 OWNER_UNREACHABLE = "OWNER_UNREACHABLE"
+# The same while the server has just joined others and is not reached by them yet.
+NODE_NOT_REACHED = "NODE_NOT_REACHED"
 # The same while the server stops, and then is away: its running games may end first, and then it starts again.
 RESTART_PAUSES_S = (0.1, 0.2, 0.4, 0.8) + 120 * (1.0,)
 SHUTTING_DOWN = "SHUTTING_DOWN"
@@ -270,6 +272,7 @@ def _pauses(request: object) -> dict[str, Iterator[float]]:
     return {
         grpc.StatusCode.UNAVAILABLE.name: iter(PAUSES_S),
         OWNER_UNREACHABLE: iter(OWNER_PAUSES_S),
+        NODE_NOT_REACHED: iter(OWNER_PAUSES_S),
         SHUTTING_DOWN: iter(RESTART_PAUSES_S),
     }
 

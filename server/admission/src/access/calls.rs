@@ -505,6 +505,8 @@ const CALLS_OF_NODES: &[Call] = &[
         .sending()
         .takes(MAX_PEER_REQUEST_BYTES, 80_000, 9 * MIB),
     call("/chefshat.peer.v1.PeerService/Share", Anyone, Unlimited).sending(),
+    call("/chefshat.peer.v1.PeerService/Reach", Anyone, Unlimited),
+    call("/chefshat.peer.v1.PeerService/Identify", Anyone, Unlimited),
 ];
 
 #[cfg(test)]

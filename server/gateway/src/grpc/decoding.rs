@@ -75,6 +75,16 @@ static PEER_SHARE: Shape = Shape {
     }],
 };
 
+static PEER_REACH: Shape = Shape {
+    name: "chefshat.peer.v1.ReachRequest",
+    size: size_of::<peer::ReachRequest>(),
+    fields: &[Field {
+        number: 1,
+        list: false,
+        kind: Kind::Text,
+    }],
+};
+
 /// The shape of the requests of a call.
 fn shape(path: &str) -> &'static Shape {
     static BY_PATH: LazyLock<HashMap<&str, &Shape>> = LazyLock::new(|| {
@@ -83,6 +93,7 @@ fn shape(path: &str) -> &'static Shape {
         let of_nodes = [
             ("/chefshat.peer.v1.PeerService/Play", &PEER_PLAY),
             ("/chefshat.peer.v1.PeerService/Share", &PEER_SHARE),
+            ("/chefshat.peer.v1.PeerService/Reach", &PEER_REACH),
         ];
         methods.chain(of_nodes).collect()
     });
@@ -567,7 +578,7 @@ mod tests {
             }
         }
         let of_nodes = of_nodes();
-        for shape in [&PEER_PLAY, &PEER_INPUT, &PEER_SHARE] {
+        for shape in [&PEER_PLAY, &PEER_INPUT, &PEER_SHARE, &PEER_REACH] {
             let name = shape.name.trim_start_matches("chefshat.peer.v1.");
             let fields = (shape.fields.iter()).map(|field| {
                 (

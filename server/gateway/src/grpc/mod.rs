@@ -43,7 +43,7 @@ pub use info::Info;
 pub use instruments::Instruments;
 pub use limits::LimitsLayer;
 pub use lookup::Lookup;
-pub use play::Play;
+pub use play::{OfNodes, Play};
 pub use recorded::Recorded;
 pub use records::Records;
 pub use refusals::count_refusals;

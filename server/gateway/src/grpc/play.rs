@@ -28,10 +28,12 @@ use super::forward::Gateway;
 use super::limits::Arrived;
 use super::lookup::Lookup;
 use super::status::{Refusal, field, request_id, room_unknown, stream_ended, ticket_unknown};
+use crate::peers::Peers;
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{Executing, Hint, Key};
 use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named};
+use chefshat_hosting::cluster::Directory;
 use chefshat_hosting::config::MAX_SEATS_PER_WATCH;
 use chefshat_hosting::room::{Loss, SeatAction};
 use chefshat_hosting::rooms::Rooms;
@@ -40,7 +42,10 @@ use chefshat_room::ids::{Id, Token};
 use chefshat_wire::convert;
 use chefshat_wire::encoded::Updates;
 use chefshat_wire::encoded::peer::peer_service_server::PeerService;
-use chefshat_wire::encoded::peer::{PlayRequest, ShareRequest, ShareResponse};
+use chefshat_wire::encoded::peer::{
+    IdentifyRequest, IdentifyResponse, PlayRequest, ReachRequest, ReachResponse, ShareRequest,
+    ShareResponse,
+};
 use chefshat_wire::encoded::service::play_service_server::PlayService;
 use chefshat_wire::outbox::{Outbox, OutboxStream, StreamEnd};
 use reader::{Reader, Requests, express_action};
@@ -107,9 +112,27 @@ impl Play {
     }
 }
 
-/// The streams of other nodes, for their clients.
+/// What other nodes ask: streams for their clients, and to be reached.
+#[derive(Debug, Clone)]
+pub struct OfNodes {
+    play: Play,
+    directory: Arc<dyn Directory>,
+    peers: Arc<Peers>,
+}
+
+impl OfNodes {
+    /// Creates the service; it reaches the nodes of `directory` over `peers`.
+    pub fn new(play: Play, directory: Arc<dyn Directory>, peers: Arc<Peers>) -> Self {
+        Self {
+            play,
+            directory,
+            peers,
+        }
+    }
+}
+
 #[tonic::async_trait]
-impl PeerService for Play {
+impl PeerService for OfNodes {
     type PlayStream = Responses;
 
     async fn play(
@@ -118,8 +141,8 @@ impl PeerService for Play {
     ) -> Result<Response<Responses>, Status> {
         let (outbox, updates) = Outbox::new();
         let caller = Caller::of(request.extensions());
-        let reader = self.reader(caller, &outbox, true).by_gateway();
-        Ok(self.responses(reader, request.into_inner(), updates))
+        let reader = self.play.reader(caller, &outbox, true).by_gateway();
+        Ok(self.play.responses(reader, request.into_inner(), updates))
     }
 
     async fn share(
@@ -128,19 +151,49 @@ impl PeerService for Play {
     ) -> Result<Response<ShareResponse>, Status> {
         let mut requests = request.into_inner();
         let mut sharing = None;
-        while let Some(message) = self.closing.run_until_cancelled(requests.message()).await
+        while let Some(message) = self
+            .play
+            .closing
+            .run_until_cancelled(requests.message())
+            .await
             && let Ok(Some(ShareRequest { room_id, others })) = message
         {
             let counted = match &mut sharing {
                 Some(counted) => counted,
                 unknown => {
-                    let room = Id::parse(&room_id).and_then(|id| self.rooms.get(id));
+                    let room = Id::parse(&room_id).and_then(|id| self.play.rooms.get(id));
                     unknown.insert(room.ok_or_else(room_unknown)?.sharing())
                 }
             };
             counted.set(others);
         }
         Ok(Response::new(ShareResponse {}))
+    }
+
+    async fn reach(
+        &self,
+        request: Request<ReachRequest>,
+    ) -> Result<Response<ReachResponse>, Status> {
+        if let Some(executing) = request.extensions().get::<Executing>() {
+            // Others are not delayed while it is reached.
+            executing.give_back();
+        }
+        let name = request.into_inner().node;
+        let (_, others) = self.directory.nodes().await;
+        let Some(peer) = others.iter().find(|peer| *peer.node == *name) else {
+            return Err(Status::not_found("it does not know this node yet"));
+        };
+        let problem = self.peers.reach(peer).await.err().unwrap_or_default();
+        Ok(Response::new(ReachResponse { problem }))
+    }
+
+    async fn identify(
+        &self,
+        _: Request<IdentifyRequest>,
+    ) -> Result<Response<IdentifyResponse>, Status> {
+        let (own, _) = self.directory.nodes().await;
+        let node = own.to_string();
+        Ok(Response::new(IdentifyResponse { node }))
     }
 }
 

@@ -260,6 +260,11 @@ pub fn shutting_down() -> Status {
     )
 }
 
+/// No other node reaches this one, which therefore accepts nothing new.
+fn node_not_reached(message: &str) -> Status {
+    status(Code::Unavailable, "NODE_NOT_REACHED", message, [])
+}
+
 /// A spectator was disconnected because it reads too slowly.
 pub fn spectator_too_slow() -> Status {
     status(
@@ -444,6 +449,7 @@ impl From<CreateError> for Refusal {
             CreateError::Refused(refused) => return refused.into(),
             CreateError::RequestIdUsed => request_id_used(&error.to_string()),
             CreateError::ShuttingDown => shutting_down(),
+            CreateError::NotReached => node_not_reached(&error.to_string()),
             CreateError::DiskNearlyFull => disk_nearly_full(&error.to_string()),
             CreateError::Store(error) => {
                 tracing::error!(%error, "creating a room failed");
@@ -464,6 +470,7 @@ pub fn not_created<P: std::error::Error>(
         CreateProblem::Refused(refused) => Refusal::from(refused).into(),
         CreateProblem::RequestIdUsed(_) => request_id_used(&message),
         CreateProblem::ShuttingDown(_) => shutting_down(),
+        CreateProblem::NotReached(_) => node_not_reached(&message),
         CreateProblem::DiskNearlyFull => disk_nearly_full(&message),
         CreateProblem::Store(error) => {
             tracing::error!(%error, "creating a tournament or study failed");

@@ -1,6 +1,7 @@
 //! Which node has a room or tournament. A node asks for those that it does not have in memory
 //! itself, so the directory of a single server has nothing to say and never waits.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::Arc;
 
@@ -75,6 +76,11 @@ impl From<&str> for FoundBy {
 pub trait Directory: Send + Sync + 'static {
     /// The name of this node, and the other nodes that are alive.
     fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)>;
+
+    /// The names of the nodes that have not been reached since they joined.
+    fn unreached(&self) -> BoxFuture<'_, BTreeSet<Arc<str>>> {
+        ready(BTreeSet::new()).boxed()
+    }
 
     /// The location of a room or tournament that is not in memory, for this caller.
     fn locate<'a>(&'a self, found_by: &'a FoundBy, caller: Key) -> BoxFuture<'a, Location>;

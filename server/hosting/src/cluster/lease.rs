@@ -1,5 +1,5 @@
-//! What the rooms, tournaments and studies of a node share with its task: until when they may publish, and
-//! which of them are new or have stopped by themselves.
+//! What the rooms, tournaments and studies of a node share with its task: until when they may publish,
+//! whether the node takes new ones, and which of them are new or have stopped by themselves.
 
 use std::collections::BTreeSet;
 use std::future::Future;
@@ -21,6 +21,9 @@ use chefshat_store::StoreError;
 pub struct NodeLease {
     until: watch::Sender<Instant>,
     node: Mutex<Option<NodeId>>,
+    /// Whether another node has reached this one since it joined, or there was none. Until then it
+    /// creates nothing and takes nothing over.
+    reached: watch::Sender<bool>,
     news: Mutex<BTreeSet<(Id, UnitEvent)>>,
     has_news: Notify,
 }
@@ -43,6 +46,7 @@ impl NodeLease {
         Self {
             until: watch::Sender::new(Instant::now()),
             node: Mutex::default(),
+            reached: watch::Sender::default(),
             news: Mutex::default(),
             has_news: Notify::new(),
         }
@@ -53,6 +57,30 @@ impl NodeLease {
         Instant::now() < *self.until.borrow()
     }
 
+    /// Whether another node has reached this one since it joined, or there was none.
+    pub(crate) fn is_reached(&self) -> bool {
+        *self.reached.borrow()
+    }
+
+    /// Notes that another node has reached this one, or that there is none.
+    pub fn set_reached(&self) {
+        self.reached.send_replace(true);
+    }
+
+    /// Waits until the node has joined, for the first time or again, and has not been reached since.
+    pub async fn joined_anew(&self) {
+        let mut reached = self.reached.subscribe();
+        let anew = reached.wait_for(|reached| !reached && self.node().is_some());
+        anew.await.expect("the sender is borrowed");
+    }
+
+    /// Waits until the node is reached.
+    pub(crate) async fn reached(&self) {
+        let mut reached = self.reached.subscribe();
+        let is_reached = reached.wait_for(|reached| *reached).await;
+        is_reached.expect("the sender is borrowed");
+    }
+
     /// The node, once it has joined.
     pub(crate) fn node(&self) -> Option<NodeId> {
         *self.node.lock().expect("nothing panics under this lock")
@@ -61,6 +89,7 @@ impl NodeLease {
     /// Sets the node, which has just joined.
     pub(crate) fn joined(&self, node: NodeId) {
         *self.node.lock().expect("nothing panics under this lock") = Some(node);
+        self.reached.send_replace(false);
     }
 
     /// Waits until the node may not publish.

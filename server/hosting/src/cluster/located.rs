@@ -1,6 +1,6 @@
 //! The directory of a node: asks the database who owns what, and remembers what other nodes own.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use super::directory::{Directory, FoundBy, Location, Peer};
 use super::lease::NodeLease;
 use chefshat_admission::limits::{FairSemaphore, Key, Shares};
 use chefshat_room::ids::Id;
-use chefshat_store::cluster::{self, ClusterStore, NodeId};
+use chefshat_store::cluster::{self, ClusterStore, LivingNode, NodeId};
 use chefshat_store::{ResumableGame, StoreError};
 
 /// Most rooms and tournaments of other nodes that are remembered, by whatever they were found.
@@ -42,7 +42,14 @@ pub struct StoreDirectory {
 /// The nodes that have a lease, or why they are unknown, and when they were read.
 struct Nodes {
     read: Instant,
-    alive: Result<BTreeMap<NodeId, Peer>, StoreError>,
+    alive: Result<Alive, StoreError>,
+}
+
+#[derive(Clone, Default)]
+struct Alive {
+    nodes: BTreeMap<NodeId, Peer>,
+    /// The names of those that have not been reached.
+    unreached: BTreeSet<Arc<str>>,
 }
 
 impl StoreDirectory {
@@ -85,7 +92,7 @@ impl StoreDirectory {
             });
         }
         let peer = match found.node {
-            Some(node) => self.alive().await?.remove(&node),
+            Some(node) => self.alive().await?.nodes.remove(&node),
             None => None,
         };
         Ok(match peer {
@@ -97,27 +104,37 @@ impl StoreDirectory {
     }
 
     /// The nodes that have a lease.
-    async fn alive(&self) -> Result<BTreeMap<NodeId, Peer>, StoreError> {
+    async fn alive(&self) -> Result<Alive, StoreError> {
         let mut nodes = self.nodes.lock().await;
         let recent = |nodes: &&Nodes| nodes.read.elapsed() < NODES_KNOWN_FOR;
         if let Some(nodes) = nodes.as_ref().filter(recent) {
             return nodes.alive.clone();
         }
         let alive = self.store.alive().await.map(|alive| {
-            let peers = alive.into_iter().map(|(id, info)| {
-                let peer = Peer {
-                    node: format!("{} #{}", info.name, id.0).into(),
-                    endpoint: info.peer_endpoint.into(),
-                };
-                (id, peer)
-            });
-            peers.collect()
+            let mut read = Alive::default();
+            for LivingNode { id, info, reached } in alive {
+                let node: Arc<str> = format!("{} #{}", info.name, id.0).into();
+                if !reached {
+                    read.unreached.insert(Arc::clone(&node));
+                }
+                let endpoint = info.peer_endpoint.into();
+                read.nodes.insert(id, Peer { node, endpoint });
+            }
+            read
         });
         *nodes = Some(Nodes {
             read: Instant::now(),
             alive: alive.clone(),
         });
         alive
+    }
+
+    /// The nodes that have a lease, as far as they are known.
+    async fn living(&self) -> Alive {
+        self.alive().await.unwrap_or_else(|error| {
+            warn!(%error, "the nodes of the cluster are unknown");
+            Alive::default()
+        })
     }
 }
 
@@ -157,15 +174,16 @@ impl Directory for StoreDirectory {
 
     fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)> {
         async move {
-            let mut alive = self.alive().await.unwrap_or_else(|error| {
-                warn!(%error, "the nodes of the cluster are unknown");
-                BTreeMap::new()
-            });
-            let own = self.lease.node().and_then(|node| alive.remove(&node));
+            let mut nodes = self.living().await.nodes;
+            let own = self.lease.node().and_then(|node| nodes.remove(&node));
             let name = own.map_or_else(|| Arc::from(""), |own| own.node);
-            (name, alive.into_values().collect())
+            (name, nodes.into_values().collect())
         }
         .boxed()
+    }
+
+    fn unreached(&self) -> BoxFuture<'_, BTreeSet<Arc<str>>> {
+        async move { self.living().await.unreached }.boxed()
     }
 
     fn is_over(&self, tournament: Id) -> BoxFuture<'_, bool> {

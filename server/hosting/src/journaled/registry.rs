@@ -32,6 +32,9 @@ pub enum CreateProblem<P: std::error::Error> {
     /// The server is shutting down.
     #[error("the server is shutting down and accepts no new {}", .0.plural())]
     ShuttingDown(UnitKind),
+    /// No other node reaches this one.
+    #[error("no other node reaches this one, which accepts no new {}; try again, and if it fails again, tell the operator", .0.plural())]
+    NotReached(UnitKind),
     /// The disk has no space for more games.
     #[error("the server's disk is nearly full; the rest is reserved for running games")]
     DiskNearlyFull,
@@ -93,6 +96,9 @@ impl<U: Journaled> Registry<U> {
     pub(crate) fn check_accepting(&self) -> Result<(), Problem<U>> {
         if self.stop.no_more_games.is_cancelled() || self.rooms.is_shutting_down() {
             return Err(CreateProblem::ShuttingDown(U::KIND));
+        }
+        if !self.rooms.is_reached() {
+            return Err(CreateProblem::NotReached(U::KIND));
         }
         match self.rooms.store().has_space() {
             true => Ok(()),

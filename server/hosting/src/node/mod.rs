@@ -53,13 +53,13 @@ const REJOIN_PAUSE: Duration = Duration::from_secs(1);
 pub struct ClusterNode {
     drain: CancellationToken,
     is_asked_to_drain: watch::Receiver<bool>,
-    may_publish: watch::Receiver<bool>,
+    serves: watch::Receiver<bool>,
     task: JoinHandle<()>,
 }
 
 impl ClusterNode {
-    /// Starts the task of a node that has joined. When it is drained, ephemeral games may continue
-    /// for `grace`.
+    /// Starts the task of a node that has joined. It takes nothing until it is reached
+    /// ([`NodeLease::set_reached`]). When it is drained, ephemeral games may continue for `grace`.
     pub fn start(
         id: NodeId,
         info: NodeInfo,
@@ -69,7 +69,7 @@ impl ClusterNode {
     ) -> Self {
         let drain = CancellationToken::new();
         let (asked, is_asked_to_drain) = watch::channel(false);
-        let (publishes, may_publish) = watch::channel(false);
+        let (serves, is_serving) = watch::channel(false);
         let lease = hosted.rooms.lease();
         let lease = Arc::clone(lease.expect("the rooms of a node have a lease"));
         lease.joined(id);
@@ -91,14 +91,15 @@ impl ClusterNode {
             releases: Arc::new(Semaphore::new(RELEASES_AT_ONCE)),
             search: Arc::new(Semaphore::new(1)),
             asked,
-            publishes,
+            serves,
+            is_reached: false,
             leaves: false,
         };
         Self {
             task: tokio::spawn(named(LongTask::Node, task.run(drain.clone()))),
             drain,
             is_asked_to_drain,
-            may_publish,
+            serves: is_serving,
         }
     }
 
@@ -110,9 +111,9 @@ impl ClusterNode {
         }
     }
 
-    /// Whether the node has a lease, and each change of that.
-    pub fn may_publish(&self) -> watch::Receiver<bool> {
-        self.may_publish.clone()
+    /// Whether the node has a lease and has been reached since it joined, and each change of that.
+    pub fn serves(&self) -> watch::Receiver<bool> {
+        self.serves.clone()
     }
 
     /// Takes nothing over any more, hands everything over, and leaves the cluster. The rooms and
@@ -171,7 +172,9 @@ struct Task {
     /// Held by the search for orphans.
     search: Arc<Semaphore>,
     asked: watch::Sender<bool>,
-    publishes: watch::Sender<bool>,
+    serves: watch::Sender<bool>,
+    /// Whether it has been reached since it joined. Until then it takes nothing over.
+    is_reached: bool,
     /// Whether it is leaving by itself, after it has handed over everything.
     leaves: bool,
 }
@@ -219,6 +222,10 @@ impl Task {
                 orphan = store.handed_over() => self.found(vec![orphan]),
                 _ = finding.tick() => self.find_orphans(ORPHANS_AT_ONCE),
                 _ = tidying.tick() => self.tidy(),
+                () = self.lease.reached(), if !self.is_reached => {
+                    self.is_reached = true;
+                    self.put_in(Input::Time);
+                }
                 () = drain.cancelled(), if !is_draining => self.put_in(Input::Drain),
             }
             if self.node.phase() == Phase::Left && !self.leaves {
@@ -251,11 +258,13 @@ impl Task {
         }
         let until_ms = self.node.publishes_until_ms();
         self.lease.set(self.began + Duration::from_millis(until_ms));
-        let publishes = self.node.may_publish(now_ms);
-        self.units.metrics().leased(publishes);
-        self.publishes.send_if_modified(|known| {
-            let is_new = *known != publishes;
-            *known = publishes;
+        let has_lease = self.node.may_publish(now_ms);
+        self.units.metrics().leased(has_lease);
+        self.units.metrics().reached(self.is_reached);
+        let serves = has_lease && self.is_reached;
+        self.serves.send_if_modified(|known| {
+            let is_new = *known != serves;
+            *known = serves;
             is_new
         });
     }
@@ -292,11 +301,11 @@ impl Task {
         match output {
             Output::Beat => {
                 self.queue.forget_ended();
-                let sent_ms = self.now_ms();
+                let (sent_ms, is_reached) = (self.now_ms(), self.is_reached);
                 // A beat without an answer must not take up the time of the next one, which the
                 // lease may still wait for.
                 let within = Duration::from_millis(store.lease().beat_every_ms());
-                let beating = async move { beat(&*store, within, sent_ms).await };
+                let beating = async move { beat(&*store, within, sent_ms, is_reached).await };
                 let answer = BeatAnswer::None;
                 self.spawn(beating, Event::Answer(Input::Beat { sent_ms, answer }));
             }
@@ -378,6 +387,9 @@ impl Task {
     }
 
     fn found(&mut self, mut orphans: Vec<(Id, Epoch)>) {
+        if !self.is_reached {
+            return;
+        }
         orphans.retain(|(unit, _)| !self.not_resumable.contains_key(unit));
         self.put_in(Input::Orphans(orphans));
     }
@@ -405,7 +417,7 @@ impl Task {
     }
 
     fn find_orphans(&mut self, count: usize) {
-        if !self.node.may_claim(self.now_ms()) {
+        if !self.is_reached || !self.node.may_claim(self.now_ms()) {
             return;
         }
         // A database that is slow is asked once at a time.
@@ -490,14 +502,15 @@ impl Task {
             }
         };
         self.lease.joined(id);
+        self.is_reached = false;
         self.node = Node::new(id, self.store.lease(), self.capacity);
         self.put_in(Input::Time);
     }
 }
 
 /// Beats, and reads what the node owns.
-async fn beat(store: &dyn ClusterStore, within: Duration, sent_ms: u64) -> Event {
-    let (answer, drain) = match answer("beat", within, store.beat()).await {
+async fn beat(store: &dyn ClusterStore, within: Duration, sent_ms: u64, is_reached: bool) -> Event {
+    let (answer, drain) = match answer("beat", within, store.beat(is_reached)).await {
         Some(Some(beat)) => (BeatAnswer::Renewed(beat.owned), beat.drain),
         Some(None) => (BeatAnswer::Unknown, false),
         None => (BeatAnswer::None, false),

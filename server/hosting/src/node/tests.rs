@@ -10,14 +10,14 @@ use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{Durability, Policy};
 use futures::FutureExt as _;
 use tokio::time::{Instant, sleep, timeout};
-use tokio_util::task::TaskTracker;
+use tokio_util::task::{AbortOnDropHandle, TaskTracker};
 
 use super::units::LOADS_AT_ONCE;
 use super::{ClusterNode, Hosted, LEFT_ALONE};
 use crate::cluster::{FoundBy, LOOK_LIMIT, Location, NodeLease, StoreDirectory, UnitEvent};
 use crate::config::ServerConfig;
 use crate::room::{Handle, JoinRequest, RoomGone};
-use crate::rooms::{NewRoom, Rooms};
+use crate::rooms::{CreateError, NewRoom, Rooms};
 use crate::studies::Studies;
 use crate::tournaments::{Entry, TournamentHandle, Tournaments};
 use chefshat_admission::limits::Key;
@@ -36,10 +36,29 @@ struct TestNode {
     rooms: Arc<Rooms>,
     tournaments: Arc<Tournaments>,
     node: ClusterNode,
+    lease: Arc<NodeLease>,
+    /// Reaches it whenever it has joined.
+    reaching: Option<AbortOnDropHandle<()>>,
 }
 
 impl TestNode {
+    /// Starts a node that others reach.
     async fn start(database: &Arc<Database>) -> Self {
+        let mut started = Self::start_unreached(database).await;
+        let lease = Arc::clone(&started.lease);
+        let reaching = tokio::spawn(async move {
+            loop {
+                lease.joined_anew().await;
+                lease.set_reached();
+            }
+        });
+        started.reaching = Some(AbortOnDropHandle::new(reaching));
+        let mut serves = started.node.serves();
+        soon(serves.wait_for(|it| *it)).await.expect("it runs");
+        started
+    }
+
+    async fn start_unreached(database: &Arc<Database>) -> Self {
         let store = FakeStore::new(database);
         let tracker = TaskTracker::new();
         let lease = Arc::new(NodeLease::new());
@@ -48,7 +67,13 @@ impl TestNode {
         let config = ServerConfig::default();
         let directory = StoreDirectory::new(Arc::clone(&shared), Arc::clone(&lease), config.shares);
         let directory = Arc::new(directory);
-        let rooms = Rooms::of_node(&config, stored, directory, Some(lease), tracker.clone());
+        let rooms = Rooms::of_node(
+            &config,
+            stored,
+            directory,
+            Some(Arc::clone(&lease)),
+            tracker.clone(),
+        );
         let rooms = rooms.expect("threads");
         let tournaments = Tournaments::new(Arc::clone(&rooms), tracker.clone());
         let studies = Studies::new(Arc::clone(&rooms), tracker);
@@ -71,13 +96,13 @@ impl TestNode {
                 studies,
             },
         );
-        let mut publishes = node.may_publish();
-        soon(publishes.wait_for(|it| *it)).await.expect("it runs");
         Self {
             store,
             rooms,
             tournaments,
             node,
+            lease,
+            reaching: None,
         }
     }
 
@@ -184,6 +209,29 @@ async fn the_room_of_a_dead_node_continues_at_another() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_node_takes_nothing_until_it_is_reached() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let second = TestNode::start_unreached(&database).await;
+    let room = first.create_room().await.id();
+    drop(first);
+    // Longer than a takeover takes.
+    sleep(SOON).await;
+    assert!(second.shows("chefshat_node_lease 1"));
+    assert!(second.shows("chefshat_node_reached 0"));
+    assert!(!*second.node.serves().borrow());
+    assert!(second.rooms.get(room).is_none());
+    let refused = second.rooms.create(NewRoom::for_tests()).await;
+    assert!(matches!(refused, Err(CreateError::NotReached)));
+
+    second.lease.set_reached();
+    second.has(room).await;
+    second.create_room().await;
+    assert!(*second.node.serves().borrow());
+    assert!(second.shows("chefshat_node_reached 1"));
+}
+
+#[tokio::test(start_paused = true)]
 async fn the_many_rooms_of_a_dead_node_are_read_a_few_at_a_time() {
     let database = Database::new();
     let first = TestNode::start(&database).await;
@@ -230,7 +278,7 @@ async fn a_node_that_returns_too_late_publishes_nothing() {
     assert_eq!(late, Err(RoomGone));
     first.store.cut_off.send_replace(false);
     first.loses(id).await;
-    soon(first.node.may_publish().wait_for(|it| *it))
+    soon(first.node.serves().wait_for(|it| *it))
         .await
         .expect("it runs");
     assert_eq!(database.seated(id), ["Bo"]);
@@ -258,9 +306,9 @@ async fn without_a_lease_nothing_is_published_until_it_is_back() {
     let database = Database::new();
     let first = TestNode::start(&database).await;
     let room = first.create_room().await;
-    let mut publishes = first.node.may_publish();
+    let mut serves = first.node.serves();
     first.store.beats_lost.send_replace(true);
-    soon(publishes.wait_for(|it| !it)).await.expect("it runs");
+    soon(serves.wait_for(|it| !it)).await.expect("it runs");
     assert!(first.shows("chefshat_node_lease 0"));
 
     let joining = join(&room, "Ada");
@@ -287,9 +335,9 @@ async fn a_beat_without_an_answer_costs_no_lease() {
     let database = Database::new();
     let first = TestNode::start(&database).await;
     let room = first.create_room().await;
-    let mut publishes = first.node.may_publish();
+    let mut serves = first.node.serves();
     first.store.beats_unanswered.send_replace(1);
-    let suspended = timeout(SOON, publishes.wait_for(|it| !it));
+    let suspended = timeout(SOON, serves.wait_for(|it| !it));
     assert!(suspended.await.is_err(), "the node keeps its lease");
     assert_eq!(*first.store.beats_unanswered.borrow(), 0, "a beat was lost");
     soon(join(&room, "Ada")).await.expect("it runs");
@@ -371,14 +419,14 @@ async fn ephemeral_rooms_outlive_an_outage_of_the_database_but_not_of_their_node
     second.store.cut_off.send_replace(true);
     sleep(Duration::from_secs(300)).await;
     first.store.cut_off.send_replace(false);
-    soon(first.node.may_publish().wait_for(|it| *it))
+    soon(first.node.serves().wait_for(|it| *it))
         .await
         .expect("it runs");
     // Within the time that is left to the other nodes.
     sleep(Duration::from_secs(3)).await;
     second.store.cut_off.send_replace(false);
     soon(join(&room, "Ada")).await.expect("it continues");
-    soon(second.node.may_publish().wait_for(|it| *it))
+    soon(second.node.serves().wait_for(|it| *it))
         .await
         .expect("it runs");
     soon(join(&room, "Bo")).await.expect("it continues");
@@ -404,7 +452,7 @@ async fn a_node_that_was_removed_joins_again() {
     assert!(!database.knows(before));
     first.store.cut_off.send_replace(false);
 
-    soon(first.node.may_publish().wait_for(|it| *it))
+    soon(first.node.serves().wait_for(|it| *it))
         .await
         .expect("it runs");
     assert_ne!(first.store.node(), before);
@@ -426,11 +474,11 @@ async fn a_node_whose_work_panics_goes_on() {
         let seen = soon(planted.wait_for(|at| at.is_empty())).await;
         drop(seen.expect("the sender is here"));
         second.has(room).await;
-        let publishes = second.node.may_publish();
+        let serves = second.node.serves();
         let beats = async {
             // Longer than a lease holds without a beat.
             sleep(SOON / 2).await;
-            *publishes.borrow()
+            *serves.borrow()
         };
         assert!(soon(beats).await, "{what}");
     }

@@ -148,7 +148,8 @@ impl Rooms {
     /// Creates a room.
     ///
     /// # Errors
-    /// There are too many rooms, the server shuts down, or the store failed.
+    /// There are too many rooms, the server shuts down or is a node that is not reached, or the store
+    /// failed.
     pub async fn create(self: &Arc<Self>, new: NewRoom) -> Result<Created, CreateError> {
         let owner = match (&new.seating, &new.request) {
             (Some(seating), _) => seating.owner,
@@ -252,6 +253,9 @@ impl Reservation {
         }
         let place = rooms.places.try_take(charged);
         let place = place.ok_or_else(|| rooms.too_many_of(charged))?;
+        if !table.shutting_down && !rooms.is_reached() {
+            return Err(CreateError::NotReached);
+        }
         table.reserve(owner.subject, unit, rooms.max_rooms)?;
         drop(table);
         Ok(Claim::Reserved(Self {

@@ -338,6 +338,12 @@ impl Rooms {
         self.lock().shutting_down
     }
 
+    /// Whether this server, if it is a node, has been reached since it joined. Until then it accepts
+    /// nothing new.
+    pub(crate) fn is_reached(&self) -> bool {
+        self.lease().is_none_or(|lease| lease.is_reached())
+    }
+
     /// Where the rooms and tournaments of other nodes are.
     pub fn directory(&self) -> &Arc<dyn Directory> {
         &self.directory

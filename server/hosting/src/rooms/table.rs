@@ -25,6 +25,11 @@ pub enum CreateError {
     /// The server is shutting down.
     #[error("the server is shutting down and accepts no new rooms")]
     ShuttingDown,
+    /// No other node reaches this one.
+    #[error(
+        "no other node reaches this one, which accepts no new rooms; try again, and if it fails again, tell the operator"
+    )]
+    NotReached,
     /// The disk has no space for more games.
     #[error("the server's disk is nearly full; the rest is reserved for running games")]
     DiskNearlyFull,

@@ -17,7 +17,8 @@ use super::owned::rooms;
 use super::values::{ROOM, integer, kind_of, millis, text};
 use super::{PostgresStore, lock};
 use crate::cluster::{
-    Beat, ClusterStore, Epoch, Kind, Location, NodeId, NodeInfo, NodeStatus, Unit, WithoutNode,
+    Beat, ClusterStore, Epoch, Kind, LivingNode, Location, NodeId, NodeInfo, NodeStatus, Unit,
+    WithoutNode,
 };
 use crate::form::FORM;
 use crate::units::UnitKind;
@@ -137,8 +138,8 @@ impl ClusterStore for PostgresStore {
                          DELETE FROM nodes WHERE beat_ms < clock_ms() - $6
                            AND NOT EXISTS (SELECT FROM owned WHERE owned.node = nodes.node AND NOT over)
                      )
-                     INSERT INTO nodes (node, name, peer_endpoint, client_endpoint, build, capacity, beat_ms)
-                     OVERRIDING SYSTEM VALUE VALUES ($7, $1, $2, $3, $4, $5, clock_ms()) RETURNING node",
+                     INSERT INTO nodes (node, name, peer_endpoint, client_endpoint, build, capacity, beat_ms, reached)
+                     OVERRIDING SYSTEM VALUE VALUES ($7, $1, $2, $3, $4, $5, clock_ms(), false) RETURNING node",
                 )
                 .bind(text(&info.name).into_owned())
                 .bind(text(&info.peer_endpoint).into_owned())
@@ -157,17 +158,18 @@ impl ClusterStore for PostgresStore {
         .boxed()
     }
 
-    fn beat(&self) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
+    fn beat(&self, reached: bool) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
         async move {
             let node = self.node()?;
             let beat = self.beats.read(move |connection| {
                 async move {
                     let mut transaction = connection.begin().await?;
                     let drain: Option<bool> = sqlx::query_scalar(
-                        "UPDATE nodes SET beat_ms = greatest(beat_ms, clock_ms())
+                        "UPDATE nodes SET beat_ms = greatest(beat_ms, clock_ms()), reached = $2
                          WHERE node = $1 RETURNING drain",
                     )
                     .bind(node)
+                    .bind(reached)
                     .fetch_optional(&mut *transaction)
                     .await?;
                     let Some(drain) = drain else {
@@ -385,19 +387,25 @@ impl ClusterStore for PostgresStore {
         .boxed()
     }
 
-    fn alive(&self) -> BoxFuture<'_, Result<Vec<(NodeId, NodeInfo)>, StoreError>> {
+    fn alive(&self) -> BoxFuture<'_, Result<Vec<LivingNode>, StoreError>> {
         async move {
             let expire_after = self.expire_after();
             let nodes = self.reader.read(move |connection| {
                 sqlx::query(
-                    "SELECT node, name, peer_endpoint, client_endpoint, build, capacity
+                    "SELECT node, name, peer_endpoint, client_endpoint, build, capacity, reached
                      FROM nodes WHERE beat_ms + $1 > clock_ms()",
                 )
                 .bind(expire_after)
                 .fetch_all(connection)
                 .boxed()
             });
-            Ok(nodes.await?.iter().map(node_of).collect())
+            let nodes = nodes.await?;
+            let alive = nodes.iter().map(|row| {
+                let (id, info) = node_of(row);
+                let reached = row.get("reached");
+                LivingNode { id, info, reached }
+            });
+            Ok(alive.collect())
         }
         .boxed()
     }
@@ -408,7 +416,7 @@ impl ClusterStore for PostgresStore {
             let nodes = self.reader.read(move |connection| {
                 sqlx::query(
                     "SELECT node, name, peer_endpoint, client_endpoint, build, capacity,
-                            greatest(clock_ms() - beat_ms, 0) AS since_ms, beat_ms + $1 <= clock_ms() AS expired, drain,
+                            greatest(clock_ms() - beat_ms, 0) AS since_ms, beat_ms + $1 <= clock_ms() AS expired, drain, reached,
                             (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 0) AS rooms,
                             (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 1) AS tournaments,
                             (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 2) AS studies
@@ -427,6 +435,7 @@ impl ClusterStore for PostgresStore {
                         last_beat: Duration::from_millis(number(row, "since_ms")),
                         expired: row.get("expired"),
                         drain: row.get("drain"),
+                        reached: row.get("reached"),
                         rooms: number(row, "rooms"),
                         tournaments: number(row, "tournaments"),
                         studies: number(row, "studies"),

@@ -42,7 +42,7 @@ pub(super) async fn release(
              WHERE unit = $1 AND node = $3 AND (over OR durable AND epoch = $2) RETURNING over
          ), next AS (
              SELECT node FROM nodes
-             WHERE node <> $3 AND NOT drain AND capacity > 0 AND beat_ms + $4 > clock_ms()
+             WHERE node <> $3 AND NOT drain AND reached AND capacity > 0 AND beat_ms + $4 > clock_ms()
              ORDER BY random() LIMIT 1
          )
          SELECT pg_notify($5, concat_ws(' ', next.node, encode($1, 'hex'), $2)) FROM next

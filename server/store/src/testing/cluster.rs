@@ -16,7 +16,7 @@ use tokio::sync::{Mutex as AsyncMutex, broadcast, watch};
 use tokio::time::{Instant, sleep};
 
 use crate::cluster::{
-    Beat, ClusterStore, Epoch, Kind, Location, NodeId, NodeInfo, NodeStatus, Unit,
+    Beat, ClusterStore, Epoch, Kind, LivingNode, Location, NodeId, NodeInfo, NodeStatus, Unit,
 };
 use crate::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
 use crate::{Journal, Listed, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame};
@@ -465,7 +465,7 @@ impl ClusterStore for FakeStore {
         .boxed()
     }
 
-    fn beat(&self) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
+    fn beat(&self, _: bool) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
         async move {
             self.may_panic("beat");
             self.reached().await;
@@ -686,7 +686,7 @@ impl ClusterStore for FakeStore {
         .boxed()
     }
 
-    fn alive(&self) -> BoxFuture<'_, Result<Vec<(NodeId, NodeInfo)>, StoreError>> {
+    fn alive(&self) -> BoxFuture<'_, Result<Vec<LivingNode>, StoreError>> {
         async { Ok(Vec::new()) }.boxed()
     }
 

@@ -67,6 +67,8 @@ export const faults: Texts["faults"] = {
       "Der Server kann keine Partien speichern und hält an. Deine bisherigen Entscheidungen sind gespeichert; die Partien gehen weiter, wenn er wieder da ist.",
     OWNER_UNREACHABLE:
       "Der zuständige Server ist nicht erreichbar, oder ein anderer übernimmt gerade. Versuche es gleich noch einmal.",
+    NODE_NOT_REACHED:
+      "Die anderen Server erreichen diesen nicht; deshalb nimmt er nichts Neues an. Versuche es gleich noch einmal; wenn es wieder fehlschlägt, sag der Person Bescheid, die ihn betreibt.",
     ROOM_GONE: "Dieser Raum wurde gerade geschlossen, oder der Server hält an. Versuche es gleich noch einmal.",
     INTERNAL:
       "Der Server konnte das nicht ausführen. Versuche es noch einmal; wenn es wieder fehlschlägt, sag der Person Bescheid, die ihn betreibt.",

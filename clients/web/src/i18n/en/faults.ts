@@ -63,6 +63,8 @@ export const faults = {
       "The server cannot store games and is stopping. Your decisions so far are stored; games resume when it is back.",
     OWNER_UNREACHABLE:
       "The server that runs this cannot be reached, or another one is just taking over. Try again in a moment.",
+    NODE_NOT_REACHED:
+      "The other servers cannot reach this one, which therefore takes nothing new. Try again in a moment; if it fails again, tell the server’s host.",
     ROOM_GONE: "This room has just ended, or the server is stopping. Try again in a moment.",
     INTERNAL: "The server failed to do this. Try again; if it fails again, tell the server’s host.",
     SHUTTING_DOWN: "The server is shutting down. Games resume when it is back.",

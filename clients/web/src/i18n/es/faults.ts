@@ -65,6 +65,8 @@ export const faults: Texts["faults"] = {
       "El servidor no puede guardar partidas y se está deteniendo. Tus decisiones hasta ahora están guardadas; las partidas se reanudan cuando vuelva.",
     OWNER_UNREACHABLE:
       "No se puede conectar con el servidor que se encarga de esto, o lo está relevando otro. Inténtalo de nuevo en un momento.",
+    NODE_NOT_REACHED:
+      "Los demás servidores no alcanzan a este, que por eso no acepta nada nuevo. Inténtalo de nuevo en un momento; si vuelve a fallar, avisa a quien administra el servidor.",
     ROOM_GONE: "Esta sala se acaba de cerrar, o el servidor se está deteniendo. Inténtalo de nuevo en un momento.",
     INTERNAL:
       "El servidor no ha podido hacerlo. Inténtalo de nuevo; si vuelve a fallar, avisa a quien administra el servidor.",

@@ -62,6 +62,8 @@ export const faults: Texts["faults"] = {
     STORE_FAILED:
       "Il server non riesce a salvare le partite e si sta fermando. Le tue decisioni finora sono salvate; le partite riprendono al suo ritorno.",
     OWNER_UNREACHABLE: "Il server che se ne occupa non è raggiungibile, o un altro sta subentrando. Riprova tra poco.",
+    NODE_NOT_REACHED:
+      "Gli altri server non raggiungono questo, che perciò non accetta nulla di nuovo. Riprova tra poco; se non basta, avvisa chi gestisce il server.",
     ROOM_GONE: "Questa stanza si è appena chiusa, o il server si sta fermando. Riprova tra poco.",
     INTERNAL: "Il server non è riuscito a farlo. Riprova; se non basta, avvisa chi gestisce il server.",
     SHUTTING_DOWN: "Il server si sta spegnendo. Le partite riprendono al suo ritorno.",

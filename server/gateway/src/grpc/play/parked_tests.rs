@@ -86,6 +86,7 @@ impl Node {
     fn start(directory: &Arc<Says>) -> Self {
         let lease = Arc::new(NodeLease::new());
         lease.set(Instant::now() + Duration::from_hours(1));
+        lease.set_reached();
         let config = ServerConfig::default();
         let (store, directory) = (Arc::new(MemoryStore::default()), Arc::clone(directory));
         let tracker = TaskTracker::new();

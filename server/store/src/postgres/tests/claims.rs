@@ -64,7 +64,7 @@ async fn the_last_word_of_an_owner_costs_no_other_claim() {
 #[tokio::test]
 async fn a_released_unit_is_offered_to_another_node() {
     let pair = Pair::new().await;
-    create(&pair.first, [1]).await;
+    create(&pair.first, 1..=2).await;
     let info = NodeInfo {
         capacity: 1,
         ..NodeInfo::default()
@@ -85,9 +85,13 @@ async fn a_released_unit_is_offered_to_another_node() {
         tokio::task::yield_now().await;
     }
     assert!(is_listening);
-    let released = pair.first.release(Id([1; 16]), FIRST);
-    released.await.expect("released");
-    assert_eq!(pair.second.handed_over().await, (Id([1; 16]), FIRST));
+    // Until it has been reached, nothing is offered to it.
+    for (room, reached) in [(1, false), (2, true)] {
+        pair.second.beat(reached).await.expect("it answers");
+        let released = pair.first.release(Id([room; 16]), FIRST);
+        released.await.expect("released");
+    }
+    assert_eq!(pair.second.handed_over().await, (Id([2; 16]), FIRST));
     pair.close().await;
 }
 

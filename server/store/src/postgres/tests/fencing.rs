@@ -1,6 +1,8 @@
 //! Takeovers: an owner that has lost a room or tournament writes nothing any more, and nothing that
 //! was acknowledged is lost.
 
+use std::collections::BTreeMap;
+
 use chefshat_base::metrics::Metrics;
 use chefshat_postgres::Server;
 use tokio::sync::watch;
@@ -37,7 +39,7 @@ impl Pair {
     /// Lets the lease of the first node expire.
     pub(super) async fn stall(&self) {
         advance(&self.database, 8_000);
-        let beat = self.second.beat().await.expect("it answers");
+        let beat = self.second.beat(true).await.expect("it answers");
         assert!(beat.is_some(), "the second node is known");
     }
 
@@ -382,10 +384,10 @@ async fn no_two_processes_are_the_same_node_even_after_a_backup_was_put_back() {
     let after = node(&database).await;
     let created = after.create(durable(1), vec![entry(1)]);
     let mut journal = created.await.expect("created");
-    assert_eq!(before.beat().await, Ok(None), "it is no node any more");
+    assert_eq!(before.beat(true).await, Ok(None), "it is no node any more");
     assert_eq!(before.claim(Id([1; 16]), FIRST).await, Ok(None));
     assert_eq!(before.leave().await, Ok(false));
-    let beat = after.beat().await.expect("it answers");
+    let beat = after.beat(true).await.expect("it answers");
     assert_eq!(beat.expect("it is known").owned, [(Id([1; 16]), FIRST)]);
     append(&mut journal, 2).await.expect("committed");
     drop(journal);
@@ -424,7 +426,7 @@ async fn a_node_is_listed_drained_and_leaves() {
     assert_eq!(pair.first.leave().await, Ok(false), "it owns a room");
     assert_eq!(pair.second.request_drain(node).await, Ok(true));
     assert_eq!(pair.second.request_drain(NodeId(99)).await, Ok(false));
-    let beat = pair.first.beat().await.expect("it answers");
+    let beat = pair.first.beat(true).await.expect("it answers");
     let beat = beat.expect("it is known");
     assert!(beat.drain);
     assert_eq!(beat.owned, [(Id([1; 16]), FIRST)]);
@@ -434,10 +436,21 @@ async fn a_node_is_listed_drained_and_leaves() {
         .collect();
     assert!(listed.contains(&(node, 1, true, false)), "{listed:?}");
     assert!(listed.contains(&(number_of(&pair.second), 0, false, false)));
+    let alive = async || {
+        let alive = pair.second.alive().await.expect("readable");
+        let reached = alive.iter().map(|node| (node.id, node.reached));
+        reached.collect::<BTreeMap<_, _>>()
+    };
+    assert!(alive().await[&node], "its beat has said so");
+    assert!(
+        !alive().await[&number_of(&pair.second)],
+        "it has just joined"
+    );
+    assert!(nodes.iter().all(|it| it.reached == (it.id == node)));
     let released = pair.first.release(Id([1; 16]), FIRST);
     released.await.expect("released");
     assert_eq!(pair.first.leave().await, Ok(true));
-    assert_eq!(pair.first.beat().await, Ok(None));
+    assert_eq!(pair.first.beat(true).await, Ok(None));
     let refused = pair.first.create(durable(2), vec![entry(1)]).await;
     assert_eq!(refused.err(), Some(StoreError::Fenced(Id([2; 16]))));
     let claimed = pair.first.claim(Id([1; 16]), FIRST).await;
@@ -546,7 +559,7 @@ async fn stopped(retry_for: Duration) -> (Server, PostgresStore, Box<dyn Journal
     let mut journal = created.expect("created");
     append(&mut journal, 2).await.expect("committed");
     server.stop();
-    assert!(store.beat().await.is_err(), "nobody answers");
+    assert!(store.beat(true).await.is_err(), "nobody answers");
     (server, store, journal)
 }
 

@@ -132,7 +132,7 @@ impl Worlds {
             Operation::Beat(node) => {
                 let server = &self.servers[node];
                 let known = self.tables.beat(server.id, self.now_ms);
-                let beat = server.store.beat().await.expect("it answers");
+                let beat = server.store.beat(true).await.expect("it answers");
                 assert_eq!(beat.is_some(), known);
                 if let Some(beat) = beat {
                     let mut owned = beat.owned;

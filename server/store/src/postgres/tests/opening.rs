@@ -33,15 +33,34 @@ async fn only_an_empty_database_gets_tables_without_being_asked() {
 }
 
 #[tokio::test]
-async fn a_database_of_the_version_before_studies_is_upgraded() {
+async fn databases_of_earlier_versions_are_upgraded() {
     let database = chefshat_postgres::database();
     migrate(database.url()).await.expect("an empty database");
-    database.run("DROP TABLE studies, study_changes, study_traces; DROP INDEX owned_by_game");
-    database.run("DELETE FROM _sqlx_migrations WHERE version > 1");
-    let error = refusal(&database).await;
-    assert!(matches!(error, DatabaseError::Older), "{error}");
-    assert_eq!(migrate(database.url()).await.ok(), Some((1, NEWEST)));
-    node(&database).await.close().await;
+    for (version, removed) in [
+        (2, "ALTER TABLE nodes DROP COLUMN reached"),
+        (
+            1,
+            "ALTER TABLE nodes DROP COLUMN reached; DROP TABLE studies, study_changes, study_traces;
+             DROP INDEX owned_by_game",
+        ),
+    ] {
+        database.run(removed);
+        database.run(&format!(
+            "DELETE FROM _sqlx_migrations WHERE version > {version}"
+        ));
+        // A node of that version, which runs on meanwhile.
+        database.run(
+            "INSERT INTO nodes (name, peer_endpoint, client_endpoint, build, capacity, beat_ms)
+             VALUES ('earlier', '', '', '', 0, clock_ms())",
+        );
+        let error = refusal(&database).await;
+        assert!(matches!(error, DatabaseError::Older), "{error}");
+        let upgraded = migrate(database.url()).await;
+        assert_eq!(upgraded.ok(), Some((version, NEWEST)));
+        node(&database).await.close().await;
+        let earlier = database.run("SELECT bool_and(reached) FROM nodes WHERE name = 'earlier'");
+        assert_eq!(earlier.trim(), "t", "nobody asked it");
+    }
 }
 
 #[tokio::test]

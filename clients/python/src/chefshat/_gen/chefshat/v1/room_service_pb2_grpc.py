@@ -81,7 +81,7 @@ class RoomServiceServicer(object):
         SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; the errors of
         GetRecord for a recorded game in the request, which the caller must be allowed to read;
         RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN,
-        STORE_FAILED).
+        STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -38,7 +38,7 @@ class RoomServiceStub:
     SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; the errors of
     GetRecord for a recorded game in the request, which the caller must be allowed to read;
     RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN,
-    STORE_FAILED).
+    STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
     """
     GetRoom: _grpc.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]
     """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private
@@ -87,7 +87,7 @@ class RoomServiceAsyncStub(RoomServiceStub):
     SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; the errors of
     GetRecord for a recorded game in the request, which the caller must be allowed to read;
     RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN,
-    STORE_FAILED).
+    STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
     """
     GetRoom: _aio.UnaryUnaryMultiCallable[_room_service_pb2.GetRoomRequest, _room_service_pb2.GetRoomResponse]  # type: ignore[assignment]
     """One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private
@@ -139,7 +139,7 @@ class RoomServiceServicer(metaclass=_abc_1.ABCMeta):
         SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; the errors of
         GetRecord for a recorded game in the request, which the caller must be allowed to read;
         RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN,
-        STORE_FAILED).
+        STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
         """
 
     @_abc_1.abstractmethod

@@ -101,7 +101,8 @@ class StudyServiceServicer(object):
     def CreateStudy(self, request, context):
         """Creates a study without participants. INVALID_ARGUMENT (SETTINGS_REFUSED names the field,
         REQUEST_ID_REFUSED); ALREADY_EXISTS (REQUEST_ID_USED); RESOURCE_EXHAUSTED (TOO_MANY_STUDIES,
-        DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+        DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of
+        the cluster reaches this one).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -38,7 +38,8 @@ class StudyServiceStub:
     CreateStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.CreateStudyRequest, _study_service_pb2.CreateStudyResponse]
     """Creates a study without participants. INVALID_ARGUMENT (SETTINGS_REFUSED names the field,
     REQUEST_ID_REFUSED); ALREADY_EXISTS (REQUEST_ID_USED); RESOURCE_EXHAUSTED (TOO_MANY_STUDIES,
-    DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+    DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of
+    the cluster reaches this one).
     """
     GetStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.GetStudyRequest, _study_service_pb2.GetStudyResponse]
     """Returns a study. NOT_FOUND (STUDY_UNKNOWN)."""
@@ -105,7 +106,8 @@ class StudyServiceAsyncStub(StudyServiceStub):
     CreateStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.CreateStudyRequest, _study_service_pb2.CreateStudyResponse]  # type: ignore[assignment]
     """Creates a study without participants. INVALID_ARGUMENT (SETTINGS_REFUSED names the field,
     REQUEST_ID_REFUSED); ALREADY_EXISTS (REQUEST_ID_USED); RESOURCE_EXHAUSTED (TOO_MANY_STUDIES,
-    DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+    DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of
+    the cluster reaches this one).
     """
     GetStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.GetStudyRequest, _study_service_pb2.GetStudyResponse]  # type: ignore[assignment]
     """Returns a study. NOT_FOUND (STUDY_UNKNOWN)."""
@@ -175,7 +177,8 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_study_service_pb2.CreateStudyResponse, _abc.Awaitable[_study_service_pb2.CreateStudyResponse]]:
         """Creates a study without participants. INVALID_ARGUMENT (SETTINGS_REFUSED names the field,
         REQUEST_ID_REFUSED); ALREADY_EXISTS (REQUEST_ID_USED); RESOURCE_EXHAUSTED (TOO_MANY_STUDIES,
-        DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
+        DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of
+        the cluster reaches this one).
         """
 
     @_abc_1.abstractmethod

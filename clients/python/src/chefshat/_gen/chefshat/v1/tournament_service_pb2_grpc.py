@@ -152,7 +152,7 @@ class TournamentServiceServicer(object):
         """Creates a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED,
         NAME_REFUSED) names the field of the settings, which may be `rules` or `policy`; the message
         names the inner field; RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE
-        (SHUTTING_DOWN, STORE_FAILED).
+        (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

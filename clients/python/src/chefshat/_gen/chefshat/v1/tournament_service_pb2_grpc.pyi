@@ -44,7 +44,7 @@ class TournamentServiceStub:
     """Creates a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED,
     NAME_REFUSED) names the field of the settings, which may be `rules` or `policy`; the message
     names the inner field; RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE
-    (SHUTTING_DOWN, STORE_FAILED).
+    (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
     """
     GetTournament: _grpc.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentRequest, _tournament_service_pb2.GetTournamentResponse]
     """Returns a tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN);
@@ -178,7 +178,7 @@ class TournamentServiceAsyncStub(TournamentServiceStub):
     """Creates a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED,
     NAME_REFUSED) names the field of the settings, which may be `rules` or `policy`; the message
     names the inner field; RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE
-    (SHUTTING_DOWN, STORE_FAILED).
+    (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
     """
     GetTournament: _aio.UnaryUnaryMultiCallable[_tournament_service_pb2.GetTournamentRequest, _tournament_service_pb2.GetTournamentResponse]  # type: ignore[assignment]
     """Returns a tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN);
@@ -315,7 +315,7 @@ class TournamentServiceServicer(metaclass=_abc_1.ABCMeta):
         """Creates a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED,
         NAME_REFUSED) names the field of the settings, which may be `rules` or `policy`; the message
         names the inner field; RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE
-        (SHUTTING_DOWN, STORE_FAILED).
+        (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
         """
 
     @_abc_1.abstractmethod
