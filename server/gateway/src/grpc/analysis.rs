@@ -24,6 +24,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
+use super::deadline::client_timeout;
 use super::pool::on_pool;
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down};
@@ -161,7 +162,8 @@ impl AnalysisService for Analyses {
             place(&self.of_addresses, payer.address)?,
             place(&self.places, payer.key)?,
         ];
-        let due = client_timeout(&request).and_then(|time| Instant::now().checked_add(time));
+        let due = client_timeout(request.metadata().as_ref())
+            .and_then(|time| Instant::now().checked_add(time));
         let message = request.into_inner();
         let plan = plan(&message)?;
         let queued = (self.queue)
@@ -331,24 +333,6 @@ impl Analysis {
     }
 }
 
-/// How long the client of a call waits for its answer, if it says so (`grpc-timeout`).
-fn client_timeout<T>(request: &Request<T>) -> Option<Duration> {
-    let text = request.metadata().get("grpc-timeout")?.to_str().ok()?;
-    let (number, unit) = text.split_at_checked(text.len().checked_sub(1)?)?;
-    // At most 8 digits, so that no product overflows.
-    let number: u32 = number.parse().ok().filter(|_| number.len() <= 8)?;
-    let unit = match unit {
-        "H" => Duration::from_secs(3_600),
-        "M" => Duration::from_secs(60),
-        "S" => Duration::from_secs(1),
-        "m" => Duration::from_millis(1),
-        "u" => Duration::from_micros(1),
-        "n" => Duration::from_nanos(1),
-        _ => return None,
-    };
-    Some(unit.saturating_mul(number))
-}
-
 pub(super) fn estimate_to_proto(estimate: &Estimate) -> v1::ActionEstimate {
     v1::ActionEstimate {
         action: estimate.action.index().into(),
@@ -456,33 +440,6 @@ mod tests {
     use chefshat_engine::{Game, RuleSetSpec};
 
     use super::*;
-
-    fn request(timeout: &'static str) -> Request<()> {
-        let mut request = Request::new(());
-        let timeout = timeout.parse().expect("a value");
-        request.metadata_mut().insert("grpc-timeout", timeout);
-        request
-    }
-
-    #[test]
-    fn the_timeout_of_a_client_is_read_in_every_unit() {
-        for (text, time) in [
-            ("2H", Some(Duration::from_secs(7_200))),
-            ("3M", Some(Duration::from_secs(180))),
-            ("4S", Some(Duration::from_secs(4))),
-            ("1500m", Some(Duration::from_millis(1_500))),
-            ("99999999u", Some(Duration::from_micros(99_999_999))),
-            ("7n", Some(Duration::from_nanos(7))),
-            ("999999999S", None),
-            ("-1S", None),
-            ("S", None),
-            ("5", None),
-            ("5x", None),
-        ] {
-            assert_eq!(client_timeout(&request(text)), time, "{text}");
-        }
-        assert_eq!(client_timeout(&Request::new(())), None);
-    }
 
     /// What the seat of the first decision of a game knows.
     fn knowledge() -> Knowledge {

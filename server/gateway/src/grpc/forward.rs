@@ -27,6 +27,7 @@ use tonic::transport::Channel;
 use tower::{Layer, Service, ServiceExt as _};
 use tracing::debug;
 
+use super::deadline::Passed;
 use super::fanout::{self, Fanout};
 use super::limits::Charged;
 use super::status::{is_elsewhere, is_not_owner, owner_unreachable};
@@ -83,7 +84,7 @@ pub struct FromPeer;
 #[derive(Clone)]
 pub(super) struct Gateway {
     layer: ForwardLayer,
-    headers: HeaderMap,
+    headers: Passed,
 }
 
 impl Gateway {
@@ -99,7 +100,7 @@ impl Gateway {
 
     /// A request to another node, for the client of this one.
     pub(super) fn request<T>(&self, message: T) -> tonic::Request<T> {
-        let mut headers = self.headers.clone();
+        let mut headers = self.headers.now();
         for own in [header::CONTENT_TYPE, header::TE, header::USER_AGENT] {
             headers.remove(own);
         }
@@ -132,7 +133,7 @@ impl ForwardLayer {
     pub(super) fn gateway<B>(&self, request: &Request<B>) -> Gateway {
         Gateway {
             layer: self.clone(),
-            headers: passed_headers(request),
+            headers: Passed::new(passed_headers(request)),
         }
     }
 }
@@ -213,11 +214,11 @@ impl Gateway {
             let Some(message) = kept.message() else {
                 break;
             };
-            let shared = fanout::key(parts.uri.path(), &self.headers, &message);
+            let shared = fanout::key(parts.uri.path(), self.headers.as_arrived(), &message);
             let mut forwarded = Request::new(Body::new(http_body_util::Full::new(message.clone())));
             *forwarded.method_mut() = parts.method.clone();
             *forwarded.uri_mut() = parts.uri.clone();
-            *forwarded.headers_mut() = self.headers.clone();
+            *forwarded.headers_mut() = self.headers.now();
             let sent = self.peers().send(&elsewhere.peer, forwarded);
             let answered = match shared {
                 Some(key) => {

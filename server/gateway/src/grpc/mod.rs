@@ -4,6 +4,7 @@
 mod access;
 mod admin;
 mod analysis;
+mod deadline;
 mod decoding;
 mod fanout;
 mod follow;
