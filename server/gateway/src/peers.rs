@@ -266,13 +266,10 @@ impl Peers {
         let asked = others.into_iter().map(async |peer| {
             let mut service = ServerServiceClient::new(self.channel(&peer));
             let asked = service.get_server_info(v1::GetServerInfoRequest {});
-            let misfit = match timeout(ANSWER_TIMEOUT, asked).await {
-                Ok(Ok(answer)) => {
-                    let fits = answer.into_inner().signing_key == signing_key;
-                    (!fits).then_some(Misfit::OtherKey)
-                }
-                Ok(Err(status)) => Some(Misfit::Silent(status.message().to_owned())),
-                Err(late) => Some(Misfit::Silent(late.to_string())),
+            let misfit = match answered(timeout(ANSWER_TIMEOUT, asked).await) {
+                Ok(answer) if answer.signing_key == signing_key => None,
+                Ok(_) => Some(Misfit::OtherKey),
+                Err(status) => Some(Misfit::Silent(status.message().to_owned())),
             };
             misfit.map(|misfit| (peer, misfit))
         });

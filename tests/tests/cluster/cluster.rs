@@ -12,7 +12,6 @@ use chefshat_tests::{Ended, Held, Launch, Link, Process, Way, own_address, patie
 use futures::future::join_all;
 use procfs::process::{FDTarget, Process as Running};
 use tempfile::TempDir;
-use tonic::transport::Channel;
 use tonic_health::pb::HealthCheckRequest;
 use tonic_health::pb::health_check_response::ServingStatus;
 use tonic_health::pb::health_client::HealthClient;
@@ -75,6 +74,12 @@ impl Pairs {
                 .collect(),
             processes: Mutex::new(vec![None; nodes]),
         }
+    }
+
+    /// Notes which processes the nodes are.
+    fn note_processes(&self, nodes: &[Node]) {
+        let ids = nodes.iter().map(Node::process_id).collect();
+        *self.processes.lock().expect("no panic") = ids;
     }
 
     /// The node whose process has a connection from this address.
@@ -144,7 +149,7 @@ impl Cluster {
             });
         }
         join_all(nodes.iter_mut().map(Node::launch)).await;
-        *pairs.processes.lock().expect("no panic") = nodes.iter().map(Node::process_id).collect();
+        pairs.note_processes(&nodes);
         let serving = async {
             for node in &nodes {
                 while node.health().await != ServingStatus::Serving {
@@ -173,7 +178,7 @@ impl Cluster {
     /// Starts a node again.
     pub(crate) async fn restart(&mut self, node: usize) {
         self.nodes[node].launch().await;
-        self.note_processes();
+        self.pairs.note_processes(&self.nodes);
     }
 
     /// Kills a node.
@@ -285,11 +290,6 @@ impl Cluster {
             self.postgres.resume();
         });
     }
-
-    fn note_processes(&self) {
-        let ids = self.nodes.iter().map(Node::process_id).collect();
-        *self.pairs.processes.lock().expect("no panic") = ids;
-    }
 }
 
 impl Node {
@@ -329,8 +329,7 @@ impl Node {
 
     /// What a health check says.
     pub(crate) async fn health(&self) -> ServingStatus {
-        let channel = Channel::from_shared(self.url()).expect("an address");
-        let mut service = HealthClient::new(channel.connect_lazy());
+        let mut service = HealthClient::new(self.client().await.channel());
         let answer = service.check(HealthCheckRequest::default()).await;
         answer.expect("it answers").into_inner().status()
     }

@@ -24,7 +24,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::{Request, Response, Status};
 
-use super::deadline::client_timeout;
+use super::deadline::deadline;
 use super::pool::on_pool;
 use super::recorded::Recorded;
 use super::status::{Refusal, field, internal, shutting_down};
@@ -162,8 +162,7 @@ impl AnalysisService for Analyses {
             place(&self.of_addresses, payer.address)?,
             place(&self.places, payer.key)?,
         ];
-        let due = client_timeout(request.metadata().as_ref())
-            .and_then(|time| Instant::now().checked_add(time));
+        let due = deadline(request.metadata().as_ref()).map(tokio::time::Instant::into_std);
         let message = request.into_inner();
         let plan = plan(&message)?;
         let queued = (self.queue)

@@ -10,7 +10,7 @@ use tokio::time::Instant;
 const TIMEOUT: &str = "grpc-timeout";
 
 /// How long the client of a call with these headers waits for its answer.
-pub(super) fn client_timeout(headers: &HeaderMap) -> Option<Duration> {
+fn client_timeout(headers: &HeaderMap) -> Option<Duration> {
     let text = headers.get(TIMEOUT)?.to_str().ok()?;
     let (number, unit) = text.split_at_checked(text.len().checked_sub(1)?)?;
     // At most 8 digits, so that no product overflows.
@@ -27,6 +27,11 @@ pub(super) fn client_timeout(headers: &HeaderMap) -> Option<Duration> {
     Some(unit.saturating_mul(number))
 }
 
+/// When the client of a call that has just arrived with these headers stops waiting.
+pub(super) fn deadline(headers: &HeaderMap) -> Option<Instant> {
+    client_timeout(headers).and_then(|timeout| Instant::now().checked_add(timeout))
+}
+
 /// The headers of a request for other nodes. What has passed of its client's time until one is asked
 /// is taken off.
 #[derive(Debug, Clone)]
@@ -39,7 +44,7 @@ pub(super) struct Passed {
 impl Passed {
     /// Of a request that has just arrived with these headers.
     pub(super) fn new(headers: HeaderMap) -> Self {
-        let ends = client_timeout(&headers).and_then(|timeout| Instant::now().checked_add(timeout));
+        let ends = deadline(&headers);
         Self { headers, ends }
     }
 

@@ -65,24 +65,22 @@ static PEER_INPUT: Shape = Shape {
         },
     ],
 };
+/// The fields of a message with one text and nothing else that costs.
+const ONE_TEXT: &[Field] = &[Field {
+    number: 1,
+    list: false,
+    kind: Kind::Text,
+}];
 static PEER_SHARE: Shape = Shape {
     name: "chefshat.peer.v1.ShareRequest",
     size: size_of::<peer::ShareRequest>(),
-    fields: &[Field {
-        number: 1,
-        list: false,
-        kind: Kind::Text,
-    }],
+    fields: ONE_TEXT,
 };
 
 static PEER_REACH: Shape = Shape {
     name: "chefshat.peer.v1.ReachRequest",
     size: size_of::<peer::ReachRequest>(),
-    fields: &[Field {
-        number: 1,
-        list: false,
-        kind: Kind::Text,
-    }],
+    fields: ONE_TEXT,
 };
 
 /// The shape of the requests of a call.

@@ -74,11 +74,9 @@ impl NodeLease {
         anew.await.expect("the sender is borrowed");
     }
 
-    /// Waits until the node is reached.
-    pub(crate) async fn reached(&self) {
-        let mut reached = self.reached.subscribe();
-        let is_reached = reached.wait_for(|reached| *reached).await;
-        is_reached.expect("the sender is borrowed");
+    /// Whether the node has been reached since it joined, and each change of that.
+    pub(crate) fn reached(&self) -> watch::Receiver<bool> {
+        self.reached.subscribe()
     }
 
     /// The node, once it has joined.

@@ -73,6 +73,7 @@ impl ClusterNode {
         let lease = hosted.rooms.lease();
         let lease = Arc::clone(lease.expect("the rooms of a node have a lease"));
         lease.joined(id);
+        let reached = lease.reached();
         let units = Units::new(Arc::clone(&store), hosted, grace);
         let capacity = usize::try_from(info.capacity).unwrap_or(usize::MAX);
         let task = Task {
@@ -92,7 +93,7 @@ impl ClusterNode {
             search: Arc::new(Semaphore::new(1)),
             asked,
             serves,
-            is_reached: false,
+            reached,
             leaves: false,
         };
         Self {
@@ -174,7 +175,7 @@ struct Task {
     asked: watch::Sender<bool>,
     serves: watch::Sender<bool>,
     /// Whether it has been reached since it joined. Until then it takes nothing over.
-    is_reached: bool,
+    reached: watch::Receiver<bool>,
     /// Whether it is leaving by itself, after it has handed over everything.
     leaves: bool,
 }
@@ -222,10 +223,7 @@ impl Task {
                 orphan = store.handed_over() => self.found(vec![orphan]),
                 _ = finding.tick() => self.find_orphans(ORPHANS_AT_ONCE),
                 _ = tidying.tick() => self.tidy(),
-                () = self.lease.reached(), if !self.is_reached => {
-                    self.is_reached = true;
-                    self.put_in(Input::Time);
-                }
+                Ok(()) = self.reached.changed() => self.put_in(Input::Time),
                 () = drain.cancelled(), if !is_draining => self.put_in(Input::Drain),
             }
             if self.node.phase() == Phase::Left && !self.leaves {
@@ -260,8 +258,9 @@ impl Task {
         self.lease.set(self.began + Duration::from_millis(until_ms));
         let has_lease = self.node.may_publish(now_ms);
         self.units.metrics().leased(has_lease);
-        self.units.metrics().reached(self.is_reached);
-        let serves = has_lease && self.is_reached;
+        let is_reached = *self.reached.borrow();
+        self.units.metrics().reached(is_reached);
+        let serves = has_lease && is_reached;
         self.serves.send_if_modified(|known| {
             let is_new = *known != serves;
             *known = serves;
@@ -301,7 +300,7 @@ impl Task {
         match output {
             Output::Beat => {
                 self.queue.forget_ended();
-                let (sent_ms, is_reached) = (self.now_ms(), self.is_reached);
+                let (sent_ms, is_reached) = (self.now_ms(), *self.reached.borrow());
                 // A beat without an answer must not take up the time of the next one, which the
                 // lease may still wait for.
                 let within = Duration::from_millis(store.lease().beat_every_ms());
@@ -387,7 +386,7 @@ impl Task {
     }
 
     fn found(&mut self, mut orphans: Vec<(Id, Epoch)>) {
-        if !self.is_reached {
+        if !*self.reached.borrow() {
             return;
         }
         orphans.retain(|(unit, _)| !self.not_resumable.contains_key(unit));
@@ -417,7 +416,7 @@ impl Task {
     }
 
     fn find_orphans(&mut self, count: usize) {
-        if !self.is_reached || !self.node.may_claim(self.now_ms()) {
+        if !*self.reached.borrow() || !self.node.may_claim(self.now_ms()) {
             return;
         }
         // A database that is slow is asked once at a time.
@@ -502,7 +501,6 @@ impl Task {
             }
         };
         self.lease.joined(id);
-        self.is_reached = false;
         self.node = Node::new(id, self.store.lease(), self.capacity);
         self.put_in(Input::Time);
     }
