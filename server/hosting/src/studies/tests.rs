@@ -437,9 +437,9 @@ async fn studies_count_after_a_restart_too() {
     one_more.expect("this server has one");
     studies.restore().await.expect("readable");
     assert_eq!(studies.earlier(None).len(), MAX_STUDIES + 1);
-    let newest = Arc::clone(&studies.earlier(None)[0].1);
-    let deleted = studies.delete(newest, true).await;
-    assert_eq!(deleted.expect("it runs"), Ok((0, 0)));
+    let one = studies.get(lab.study.id()).expect("it was resumed");
+    let deleted = studies.delete(one, true).await;
+    assert_eq!(deleted.expect("it runs"), Ok((2, 0)));
     let refused = studies.create(settings(), None, Key::Local).await;
     assert!(
         matches!(refused, Err(CreateProblem::Refused(_))),
