@@ -133,6 +133,11 @@ impl Places {
         self.own.join("tools")
     }
 
+    /// Virtual environment of what makes the others.
+    pub(crate) fn uv(&self) -> PathBuf {
+        self.own.join("uv")
+    }
+
     /// Virtual environment of the builders of wheels in wheels.txt.
     pub(crate) fn wheel_tools(&self) -> PathBuf {
         self.own.join("wheel-tools")
