@@ -81,6 +81,9 @@ export default defineConfig({
   },
   test: {
     environment: "happy-dom",
+    // The DOM is set up once for all files, which would take most of their time.
+    isolate: false,
+    setupFiles: ["tests/setup.ts"],
     testTimeout: 60_000,
     include: ["tests/*.test.{ts,tsx}", "src/**/*.test.{ts,tsx}"],
   },
