@@ -5,6 +5,7 @@ import { createRequire } from "node:module";
 import type Axe from "axe-core";
 import type { Page } from "playwright-core";
 import { expect } from "vitest";
+import { languages } from "../../src/i18n";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 
@@ -13,6 +14,9 @@ export const PHONE = { width: 320, height: 740 };
 
 /** Phones, the smallest first, and one on its side. */
 export const PHONES = [PHONE, { width: 375, height: 667 }, { width: 390, height: 664 }, { width: 667, height: 375 }];
+
+/** The languages in which pages are looked at: all in long tests (CHEFSHAT_SLOW), otherwise the one with the longest texts. */
+export const LANGUAGES = languages.filter(({ value }) => process.env.CHEFSHAT_SLOW || value === "de");
 
 /** Everything that axe-core finds in the light and the dark theme, with any impact, also against best practice. */
 export async function inaccessible(page: Page): Promise<string[]> {

@@ -4,8 +4,7 @@
 import type { Page } from "playwright-core";
 import { beforeAll, expect, test } from "vitest";
 import { TournamentFormat } from "../../src/gen/chefshat/v1/tournament_pb";
-import { languages } from "../../src/i18n";
-import { inaccessible, PHONES, tooWide, unnamed } from "./checks";
+import { inaccessible, LANGUAGES, PHONES, tooWide, unnamed } from "./checks";
 import { newStudy } from "./participants";
 import { byClicks, nextDecision, sitDown } from "./play";
 import { agent, clientsOf, gameOf, newPhysicalRoom, newRoom } from "./rooms";
@@ -166,7 +165,7 @@ test.each(Object.keys(PAGES))("%s: accessible in both themes, and no wider than 
     await expect.poll(() => tooWide(page), { message: JSON.stringify(phone) }).toEqual([]);
   }
   // Texts in other languages are longer.
-  for (const { value } of languages.filter(({ value }) => value !== "en")) {
+  for (const { value } of LANGUAGES.filter(({ value }) => value !== "en")) {
     await page.goto(`${server.url}${path()}${path().includes("?") ? "&" : "?"}lang=${value}`);
     await page.locator(ready).first().waitFor();
     if (opened) await page.locator(opened).first().click();

@@ -5,8 +5,8 @@ import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { createInterface } from "node:readline";
-import { type Browser, type BrowserContextOptions, chromium, type Page } from "playwright-core";
-import { afterAll, beforeAll, vi } from "vitest";
+import { type Browser, type BrowserContext, type BrowserContextOptions, chromium, type Page } from "playwright-core";
+import { afterAll, afterEach, beforeAll, beforeEach, vi } from "vitest";
 import { PATIENCE_MS } from "./patience";
 
 const CHROMIUM = process.env.CHEFSHAT_CHROMIUM ?? "/usr/bin/chromium-headless-shell";
@@ -92,12 +92,20 @@ export let server: Server;
 /** The browser of a test file. */
 export let browser: Browser;
 
+/** What people have open since the test began: their pages would go on taking time from the tests that follow. */
+const opened: BrowserContext[] = [];
+
 /** Sets up a server and a browser for a test file. Call it at the top level. */
 export function useStage(): void {
   beforeAll(async () => {
     server = await Server.start();
     browser = await startBrowser();
   });
+  // Those of `beforeAll` are for all tests.
+  beforeEach(() => {
+    opened.length = 0;
+  });
+  afterEach(() => Promise.all(opened.map((context) => context.close())));
   afterAll(async () => {
     await browser?.close();
     await server?.stop();
@@ -124,6 +132,7 @@ export async function person(
     reducedMotion: "reduce",
     ...options,
   });
+  opened.push(context);
   context.setDefaultTimeout(PATIENCE_MS);
   const page = await context.newPage();
   if (SLOWDOWN > 1) {
