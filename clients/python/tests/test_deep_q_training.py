@@ -76,6 +76,7 @@ def games(address: str, *, seats: list[int], seeds: list[bytes], shifts: int = 2
     )
 
 
+@pytest.mark.slow
 @pytest.mark.server
 def test_a_game_does_not_depend_on_the_games_beside_it(real_address: str) -> None:
     config = DeepQConfig(hidden=(16,), batch_size=8, memory_size=64, wrong_limit=5)

@@ -42,12 +42,12 @@ def test_a_comparison_needs_no_luck_with_the_deals() -> None:
 
     same = compare(trained, trained.actions_of, "greedy", deals=20, seed=5)
     assert (same.difference, same.standard_error) == (0, 0)
-    found = compare(trained, first_legal, "greedy", deals=60, seats=[0, 2], seed=5)
+    found = compare(trained, first_legal, "greedy", deals=30, seats=[0, 2], seed=5)
     assert found.points[0] - found.points[1] == pytest.approx(found.difference)
     assert found.difference > 1
-    alone = [evaluate(player, "greedy", games=60, seed=5) for player in (trained, first_legal)]
+    alone = [evaluate(player, "greedy", games=30, seed=5) for player in (trained, first_legal)]
     independent = (alone[0].standard_error ** 2 + alone[1].standard_error ** 2) ** 0.5
     assert 0 < found.standard_error < independent
-    assert "on 60 deals" in str(found)
+    assert "on 30 deals" in str(found)
     with pytest.raises(ValueError, match="at least 2"):
         compare(trained, first_legal, "greedy", deals=1)

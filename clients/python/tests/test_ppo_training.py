@@ -49,6 +49,7 @@ def test_some_games_may_be_against_built_in_agents(real_address: str) -> None:
         assert trainer.training.progress.decisions == 16 * 16
 
 
+@pytest.mark.slow
 def test_some_games_may_be_against_a_past_self(real_address: str, tmp_path: Path) -> None:
     rules = full_rules({**SMALL, "players": 3}, real_address)
     past = ppo_checkpoint.begin(PLAN, 1, rules, "a test").network("past")
@@ -95,6 +96,7 @@ def test_a_training_resumes_against_the_same_file_only(
     assert command.main([*resume, "--opponents", str(past), "greedy", "random"]) == 0
 
 
+@pytest.mark.slow
 def test_the_value_network_may_see_all_hands_and_learn_first(real_address: str, tmp_path: Path) -> None:
     plan = replace(PLAN, games=8, steps=16, value_updates=1, hyper=replace(PLAN.hyper, all_hands=True))
     begun = ppo_checkpoint.begin(plan, 1, full_rules(SMALL, real_address), "a test")
@@ -153,6 +155,7 @@ def test_the_command_writes_its_files_and_resumes(real_address: str, tmp_path: P
     assert (found["opponents"], found["games"], sum(found["places"])) == (["greedy"] * 3, 3, found["shifts"])
 
 
+@pytest.mark.slow
 def test_a_best_response_begins_with_a_network(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     small = ["--steps", "16", "--minibatches", "2", "--evaluations", "1", "--evaluation-games", "2", "--address", real_address]
     first, second = tmp_path / "first.safetensors", tmp_path / "second.safetensors"

@@ -20,7 +20,7 @@ from chefshat.envs.single import SingleRow
 def test_rows_are_those_of_the_columns(rules: Any) -> None:
     kinds = ends = 0
     # Special actions, which only the default game is searched for, are rare.
-    steps = 500 if rules is None else 250
+    steps = 300 if rules is None else 250
     for seat in (0, 1):
         with VectorEnv(rules=rules, seed=6, rewards="winning", client_seats=[seat], invalid="ask_again") as env:
             chance = np.random.default_rng(seat)

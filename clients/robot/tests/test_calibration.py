@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -23,9 +24,14 @@ CAMERA = Camera(
 )
 
 
+@cache
+def enough_frames() -> tuple[Frame, ...]:
+    return tuple(calibration_frames(CAMERA, 20))
+
+
 def test_the_camera_is_found() -> None:
     counts: list[int] = []
-    calibration = calibrate(calibration_frames(CAMERA, 20), counts.append)
+    calibration = calibrate(enough_frames(), counts.append)
     assert counts == list(range(1, len(calibration.views) + 1))
     camera = calibration.camera
     assert (camera.width, camera.height) == (640, 360)
@@ -45,7 +51,7 @@ def test_too_few_positions_are_refused() -> None:
 
 def test_a_sheet_that_stays_in_the_middle_is_refused() -> None:
     with pytest.raises(CalibrationError, match="edges and corners"):
-        calibrate(calibration_frames(CAMERA, 30, spread=0.2))
+        calibrate(calibration_frames(CAMERA, 20, spread=0.2))
 
 
 def test_pictures_of_different_sizes_are_refused() -> None:
@@ -60,7 +66,7 @@ def test_pictures_of_different_sizes_are_refused() -> None:
 def test_the_command_writes_the_camera_and_its_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pictures = tmp_path / "pictures"
     pictures.mkdir()
-    for frame in calibration_frames(CAMERA, 20):
+    for frame in enough_frames():
         cv2.imwrite(str(pictures / f"{frame.index:02}.png"), frame.image)
     output = tmp_path / "camera.json"
     assert cli.main(["calibrate", str(pictures), "--output", str(output), "--json"]) == 0

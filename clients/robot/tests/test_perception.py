@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Thread
@@ -137,18 +138,23 @@ def assert_true(table: SyntheticTable, events: Sequence[Observed]) -> None:
     assert laid == [said(true_event) for true_event in table.true_events if true_event.kind in ("laid", "cleared")]
 
 
-@pytest.mark.parametrize("name", list(DIFFICULTIES))
-def test_the_first_pizzas_of_a_shift(name: str) -> None:
-    difficulty = DIFFICULTIES[name]
+@cache
+def first_pizzas(difficulty: Difficulty) -> tuple[SyntheticTable, list[Observed]]:
+    """The first pizzas of a Shift, and the events of their table."""
     acts = [act for act in acts_of_steps(random_shift(11), 11, difficulty.pause, difficulty.hovers) if act.start < 18.0]
     table = SyntheticTable(acts, difficulty, seed=11)
+    return table, watch(table)
+
+
+@pytest.mark.parametrize("name", ["easy", pytest.param("medium", marks=pytest.mark.slow), "hard"])
+def test_the_first_pizzas_of_a_shift(name: str) -> None:
+    table, events = first_pizzas(DIFFICULTIES[name])
     assert len(table.true_events) >= 8
-    assert_true(table, watch(table))
+    assert_true(table, events)
 
 
 def test_most_plays_show_from_which_side_they_were_laid() -> None:
-    acts = [act for act in acts_of_steps(random_shift(11), 11, EASY.pause, EASY.hovers) if act.start < 18.0]
-    laid = [event for event in watch(SyntheticTable(acts, EASY, seed=11)) if isinstance(event, Laid)]
+    laid = [event for event in first_pizzas(EASY)[1] if isinstance(event, Laid)]
     assert sum(event.side is not None for event in laid) >= 0.8 * len(laid)
 
 
@@ -195,7 +201,7 @@ def test_hands_that_pass_over_are_nothing() -> None:
     assert_true(table, watch(table))
 
 
-@pytest.mark.parametrize("seat", [1, 2, 3])
+@pytest.mark.parametrize("seat", [1, *(pytest.param(seat, marks=pytest.mark.slow) for seat in (2, 3))])
 def test_an_arm_that_rests_over_the_cards_is_nothing(seat: int) -> None:
     acts: list[Act] = [
         LayCards(0.6, 0, (Card(0, 50), Card(0, 51), Card(0, 52)), (1, 2, 3)),
@@ -257,7 +263,7 @@ def test_a_pass_card_that_cannot_be_read_is_asked_about() -> None:
     assert happened(events) == [("pass_shown", 2), ("pass_withdrawn", 2)]
 
 
-@pytest.mark.parametrize("seat", range(4))
+@pytest.mark.parametrize("seat", [*(pytest.param(seat, marks=pytest.mark.slow) for seat in range(3)), 3])
 def test_a_pass_card_that_lies_face_down_is_asked_about_at_every_place(seat: int) -> None:
     for difficulty in (EASY, MEDIUM):
         table = SyntheticTable([ShowPass(0.6, seat, face_down=True), WithdrawPass(3.5, seat)], difficulty, seed=7)
@@ -279,8 +285,15 @@ def begin_in_the_middle(table: SyntheticTable, begin: float) -> list[Observed]:
     return events
 
 
-@pytest.mark.parametrize("difficulty", [EASY, MEDIUM])
-@pytest.mark.parametrize("face_down", [False, True])
+@pytest.mark.parametrize(
+    ("difficulty", "face_down"),
+    [
+        (EASY, False),
+        (MEDIUM, True),
+        pytest.param(EASY, True, marks=pytest.mark.slow),
+        pytest.param(MEDIUM, False, marks=pytest.mark.slow),
+    ],
+)
 def test_what_lies_there_when_perception_begins_was_found(difficulty: Difficulty, face_down: bool) -> None:
     acts: list[Act] = [
         LayCards(0.6, 0, (Card(0, 65), Card(0, 58)), (1, 2), face_down),

@@ -14,7 +14,7 @@ use crate::cluster::{Cluster, Leases};
 use crate::faults::Faults;
 
 /// Number of faults; `CHEFSHAT_FAULTS` overrides it.
-const ROUNDS: u64 = 30;
+const ROUNDS: u64 = 20;
 /// From which the faults follow; `CHEFSHAT_FAULTS_SEED` overrides it.
 const SEED: u64 = 17;
 const NODES: usize = 3;

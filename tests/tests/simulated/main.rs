@@ -11,7 +11,7 @@ mod run;
 use run::{Run, simulate};
 
 /// Seeds in `cargo test`.
-const RUNS: u64 = 30;
+const RUNS: u64 = 20;
 
 /// A number from the environment.
 fn number(name: &str) -> Option<u64> {

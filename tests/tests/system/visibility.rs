@@ -907,12 +907,18 @@ async fn everything_for_everybody(mode: AccessSettings) {
     }
     // The rooms and records of tournaments are those of their tournaments.
     let called = |index: usize| games[index].clone();
-    check(&server, &subjects, first, "after the end").await;
+    // Without tokens fewer ask, and of the same: each is looked at in one state less.
+    let tokens = host.is_some();
+    if tokens {
+        check(&server, &subjects, first, "after the end").await;
+    }
     check(&server, &subjects, called, "a tournament's game").await;
 
     let server = server.restart(ServerConfig::default().retention).await;
     check(&server, &subjects, first, "after a restart").await;
-    check(&server, &subjects, called, "a tournament's game, restarted").await;
+    if tokens {
+        check(&server, &subjects, called, "a tournament's game, restarted").await;
+    }
     // Only the records are left of the rooms.
     let server = server.restart(Duration::ZERO).await;
     check(&server, &subjects, first, "without rooms").await;

@@ -350,6 +350,7 @@ fn with_extent(tests: &mut Command, options: Options) {
         tests.env("CHEFSHAT_KILLS", "100");
         tests.env("CHEFSHAT_SIMULATIONS", "300");
         tests.env("CHEFSHAT_MODEL", "all");
+        tests.env("CHEFSHAT_PAIRS", "100000");
     }
 }
 

@@ -45,7 +45,9 @@ pub(crate) fn test_in_browser(
         Ok(()) => {
             let mut tests = npm(places);
             tests.args(["run", "test:browser"]);
-            if !slow {
+            if slow {
+                tests.env("CHEFSHAT_SLOW", "1");
+            } else {
                 tests.args(["--", "--exclude", "**/*.slow.test.ts"]);
             }
             steps.program("browser tests", &mut tests)

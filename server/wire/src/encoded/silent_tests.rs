@@ -20,7 +20,7 @@ use prost::Message as _;
 use crate::convert;
 
 /// How many pairs are played, unless `CHEFSHAT_PAIRS` says another number.
-const PAIRS: u64 = 10_000;
+const PAIRS: u64 = 3_000;
 
 /// A small generator of random numbers (SplitMix64).
 struct Chance(u64);
