@@ -141,5 +141,16 @@ test.each<[Partial<RoomForm>, object]>([
 });
 
 test("the name of a quick game has a valid length", () => {
-  expect(Array.from(quickGame("🍕".repeat(80), AGENTS).name ?? "").length).toBe(MAX_NAME);
+  expect(Array.from(quickGame("🍕".repeat(80), "Ada", AGENTS).name ?? "").length).toBe(MAX_NAME);
+});
+
+test.each([
+  ["Ada", ["trained", "greedy", "random"], ["Greta", "Gustav", "Rolf"]],
+  [" greta ", ["trained", "greedy", "random"], ["Pia", "Gustav", "Rolf"]],
+  ["Ada", ["greedy"], ["Gustav", "", ""]],
+  ["Ada", ["special"], ["", "", ""]],
+])("the agents of a quick game of %j on a server with %j are called %j", (player, agents, names) => {
+  const { seats = [] } = quickGame("Friday", player, agents);
+  expect(seats.map(({ filledBy }) => filledBy?.case)).toEqual(["reservedFor", ...names.map(() => "builtInAgent")]);
+  expect(seats.slice(1).map(({ name }) => name)).toEqual(names);
 });

@@ -29,7 +29,7 @@ export function Seats({ room, mine }: { room: Room; mine?: number | undefined })
                 {nameOf(participant)}
                 {participant.seat === mine && <span class="soft"> {words.you}</span>}
               </span>
-              <KindBadge kind={participant.kind} builtIn={participant.builtInAgent} />
+              <KindBadge kind={participant.kind} builtIn={participant.builtInAgent} name={participant.name} />
               {participant.atTable ? (
                 <span class="soft small">{t().table.physical.atTable}</span>
               ) : (

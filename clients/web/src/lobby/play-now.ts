@@ -12,7 +12,7 @@ export async function playNow(name: string): Promise<void> {
   const words = t().lobby.quick;
   const { builtInAgents } = await serverInfo();
   const player = name.trim() || words.guest;
-  const { joinCode } = await createRoom(quickGame(words.roomOf(player), builtInAgents));
+  const { joinCode } = await createRoom(quickGame(words.roomOf(player), player, builtInAgents));
   const { roomId } = await takeSeat(joinCode, player);
   navigate({ page: "room", roomId });
 }

@@ -87,23 +87,40 @@ function namesMissing({ seats, seatNames }: RoomForm): boolean {
   return seats.some((choice, seat) => isAtTable(choice) && (seatNames[seat] ?? "").trim() === "");
 }
 
-/** The request of a form without problems. */
-export function requestOf(form: RoomForm): MessageInitShape<typeof CreateRoomRequestSchema> {
+/** The request of a form without problems; `agentNames`: what built-in agents are called, by seat. */
+export function requestOf(
+  form: RoomForm,
+  agentNames: readonly string[] = [],
+): MessageInitShape<typeof CreateRoomRequestSchema> {
   return {
     name: form.name.trim(),
     rules: rulesOf(form, form.seats.length),
-    seats: form.seats.map((choice, seat) => seatConfig(choice, form.seatNames[seat] ?? "")),
+    seats: form.seats.map((choice, seat) => seatConfig(choice, form.seatNames[seat] ?? "", agentNames[seat] ?? "")),
     policy: { ...policyOf(form), abort: ABORTS[form.abort] },
     physical: form.cards === "real",
   };
 }
 
-/** The request for a game of one person and three built-in agents, with the relaxed clock. */
+/** What the agents of a quick game are called; by the second name if the person has the first. */
+const NAMES: Record<string, readonly [string, string]> = {
+  trained: ["Greta", "Pia"],
+  greedy: ["Gustav", "Udo"],
+  random: ["Rolf", "Emil"],
+};
+
+/** The request for a game of one person and three built-in agents with names, with the relaxed clock. */
 export function quickGame(
   name: string,
+  player: string,
   builtInAgents: readonly string[],
 ): MessageInitShape<typeof CreateRoomRequestSchema> {
-  return { ...requestOf(newForm(builtInAgents)), name: Array.from(name).slice(0, MAX_NAME).join("") };
+  const form = { ...newForm(builtInAgents), name: Array.from(name).slice(0, MAX_NAME).join("") };
+  const names = threeOf(builtInAgents).map((agent, index, agents) => {
+    // A server without one of them has another twice.
+    const [first = "", second = ""] = agents.indexOf(agent) === index ? (NAMES[agent] ?? []) : [];
+    return first.toLowerCase() === player.trim().toLowerCase() ? second : first;
+  });
+  return requestOf(form, ["", ...names]);
 }
 
 /** The fields by their names in the protocol. */
@@ -127,7 +144,7 @@ const KINDS = {
   anybody: ParticipantKind.UNSPECIFIED,
 };
 
-function seatConfig(choice: SeatChoice, name: string) {
+function seatConfig(choice: SeatChoice, name: string, agentName: string) {
   switch (choice) {
     case "at-table human":
       return { filledBy: { case: "atTable" as const, value: KINDS.human }, name: name.trim() };
@@ -142,6 +159,6 @@ function seatConfig(choice: SeatChoice, name: string) {
     case "anybody":
       return { filledBy: { case: "reservedFor" as const, value: KINDS[choice] } };
     default:
-      return { filledBy: { case: "builtInAgent" as const, value: choice.slice("built-in ".length) } };
+      return { filledBy: { case: "builtInAgent" as const, value: choice.slice("built-in ".length) }, name: agentName };
   }
 }

@@ -10,17 +10,31 @@ interface KindBadgeProps {
   kind: ParticipantKind;
   /** Name of the built-in agent; empty or absent for other participants. */
   builtIn?: string;
+  /** The participant's name, where it is shown. A built-in agent of another name says how it plays. */
+  name?: string;
 }
 
 /** The badge of a participant; nothing if its kind is hidden by a study. */
-export function KindBadge({ kind, builtIn = "" }: KindBadgeProps) {
+export function KindBadge({ kind, builtIn = "", name = builtIn }: KindBadgeProps) {
   if (builtIn === "" && kind === ParticipantKind.UNSPECIFIED) return null;
   return (
     <span class={css.kindBadge} data-part="kind-badge" title={builtIn === "" ? undefined : t().common.kinds.builtIn}>
       <Drawing name={builtIn === "" ? symbols[kind] : "kind-built-in"} />
-      <span>{builtIn === "" ? kindWord(kind) : t().common.kinds.agent}</span>
+      <span>
+        {builtIn === "" ? kindWord(kind) : t().common.kinds.agent}
+        {name !== "" && builtIn !== "" && name !== builtIn && (
+          <span data-part="character"> · {characterWords(builtIn)}</span>
+        )}
+      </span>
     </span>
   );
+}
+
+/** How a built-in agent plays. */
+function characterWords(builtIn: string): string {
+  // A search may have a budget: "monte_carlo:400".
+  const [agent = ""] = builtIn.split(":");
+  return t().common.characters[agent] ?? builtIn;
 }
 
 const symbols: Record<ParticipantKind, string> = {

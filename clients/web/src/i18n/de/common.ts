@@ -72,6 +72,7 @@ export const common: Texts["common"] = {
     builtIn: "eingebauter Agent",
     open: "frei",
   },
+  characters: { trained: "erfahren", greedy: "hastig", random: "nach Laune", monte_carlo: "bedächtig" },
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Koch", waiter: "Kellner", dishwasher: "Tellerwäscher" },
   faces: [
     "Trüffel",

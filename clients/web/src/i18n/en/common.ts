@@ -63,6 +63,11 @@ export const common = {
     forgetDo: "Forget everything",
   },
   kinds: { agent: "agent", human: "person", robot: "robot", model: "model", builtIn: "built-in agent", open: "free" },
+  /** How built-in agents with names of their own play. */
+  characters: { trained: "experienced", greedy: "hasty", random: "on a whim", monte_carlo: "thoughtful" } as Record<
+    string,
+    string
+  >,
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cook", waiter: "Waiter", dishwasher: "Dishwasher" },
   faces: [
     "truffle",

@@ -73,6 +73,7 @@ export const common: Texts["common"] = {
     builtIn: "agente integrado",
     open: "libre",
   },
+  characters: { trained: "con experiencia", greedy: "con prisa", random: "a la aventura", monte_carlo: "con calma" },
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cocinero", waiter: "Camarero", dishwasher: "Lavaplatos" },
   faces: [
     "trufa",

@@ -70,6 +70,7 @@ export const common: Texts["common"] = {
     builtIn: "agente integrato",
     open: "libero",
   },
+  characters: { trained: "con esperienza", greedy: "di fretta", random: "a caso", monte_carlo: "con calma" },
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cuoco", waiter: "Cameriere", dishwasher: "Lavapiatti" },
   faces: [
     "tartufo",

@@ -95,7 +95,7 @@ function WaitingSeat({ table, seat, own }: { table: TableState; seat: SeatState;
               {own && <span class="soft"> ({t().table.you})</span>}
             </h3>
             <p class={`${css.state} small`}>
-              <KindBadge kind={seat.kind} builtIn={seat.builtIn} />
+              <KindBadge kind={seat.kind} builtIn={seat.builtIn} name={seat.name} />
               <span class={ready ? css.there : ""}>
                 <span aria-hidden="true">{ready ? "✓" : "…"}</span> {ready ? readyWords(seat) : words.notHere}
               </span>
