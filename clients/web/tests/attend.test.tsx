@@ -82,7 +82,7 @@ describe("what the table waits for", () => {
     await show(stateOf());
     expect(part("awaited")?.textContent).toContain("≤ 8");
     expect(part("awaited")?.textContent).toContain("≥ 3");
-    expect(part("board-words")?.textContent).toBe("2 × 9 + joker");
+    expect(part("board-words")?.textContent).toBe("two 9s with a joker");
     const seats = [...root.querySelectorAll('[data-part~="attend-seat"]')].map(({ textContent }) => textContent);
     expect(seats[0]).toContain("16 cards");
     expect(seats[2]).toMatch(/remote.*hand known/);
@@ -114,10 +114,10 @@ describe("entering by hand", () => {
   test("a play: the face, how many, jokers", async () => {
     await show(stateOf());
     await press("5, chilli");
-    expect(button("Ada lays 3 × 5")).toBeTruthy();
+    expect(button("Ada lays three 5s")).toBeTruthy();
     await press("More: How many");
     await press("More: Jokers with them");
-    await press("Ada lays 4 × 5 + joker");
+    await press("Ada lays four 5s with a joker");
     expect(sent).toEqual([{ case: "laid", value: { seat: 0, cards: { cards: [5, 5, 5, 5, 12], golden: false } } }]);
     expect(button("Report the play").getAttribute("aria-disabled")).toBe("true");
   });
@@ -126,7 +126,7 @@ describe("entering by hand", () => {
     await show(stateOf());
     await press("5, chilli");
     await show(stateOf({ seat: 1 }));
-    await press("Ada lays 3 × 5");
+    await press("Ada lays three 5s");
     expect(sent).toMatchObject([{ case: "laid", value: { seat: 0 } }]);
     await press("Bo passes");
     expect(sent).toMatchObject([{ case: "laid" }, { case: "pass", value: { seat: 1 } }]);
@@ -135,7 +135,7 @@ describe("entering by hand", () => {
   test("a play that is not allowed is marked, and can be reported all the same", async () => {
     await show(stateOf());
     await press("10, tomato, not allowed now");
-    await press("Ada lays 3 × 10");
+    await press("Ada lays three 10s");
     expect(sent).toHaveLength(1);
   });
 
@@ -143,10 +143,10 @@ describe("entering by hand", () => {
     await show(stateOf());
     await press("5, chilli");
     outcome = { kind: "violation" };
-    await press("Ada lays 3 × 5");
-    expect(button("Ada lays 3 × 5")).toBeTruthy();
+    await press("Ada lays three 5s");
+    expect(button("Ada lays three 5s")).toBeTruthy();
     outcome = { kind: "fault", words: "The server does not answer." };
-    await press("Ada lays 3 × 5");
+    await press("Ada lays three 5s");
     expect(part("entry")?.querySelector("[role=alert]")?.textContent).toContain("The server does not answer.");
   });
 
@@ -158,7 +158,7 @@ describe("entering by hand", () => {
     await press("Report the play");
     await press("11, mozzarella");
     await press("2 Bo");
-    await press("Bo lays 1 × 11, Golden");
+    await press("Bo lays the Golden 11");
     expect(sent).toEqual([
       { case: "laid", value: { cards: { cards: [11], golden: true } } },
       { case: "laid", value: { seat: 1, cards: { cards: [11], golden: true } } },
@@ -173,7 +173,7 @@ describe("entering by hand", () => {
     await press("Report the play");
     expect(sent).toEqual([]);
     await press("2 Bo");
-    await press("Bo lays 3 × 5");
+    await press("Bo lays three 5s");
     expect(sent).toHaveLength(1);
   });
 
@@ -336,7 +336,7 @@ describe("a violation", () => {
     await press("Enter what really lies there");
     expect(document.activeElement?.textContent).toBe("Enter by hand");
     await press("3, anchovy");
-    await press("Bo lays 3 × 3");
+    await press("Bo lays three 3s");
     expect(sent).toEqual([{ case: "laid", value: { seat: 1, cards: { cards: [3, 3, 3], golden: false } } }]);
   });
 
@@ -364,7 +364,7 @@ describe("the reports of the Shift", () => {
   test("are listed, the newest first", async () => {
     await show(stateOf({ reports }));
     const words = [...root.querySelectorAll('[data-part~="report"] p')].map(({ textContent }) => textContent);
-    expect(words).toEqual(["2 Dan passed", "2 Bo laid 2 × 9 + joker", "3 The hand of Cleo was seen"]);
+    expect(words).toEqual(["2 Dan passed", "2 Bo laid two 9s with a joker", "3 The hand of Cleo was seen"]);
   });
 
   test("are shown eight at a time, or all", async () => {
@@ -377,13 +377,13 @@ describe("the reports of the Shift", () => {
 
   test("can be changed into what happened instead", async () => {
     await show(stateOf({ reports }));
-    await press("Change: Bo laid 2 × 9 + joker", item(1));
+    await press("Change: Bo laid two 9s with a joker", item(1));
     const dialog = part("change");
     if (!dialog) throw new Error("no dialog");
-    expect(button("Bo lays 2 × 9 + joker", dialog)).toBeTruthy();
+    expect(button("Bo lays two 9s with a joker", dialog)).toBeTruthy();
     await press("6, basil", dialog);
     outcome = { kind: "violation" };
-    await press("Bo lays 2 × 6 + joker", dialog);
+    await press("Bo lays two 6s with a joker", dialog);
     expect(part("change")?.querySelector("[role=alert]")).not.toBeNull();
     outcome = { kind: "void", count: 2 };
     await press("Bo passes", dialog);
@@ -406,11 +406,11 @@ describe("the reports of the Shift", () => {
     await show(stateOf({ reports: moved }));
     expect(item(1).textContent).toContain("(who it was is assumed)");
     expect(item(0).textContent).not.toContain("assumed");
-    await press("Change: Bo laid 2 × 9 + joker", item(1));
+    await press("Change: Bo laid two 9s with a joker", item(1));
     const dialog = part("change");
     if (!dialog) throw new Error("no dialog");
     await press("1 Ada", dialog);
-    await press("Ada lays 2 × 9 + joker", dialog);
+    await press("Ada lays two 9s with a joker", dialog);
     expect(sent).toMatchObject([
       { case: "correction", value: { report: 2n, instead: { kind: { case: "laid", value: { seat: 0 } } } } },
     ]);

@@ -65,8 +65,8 @@ test("a hint picks the suggested cards and shows points", async () => {
     ],
   });
   await show({ decision: 7n, hint }, () => {});
-  expect(text()).toBe("Suggested: 2 × 9: 3.0 ± 0.2 points · Pass: 1.3 ± 0.1 points");
-  expect(button("play")?.textContent).toBe("Play 2 × 9");
+  expect(text()).toBe("Suggested: two 9s: 3.0 ± 0.2 points · Pass: 1.3 ± 0.1 points");
+  expect(button("play")?.textContent).toBe("Play two 9s");
   expect(button("play")?.getAttribute("aria-disabled")).toBe("false");
 });
 

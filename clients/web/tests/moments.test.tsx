@@ -29,6 +29,9 @@ const deal: Kind = { case: "shiftStarted", value: { shift: 1 } };
 const play = (seat: number, face: number, quantity: number, cardsLeft: number): Kind => {
   return { case: "play", value: { seat, face, quantity, cardsLeft } };
 };
+const gift = (giver: number, receiver: number): Kind => {
+  return { case: "cardsExchanged", value: { giver, receiver, count: 2 } };
+};
 
 afterEach(async () => {
   await act(() => render(null, root));
@@ -43,6 +46,9 @@ test.each<[string, Kind[], string | undefined]>([
   ["Dinner is Served", [deal, declared(SpecialAction.DINNER_IS_SERVED)], "dinner"],
   ["a Food Fight", [deal, declared(SpecialAction.FOOD_FIGHT)], "foodFight"],
   ["a deal", [deal], undefined],
+  ["the first gift of an exchange", [deal, gift(3, 0)], "exchange"],
+  ["a later gift", [deal, gift(3, 0), gift(0, 3)], "exchange"],
+  ["the opening after an exchange", [deal, gift(3, 0), play(1, 11, 2, 15)], "opening"],
 ])("%s", (_, kinds, kind) => {
   expect(momentSince(played(start(), ...kinds), 0)?.kind).toBe(kind);
 });

@@ -69,11 +69,11 @@ beforeEach(() => {
 test("a chosen play is sent on the turn", async () => {
   await show(table());
   await pick(8);
-  expect(button("plan-play")?.textContent).toBe("Then: 2 × 8");
+  expect(button("plan-play")?.textContent).toBe("Then: two 8s");
   await click("plan-play");
   await wait();
   expect(answers).toEqual([]);
-  expect(note()).toBe("Chosen for your turn: 2 × 8");
+  expect(note()).toBe("Chosen for your turn: two 8s");
   await show(table(), turn(EIGHTS, PASS));
   await wait();
   expect(answers).toEqual([[action(EIGHTS), "planned"]]);
@@ -117,7 +117,7 @@ test.each([
   await pick(8);
   await click("plan-play");
   await show(table(changed));
-  expect(note()).toBe("Not possible any more: 2 × 8. Choose again.");
+  expect(note()).toBe("Not possible any more: two 8s. Choose again.");
   await show(table(changed), turn(EIGHTS, PASS));
   await wait();
   expect(answers).toEqual([]);

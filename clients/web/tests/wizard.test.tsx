@@ -173,7 +173,7 @@ test("moves are listed, the suggested one first in look, and played by a click",
   const hint = create(HintSchema, { action: NINES });
   const shown = await show(decisionAt(0), { decision: 7n, hint }, ask);
   expect(all("[data-move]").map((button) => [button.textContent, button.dataset.look])).toEqual([
-    ["2 × 9 · suggested", "main"],
+    ["two 9s · suggested", "main"],
     ["Pass", "plain"],
   ]);
   all("[data-move]")[0]?.click();

@@ -14,6 +14,12 @@ export function plurals(language: string): (count: number, forms: Forms) => stri
     (rules.select(count) === "one" ? forms.one : forms.other).replaceAll("#", digits.format(count));
 }
 
+/** Returns a function from a number, from 1, to its word; where there is none, to its digits. */
+export function numerals(words: string): (count: number) => string {
+  const known = words.split(" ");
+  return (count) => known[count - 1] ?? String(count);
+}
+
 /** Returns a function from milliseconds to words, in the largest unit that is a whole number. */
 export function durations(
   language: string,

@@ -33,7 +33,7 @@ export function cardWord(card: Card): string {
   return ingredient ? text : text.replace(/, $/, "");
 }
 
-/** The cards of a play: "3 × 9 + 2 jokers". */
+/** The cards of a play: "three 9s with 2 jokers". */
 export function playWords(cards: readonly Card[]): string {
   const jokers = cards.filter((card) => card.kind === "joker").length;
   const face = cards.map(faceOf).find((other) => other !== undefined);

@@ -56,9 +56,9 @@ async function enter(page: Page, ...names: readonly string[]): Promise<void> {
 async function playRemotely(cleo: Page, attendant: Page, face: number, before?: string): Promise<string | undefined> {
   const id = await nextDecision(cleo, before);
   await cleo.locator(`[data-part~="hand-card"][data-card="${face}"]`).click();
-  await cleo.getByRole("button", { name: `Play 1 × ${face}` }).click();
+  await cleo.getByRole("button", { name: `Play one ${face}` }).click();
   const item = attendant.locator('[data-part~="to-lay-item"]').filter({ hasText: "Lay for Cleo" });
-  await item.getByText(`1 × ${face}`).waitFor({ state: "attached" });
+  await item.getByText(`one ${face}`).waitFor({ state: "attached" });
   await item.getByRole("button").click();
   await item.waitFor({ state: "detached" });
   return id;
@@ -94,29 +94,29 @@ test("an attendant enters a Shift, with a question, a violation and a correction
   const question = tablet.locator('[data-part~="question-card"]');
   await question.getByRole("heading", { name: "Who opened the Shift?" }).waitFor();
   await question.getByRole("button", { name: "Ada" }).click();
-  await board("1 × 4, Golden · Ada");
+  await board("the Golden 4 · Ada");
 
   // A violation, which everybody sees and which does not count.
   await awaits(attendant, "Bo to play");
-  await enter(attendant, "4, artichoke, not allowed now", "Bo lays 1 × 4");
+  await enter(attendant, "4, artichoke, not allowed now", "Bo lays one 4");
   const violation = attendant.locator('[data-part~="violation"]');
   await violation.filter({ hasText: "Bo: That pizza already shows 4s" }).waitFor();
   await cleo.locator('[data-part~="table-banner"]').filter({ hasText: "That pizza already shows 4s" }).waitFor();
-  await board("1 × 4, Golden · Ada");
+  await board("the Golden 4 · Ada");
 
   // The second attempt is misread, and corrected while Cleo decides.
   await violation.getByRole("button", { name: "Enter what really lies there" }).click();
-  await enter(attendant, "2, shrimp", "Bo lays 1 × 2");
+  await enter(attendant, "2, shrimp", "Bo lays one 2");
   await violation.waitFor({ state: "detached" });
-  await board("1 × 2 · Bo");
+  await board("one 2 · Bo");
   const misread = await nextDecision(cleo);
   expect(await cleo.locator('[data-part~="hand-card"][data-card="2"]').getAttribute("aria-disabled")).toBe("true");
-  await attendant.getByRole("button", { name: "Change: Bo laid 1 × 2" }).click();
+  await attendant.getByRole("button", { name: "Change: Bo laid one 2" }).click();
   const change = attendant.locator('[data-part~="change"]');
   await change.getByRole("button", { name: "3, anchovy" }).click();
-  await change.getByRole("button", { name: "Bo lays 1 × 3" }).click();
+  await change.getByRole("button", { name: "Bo lays one 3" }).click();
   await change.waitFor({ state: "detached" });
-  await board("1 × 3 · Bo");
+  await board("one 3 · Bo");
   await cleo.locator('[data-part~="log"]').getByText("Corrected:").waitFor();
 
   // A pause, seen by the remote player.
@@ -133,7 +133,7 @@ test("an attendant enters a Shift, with a question, a violation and a correction
   await awaits(attendant, "Cleo is deciding");
   decision = await playRemotely(cleo, attendant, 3, decision);
   await awaits(attendant, "Ada to play");
-  await enter(attendant, "2, shrimp", "Ada lays 1 × 2");
+  await enter(attendant, "2, shrimp", "Ada lays one 2");
   await awaits(attendant, "Bo to play");
   await enter(attendant, "Bo passes");
   await playRemotely(cleo, attendant, 1, decision);
@@ -143,7 +143,7 @@ test("an attendant enters a Shift, with a question, a violation and a correction
   await until(
     async () => (await attendant.locator('[data-part~="board-words"]').textContent()) === "The board is empty",
   );
-  await enter(attendant, "3, anchovy", "Ada lays 1 × 3");
+  await enter(attendant, "3, anchovy", "Ada lays one 3");
 
   await awaits(attendant, "The game is over");
   await awaits(tablet, "The game is over");
@@ -179,7 +179,7 @@ test("with the keyboard alone: a hand is typed, a play and a pass are reported, 
   await press("1 Ada");
   await press("11, mozzarella");
   await press("More: How many");
-  await press("Ada lays 2 × 11, Golden");
+  await press("Ada lays two 11s (one Golden)");
   await hears("Bo to play.");
   await press("Bo passes");
   await hears("Cleo to play.");

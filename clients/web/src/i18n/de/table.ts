@@ -3,9 +3,10 @@
 import { AbortReason, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import { ViolatedRule } from "../../gen/chefshat/v1/table_pb";
 import type { Texts } from "../en";
-import { plurals } from "../plural";
+import { numerals, plurals } from "../plural";
 
 const plural = plurals("de");
+const number = numerals("eins zwei drei vier fünf sechs sieben acht neun zehn elf zwölf dreizehn vierzehn fünfzehn");
 
 export const table: Texts["table"] = {
   title: "Tisch",
@@ -31,8 +32,11 @@ export const table: Texts["table"] = {
     joker: "Joker",
     received: "im Tausch bekommen",
   },
-  play: (quantity, face, golden, jokers) =>
-    `${quantity} × ${face}${golden ? ", golden" : ""}${jokers === 0 ? "" : plural(jokers, { one: " + Joker", other: " + # Joker" })}`,
+  play: (quantity, face, golden, jokers) => {
+    const one = golden ? `die goldene ${face}` : `eine ${face}`;
+    const cards = quantity === 1 ? one : `${number(quantity)} ${face}er${golden ? " (eine golden)" : ""}`;
+    return cards + (jokers === 0 ? "" : plural(jokers, { one: " mit Joker", other: " mit # Jokern" }));
+  },
   jokers: (count) => plural(count, { one: "ein Joker", other: "# Joker" }),
   board: { label: "Brett", empty: "Das Brett ist leer", by: (cards, name) => `${cards} · ${name}` },
   hand: {
@@ -147,7 +151,7 @@ export const table: Texts["table"] = {
   actions: {
     label: "Deine Entscheidung",
     play: "Spielen",
-    playCards: (cards) => `${cards} spielen`,
+    playCards: (cards) => `Spielen: ${cards}`,
     pass: "Passen",
     give: "Abgeben",
     giveCard: (card) => `${card} abgeben`,
@@ -200,6 +204,10 @@ export const table: Texts["table"] = {
     dinner: {
       title: (name) => `${name}: Dinner is Served!`,
       text: "In diesem Shift werden keine Karten getauscht.",
+    },
+    exchange: {
+      title: () => "Der Tausch",
+      text: "Das Vorrecht des Chefs: Der Tellerwäscher gibt die besten Karten ab und bekommt andere zurück.",
     },
     opening: {
       title: (name) => `${name} spielt die goldene Karte`,

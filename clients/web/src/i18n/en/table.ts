@@ -2,9 +2,10 @@
 
 import { AbortReason, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import type { ViolatedRule } from "../../gen/chefshat/v1/table_pb";
-import { plurals } from "../plural";
+import { numerals, plurals } from "../plural";
 
 const plural = plurals("en");
+const number = numerals("one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen");
 
 /** What the sentence about a violation is made of. */
 export interface Breach {
@@ -49,9 +50,12 @@ export const table = {
     joker: "joker",
     received: "received in the exchange",
   },
-  /** Cards in short, as in "3 × 9 + 2 jokers". */
-  play: (quantity: number, face: number, golden: boolean, jokers: number) =>
-    `${quantity} × ${face}${golden ? ", Golden" : ""}${jokers === 0 ? "" : plural(jokers, { one: " + joker", other: " + # jokers" })}`,
+  /** Cards in short, as in "three 9s with 2 jokers". */
+  play: (quantity: number, face: number, golden: boolean, jokers: number) => {
+    const one = golden ? `the Golden ${face}` : `one ${face}`;
+    const cards = quantity === 1 ? one : `${number(quantity)} ${face}s${golden ? " (one Golden)" : ""}`;
+    return cards + (jokers === 0 ? "" : plural(jokers, { one: " with a joker", other: " with # jokers" }));
+  },
   jokers: (count: number) => plural(count, { one: "a joker", other: "# jokers" }),
   board: { label: "Board", empty: "The board is empty", by: (cards: string, name: string) => `${cards} · ${name}` },
   hand: {
@@ -195,6 +199,10 @@ export const table = {
     dinner: {
       title: (name: string) => `${name}: Dinner is Served!`,
       text: "No cards are exchanged in this Shift.",
+    },
+    exchange: {
+      title: () => "The exchange",
+      text: "It is the Chef’s privilege: the Dishwasher gives up the best cards and gets others back.",
     },
     opening: {
       title: (name: string) => `${name} plays the Golden card`,

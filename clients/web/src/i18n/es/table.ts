@@ -3,9 +3,10 @@
 import { AbortReason, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import { ViolatedRule } from "../../gen/chefshat/v1/table_pb";
 import type { Texts } from "../en";
-import { plurals } from "../plural";
+import { numerals, plurals } from "../plural";
 
 const plural = plurals("es");
+const number = numerals("uno dos tres cuatro cinco seis siete ocho nueve diez once doce trece catorce quince");
 
 export const table: Texts["table"] = {
   title: "Mesa",
@@ -31,8 +32,11 @@ export const table: Texts["table"] = {
     joker: "comodín",
     received: "recibida en el intercambio",
   },
-  play: (quantity, face, golden, jokers) =>
-    `${quantity} × ${face}${golden ? ", dorado" : ""}${jokers === 0 ? "" : plural(jokers, { one: " + comodín", other: " + # comodines" })}`,
+  play: (quantity, face, golden, jokers) => {
+    const one = golden ? `el ${face} dorado` : `un ${face}`;
+    const cards = quantity === 1 ? one : `${number(quantity)} ${face}${golden ? " (uno dorado)" : ""}`;
+    return cards + (jokers === 0 ? "" : plural(jokers, { one: " con comodín", other: " con # comodines" }));
+  },
   jokers: (count) => plural(count, { one: "un comodín", other: "# comodines" }),
   board: { label: "Tablero", empty: "El tablero está vacío", by: (cards, name) => `${cards} · ${name}` },
   hand: {
@@ -200,6 +204,10 @@ export const table: Texts["table"] = {
     dinner: {
       title: (name) => `${name}: Dinner is Served!`,
       text: "En este Shift no se intercambian cartas.",
+    },
+    exchange: {
+      title: () => "El intercambio",
+      text: "Es el privilegio del Chef: el Lavaplatos entrega las mejores cartas y recibe otras.",
     },
     opening: {
       title: (name) => `${name} juega la carta dorada`,

@@ -3,9 +3,12 @@
 import { AbortReason, ParticipantKind } from "../../gen/chefshat/v1/room_pb";
 import { ViolatedRule } from "../../gen/chefshat/v1/table_pb";
 import type { Texts } from "../en";
-import { plurals } from "../plural";
+import { numerals, plurals } from "../plural";
 
 const plural = plurals("it");
+const number = numerals(
+  "uno due tre quattro cinque sei sette otto nove dieci undici dodici tredici quattordici quindici",
+);
 
 export const table: Texts["table"] = {
   title: "Tavolo",
@@ -31,8 +34,11 @@ export const table: Texts["table"] = {
     joker: "jolly",
     received: "ricevuta nello scambio",
   },
-  play: (quantity, face, golden, jokers) =>
-    `${quantity} × ${face}${golden ? ", d’oro" : ""}${jokers === 0 ? "" : plural(jokers, { one: " + jolly", other: " + # jolly" })}`,
+  play: (quantity, face, golden, jokers) => {
+    const one = golden ? `${face === 8 || face === 11 ? "l’" : "il "}${face} d’oro` : `un ${face}`;
+    const cards = quantity === 1 ? one : `${number(quantity)} ${face}${golden ? " (uno d’oro)" : ""}`;
+    return cards + (jokers === 0 ? "" : plural(jokers, { one: " con jolly", other: " con # jolly" }));
+  },
   jokers: (count) => plural(count, { one: "un jolly", other: "# jolly" }),
   board: { label: "Piatto", empty: "Il piatto è vuoto", by: (cards, name) => `${cards} · ${name}` },
   hand: {
@@ -200,6 +206,10 @@ export const table: Texts["table"] = {
     dinner: {
       title: (name) => `${name}: Dinner is Served!`,
       text: "In questo Shift non si scambiano carte.",
+    },
+    exchange: {
+      title: () => "Lo scambio",
+      text: "È il privilegio dello Chef: il Lavapiatti cede le carte migliori e ne riceve altre.",
     },
     opening: {
       title: (name) => `${name} gioca la carta d’oro`,

@@ -9,6 +9,7 @@ import { decimal, t } from "../../i18n";
 import buttonCss from "../../parts/Button.module.css";
 import { Clock } from "../../parts/Clock";
 import type { GivenHint } from "../acting";
+import { mustPass } from "../auto-pass";
 import { type Move, moveOf } from "../model/actions";
 import type { OpenDecision } from "../model/live";
 import { missing } from "../model/picking";
@@ -50,6 +51,7 @@ export function ActionBar(props: ActionBarProps) {
   const kind = decision?.kind;
   const special = kind === DecisionKind.SPECIAL_ACTION;
   const mayPass = moves.some((legal) => legal.kind === "pass");
+  const passing = decision !== undefined && mustPass(decision, table.faces);
   return (
     <section class={css.actions} data-part="actions" aria-label={words.label}>
       <p class={`${css.hint} ${remark ? css.remark : ""}`} role="note">
@@ -87,10 +89,10 @@ export function ActionBar(props: ActionBarProps) {
           </>
         ) : deciding.planning ? null : (
           <>
-            <Act main ready={move !== undefined && !sending} onClick={play} id="play">
+            <Act main={!passing} ready={move !== undefined && !sending} onClick={play} id="play">
               {move ? words.playCards(moveWords(move)) : words.play}
             </Act>
-            <Act ready={mayPass && !sending} onClick={deciding.pass} id="pass">
+            <Act main={passing} ready={mayPass && !sending} onClick={deciding.pass} id="pass">
               {words.pass}
             </Act>
           </>
@@ -159,7 +161,7 @@ function hint({ table, decision, deciding, sending, taught, autoPassing }: Actio
     const more = missing(decision.hand, picked, moves);
     return more === undefined || more === 0 ? words.pick : words.more(more);
   }
-  if (moves.every((legal) => legal.kind === "pass")) return autoPassing ? words.autoPassing : words.onlyPass;
+  if (mustPass(decision, table.faces)) return autoPassing ? words.autoPassing : words.onlyPass;
   if (!mayPass && decision.requirement && isOpening(decision.requirement)) return words.noPass;
   if (!mayPass) return table.board.length === 0 && !taught ? words.mustPlay : words.pickMust;
   return words.pick;

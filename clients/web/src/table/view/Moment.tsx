@@ -18,6 +18,7 @@ const SHOWN_MS = 4500;
 const DRAWINGS: Record<MomentKind, string> = {
   foodFight: "face-10-tomato",
   dinner: "role-chef",
+  exchange: "role-dishwasher",
   opening: "golden",
   lastCard: "face-1-truffle",
 };

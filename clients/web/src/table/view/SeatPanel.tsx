@@ -9,7 +9,7 @@ import { Drawing } from "../../parts/Drawing";
 import { KindBadge, kindWord } from "../../parts/KindBadge";
 import { SeatNumber } from "../../parts/SeatNumber";
 import { isLabel, phraseOf } from "../expressions";
-import { stacks } from "../model/cards";
+import { type Card as CardValue, faceOf, stacks } from "../model/cards";
 import { isTaken, type SeatState, type TableState } from "../model/state";
 import { cardWord, expressionWord, nameOf, playWords, presenceWords, roleWord } from "../words";
 import { Face } from "./Face";
@@ -70,7 +70,7 @@ export function SeatPanel({ table, seat, own = false, deciding, kind, cards = tr
           {own && <span class="soft"> ({words.you})</span>}
         </h2>
         <p class={css.kind}>
-          {isTaken(seat) && <KindBadge kind={seat.kind} builtIn={seat.builtIn} />}
+          {isTaken(seat) && <KindBadge kind={seat.kind} builtIn={seat.builtIn} name={seat.name} />}
           {isTaken(seat) && presence && <span class={css.presence}>{presence}</span>}
         </p>
       </div>
@@ -123,7 +123,22 @@ function Chip({ table, seat, state, kind }: ChipProps) {
     return chip(css.chipDeciding, kind === DecisionKind.SPECIAL_ACTION ? words.toDeclare : words.toPlay);
   }
   if (seat.lastMove === "pass") return chip(css.chipPassed, words.passed);
-  return seat.lastMove ? chip(css.chipPlayed, playWords(seat.lastMove)) : null;
+  return seat.lastMove ? <Play cards={seat.lastMove} /> : null;
+}
+
+/** The cards of a play, small and one over the other. */
+function Play({ cards }: { cards: readonly CardValue[] }) {
+  const words = playWords(cards);
+  return (
+    <span class={`${css.chip} ${css.play}`} data-part="chip" title={words} style={{ "--cards": cards.length }}>
+      <span class="visually-hidden">{words}</span>
+      {cards.map((card, index) => (
+        <b key={index} class={`number ${card.kind === "golden" ? css.playGolden : ""}`} aria-hidden="true">
+          {faceOf(card) ?? "J"}
+        </b>
+      ))}
+    </span>
+  );
 }
 
 /** The place in the game, once it is over. */

@@ -31,6 +31,7 @@ import { SeatPanel } from "./SeatPanel";
 import { useShortcuts } from "./shortcuts";
 import css from "./TableView.module.css";
 import { Expressions, type ShownTurn, Tools } from "./Tools";
+import { Travel } from "./Travel";
 
 interface TableViewProps {
   table: TableState;
@@ -233,6 +234,7 @@ export function TableView(props: TableViewProps) {
         <Seats table={table} own={own} next={next} kind={kind} lower />
       )}
       {props.children}
+      <Travel table={table} />
       {helped && (
         <Help
           table={table}

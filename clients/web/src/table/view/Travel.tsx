@@ -1,0 +1,66 @@
+// The cards of the exchange, which travel from the one who gives them to the one who gets them.
+// Decorative: the history says what was given.
+
+import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
+import { hidden } from "../../hiding";
+import { Card } from "../../parts/Card";
+import { isOn } from "../../preferences";
+import { MOST_AT_ONCE } from "../model/log";
+import type { LogEntry, TableState } from "../model/state";
+import css from "./Travel.module.css";
+
+/** How long cards are under way, milliseconds; as in the style sheet. */
+const UNDER_WAY_MS = 1600;
+
+interface Gift extends Extract<LogEntry, { kind: "gave" }> {
+  readonly sequence: number;
+}
+
+export function Travel({ table }: { table: TableState }) {
+  const [gifts, setGifts] = useState<readonly Gift[]>([]);
+  const last = table.log.at(-1)?.sequence ?? 0;
+  const seen = useRef(last);
+  useEffect(() => {
+    const fresh = table.log.filter(({ sequence }) => sequence > seen.current);
+    seen.current = last;
+    // A reader who catches up does not see the past.
+    if (fresh.length > MOST_AT_ONCE || !isOn("moments") || hidden.peek().includes("log")) return;
+    const given = fresh.flatMap(({ entry, sequence }) => (entry.kind === "gave" ? [{ ...entry, sequence }] : []));
+    if (given.length > 0) setGifts(given);
+  }, [last]);
+  useEffect(() => {
+    if (gifts.length === 0) return;
+    const timer = setTimeout(() => setGifts([]), UNDER_WAY_MS);
+    return () => clearTimeout(timer);
+  }, [gifts]);
+  return (
+    <>
+      {gifts.map((gift) => (
+        <UnderWay key={gift.sequence} gift={gift} />
+      ))}
+    </>
+  );
+}
+
+function UnderWay({ gift }: { gift: Gift }) {
+  const cards = useRef<HTMLDivElement>(null);
+  useLayoutEffect(() => {
+    const { current } = cards;
+    const table = current?.closest('[data-part~="table"]');
+    const [from, to] = [gift.giver, gift.receiver].map((seat) => {
+      const box = table?.querySelector(`[data-part~="seat"][data-seat="${seat}"]`)?.getBoundingClientRect();
+      return box && ([box.left + box.width / 2, box.top + box.height / 2] as const);
+    });
+    if (!current || !from || !to) return;
+    for (const [name, [x, y]] of [["from", from] as const, ["to", to] as const])
+      current.style.setProperty(`--${name}`, `${x.toFixed(0)}px ${y.toFixed(0)}px`);
+  }, []);
+  const shown = gift.cards.length > 0 ? gift.cards : Array.from({ length: gift.count }, () => undefined);
+  return (
+    <div ref={cards} class={css.underWay} data-part="under-way" aria-hidden="true">
+      {shown.map((card, index) => (
+        <Card key={index} card={card} />
+      ))}
+    </div>
+  );
+}
