@@ -105,7 +105,8 @@ test("two people wait for each other, play together, and one goes on with agents
   await first.page.goto(links[0] ?? "");
   await agree(first.page);
   await first.page.getByRole("heading", { name: "Waiting for the others" }).waitFor();
-  await first.page.getByText("1 of 2 people are here").waitFor();
+  // It is read out as well, with the step.
+  await first.page.getByText("1 of 2 people are here", { exact: true }).waitFor();
   expect(await inaccessible(first.page)).toEqual([]);
   expect(await tooWide(first.page)).toEqual([]);
   // Whoever closes the page does not count until it is open again.
