@@ -338,32 +338,48 @@ fn venv(places: &Places, folder: &Path, made_from: &str, install: &[&str]) -> Re
     if !succeeds("python3", &["-c", "import ensurepip, venv"]) {
         debian_package("python3-venv")?;
     }
-    // uv does not read the settings of pip, which may name the only index that can be reached.
-    if let Err(failure) = venv_by_uv(places, folder, install) {
-        println!("{failure}; pip installs the packages instead");
+    let by_uv = match is_pip_configured() {
+        true => Err(Failure::new("pip is configured")),
+        false => venv_by_uv(places, folder, install),
+    };
+    if let Err(failure) = by_uv {
+        println!("{failure}; pip installs the packages instead of uv");
         venv_by_pip(folder, install)?;
     }
     note_made_from(folder, made_from)
 }
 
+/// Whether pip has an index or constraints of its own, which uv would not read.
+fn is_pip_configured() -> bool {
+    let settings = read(Command::new("python3").args(["-m", "pip", "config", "list"]));
+    settings.is_ok_and(|settings| {
+        ["index", "constraint"]
+            .iter()
+            .any(|name| settings.contains(name))
+    })
+}
+
 fn venv_by_uv(places: &Places, folder: &Path, install: &[&str]) -> Result<(), Failure> {
     // Steps that run side by side need it.
     static BEING_SET_UP: Mutex<()> = Mutex::new(());
-    let uv = places.uv();
+    let (environment, program) = (places.uv(), places.uv().join("bin/uv"));
     {
         let _one_at_a_time = BEING_SET_UP.lock().expect("no code that holds it panics");
-        if !is_made_from(&uv, UV) {
-            venv_by_pip(&uv, &[UV])?;
-            note_made_from(&uv, UV)?;
+        let runs = || succeeds(&program, &["--version"]);
+        if !is_made_from(&environment, UV) || !runs() {
+            venv_by_pip(&environment, &[UV])?;
+            note_made_from(&environment, UV)?;
         }
     }
     let uv = || {
-        let mut program = Command::new(uv.join("bin/uv"));
-        program.args(["--quiet", "--system-certs"]);
-        program
+        let mut uv = Command::new(&program);
+        uv.args(["--quiet", "--system-certs"]);
+        uv
     };
+    // uv itself would prefer a Python that it has installed.
+    let python = read(Command::new("python3").args(["-c", "import sys; print(sys.executable)"]))?;
     run(uv()
-        .args(["venv", "--clear", "--seed", "--python", "python3"])
+        .args(["venv", "--clear", "--seed", "--python", python.trim()])
         .arg(folder))?;
     run(uv()
         .args(["pip", "install", "--python"])

@@ -351,6 +351,7 @@ fn with_extent(tests: &mut Command, options: Options) {
         tests.env("CHEFSHAT_SIMULATIONS", "300");
         tests.env("CHEFSHAT_MODEL", "all");
         tests.env("CHEFSHAT_PAIRS", "100000");
+        tests.env("CHEFSHAT_SLOW", "1");
     }
 }
 
