@@ -92,7 +92,6 @@ def test_rows_without_weight_are_ignored() -> None:
     assert float(losses.value) == 0
 
 
-@pytest.mark.slow
 def test_the_value_network_may_see_other_hands_and_learn_alone() -> None:
     hyper = dataclasses.replace(HYPER, all_hands=True)
     learner = ppo.start(1, 334, 214, hyper, hidden=36)

@@ -146,9 +146,15 @@ def first_pizzas(difficulty: Difficulty) -> tuple[SyntheticTable, list[Observed]
     return table, watch(table)
 
 
-@pytest.mark.parametrize("name", ["easy", pytest.param("medium", marks=pytest.mark.slow), "hard"])
-def test_the_first_pizzas_of_a_shift(name: str) -> None:
-    table, events = first_pizzas(DIFFICULTIES[name])
+SHORT_RUNS = (EASY, HARD)
+
+
+@pytest.mark.parametrize(
+    "difficulty",
+    [pytest.param(it, id=name, marks=[] if it in SHORT_RUNS else pytest.mark.slow) for name, it in DIFFICULTIES.items()],
+)
+def test_the_first_pizzas_of_a_shift(difficulty: Difficulty) -> None:
+    table, events = first_pizzas(difficulty)
     assert len(table.true_events) >= 8
     assert_true(table, events)
 

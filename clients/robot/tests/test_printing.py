@@ -26,7 +26,7 @@ SIZES = {"a4": (210.0, 297.0), "letter": (215.9, 279.4)}
 PIECES = {"cards": (PieceKind.CARD, 68), "roles": (PieceKind.ROLE, 6), "passes": (PieceKind.PASS, 6)}
 
 
-@pytest.fixture(scope="module", params=["a4", pytest.param("letter", marks=pytest.mark.slow)])
+@pytest.fixture(scope="module", params=[pytest.param(name, marks=[] if name == "a4" else pytest.mark.slow) for name in PAPERS])
 def paper(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 

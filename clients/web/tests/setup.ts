@@ -1,4 +1,4 @@
-// What the tests of one file leave behind is not there for the next.
+// What the tests of one file leave in modules, the document and the stores is not there for the next.
 
 import { vi } from "vitest";
 
@@ -7,6 +7,8 @@ vi.useRealTimers();
 vi.unstubAllGlobals();
 vi.restoreAllMocks();
 document.body.replaceChildren();
+document.head.replaceChildren();
+for (const name of document.documentElement.getAttributeNames()) document.documentElement.removeAttribute(name);
 localStorage.clear();
 sessionStorage.clear();
 history.replaceState(null, "", "/");
