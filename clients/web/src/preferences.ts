@@ -19,7 +19,7 @@ const AT_FIRST = {
   autoPass: false,
   /** Chooses a play before the turn. */
   plans: true,
-  /** Shows special moments of the game in large. */
+  /** Shows special moments of the game in large, and the cards of the exchange on their way. */
   moments: true,
 };
 

@@ -13,6 +13,7 @@ import { momentSince } from "../src/table/model/moments";
 import { applyEvents } from "../src/table/model/reduce";
 import { emptyTable, seatFromParticipant, type TableState } from "../src/table/model/state";
 import { Moment } from "../src/table/view/Moment";
+import { Travel } from "../src/table/view/Travel";
 import { root } from "./mounted";
 import { RECORDS, recorded } from "./record";
 import { stateOf } from "./table-state";
@@ -47,10 +48,33 @@ test.each<[string, Kind[], string | undefined]>([
   ["a Food Fight", [deal, declared(SpecialAction.FOOD_FIGHT)], "foodFight"],
   ["a deal", [deal], undefined],
   ["the first gift of an exchange", [deal, gift(3, 0)], "exchange"],
-  ["a later gift", [deal, gift(3, 0), gift(0, 3)], "exchange"],
   ["the opening after an exchange", [deal, gift(3, 0), play(1, 11, 2, 15)], "opening"],
 ])("%s", (_, kinds, kind) => {
   expect(momentSince(played(start(), ...kinds), 0)?.kind).toBe(kind);
+});
+
+test("a later gift of an exchange is no moment", () => {
+  const begun = played(start(), deal, gift(3, 0));
+  expect(momentSince(played(begun, gift(0, 3)), begun.nextSequence - 1)).toBeUndefined();
+});
+
+test("gifts travel until they have arrived, also when the next ones come meanwhile", async () => {
+  vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] });
+  const show = (table: TableState) => act(() => render(<Travel table={table} />, root));
+  const underWay = () => root.querySelectorAll('[data-part~="under-way"]').length;
+  const later = (ms: number) => act(() => void vi.advanceTimersByTime(ms));
+  let table = played(start(), deal);
+  await show(table);
+  table = played(table, gift(3, 0));
+  await show(table);
+  expect(underWay()).toBe(1);
+  await later(1_000);
+  await show(played(table, gift(0, 3)));
+  expect(underWay()).toBe(2);
+  await later(1_000);
+  expect(underWay()).toBe(1);
+  await later(1_000);
+  expect(underWay()).toBe(0);
 });
 
 test("only events after a number count", () => {

@@ -110,6 +110,15 @@ test.each([
 });
 
 test.each([
+  ["pass", [PASS]],
+  ["play", [EIGHTS, PASS]],
+])("the main button is %s where what is legal is %j", async (main, legal) => {
+  await show(table({ next: OWN }), turn(...legal));
+  expect(button(main)?.dataset.look).toBe("main");
+  expect(root.querySelectorAll('[data-look="main"]')).toHaveLength(1);
+});
+
+test.each([
   ["the board rises above it", { board: playedCards(7, 2, 0, false) }],
   ["the pizza is done", { pizza: 2, board: [] }],
 ])("it is dropped when %s", async (_, changed) => {

@@ -29,7 +29,7 @@ export function SeatList({ state, table }: { state: TableState; table: Table }) 
                   {role && <span class="soft"> {role}</span>}
                 </div>
                 <p class={css.badges}>
-                  {isTaken(seat) && <KindBadge kind={seat.kind} builtIn={seat.builtIn} />}
+                  {isTaken(seat) && <KindBadge kind={seat.kind} builtIn={seat.builtIn} name={seat.name} />}
                   <span class="soft">{seat.atTable ? words.atTable : words.remote}</span>
                   {isTaken(seat) && !seat.connected && !seat.builtIn && <strong>{t().table.presence.away}</strong>}
                 </p>

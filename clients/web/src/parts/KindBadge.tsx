@@ -3,6 +3,7 @@
 
 import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
+import { inStudy } from "../table/labels";
 import { Drawing } from "./Drawing";
 import css from "./KindBadge.module.css";
 
@@ -10,31 +11,30 @@ interface KindBadgeProps {
   kind: ParticipantKind;
   /** Name of the built-in agent; empty or absent for other participants. */
   builtIn?: string;
-  /** The participant's name, where it is shown. A built-in agent of another name says how it plays. */
+  /** The participant's name, where it is shown. A built-in agent of another name says how it plays, but not in a study. */
   name?: string;
 }
 
 /** The badge of a participant; nothing if its kind is hidden by a study. */
 export function KindBadge({ kind, builtIn = "", name = builtIn }: KindBadgeProps) {
   if (builtIn === "" && kind === ParticipantKind.UNSPECIFIED) return null;
+  const character = name === "" || name === builtIn || inStudy.value ? undefined : characterWords(builtIn);
   return (
     <span class={css.kindBadge} data-part="kind-badge" title={builtIn === "" ? undefined : t().common.kinds.builtIn}>
       <Drawing name={builtIn === "" ? symbols[kind] : "kind-built-in"} />
       <span>
         {builtIn === "" ? kindWord(kind) : t().common.kinds.agent}
-        {name !== "" && builtIn !== "" && name !== builtIn && (
-          <span data-part="character"> · {characterWords(builtIn)}</span>
-        )}
+        {character && <span data-part="character"> · {character}</span>}
       </span>
     </span>
   );
 }
 
-/** How a built-in agent plays. */
-function characterWords(builtIn: string): string {
+/** How a built-in agent plays; undefined of others, such as those that repeat a recorded player. */
+function characterWords(builtIn: string): string | undefined {
   // A search may have a budget: "monte_carlo:400".
   const [agent = ""] = builtIn.split(":");
-  return t().common.characters[agent] ?? builtIn;
+  return t().common.characters[agent];
 }
 
 const symbols: Record<ParticipantKind, string> = {

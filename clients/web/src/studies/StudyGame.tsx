@@ -10,7 +10,7 @@ import { t } from "../i18n";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import { labelled } from "../table/labels";
+import { inStudy, labelled } from "../table/labels";
 import { tableFromRoom } from "../table/model/state";
 import { Seated } from "../table/Seated";
 import { type Session, startSession } from "../table/session";
@@ -47,8 +47,10 @@ export function StudyGame({ game, title, traces, part }: StudyGameProps) {
   useLayoutEffect(() => leaveOut((hide === "" ? [] : hide.split(" ")) as Hideable[]), [hide]);
   useLayoutEffect(() => {
     labelled.value = game.labelled;
+    inStudy.value = true;
     return () => {
       labelled.value = false;
+      inStudy.value = false;
     };
   }, [game.labelled]);
   const session = table?.session.value;

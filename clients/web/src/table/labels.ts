@@ -7,6 +7,9 @@ import { t } from "../i18n";
 /** Whether the other seats of the table that is shown have such names. */
 export const labelled = signal(false);
 
+/** Whether the table that is shown belongs to a study, whose participants are told no more of the others than it wants. */
+export const inStudy = signal(false);
+
 /** The name of a seat as the page shows it. */
 export function shownName(seat: number, name: string): string {
   if (!labelled.value) return name;

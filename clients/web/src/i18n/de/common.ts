@@ -42,7 +42,7 @@ export const common: Texts["common"] = {
         keys: "9 und Enter spielen eine 9, p passt. Das Fragezeichen zeigt alle Tasten.",
         plans: "Gespielt wird, wenn du dran bist und es dann noch erlaubt ist.",
         autoPass: "Nach einer Pause wie deiner eigenen, damit es den anderen nichts verrät. Nicht in Studien.",
-        moments: "Food Fight, Dinner is Served, die goldene Karte, eine letzte Karte.",
+        moments: "Food Fight, Dinner is Served, der Tausch, die goldene Karte, eine letzte Karte.",
       },
       notAllowed:
         "Dein Browser erlaubt dieser Seite keine Benachrichtigungen. Das kannst du in den Einstellungen des Browsers ändern.",
@@ -72,7 +72,13 @@ export const common: Texts["common"] = {
     builtIn: "eingebauter Agent",
     open: "frei",
   },
-  characters: { trained: "erfahren", greedy: "hastig", random: "nach Laune", monte_carlo: "bedächtig" },
+  characters: {
+    trained: "erfahren",
+    greedy: "hastig",
+    random: "nach Laune",
+    random_unmasked: "blindlings",
+    monte_carlo: "bedächtig",
+  },
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Koch", waiter: "Kellner", dishwasher: "Tellerwäscher" },
   faces: [
     "Trüffel",

@@ -34,7 +34,7 @@ export const table: Texts["table"] = {
   },
   play: (quantity, face, golden, jokers) => {
     const one = golden ? `die goldene ${face}` : `eine ${face}`;
-    const cards = quantity === 1 ? one : `${number(quantity)} ${face}er${golden ? " (eine golden)" : ""}`;
+    const cards = quantity === 1 ? one : `${number(quantity)} ${face}er${golden ? " (davon eine golden)" : ""}`;
     return cards + (jokers === 0 ? "" : plural(jokers, { one: " mit Joker", other: " mit # Jokern" }));
   },
   jokers: (count) => plural(count, { one: "ein Joker", other: "# Joker" }),
@@ -207,7 +207,7 @@ export const table: Texts["table"] = {
     },
     exchange: {
       title: () => "Der Tausch",
-      text: "Das Vorrecht des Chefs: Der Tellerwäscher gibt die besten Karten ab und bekommt andere zurück.",
+      text: "Beim Tausch gibt der Tellerwäscher dem Chef die besten Karten und bekommt andere zurück: Das ist dessen Vorrecht.",
     },
     opening: {
       title: (name) => `${name} spielt die goldene Karte`,

@@ -40,7 +40,7 @@ export const common = {
         keys: "9 and Enter play a 9, p passes. The question mark shows them all.",
         plans: "It is played on your turn, unless it has become illegal.",
         autoPass: "After a pause like your own, so that it tells the others nothing. Not in studies.",
-        moments: "Food Fight, Dinner is Served, the Golden card, a last card.",
+        moments: "Food Fight, Dinner is Served, the exchange, the Golden card, a last card.",
       },
       notAllowed:
         "Your browser does not allow notifications from this page. You can change that in the browser’s settings.",
@@ -64,10 +64,13 @@ export const common = {
   },
   kinds: { agent: "agent", human: "person", robot: "robot", model: "model", builtIn: "built-in agent", open: "free" },
   /** How built-in agents with names of their own play. */
-  characters: { trained: "experienced", greedy: "hasty", random: "on a whim", monte_carlo: "thoughtful" } as Record<
-    string,
-    string
-  >,
+  characters: {
+    trained: "experienced",
+    greedy: "hasty",
+    random: "on a whim",
+    random_unmasked: "without looking",
+    monte_carlo: "thoughtful",
+  } as Record<string, string>,
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cook", waiter: "Waiter", dishwasher: "Dishwasher" },
   faces: [
     "truffle",

@@ -202,7 +202,7 @@ export const table = {
     },
     exchange: {
       title: () => "The exchange",
-      text: "It is the Chef’s privilege: the Dishwasher gives up the best cards and gets others back.",
+      text: "In the exchange the Dishwasher gives the Chef the best cards and gets others back: the Chef’s privilege.",
     },
     opening: {
       title: (name: string) => `${name} plays the Golden card`,

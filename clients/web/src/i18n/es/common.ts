@@ -43,7 +43,7 @@ export const common: Texts["common"] = {
         keys: "9 e Intro juegan un 9, p pasa. El signo de interrogación las muestra todas.",
         plans: "Se juega en tu turno, si todavía está permitido.",
         autoPass: "Tras una pausa como las tuyas, para no revelar nada a los demás. No en los estudios.",
-        moments: "Food Fight, Dinner is Served, la carta dorada, una última carta.",
+        moments: "Food Fight, Dinner is Served, el intercambio, la carta dorada, una última carta.",
       },
       notAllowed:
         "Tu navegador no permite las notificaciones de esta página. Puedes cambiarlo en los ajustes del navegador.",
@@ -73,7 +73,13 @@ export const common: Texts["common"] = {
     builtIn: "agente integrado",
     open: "libre",
   },
-  characters: { trained: "con experiencia", greedy: "con prisa", random: "a la aventura", monte_carlo: "con calma" },
+  characters: {
+    trained: "con experiencia",
+    greedy: "con prisa",
+    random: "a la aventura",
+    random_unmasked: "a ciegas",
+    monte_carlo: "con calma",
+  },
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cocinero", waiter: "Camarero", dishwasher: "Lavaplatos" },
   faces: [
     "trufa",

@@ -207,7 +207,7 @@ export const table: Texts["table"] = {
     },
     exchange: {
       title: () => "El intercambio",
-      text: "Es el privilegio del Chef: el Lavaplatos entrega las mejores cartas y recibe otras.",
+      text: "En el intercambio, el Lavaplatos da al Chef las mejores cartas y recibe otras: es el privilegio del Chef.",
     },
     opening: {
       title: (name) => `${name} juega la carta dorada`,

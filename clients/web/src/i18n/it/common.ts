@@ -41,7 +41,7 @@ export const common: Texts["common"] = {
         keys: "9 e Invio giocano un 9, p passa. Il punto interrogativo li mostra tutti.",
         plans: "Viene giocata al tuo turno, se è ancora permessa.",
         autoPass: "Dopo una pausa come le tue, così agli altri non rivela nulla. Non negli studi.",
-        moments: "Food Fight, Dinner is Served, la carta d’oro, un’ultima carta.",
+        moments: "Food Fight, Dinner is Served, lo scambio, la carta d’oro, un’ultima carta.",
       },
       notAllowed: "Il browser non permette le notifiche di questa pagina. Puoi cambiarlo nelle sue impostazioni.",
     },
@@ -70,7 +70,13 @@ export const common: Texts["common"] = {
     builtIn: "agente integrato",
     open: "libero",
   },
-  characters: { trained: "con esperienza", greedy: "di fretta", random: "a caso", monte_carlo: "con calma" },
+  characters: {
+    trained: "con esperienza",
+    greedy: "di fretta",
+    random: "a caso",
+    random_unmasked: "alla cieca",
+    monte_carlo: "con calma",
+  },
   roles: { chef: "Chef", sousChef: "Sous-Chef", cook: "Cuoco", waiter: "Cameriere", dishwasher: "Lavapiatti" },
   faces: [
     "tartufo",

@@ -209,7 +209,7 @@ export const table: Texts["table"] = {
     },
     exchange: {
       title: () => "Lo scambio",
-      text: "È il privilegio dello Chef: il Lavapiatti cede le carte migliori e ne riceve altre.",
+      text: "Nello scambio il Lavapiatti dà allo Chef le carte migliori e ne riceve altre: è il privilegio dello Chef.",
     },
     opening: {
       title: (name) => `${name} gioca la carta d’oro`,

@@ -130,7 +130,7 @@ function Chip({ table, seat, state, kind }: ChipProps) {
 function Play({ cards }: { cards: readonly CardValue[] }) {
   const words = playWords(cards);
   return (
-    <span class={`${css.chip} ${css.play}`} data-part="chip" title={words} style={{ "--cards": cards.length }}>
+    <span class={`${css.chip} ${css.play}`} data-part="chip" title={words}>
       <span class="visually-hidden">{words}</span>
       {cards.map((card, index) => (
         <b key={index} class={`number ${card.kind === "golden" ? css.playGolden : ""}`} aria-hidden="true">

@@ -21,29 +21,31 @@ export function Travel({ table }: { table: TableState }) {
   const last = table.log.at(-1)?.sequence ?? 0;
   const seen = useRef(last);
   useEffect(() => {
-    const fresh = table.log.filter(({ sequence }) => sequence > seen.current);
+    const since = seen.current;
     seen.current = last;
     // A reader who catches up does not see the past.
-    if (fresh.length > MOST_AT_ONCE || !isOn("moments") || hidden.peek().includes("log")) return;
-    const given = fresh.flatMap(({ entry, sequence }) => (entry.kind === "gave" ? [{ ...entry, sequence }] : []));
-    if (given.length > 0) setGifts(given);
+    if (last - since > MOST_AT_ONCE || !isOn("moments") || hidden.peek().includes("log")) return;
+    const given = table.log.flatMap(({ entry, sequence }) =>
+      entry.kind === "gave" && sequence > since ? [{ ...entry, sequence }] : [],
+    );
+    if (given.length > 0) setGifts((before) => [...before, ...given]);
   }, [last]);
-  useEffect(() => {
-    if (gifts.length === 0) return;
-    const timer = setTimeout(() => setGifts([]), UNDER_WAY_MS);
-    return () => clearTimeout(timer);
-  }, [gifts]);
+  const arrived = (sequence: number) => setGifts((before) => before.filter((gift) => gift.sequence !== sequence));
   return (
     <>
       {gifts.map((gift) => (
-        <UnderWay key={gift.sequence} gift={gift} />
+        <UnderWay key={gift.sequence} gift={gift} onArrived={() => arrived(gift.sequence)} />
       ))}
     </>
   );
 }
 
-function UnderWay({ gift }: { gift: Gift }) {
+function UnderWay({ gift, onArrived }: { gift: Gift; onArrived: () => void }) {
   const cards = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    const timer = setTimeout(onArrived, UNDER_WAY_MS);
+    return () => clearTimeout(timer);
+  }, []);
   useLayoutEffect(() => {
     const { current } = cards;
     const table = current?.closest('[data-part~="table"]');
@@ -51,7 +53,9 @@ function UnderWay({ gift }: { gift: Gift }) {
       const box = table?.querySelector(`[data-part~="seat"][data-seat="${seat}"]`)?.getBoundingClientRect();
       return box && ([box.left + box.width / 2, box.top + box.height / 2] as const);
     });
-    if (!current || !from || !to) return;
+    if (!current) return;
+    current.hidden = !from || !to;
+    if (!from || !to) return;
     for (const [name, [x, y]] of [["from", from] as const, ["to", to] as const])
       current.style.setProperty(`--${name}`, `${x.toFixed(0)}px ${y.toFixed(0)}px`);
   }, []);
