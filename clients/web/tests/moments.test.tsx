@@ -53,7 +53,7 @@ test.each<[string, Kind[], string | undefined]>([
   expect(momentSince(played(start(), ...kinds), 0)?.kind).toBe(kind);
 });
 
-test("a later gift of an exchange is no moment", () => {
+test("only the first gift of an exchange is a moment", () => {
   const begun = played(start(), deal, gift(3, 0));
   expect(momentSince(played(begun, gift(0, 3)), begun.nextSequence - 1)).toBeUndefined();
 });

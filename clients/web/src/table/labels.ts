@@ -7,7 +7,7 @@ import { t } from "../i18n";
 /** Whether the other seats of the table that is shown have such names. */
 export const labelled = signal(false);
 
-/** Whether the table that is shown belongs to a study, whose participants are told no more of the others than it wants. */
+/** Whether the table that is shown belongs to a study: there nothing says how a built-in agent plays. */
 export const inStudy = signal(false);
 
 /** The name of a seat as the page shows it. */

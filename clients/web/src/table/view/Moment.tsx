@@ -50,9 +50,14 @@ export function Moment({ table }: { table: TableState }) {
   );
 }
 
+/** Whether moments are shown, and cards on their way: not where a study hides what happened. */
+export function showsMoments(): boolean {
+  return isOn("moments") && !hidden.peek().includes("log");
+}
+
 /** The last moment after an event, if moments are shown. */
 function shownMoment(table: TableState, since: number): GameMoment | undefined {
-  return isOn("moments") && !hidden.peek().includes("log") ? momentSince(table, since) : undefined;
+  return showsMoments() ? momentSince(table, since) : undefined;
 }
 
 /** The last moment after an event as it is read out after its event; empty for none. */

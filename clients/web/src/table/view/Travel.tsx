@@ -2,11 +2,10 @@
 // Decorative: the history says what was given.
 
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
-import { hidden } from "../../hiding";
 import { Card } from "../../parts/Card";
-import { isOn } from "../../preferences";
 import { MOST_AT_ONCE } from "../model/log";
 import type { LogEntry, TableState } from "../model/state";
+import { showsMoments } from "./Moment";
 import css from "./Travel.module.css";
 
 /** How long cards are under way, milliseconds; as in the style sheet. */
@@ -24,7 +23,7 @@ export function Travel({ table }: { table: TableState }) {
     const since = seen.current;
     seen.current = last;
     // A reader who catches up does not see the past.
-    if (last - since > MOST_AT_ONCE || !isOn("moments") || hidden.peek().includes("log")) return;
+    if (last - since > MOST_AT_ONCE || !showsMoments()) return;
     const given = table.log.flatMap(({ entry, sequence }) =>
       entry.kind === "gave" && sequence > since ? [{ ...entry, sequence }] : [],
     );
