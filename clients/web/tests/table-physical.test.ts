@@ -128,7 +128,7 @@ describe("a correction", () => {
     ];
     expect(tableOf([...BEGUN, passes(2), ...end])).toMatchObject({ shift: 2 });
     const table = tableOf([...BEGUN, passes(2), ...end, corrects(7n)]);
-    expect(table).toMatchObject({ shift: 1, phase: "pizza", result: undefined });
+    expect(table).toMatchObject({ shift: 1, phase: "pizza", results: [] });
     expect(table.seats.map(({ points }) => points)).toEqual([0, 0, 0]);
   });
 

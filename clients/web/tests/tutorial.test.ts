@@ -36,5 +36,5 @@ test("every lesson asks for a legal action, and leads to the next", () => {
     }
   }
   expect(turns).toBe(5);
-  expect(table.result?.order).toEqual([0, 1, 2, 3]);
+  expect(table.results.at(-1)?.order).toEqual([0, 1, 2, 3]);
 });

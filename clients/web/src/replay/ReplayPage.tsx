@@ -1,10 +1,8 @@
 // A record played back at the table, from any perspective, with the look-up table of every turn.
 
 import { useEffect, useMemo, useState } from "preact/hooks";
-import { recordApi } from "../api/client";
-import { inWords } from "../api/faults";
 import { DecisionKind, type DecisionRequest } from "../gen/chefshat/v1/decision_pb";
-import type { DecisionRecord, RecordLine } from "../gen/chefshat/v1/record_pb";
+import type { DecisionRecord } from "../gen/chefshat/v1/record_pb";
 import { t } from "../i18n";
 import { ErrorPage } from "../parts/ErrorPage";
 import type { PageProps } from "../router";
@@ -18,7 +16,9 @@ import { TableView } from "../table/view/TableView";
 import { distinctName, moveWords } from "../table/words";
 import { Analysis } from "./Analysis";
 import { Controls, type Speed } from "./Controls";
-import { type Film, filmOf } from "./frames";
+import type { Film } from "./frames";
+import { Graph } from "./Graph";
+import { useFilm } from "./hooks";
 import { decidingFor, type Perspective, seenFrom } from "./perspective";
 import css from "./Replay.module.css";
 
@@ -34,22 +34,7 @@ const SHOWN_SECONDS = 0.05;
 /** The page. */
 export function ReplayPage({ route }: PageProps<"replay">) {
   const { gameId } = route;
-  const [film, setFilm] = useState<Film | undefined>(undefined);
-  const [fault, setFault] = useState("");
-  useEffect(() => {
-    const leaving = new AbortController();
-    const load = async () => {
-      const lines: RecordLine[] = [];
-      try {
-        for await (const part of recordApi.getRecord({ gameId }, { signal: leaving.signal })) lines.push(...part.lines);
-        setFilm(filmOf(lines));
-      } catch (thrown) {
-        if (!leaving.signal.aborted) setFault(inWords(thrown));
-      }
-    };
-    void load();
-    return () => leaving.abort();
-  }, [gameId]);
+  const { film, fault } = useFilm(gameId);
   if (fault) return <ErrorPage title={t().replay.title} words={fault} />;
   if (!film) return <p class="soft">{t().common.loading}</p>;
   if (film.length === 0) return <ErrorPage title={t().replay.title} words={t().replay.empty} />;
@@ -78,6 +63,10 @@ function Playback({ gameId, film }: { gameId: string; film: Film }) {
   const next = decidingFor(frame, perspective);
   useAnnounced(table, undefined, undefined);
   const go = (to: number) => setAt(Math.max(0, Math.min(last, to)));
+  const jump = (to: number) => {
+    setPlaying(false);
+    go(to);
+  };
   const open = next === undefined ? undefined : frame.open;
   const known = open && (perspective === "all" || perspective === open.seat);
   return (
@@ -96,10 +85,7 @@ function Playback({ gameId, film }: { gameId: string; film: Film }) {
         playing={playing}
         speed={speed}
         perspective={perspective}
-        onGo={(to) => {
-          setPlaying(false);
-          go(to);
-        }}
+        onGo={jump}
         onPlaying={(start) => {
           if (start && at >= last) go(0);
           setPlaying(start);
@@ -117,6 +103,9 @@ function Playback({ gameId, film }: { gameId: string; film: Film }) {
           shown={analysing}
           onShown={setAnalysing}
         />
+      )}
+      {film.handsKnown && (
+        <Graph gameId={gameId} film={film} table={frame.table} decisions={frame.decisions} onGo={jump} />
       )}
     </TableView>
   );

@@ -14,6 +14,7 @@ import { giveUpSeat, heldSeat } from "../lobby/seat";
 import { Button } from "../parts/Button";
 import { ErrorPage } from "../parts/ErrorPage";
 import { Notice } from "../parts/Notice";
+import { Highlights } from "../replay/Highlights";
 import type { PageProps } from "../router";
 import { isTaken, type SeatState, type TableState, tableFromRoom } from "./model/state";
 import { Seated } from "./Seated";
@@ -109,7 +110,12 @@ function Held({ session }: { session: Session }) {
         acting={session}
         banner={banner}
         tools={!isOver(table) && leave}
-        onward={<Again roomId={roomId} others={others} />}
+        onward={
+          <>
+            <Highlights table={table} own={own} />
+            <Again roomId={roomId} others={others} />
+          </>
+        }
         below={
           <>
             <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />

@@ -136,7 +136,8 @@ export function spokenLine(table: TableState, { entry }: LogLine): string {
 export function outcomeWords(table: TableState, { entry }: LogLine): string {
   const line = (seat: number, place: number, points: number) =>
     `${t().common.place(place)} ${distinctName(table, seat)}, ${t().common.points(points)}.`;
-  const { result, standings } = table;
+  const { results, standings } = table;
+  const result = results.at(-1);
   // Of the last Shift it is that of the game, which follows.
   if (entry.kind === "shiftOver" && result?.shift === entry.shift && standings.length === 0)
     return result.order.map((seat, index) => line(seat, index + 1, result.points[seat] ?? 0)).join(" ");

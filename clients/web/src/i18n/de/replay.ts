@@ -45,5 +45,22 @@ export const replay: Texts["replay"] = {
     joker: "J",
     cards: (count) => count.toFixed(1).replace(".", ","),
   },
+  graph: {
+    title: "Wendepunkte",
+    subtitle: "was jede Wahl der Partie ihrem Sitzplatz wert war",
+    label: "Mittlere Punkte des Shifts bei jeder Wahl, eine Linie je Sitzplatz",
+    progress: (done, all) => `${done} von ${all} Entscheidungen bewertet`,
+    turning: "Die teuersten Entscheidungen",
+    none: "Keine Entscheidung hat merklich mehr gekostet als der Zufall.",
+    turningPoint: (shift, name, words) => `Shift ${shift}, ${name}: ${words}`,
+    cost: (taken, other, points) => `${taken}; ${other} war ${points.toFixed(1).replace(".", ",")} Punkte mehr wert`,
+    gained: (taken, other, points) => `${taken}, ${points.toFixed(1).replace(".", ",")} Punkte mehr wert als ${other}`,
+  },
+  highlights: {
+    ask: "Meine beste und schlechteste Entscheidung",
+    best: (shift) => `Deine beste Entscheidung, in Shift ${shift}`,
+    worst: (shift) => `Die teuerste, in Shift ${shift}`,
+    none: "Keine deiner Entscheidungen hat merklich etwas geändert.",
+  },
   empty: "Diese Aufzeichnung enthält keine Ereignisse.",
 };

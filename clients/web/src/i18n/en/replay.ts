@@ -43,5 +43,24 @@ export const replay = {
     joker: "J",
     cards: (count: number) => count.toFixed(1),
   },
+  graph: {
+    title: "Turning points",
+    subtitle: "what each choice of the game was worth to its seat",
+    label: "Mean points of the Shift at each choice, a line for each seat",
+    progress: (done: number, all: number) => `${done} of ${all} choices judged`,
+    turning: "The choices that cost most",
+    none: "No choice cost noticeably more than chance.",
+    turningPoint: (shift: number, name: string, words: string) => `Shift ${shift}, ${name}: ${words}`,
+    cost: (taken: string, other: string, points: number) =>
+      `${taken}; ${other} was worth ${points.toFixed(1)} points more`,
+    gained: (taken: string, other: string, points: number) =>
+      `${taken}, worth ${points.toFixed(1)} points more than ${other}`,
+  },
+  highlights: {
+    ask: "My best and worst decision",
+    best: (shift: number) => `Your best decision, in Shift ${shift}`,
+    worst: (shift: number) => `The one that cost most, in Shift ${shift}`,
+    none: "None of your decisions made a noticeable difference.",
+  },
   empty: "This record contains no events.",
 };

@@ -44,5 +44,22 @@ export const replay: Texts["replay"] = {
     joker: "J",
     cards: (count) => count.toFixed(1).replace(".", ","),
   },
+  graph: {
+    title: "Momentos decisivos",
+    subtitle: "lo que valió cada elección de la partida para su asiento",
+    label: "Puntos medios del Shift en cada elección, una línea por asiento",
+    progress: (done, all) => `${done} de ${all} elecciones valoradas`,
+    turning: "Las elecciones que más costaron",
+    none: "Ninguna elección costó claramente más que el azar.",
+    turningPoint: (shift, name, words) => `Shift ${shift}, ${name}: ${words}`,
+    cost: (taken, other, points) => `${taken}; ${other} valía ${points.toFixed(1).replace(".", ",")} puntos más`,
+    gained: (taken, other, points) => `${taken}, ${points.toFixed(1).replace(".", ",")} puntos más que ${other}`,
+  },
+  highlights: {
+    ask: "Mi mejor y mi peor decisión",
+    best: (shift) => `Tu mejor decisión, en el Shift ${shift}`,
+    worst: (shift) => `La que más costó, en el Shift ${shift}`,
+    none: "Ninguna de tus decisiones supuso una diferencia clara.",
+  },
   empty: "Este registro no contiene eventos.",
 };

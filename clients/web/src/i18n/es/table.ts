@@ -285,6 +285,8 @@ export const table: Texts["table"] = {
     name: "Nombre",
     points: "Puntos",
     total: "Total",
+    close: "Continuar",
+    curve: "Puntos de la partida tras cada Shift, una línea por asiento",
     adjudicated: "Terminado por el límite de turnos.",
     replay: "Ver la repetición",
     lobby: "Ir al vestíbulo",

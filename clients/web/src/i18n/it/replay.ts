@@ -44,5 +44,22 @@ export const replay: Texts["replay"] = {
     joker: "J",
     cards: (count) => count.toFixed(1).replace(".", ","),
   },
+  graph: {
+    title: "Momenti decisivi",
+    subtitle: "quanto valeva ogni scelta della partita per il suo posto",
+    label: "Punti medi dello Shift a ogni scelta, una linea per posto",
+    progress: (done, all) => `${done} di ${all} scelte valutate`,
+    turning: "Le scelte costate di più",
+    none: "Nessuna scelta è costata chiaramente più del caso.",
+    turningPoint: (shift, name, words) => `Shift ${shift}, ${name}: ${words}`,
+    cost: (taken, other, points) => `${taken}; ${other} valeva ${points.toFixed(1).replace(".", ",")} punti in più`,
+    gained: (taken, other, points) => `${taken}, ${points.toFixed(1).replace(".", ",")} punti in più di ${other}`,
+  },
+  highlights: {
+    ask: "La mia scelta migliore e la peggiore",
+    best: (shift) => `La tua scelta migliore, nello Shift ${shift}`,
+    worst: (shift) => `Quella costata di più, nello Shift ${shift}`,
+    none: "Nessuna delle tue scelte ha fatto una chiara differenza.",
+  },
   empty: "Questa registrazione non contiene eventi.",
 };

@@ -154,7 +154,7 @@ function change(table: TableState, event: GameEvent, sequence: number): Change {
       }));
       const result = { shift, order, shiftPoints, points, adjudicated };
       return [
-        { ...ended, phase: "shiftOver", result, next: undefined },
+        { ...ended, phase: "shiftOver", results: [...table.results, result], next: undefined },
         { kind: "shiftOver", shift, winner: order[0] ?? 0 },
       ];
     }

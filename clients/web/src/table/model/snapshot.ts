@@ -13,7 +13,7 @@ export function applySnapshot(table: TableState, snapshot: Snapshot, own: number
   if (!start || !observation) return { ...table, nextSequence };
   const { gameId, policy } = start;
   const seats = start.seats.map(seatFromParticipant);
-  const unknown = { log: [], next: undefined, toppings: [], result: undefined };
+  const unknown = { log: [], next: undefined, toppings: [], results: [] };
   const begun = { ...table, ...unknown, ...fromRules(start.rules), gameId, policy, seats, nextSequence };
   const seen = applyObservation(begun, beforeGifts(observation), own);
   return table.history ? withHistory(seen) : seen;

@@ -157,8 +157,8 @@ export interface TableState {
   /** Cards played in this Shift, F+1 counts. */
   readonly played: readonly number[];
   readonly log: readonly LogLine[];
-  /** The result of the last Shift. */
-  readonly result: ShiftResult | undefined;
+  /** The results of the Shifts whose end the viewer has seen, in their order. */
+  readonly results: readonly ShiftResult[];
   /** Why the game was aborted. */
   readonly abortReason: AbortReason;
   /** The final standings, best first; empty before the end. */
@@ -232,7 +232,7 @@ export function emptyTable(seats: readonly SeatState[] = []): TableState {
     next: undefined,
     played: [],
     log: [],
-    result: undefined,
+    results: [],
     abortReason: AbortReason.UNSPECIFIED,
     standings: [],
     physical: false,

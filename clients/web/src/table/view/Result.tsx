@@ -1,14 +1,20 @@
 // The result of a Shift or game, over the pizza: places, points, and next steps.
 
 import type { ComponentChildren } from "preact";
-import { useLayoutEffect, useRef } from "preact/hooks";
+import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { t } from "../../i18n";
-import { ButtonLink } from "../../parts/Button";
+import { Button, ButtonLink } from "../../parts/Button";
+import { Chart } from "../../parts/Chart";
+import { Drawing } from "../../parts/Drawing";
 import { SeatNumber } from "../../parts/SeatNumber";
 import { PersonName } from "../../people/PersonName";
 import type { ShiftResult, TableState } from "../model/state";
 import { distinctName, nameOf } from "../words";
+import { showsMoments } from "./Moment";
 import css from "./Result.module.css";
+
+/** Pieces of confetti. */
+const CONFETTI = 16;
 
 interface ResultProps {
   table: TableState;
@@ -23,17 +29,29 @@ interface ResultProps {
 }
 
 /**
- * The result to show: the game's once it is over, otherwise the last Shift's until the next one
- * starts.
+ * The result to show: the game's once it is over, otherwise the last Shift's: for players until they
+ * close it or act in the next one, for others until that one's first turn.
  */
 export function Result({ table, own, links = true, onward }: ResultProps) {
+  const result = table.results.at(-1);
+  const player = links ? own : undefined;
+  const { closed, close } = useClosing(table, player, result?.shift ?? 0);
   const ways = links && <Ways table={table} onward={onward} />;
-  if (table.phase === "gameOver") return <GameResult table={table} own={own} profiles={!links} ways={ways} />;
+  if (table.phase === "gameOver") return <GameResult table={table} own={player} profiles={!links} ways={ways} />;
   if (table.phase === "aborted") return <Aborted table={table} ways={ways} />;
-  if (table.result && table.phase !== "pizza") {
-    return <ShiftTable table={table} result={table.result} />;
-  }
-  return null;
+  if (!result || closed || (player === undefined && table.phase === "pizza")) return null;
+  return <ShiftTable table={table} own={player} result={result} onClose={player === undefined ? undefined : close} />;
+}
+
+/** Whether a player has seen enough of the last Shift's result. */
+function useClosing({ phase, seats }: TableState, player: number | undefined, shift: number) {
+  // What ended before the page was opened is not shown again.
+  const [last, setLast] = useState(phase === "pizza" ? shift : 0);
+  const acted = phase === "pizza" && player !== undefined && seats[player]?.lastMove !== undefined;
+  useEffect(() => {
+    if (acted) setLast(shift);
+  }, [acted, shift]);
+  return { closed: last === shift, close: () => setLast(shift) };
 }
 
 /** The main step, and links. An aborted game has no replay. */
@@ -57,7 +75,14 @@ function Ways({ table, onward }: Pick<ResultProps, "table" | "onward">) {
   );
 }
 
-function ShiftTable({ table, result }: { table: TableState; result: ShiftResult }) {
+interface ShiftTableProps {
+  table: TableState;
+  own: number | undefined;
+  result: ShiftResult;
+  onClose: (() => void) | undefined;
+}
+
+function ShiftTable({ table, own, result, onClose }: ShiftTableProps) {
   const words = t().table.result;
   return (
     <section class={`${css.result} sheet`} data-part="result" aria-label={words.shift(result.shift)}>
@@ -73,7 +98,7 @@ function ShiftTable({ table, result }: { table: TableState; result: ShiftResult 
         </thead>
         <tbody>
           {result.order.map((seat, index) => (
-            <Row key={seat} table={table} seat={seat} place={index + 1}>
+            <Row key={seat} table={table} own={own} seat={seat} place={index + 1}>
               <td class="number">+{result.shiftPoints[seat] ?? 0}</td>
               <td class="number">{result.points[seat] ?? 0}</td>
             </Row>
@@ -81,6 +106,11 @@ function ShiftTable({ table, result }: { table: TableState; result: ShiftResult 
         </tbody>
       </table>
       {result.adjudicated && <p class="soft">{words.adjudicated}</p>}
+      {onClose && (
+        <div class={css.ways}>
+          <Button onClick={onClose}>{words.close}</Button>
+        </div>
+      )}
     </section>
   );
 }
@@ -100,6 +130,7 @@ function GameResult({ table, own, profiles, ways }: EndProps & { own: number | u
   }, []);
   return (
     <section class={`${css.result} sheet`} data-part="result" aria-label={words.game}>
+      {showsMoments() && <Celebration />}
       <h2 ref={heading} tabIndex={-1}>
         {winner !== undefined && (winner === own ? words.youWon : words.wins(distinctName(table, winner)))}
       </h2>
@@ -113,14 +144,49 @@ function GameResult({ table, own, profiles, ways }: EndProps & { own: number | u
         </thead>
         <tbody>
           {table.standings.map(({ seat, place, points }) => (
-            <Row key={seat} table={table} seat={seat} place={place} profile={profiles}>
+            <Row key={seat} table={table} own={own} seat={seat} place={place} profile={profiles}>
               <td class="number">{points}</td>
             </Row>
           ))}
         </tbody>
       </table>
+      <Curve table={table} />
       {ways}
     </section>
+  );
+}
+
+/** The points of the game after each Shift, if the viewer has seen them all and there were several. */
+function Curve({ table: { results, seats } }: { table: TableState }) {
+  const points = results.map((result) => result.points);
+  if (results.length < 2 || results[0]?.shift !== 1 || results.at(-1)?.shift !== results.length) return null;
+  const top = Math.max(...points.flat());
+  return (
+    <Chart
+      label={t().table.result.curve}
+      lines={seats.map(({ seat }) => ({
+        seat,
+        parts: [[[0, 0], ...points.map((of, index) => [index + 1, of[seat] ?? 0] as const)]],
+      }))}
+      width={results.length}
+      top={top}
+      scale={[0, top].map((value) => ({ value, text: String(value) }))}
+    />
+  );
+}
+
+/** The Chef's hat, and confetti that falls once. */
+function Celebration() {
+  return (
+    <div class={css.celebration} data-part="celebration" aria-hidden="true">
+      <Drawing name="role-chef" class={css.hat} />
+      {Array.from({ length: CONFETTI }, (_, piece) => (
+        <i
+          key={piece}
+          style={{ "--piece": String(piece), "--of": String(CONFETTI), background: `var(--seat-${piece % 4})` }}
+        />
+      ))}
+    </div>
   );
 }
 
@@ -138,16 +204,17 @@ function Aborted({ table, ways }: EndProps) {
 
 interface RowProps {
   table: TableState;
+  own: number | undefined;
   seat: number;
   place: number;
   profile?: boolean;
   children: ComponentChildren;
 }
 
-function Row({ table, seat, place, profile = false, children }: RowProps) {
+function Row({ table, own, seat, place, profile = false, children }: RowProps) {
   const name = nameOf(table, seat);
   return (
-    <tr>
+    <tr data-own={seat === own ? "" : undefined}>
       <td>{t().common.place(place)}</td>
       <th scope="row">
         <SeatNumber seat={seat} />{" "}
@@ -160,6 +227,7 @@ function Row({ table, seat, place, profile = false, children }: RowProps) {
         ) : (
           name
         )}
+        {seat === own && <span class="soft"> ({t().table.you})</span>}
       </th>
       {children}
     </tr>

@@ -1,0 +1,163 @@
+// What the choices of a game were worth: asked one after the other, listed where it matters, and led
+// to from the graph and the end of a game.
+
+import { create } from "@bufbuild/protobuf";
+import { Code, ConnectError } from "@connectrpc/connect";
+import { render } from "preact";
+import { act } from "preact/test-utils";
+import { afterEach, expect, test, vi } from "vitest";
+import { analysisApi, recordApi } from "../src/api/client";
+import { EvaluateResponseSchema } from "../src/gen/chefshat/v1/analysis_service_pb";
+import { GetRecordResponseSchema } from "../src/gen/chefshat/v1/record_service_pb";
+import { filmOf } from "../src/replay/frames";
+import { Graph } from "../src/replay/Graph";
+import { Highlights } from "../src/replay/Highlights";
+import { choices, costliest, finest, judged } from "../src/replay/judging";
+import { legalActions } from "../src/table/model/actions";
+import { root, settle } from "./mounted";
+import { recorded } from "./record";
+
+afterEach(() => vi.restoreAllMocks());
+
+const FILM = filmOf(recorded("fixed"));
+const ALL = choices(FILM);
+const CHOICE = { decisions: 4, frame: 9, shift: 1, seat: 2, taken: 7 };
+
+const worth = (action: number, points: number, standardError = 0.05) =>
+  ({ action, points, standardError }) as Parameters<typeof judged>[1][number];
+
+/** The server answers by the number of decisions before the one asked for. */
+function answers(points: (decisions: number, action: number) => number) {
+  return vi.spyOn(analysisApi, "evaluate").mockImplementation(async function* ({ position }) {
+    const decisions = Number(position?.case === "moment" ? position.value.decisions : -1n);
+    const mask = FILM.at(ALL.find((choice) => choice.decisions === decisions)?.frame ?? 0).open?.actionMask;
+    const actions = legalActions(mask ?? new Uint8Array());
+    yield create(EvaluateResponseSchema, {
+      actions: actions.map((action) => ({ action, points: points(decisions, action), standardError: 0.01 })),
+    });
+  });
+}
+
+/** Opens the section, as a click on its summary does. */
+async function open() {
+  const details = root.querySelector("details");
+  await act(() => {
+    details?.setAttribute("open", "");
+    details?.dispatchEvent(new Event("toggle"));
+  });
+}
+
+/** Waits until everything asked for has been answered. */
+async function answered() {
+  for (let turn = 0; turn < 2 * ALL.length && root.querySelector("progress"); turn += 1) await settle();
+}
+
+test("every decision with several legal actions is a choice, of one seat or of all", () => {
+  const decisions = recorded("fixed").flatMap(({ line }) => (line.case === "decision" ? [line.value] : []));
+  const several = decisions.filter(({ actionMask }) => legalActions(actionMask).length > 1);
+  expect(several.length).toBeLessThan(decisions.length);
+  expect(ALL.map(({ seat, taken }) => [seat, taken])).toEqual(several.map(({ seat, action }) => [seat, action]));
+  expect(choices(FILM, 1)).toEqual(ALL.filter(({ seat }) => seat === 1));
+});
+
+test("a choice is compared with the best other one, and chance is not noteworthy", () => {
+  expect(judged(CHOICE, [worth(7, 1), worth(8, 1.5), worth(9, 2)])).toMatchObject({
+    other: 9,
+    won: -1,
+    noteworthy: true,
+  });
+  expect(judged(CHOICE, [worth(7, 2), worth(8, 1.5), worth(9, 1)])).toMatchObject({
+    other: 8,
+    won: 0.5,
+    noteworthy: true,
+  });
+  expect(judged(CHOICE, [worth(7, 1), worth(8, 1.1)])?.noteworthy).toBe(false);
+  expect(judged(CHOICE, [worth(7, 1, 0.5), worth(8, 2, 0.5)])?.noteworthy).toBe(false);
+  expect(judged(CHOICE, [worth(8, 2)])).toBeUndefined();
+  expect(judged(CHOICE, [worth(7, 2)])).toBeUndefined();
+});
+
+test("the costliest come first, and only what is noteworthy is listed", () => {
+  const of = (won: number, noteworthy = true) => ({ ...CHOICE, points: 1, other: 8, won, noteworthy });
+  const judgements = [of(-0.3), of(0.4), of(-0.9), of(-2, false), of(0.7), of(3, false)];
+  expect(costliest(judgements, 1).map(({ won }) => won)).toEqual([-0.9]);
+  expect(costliest(judgements, 9).map(({ won }) => won)).toEqual([-0.9, -0.3]);
+  expect(finest(judgements)?.won).toBe(0.7);
+  expect(finest([of(3, false)])).toBeUndefined();
+});
+
+test("the graph asks while it is open, and its list and its picture lead to the moments", async () => {
+  const worst = ALL[3];
+  const evaluate = answers((decisions, action) => (decisions === worst?.decisions && action !== worst.taken ? 3 : 1));
+  const onGo = vi.fn();
+  const table = FILM.at(0).table;
+  await act(() => render(<Graph gameId="g" film={FILM} table={table} decisions={3} onGo={onGo} />, root));
+  await settle();
+  expect(evaluate).not.toHaveBeenCalled();
+  await open();
+  await answered();
+  expect(evaluate).toHaveBeenCalledTimes(ALL.length);
+  const turning = [...root.querySelectorAll<HTMLElement>('[data-part~="turning-points"] button')];
+  expect(turning).toHaveLength(1);
+  expect(turning[0]?.textContent).toMatch(/^Shift 1, .+; .+ was worth 2\.0 points more$/);
+  await act(() => turning[0]?.click());
+  expect(onGo).toHaveBeenLastCalledWith(worst?.frame);
+  const svg = root.querySelector("svg");
+  expect(svg?.querySelectorAll("path[style]")).toHaveLength(table.seats.length);
+  await act(() => {
+    svg?.dispatchEvent(new MouseEvent("click", { bubbles: true, clientX: 0 }));
+  });
+  expect(onGo).toHaveBeenLastCalledWith(0);
+});
+
+test("a decision that cannot be estimated is left out, any other error is said", async () => {
+  const evaluate = answers(() => 1);
+  const good = evaluate.getMockImplementation();
+  const fail = (code: Code) =>
+    (async function* () {
+      yield* [];
+      throw new ConnectError("no", code);
+    })();
+  let calls = 0;
+  evaluate.mockImplementation((...args) => {
+    calls += 1;
+    if (calls === 2) return fail(Code.InvalidArgument);
+    if (calls === 4) return fail(Code.ResourceExhausted);
+    return good?.(...args) ?? fail(Code.Internal);
+  });
+  await act(() =>
+    render(<Graph gameId="g" film={FILM} table={FILM.at(0).table} decisions={0} onGo={() => {}} />, root),
+  );
+  await open();
+  for (let turn = 0; turn < 9 && !root.querySelector('[role="alert"]'); turn += 1) await settle();
+  expect(root.querySelector('[role="alert"]')?.textContent).not.toBe("");
+  expect(calls).toBe(4);
+});
+
+test("at the end of a game a player asks for the best and the costliest own decision", async () => {
+  const own = choices(FILM, 0);
+  const [best, worst] = [own[1], own[0]];
+  const evaluate = answers((decisions, action) => {
+    if (decisions === best?.decisions) return action === best.taken ? 2.5 : 1;
+    return decisions === worst?.decisions && action !== worst.taken ? 2 : 1;
+  });
+  vi.spyOn(recordApi, "getRecord").mockImplementation(async function* () {
+    yield create(GetRecordResponseSchema, { lines: recorded("fixed") });
+  });
+  const over = { ...FILM.at(FILM.length - 1).table, phase: "gameOver" as const, gameId: "g" };
+  await act(() => render(<Highlights table={{ ...over, phase: "shiftOver" }} own={0} />, root));
+  expect(root.childElementCount).toBe(0);
+  await act(() => render(<Highlights table={{ ...over, physical: true }} own={0} />, root));
+  expect(root.childElementCount).toBe(0);
+  await act(() => render(<Highlights table={over} own={0} />, root));
+  expect(evaluate).not.toHaveBeenCalled();
+  await act(() => root.querySelector("button")?.click());
+  await settle();
+  await answered();
+  expect(evaluate).toHaveBeenCalledTimes(own.length);
+  const links = [...root.querySelectorAll('[data-part~="highlights"] a')];
+  expect(links.map((link) => link.getAttribute("href"))).toEqual(
+    [best, worst].map((choice) => `/replay/g?decision=${(choice?.decisions ?? 0) + 1}`),
+  );
+  expect(root.textContent).toMatch(/Your best decision, in Shift 1: .+, worth 1\.5 points more than .+/);
+});
