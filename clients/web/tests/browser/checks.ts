@@ -18,16 +18,25 @@ export const PHONES = [PHONE, { width: 375, height: 667 }, { width: 390, height:
 /** The languages in which pages are looked at: all in long tests (CHEFSHAT_SLOW), otherwise the one with the longest texts. */
 export const LANGUAGES = languages.filter(({ value }) => process.env.CHEFSHAT_SLOW || value === "de");
 
-/** Everything that axe-core finds in the light and the dark theme, with any impact, also against best practice. */
+/**
+ * Everything that axe-core finds in the light theme, with any impact, also against best practice, and
+ * what depends on colours in the dark one.
+ */
 export async function inaccessible(page: Page): Promise<string[]> {
   const found: string[] = [];
-  for (const colorScheme of ["light", "dark"] as const) {
+  for (const [colorScheme, rules] of [
+    ["light", []],
+    ["dark", COLOR_RULES],
+  ] as const) {
     await page.emulateMedia({ colorScheme });
-    found.push(...(await findings(page)).map((finding) => `${colorScheme}: ${finding}`));
+    found.push(...(await findings(page, rules)).map((finding) => `${colorScheme}: ${finding}`));
   }
   await page.emulateMedia({ colorScheme: "light" });
   return found;
 }
+
+/** The rules whose outcome depends on colours. */
+const COLOR_RULES = ["color-contrast", "link-in-text-block"];
 
 /** The rules whose outcome depends on texts. */
 const TEXT_RULES = [
@@ -66,14 +75,14 @@ export async function unnamed(page: Page): Promise<string[]> {
 const NOT_FOLLOWED = ["wcag2aaa", "deprecated"];
 
 /** With the rules given, or with all that the page follows, of which axe-core leaves out some by default. */
-async function findings(page: Page, named: string[] = []): Promise<string[]> {
+async function findings(page: Page, named: readonly string[] = []): Promise<string[]> {
   if (!(await page.evaluate(() => "axe" in globalThis))) await page.evaluate(AXE);
   const found = await page.evaluate(
     async ([named, notFollowed]) => {
       const { axe } = globalThis as unknown as { axe: Pick<typeof Axe, "run" | "getRules"> };
       const followed = axe.getRules().filter(({ tags }) => !tags.some((tag) => notFollowed.includes(tag)));
       const values = named.length > 0 ? named : followed.map(({ ruleId }) => ruleId);
-      return axe.run({ runOnly: { type: "rule", values }, resultTypes: ["violations"] });
+      return axe.run({ runOnly: { type: "rule", values: [...values] }, resultTypes: ["violations"] });
     },
     [named, NOT_FOLLOWED] as const,
   );

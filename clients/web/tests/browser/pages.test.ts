@@ -181,9 +181,8 @@ test("the checks find what is wrong with a page", async () => {
     <style>@media (prefers-color-scheme: dark) { p { color: #777; background: #666 } }</style>
     <main style="width: 3000px"><h1>A page</h1><h3>Skips a level</h3><p>Seen by day</p><button></button></main>`);
   const [everything, names] = [await inaccessible(page), await unnamed(page)];
-  for (const theme of ["light", "dark"])
-    for (const rule of ["button-name", "document-title", "heading-order", "html-has-lang"])
-      expect(everything.join("\n")).toContain(`${theme}: ${rule}: `);
+  for (const rule of ["button-name", "document-title", "heading-order", "html-has-lang"])
+    expect(everything.join("\n")).toContain(`light: ${rule}: `);
   expect(everything.filter((finding) => finding.includes("color-contrast")).join()).toMatch(/^dark: /);
   expect(names.map((finding) => finding.split(":")[0])).toEqual(["button-name", "document-title", "html-has-lang"]);
   expect(await tooWide(page)).not.toEqual([]);
