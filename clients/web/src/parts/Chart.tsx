@@ -8,8 +8,8 @@ import { SeatNumber } from "./SeatNumber";
 /** The drawing's own units, which are stretched to the space there is. */
 const WIDTH = 1000;
 const HEIGHT = 200;
-/** The least distance between the numbers at the ends of two lines, as a part of the height. */
-const APART = 0.17;
+/** The distance between the numbers at the ends of two lines, where there is room for all: a part of the height. */
+const APART = 0.28;
 
 /** A line: its points from left to right; a new part begins where it is interrupted. */
 export interface ChartLine {
@@ -100,10 +100,11 @@ function ends(lines: readonly ChartLine[], y: (value: number) => number): { seat
       return last ? [{ seat, height: y(last[1]) / HEIGHT }] : [];
     })
     .sort((a, b) => a.height - b.height || a.seat - b.seat);
+  const apart = Math.min(APART, 1 / Math.max(1, wished.length - 1));
   // Down from the top, then up from the bottom where that went too far.
-  let above = -APART;
-  for (const end of wished) above = end.height = Math.max(end.height, above + APART);
-  let below = 1 + APART;
-  for (const end of wished.toReversed()) below = end.height = Math.min(end.height, below - APART);
+  let above = -apart;
+  for (const end of wished) above = end.height = Math.max(end.height, above + apart);
+  let below = 1 + apart;
+  for (const end of wished.toReversed()) below = end.height = Math.min(end.height, below - apart);
   return wished;
 }

@@ -7,10 +7,12 @@ import type { Judgement } from "./judging";
 
 /** What was done, and what the best other action was worth beside it. */
 export function judgementWords({ taken, other, won }: Judgement, faces: number): string {
+  const { cost, gained, gift, pass } = t().replay.graph;
   const words = (action: number) => {
     const move = moveOf(action, faces);
-    return move ? moveWords(move) : String(action);
+    if (!move) return String(action);
+    if (move.kind === "pass") return pass;
+    return move.kind === "give" || move.kind === "giveJoker" ? gift(moveWords(move)) : moveWords(move);
   };
-  const { cost, gained } = t().replay.graph;
   return won < 0 ? cost(words(taken), words(other), -won) : gained(words(taken), words(other), won);
 }

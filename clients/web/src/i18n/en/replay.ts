@@ -45,12 +45,14 @@ export const replay = {
   },
   graph: {
     title: "Turning points",
-    subtitle: "what each choice of the game was worth to its seat",
+    subtitle: "points of the Shift that each choice was worth to its seat, played on by greedy agents",
     label: "Mean points of the Shift at each choice, a line for each seat",
     progress: (done: number, all: number) => `${done} of ${all} choices judged`,
     turning: "The choices that cost most",
     none: "No choice cost noticeably more than chance.",
     turningPoint: (shift: number, name: string, words: string) => `Shift ${shift}, ${name}: ${words}`,
+    gift: (card: string) => `the gift of ${card}`,
+    pass: "passing",
     cost: (taken: string, other: string, points: number) =>
       `${taken}; ${other} was worth ${points.toFixed(1)} points more`,
     gained: (taken: string, other: string, points: number) =>

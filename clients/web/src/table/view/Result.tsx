@@ -134,23 +134,25 @@ function GameResult({ table, own, profiles, ways }: EndProps & { own: number | u
       <h2 ref={heading} tabIndex={-1}>
         {winner !== undefined && (winner === own ? words.youWon : words.wins(distinctName(table, winner)))}
       </h2>
-      <table>
-        <thead>
-          <tr>
-            <th scope="col">{words.place}</th>
-            <th scope="col">{words.name}</th>
-            <th scope="col">{words.points}</th>
-          </tr>
-        </thead>
-        <tbody>
-          {table.standings.map(({ seat, place, points }) => (
-            <Row key={seat} table={table} own={own} seat={seat} place={place} profile={profiles}>
-              <td class="number">{points}</td>
-            </Row>
-          ))}
-        </tbody>
-      </table>
-      <Curve table={table} />
+      <div class={css.summary}>
+        <table>
+          <thead>
+            <tr>
+              <th scope="col">{words.place}</th>
+              <th scope="col">{words.name}</th>
+              <th scope="col">{words.points}</th>
+            </tr>
+          </thead>
+          <tbody>
+            {table.standings.map(({ seat, place, points }) => (
+              <Row key={seat} table={table} own={own} seat={seat} place={place} profile={profiles}>
+                <td class="number">{points}</td>
+              </Row>
+            ))}
+          </tbody>
+        </table>
+        <Curve table={table} />
+      </div>
       {ways}
     </section>
   );
