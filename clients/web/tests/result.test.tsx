@@ -26,33 +26,39 @@ const OVER: TableState = {
   standings: [2, 0, 1, 3].map((seat, index) => ({ seat, points: 3 - index, place: index + 1 })),
 };
 
-const show = (table: TableState, own: number | undefined, links = true) =>
-  act(() => render(<Result table={table} own={own} links={links} />, root));
+const show = (table: TableState, own: number | undefined, props: Partial<Parameters<typeof Result>[0]> = {}) =>
+  act(() => render(<Result table={table} own={own} {...props} />, root));
+const PLAYING = { playing: true };
 const shown = () => root.querySelector("h2")?.textContent;
 const button = () => root.querySelector("button");
 
 test("a player's result stays in the next Shift until it is closed", async () => {
-  await show(ENDED, 0);
-  await show(NEXT, 0);
+  await show(ENDED, 0, PLAYING);
+  await show(NEXT, 0, PLAYING);
   expect(shown()).toBe("Shift 1");
   await act(() => button()?.click());
   expect(shown()).toBeUndefined();
-  await show({ ...NEXT, phase: "shiftOver", results: [shift(1), shift(2)] }, 0);
+  await show({ ...NEXT, phase: "shiftOver", results: [shift(1), shift(2)] }, 0, PLAYING);
   expect(shown()).toBe("Shift 2");
 });
 
-test("a player's own turn closes it, that of others does not", async () => {
-  const turnOf = (of: number): TableState => ({
-    ...NEXT,
-    seats: NEXT.seats.map((seat) => (seat.seat === of ? { ...seat, lastMove: "pass" as const } : seat)),
-  });
-  await show(ENDED, 0);
-  await show(turnOf(1), 0);
-  expect(shown()).toBe("Shift 1");
-  await show(turnOf(0), 0);
+test("a player's action closes it for good", async () => {
+  await show(ENDED, 0, PLAYING);
+  await show(NEXT, 0, { ...PLAYING, acted: true });
   expect(shown()).toBeUndefined();
-  // In the next pizza nobody has played.
-  await show(NEXT, 0);
+  await show(NEXT, 0, PLAYING);
+  expect(shown()).toBeUndefined();
+  // A correction makes new values of the results: the same one stays closed, another one is shown.
+  await show({ ...NEXT, results: [shift(1)] }, 0, PLAYING);
+  expect(shown()).toBeUndefined();
+  await show({ ...NEXT, results: [{ ...shift(1), order: [0, 2, 1, 3] }] }, 0, PLAYING);
+  expect(shown()).toBe("Shift 1");
+});
+
+test("what ended while the reader was away is not shown during the next Shift", async () => {
+  const line = (sequence: number) => ({ sequence, entry: { kind: "restarted" as const } });
+  await show({ ...START, log: [line(1)] }, 0, PLAYING);
+  await show({ ...NEXT, log: [line(1), line(200)] }, 0, PLAYING);
   expect(shown()).toBeUndefined();
 });
 
@@ -60,15 +66,18 @@ test.each([
   ["spectators", undefined, true],
   ["readers of a replay", 0, false],
 ])("%s see it until the next Shift's first turn", async (_, own, links) => {
-  await show(ENDED, own, links);
+  await show(NEXT, own, { links });
+  expect(shown()).toBeUndefined();
+  // A replay also goes back.
+  await show(ENDED, own, { links });
   expect(shown()).toBe("Shift 1");
   expect(button()).toBeNull();
-  await show(NEXT, own, links);
+  await show(NEXT, own, { links });
   expect(shown()).toBeUndefined();
 });
 
 test("what ended before the page was opened is not shown", async () => {
-  await show(NEXT, 0);
+  await show(NEXT, 0, PLAYING);
   expect(shown()).toBeUndefined();
 });
 
@@ -77,7 +86,7 @@ test("a player's own row is marked, with a word", async () => {
   for (const table of [ENDED, OVER]) {
     await show(table, 0);
     expect(marked()).toEqual([expect.stringContaining("Ada (you)")]);
-    await show(table, 0, false);
+    await show(table, 0, { links: false });
     expect(marked()).toEqual([]);
   }
 });
@@ -88,8 +97,8 @@ test("the curve has the points after each Shift, if all of them were seen", asyn
   expect(curve()?.querySelectorAll("path[style]")).toHaveLength(4);
   const lines = [...(curve()?.querySelectorAll("path[style]") ?? [])].map((path) => path.getAttribute("d"));
   // Six points are the most, at the top right; who has none stays at the bottom.
-  expect(lines[2]).toBe("M0.0 200.0L500.0 100.0L1000.0 0.0");
-  expect(lines[3]).toBe("M0.0 200.0L500.0 200.0L1000.0 200.0");
+  expect(lines[2]).toBe("M0.0 200.0L500.0 100.0L1000.0 0.0h0");
+  expect(lines[3]).toBe("M0.0 200.0L500.0 200.0L1000.0 200.0h0");
   await show({ ...OVER, results: [shift(2)] }, 0);
   expect(curve()).toBeNull();
   await show({ ...OVER, results: [shift(1)] }, 0);

@@ -25,8 +25,6 @@ interface ChartProps {
   width: number;
   /** The value at the top; that at the bottom is 0. */
   top: number;
-  /** Values that stand beside their height. */
-  scale: readonly { readonly value: number; readonly text: string }[];
   /** Where vertical lines are. */
   marks?: readonly number[];
   /** The moment that is shown elsewhere on the page. */
@@ -35,17 +33,14 @@ interface ChartProps {
   onGo?: (x: number) => void;
 }
 
-export function Chart({ label, lines, width, top, scale, marks = [], at, onGo }: ChartProps) {
+export function Chart({ label, lines, width, top, marks = [], at, onGo }: ChartProps) {
   const x = (value: number) => (WIDTH * value) / Math.max(width, 1);
   const y = (value: number) => HEIGHT * (1 - Math.min(1, Math.max(0, value / Math.max(top, 1))));
   return (
     <div class={css.chart} data-part="chart">
       <div class={`${css.scale} small soft number`} aria-hidden="true">
-        {scale.map(({ value, text }) => (
-          <span key={value} style={{ top: percent(y(value) / HEIGHT) }}>
-            {text}
-          </span>
-        ))}
+        <span>{top}</span>
+        <span>0</span>
       </div>
       {/* biome-ignore lint/a11y/useKeyWithClickEvents: by keyboard, the slider and the list below lead to the same moments */}
       <svg
@@ -59,9 +54,7 @@ export function Chart({ label, lines, width, top, scale, marks = [], at, onGo }:
           onGo?.(((event.clientX - box.left) / Math.max(box.width, 1)) * width);
         }}
       >
-        {scale.map(({ value }) => (
-          <path key={value} class={css.rule} d={`M0 ${y(value)}H${WIDTH}`} />
-        ))}
+        <path class={css.rule} d={`M0 0H${WIDTH}M0 ${HEIGHT}H${WIDTH}`} />
         {marks.map((mark) => (
           <path key={mark} class={css.rule} d={`M${x(mark)} 0V${HEIGHT}`} />
         ))}
@@ -70,8 +63,9 @@ export function Chart({ label, lines, width, top, scale, marks = [], at, onGo }:
             key={seat}
             class={css.line}
             style={{ stroke: `var(--seat-${seat})` }}
+            // With `h0` the line of a single point is a dot.
             d={parts
-              .map((part) => `M${part.map(([px, py]) => `${x(px).toFixed(1)} ${y(py).toFixed(1)}`).join("L")}`)
+              .map((part) => `M${part.map(([px, py]) => `${x(px).toFixed(1)} ${y(py).toFixed(1)}`).join("L")}h0`)
               .join("")}
           />
         ))}

@@ -5,16 +5,13 @@ import { SelectField } from "../parts/Field";
 import { Icon } from "../parts/Icon";
 import toolsCss from "../table/view/Tools.module.css";
 import { distinctName } from "../table/words";
-import type { Film, Frame } from "./frames";
+import { type Film, type Frame, marked } from "./frames";
 import type { Perspective } from "./perspective";
 import replayCss from "./Replay.module.css";
 
 /** Playback speeds; at 1, MOMENT_MS per moment. */
 export const SPEEDS = [0.5, 1, 2, 4, 8] as const;
 export type Speed = (typeof SPEEDS)[number];
-
-/** Most Shifts marked on the slider; more would look like a bar. */
-const MOST_MARKS = 60;
 
 interface ControlsProps {
   film: Film;
@@ -70,7 +67,7 @@ export function Controls({
             onInput={(event) => onGo(Number(event.currentTarget.value))}
           />
           <span class={replayCss.marks} aria-hidden="true">
-            {film.shifts.slice(0, film.shifts.length > MOST_MARKS ? 0 : undefined).map((start) => (
+            {marked(film).map((start) => (
               <i
                 key={start.shift}
                 style={{ insetInlineStart: `${((start.frame / Math.max(1, last)) * 100).toFixed(2)}%` }}

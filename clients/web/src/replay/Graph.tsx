@@ -6,13 +6,14 @@ import { t } from "../i18n";
 import { Chart } from "../parts/Chart";
 import type { TableState } from "../table/model/state";
 import { distinctName } from "../table/words";
-import type { Film } from "./frames";
+import { choices, costliest, type EstimatedChoice } from "./choices";
+import { EstimatingProgress } from "./EstimatingProgress";
+import { type Film, marked } from "./frames";
 import css from "./Graph.module.css";
-import { useJudgements } from "./hooks";
-import { JudgingProgress } from "./JudgingProgress";
-import { choices, costliest, type Judgement } from "./judging";
+import { useEstimatedChoices } from "./hooks";
+import type { Perspective } from "./perspective";
 import replayCss from "./Replay.module.css";
-import { judgementWords } from "./words";
+import { choiceWords } from "./words";
 
 /** The most turning points listed. */
 const MOST_LISTED = 6;
@@ -21,19 +22,22 @@ interface GraphProps {
   gameId: string;
   film: Film;
   table: TableState;
+  perspective: Perspective;
   /** Decisions before the moment shown. */
   decisions: number;
   onGo: (frame: number) => void;
 }
 
-export function Graph({ gameId, film, table, decisions, onGo }: GraphProps) {
+export function Graph({ gameId, film, table, perspective, decisions, onGo }: GraphProps) {
   const [shown, setShown] = useState(false);
   const top = useMemo(() => mostPoints(film), [film]);
   const asked = useMemo(() => (shown ? choices(film) : []), [film, shown]);
-  const { judgements, looked, fault } = useJudgements(gameId, asked);
+  const estimates = useEstimatedChoices(gameId, asked);
+  // Only a seat itself knows what it gave, or might have declared.
+  const estimated = estimates.estimated.filter(({ seat }) => perspective === "all" || seat === perspective);
   const words = t().replay.graph;
-  const turning = costliest(judgements, MOST_LISTED).sort((a, b) => a.frame - b.frame);
-  const done = shown && looked === asked.length;
+  const turning = costliest(estimated, MOST_LISTED).sort((a, b) => a.frame - b.frame);
+  const done = shown && estimates.looked === asked.length;
   return (
     <details
       class={`${replayCss.decision} sheet`}
@@ -44,39 +48,33 @@ export function Graph({ gameId, film, table, decisions, onGo }: GraphProps) {
       <summary>
         <strong>{words.title}</strong> <span class="soft">{words.subtitle}</span>
       </summary>
-      {judgements.length > 0 && (
+      {estimated.length > 0 && (
         <Chart
           label={words.label}
-          lines={table.seats.map(({ seat }) => ({ seat, parts: byShift(judgements, seat) }))}
+          lines={table.seats.map(({ seat }) => ({ seat, parts: byShift(estimated, seat) }))}
           width={film.decisions}
           top={top}
-          scale={[0, top].map((value) => ({ value, text: String(value) }))}
-          marks={film.shifts.slice(1).map(({ frame }) => film.at(frame).decisions)}
+          marks={marked(film).map((shift) => shift.decisions)}
           at={decisions}
           onGo={(x) => onGo(film.after(Math.round(x)) ?? film.length - 1)}
         />
       )}
-      {fault && <p role="alert">{fault}</p>}
-      {shown && !fault && !done && <JudgingProgress done={looked} all={asked.length} />}
+      {shown && !done && <EstimatingProgress estimates={estimates} all={asked.length} />}
       {turning.length > 0 && (
         <>
           <h2 class={css.title}>{words.turning}</h2>
           <ol class={css.turning} data-part="turning-points">
-            {turning.map((judgement) => (
-              <li key={judgement.decisions}>
-                <button type="button" onClick={() => onGo(judgement.frame)}>
-                  {words.turningPoint(
-                    judgement.shift,
-                    distinctName(table, judgement.seat),
-                    judgementWords(judgement, table.faces),
-                  )}
+            {turning.map((choice) => (
+              <li key={choice.decisions}>
+                <button type="button" onClick={() => onGo(choice.frame)}>
+                  {words.turningPoint(choice.shift, distinctName(table, choice.seat), choiceWords(choice, table.faces))}
                 </button>
               </li>
             ))}
           </ol>
         </>
       )}
-      {done && turning.length === 0 && <p class="soft">{words.none}</p>}
+      {done && turning.length === 0 && <p class="soft">{estimated.length > 0 ? words.none : words.unknown}</p>}
     </details>
   );
 }
@@ -88,9 +86,9 @@ function mostPoints(film: Film): number {
 }
 
 /** A seat's worth of its choices, a part for each Shift. */
-function byShift(judgements: readonly Judgement[], seat: number): (readonly [number, number])[][] {
+function byShift(estimated: readonly EstimatedChoice[], seat: number): (readonly [number, number])[][] {
   const parts = new Map<number, (readonly [number, number])[]>();
-  for (const { seat: of, shift, decisions, points } of judgements) {
+  for (const { seat: of, shift, decisions, points } of estimated) {
     if (of !== seat) continue;
     const part = parts.get(shift) ?? [];
     part.push([decisions, points]);

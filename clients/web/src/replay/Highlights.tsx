@@ -1,15 +1,16 @@
 // A player's best and costliest decision of the game that is over, on request: the server estimates
 // each of the player's choices first.
 
-import { useMemo, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import { t } from "../i18n";
+import { announce } from "../parts/Announcer";
 import { Button } from "../parts/Button";
 import type { TableState } from "../table/model/state";
+import { choices, costliest, type EstimatedChoice, finest } from "./choices";
+import { EstimatingProgress } from "./EstimatingProgress";
 import css from "./Highlights.module.css";
-import { useFilm, useJudgements } from "./hooks";
-import { JudgingProgress } from "./JudgingProgress";
-import { choices, costliest, finest, type Judgement } from "./judging";
-import { judgementWords } from "./words";
+import { useEstimatedChoices, useFilm } from "./hooks";
+import { choiceWords } from "./words";
 
 /** For the holder of a seat; nothing until the game is over. */
 export function Highlights({ table, own }: { table: TableState; own: number | undefined }) {
@@ -22,22 +23,33 @@ export function Highlights({ table, own }: { table: TableState; own: number | un
 
 function Found({ gameId, own, faces }: { gameId: string; own: number; faces: number }) {
   const words = t().replay.highlights;
-  const { film, fault: unread } = useFilm(gameId);
+  const { film, fault } = useFilm(gameId);
   const asked = useMemo(() => (film ? choices(film, own) : []), [film, own]);
-  const { judgements, looked, fault } = useJudgements(gameId, asked);
-  if (unread || fault) return <p role="alert">{unread || fault}</p>;
-  if (!film || looked < asked.length) return <JudgingProgress done={looked} all={asked.length} />;
-  const [best, worst] = [finest(judgements), costliest(judgements, 1)[0]];
-  const link = (of: Judgement, title: string) => (
+  const estimates = useEstimatedChoices(gameId, asked);
+  const done = film !== undefined && estimates.looked === asked.length;
+  const [best, worst] = [finest(estimates.estimated), costliest(estimates.estimated, 1)[0]];
+  // The button that was pressed is gone.
+  const section = useRef<HTMLElement>(null);
+  useLayoutEffect(() => section.current?.focus(), []);
+  useEffect(() => {
+    if (done) announce(section.current?.textContent ?? "");
+  }, [done]);
+  const line = (choice: EstimatedChoice, title: string) => (
     <li>
-      <a href={`/replay/${gameId}?decision=${of.decisions + 1}`}>{title}</a>: {judgementWords(of, faces)}
+      <a href={`/replay/${gameId}?decision=${choice.decisions + 1}`}>{title}</a>: {choiceWords(choice, faces)}
     </li>
   );
   return (
-    <ul class={css.highlights} data-part="highlights">
-      {best && link(best, words.best(best.shift))}
-      {worst && link(worst, words.worst(worst.shift))}
-      {!best && !worst && <li>{words.none}</li>}
-    </ul>
+    <section ref={section} class={css.highlights} data-part="highlights" tabIndex={-1} aria-label={words.ask}>
+      {fault && <p role="alert">{fault}</p>}
+      {!fault && !done && <EstimatingProgress estimates={estimates} all={asked.length} />}
+      {done && (
+        <ul>
+          {best && line(best, words.best(best.shift))}
+          {worst && line(worst, words.worst(worst.shift))}
+          {!best && !worst && <li>{words.none}</li>}
+        </ul>
+      )}
+    </section>
   );
 }

@@ -104,8 +104,15 @@ function Playback({ gameId, film }: { gameId: string; film: Film }) {
           onShown={setAnalysing}
         />
       )}
-      {film.handsKnown && (
-        <Graph gameId={gameId} film={film} table={frame.table} decisions={frame.decisions} onGo={jump} />
+      {film.handsKnown && !table.physical && perspective !== "none" && (
+        <Graph
+          gameId={gameId}
+          film={film}
+          table={frame.table}
+          perspective={perspective}
+          decisions={frame.decisions}
+          onGo={jump}
+        />
       )}
     </TableView>
   );

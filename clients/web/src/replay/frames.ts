@@ -21,6 +21,14 @@ export interface Frame {
   readonly decisions: number;
 }
 
+/** The first moment of a Shift with its cards. */
+interface ShiftStart {
+  readonly shift: number;
+  readonly frame: number;
+  /** Decisions of the game before it. */
+  readonly decisions: number;
+}
+
 /** A record that can be stepped through. */
 export interface Film {
   readonly header: RecordHeader | undefined;
@@ -30,8 +38,7 @@ export interface Film {
   readonly decisions: number;
   /** Whether a hand is known at any moment; in some imported games none is. */
   readonly handsKnown: boolean;
-  /** The first moment of each Shift with its cards. */
-  readonly shifts: readonly { readonly shift: number; readonly frame: number }[];
+  readonly shifts: readonly ShiftStart[];
   /** A moment by number, from 0 to `length` - 1. */
   at(moment: number): Frame;
   /** The first moment after a number of decisions; undefined if there are fewer. */
@@ -46,12 +53,20 @@ interface Moment {
   open: DecisionRecord | undefined;
 }
 
+/** Most Shifts that are marked on a slider or a graph; more would look like a bar. */
+const MOST_MARKS = 60;
+
+/** The Shifts to mark. */
+export function marked({ shifts }: Film): readonly ShiftStart[] {
+  return shifts.length > MOST_MARKS ? [] : shifts;
+}
+
 /** The film of a record. */
 export function filmOf(lines: readonly RecordLine[], storedEvery = STORED_EVERY): Film {
   let header: RecordHeader | undefined;
   let decisions = 0;
   const moments: Moment[] = [];
-  const shifts: { shift: number; frame: number }[] = [];
+  const shifts: ShiftStart[] = [];
   let handsKnown = false;
   lines.forEach(({ line }, index) => {
     switch (line.case) {
@@ -71,7 +86,7 @@ export function filmOf(lines: readonly RecordLine[], storedEvery = STORED_EVERY)
         moments.push({ event: line.value, open: undefined, decisions });
         handsKnown ||= showsHand(line.value);
         if (line.value.kind.case === "shiftStarted") {
-          shifts.push({ shift: line.value.kind.value.shift, frame: moments.length - 1 });
+          shifts.push({ shift: line.value.kind.value.shift, frame: moments.length - 1, decisions });
         }
         break;
       default:

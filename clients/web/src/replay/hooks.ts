@@ -5,8 +5,8 @@ import { useEffect, useState } from "preact/hooks";
 import { recordApi } from "../api/client";
 import { inWords } from "../api/faults";
 import type { RecordLine } from "../gen/chefshat/v1/record_pb";
+import { type Choice, type EstimatedChoice, estimatedChoices } from "./choices";
 import { type Film, filmOf } from "./frames";
-import { type Choice, type Judgement, judgedChoices } from "./judging";
 
 /** Reads a record; the film is undefined until all of it is there. */
 export function useFilm(gameId: string) {
@@ -29,16 +29,27 @@ export function useFilm(gameId: string) {
   return { film, fault };
 }
 
-/** Judges what is asked in turn, going on where it was interrupted. */
-export function useJudgements(gameId: string, asked: readonly Choice[]) {
-  const [answers, setAnswers] = useState<readonly (Judgement | undefined)[]>([]);
+/** The estimates of the choices asked for so far, and a way to ask again for what failed. */
+export interface Estimates {
+  readonly estimated: readonly EstimatedChoice[];
+  /** Choices that have been looked at, with those that cannot be estimated. */
+  readonly looked: number;
+  /** Why no more come, in words; empty while they do. */
+  readonly fault: string;
+  readonly resume: () => void;
+}
+
+/** Has choices estimated in turn; those asked for again resume where they were interrupted. */
+export function useEstimatedChoices(gameId: string, asked: readonly Choice[]): Estimates {
+  const [answers, setAnswers] = useState<readonly (EstimatedChoice | undefined)[]>([]);
   const [fault, setFault] = useState("");
+  const [attempt, setAttempt] = useState(1);
   useEffect(() => {
     const leaving = new AbortController();
-    const judge = async () => {
+    const load = async () => {
       try {
         const left = asked.slice(answers.length);
-        for await (const answer of judgedChoices(gameId, left, leaving.signal)) {
+        for await (const answer of estimatedChoices(gameId, left, leaving.signal)) {
           setAnswers((before) => [...before, answer]);
         }
       } catch (thrown) {
@@ -46,8 +57,13 @@ export function useJudgements(gameId: string, asked: readonly Choice[]) {
       }
     };
     setFault("");
-    void judge();
+    void load();
     return () => leaving.abort();
-  }, [gameId, asked]);
-  return { judgements: answers.filter((answer) => answer !== undefined), looked: answers.length, fault };
+  }, [gameId, asked, attempt]);
+  return {
+    estimated: answers.filter((answer) => answer !== undefined),
+    looked: answers.length,
+    fault,
+    resume: () => setAttempt(attempt + 1),
+  };
 }

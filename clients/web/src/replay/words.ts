@@ -1,12 +1,12 @@
-// Decisions that were judged, in words.
+// Decisions that were compared, in words.
 
 import { t } from "../i18n";
 import { moveOf } from "../table/model/actions";
 import { moveWords } from "../table/words";
-import type { Judgement } from "./judging";
+import type { EstimatedChoice } from "./choices";
 
 /** What was done, and what the best other action was worth beside it. */
-export function judgementWords({ taken, other, won }: Judgement, faces: number): string {
+export function choiceWords({ taken, other, won }: EstimatedChoice, faces: number): string {
   const { cost, gained, gift, pass } = t().replay.graph;
   const words = (action: number) => {
     const move = moveOf(action, faces);

@@ -285,7 +285,6 @@ export const table: Texts["table"] = {
     name: "Name",
     points: "Punkte",
     total: "Gesamt",
-    close: "Weiter",
     curve: "Punkte der Partie nach jedem Shift, eine Linie je Sitzplatz",
     adjudicated: "Durch das Zuglimit beendet.",
     replay: "Replay ansehen",

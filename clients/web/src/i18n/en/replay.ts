@@ -45,18 +45,20 @@ export const replay = {
   },
   graph: {
     title: "Turning points",
-    subtitle: "points of the Shift that each choice was worth to its seat, played on by greedy agents",
-    label: "Mean points of the Shift at each choice, a line for each seat",
-    progress: (done: number, all: number) => `${done} of ${all} choices judged`,
-    turning: "The choices that cost most",
-    none: "No choice cost noticeably more than chance.",
+    subtitle: "average points of the Shift after each decision, if greedy agents play on",
+    label: "Average points of the Shift after each decision, a line for each seat",
+    progress: (done: number, all: number) => `${done} of ${all} decisions estimated`,
+    resume: "Try again",
+    turning: "The decisions that cost most",
+    none: "No decision clearly cost points.",
+    unknown: "The server cannot estimate this game.",
     turningPoint: (shift: number, name: string, words: string) => `Shift ${shift}, ${name}: ${words}`,
-    gift: (card: string) => `the gift of ${card}`,
+    gift: (card: string) => `${card} as a gift`,
     pass: "passing",
     cost: (taken: string, other: string, points: number) =>
-      `${taken}; ${other} was worth ${points.toFixed(1)} points more`,
+      `${taken} (better by ${points.toFixed(1)} points: ${other})`,
     gained: (taken: string, other: string, points: number) =>
-      `${taken}, worth ${points.toFixed(1)} points more than ${other}`,
+      `${taken} (better than ${other} by ${points.toFixed(1)} points)`,
   },
   highlights: {
     ask: "My best and worst decision",

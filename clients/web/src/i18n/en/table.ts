@@ -280,7 +280,6 @@ export const table = {
     name: "Name",
     points: "Points",
     total: "Total",
-    close: "Go on",
     curve: "Points of the game after each Shift, a line for each seat",
     adjudicated: "Ended by the turn limit.",
     replay: "Watch the replay",

@@ -285,7 +285,6 @@ export const table: Texts["table"] = {
     name: "Nombre",
     points: "Puntos",
     total: "Total",
-    close: "Continuar",
     curve: "Puntos de la partida tras cada Shift, una línea por asiento",
     adjudicated: "Terminado por el límite de turnos.",
     replay: "Ver la repetición",

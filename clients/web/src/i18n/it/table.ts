@@ -287,7 +287,6 @@ export const table: Texts["table"] = {
     name: "Nome",
     points: "Punti",
     total: "Totale",
-    close: "Continua",
     curve: "Punti della partita dopo ogni Shift, una linea per posto",
     adjudicated: "Terminato per il limite di turni.",
     replay: "Guarda il replay",

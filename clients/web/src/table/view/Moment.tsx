@@ -1,15 +1,15 @@
 // A special moment of the game, over the pizza for a few seconds, with what it means. It is read out
 // after its event (following.ts).
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import { hidden } from "../../hiding";
 import { t } from "../../i18n";
 import { Drawing } from "../../parts/Drawing";
 import { isOn } from "../../preferences";
-import { MOST_AT_ONCE } from "../model/log";
 import { type Moment as GameMoment, type MomentKind, momentSince } from "../model/moments";
 import type { TableState } from "../model/state";
 import { distinctName } from "../words";
+import { useArrivals } from "./arrivals";
 import css from "./Moment.module.css";
 
 /** How long a moment is shown, milliseconds. */
@@ -25,15 +25,10 @@ const DRAWINGS: Record<MomentKind, string> = {
 
 export function Moment({ table }: { table: TableState }) {
   const [shown, setShown] = useState<GameMoment | undefined>(undefined);
-  // The past of a table that has just been opened is no moment.
-  const last = table.log.at(-1)?.sequence ?? 0;
-  const seen = useRef(last);
-  useEffect(() => {
-    const fresh = last - seen.current;
-    const found = fresh > 0 && fresh <= MOST_AT_ONCE ? shownMoment(table, seen.current) : undefined;
-    seen.current = last;
+  useArrivals(table, (since, caughtUp) => {
+    const found = caughtUp ? undefined : shownMoment(table, since);
     if (found) setShown(found);
-  }, [last]);
+  });
   useEffect(() => {
     if (!shown) return;
     const timer = setTimeout(() => setShown(undefined), SHOWN_MS);

@@ -10,6 +10,7 @@ import { SeatNumber } from "../../parts/SeatNumber";
 import { PersonName } from "../../people/PersonName";
 import type { ShiftResult, TableState } from "../model/state";
 import { distinctName, nameOf } from "../words";
+import { useArrivals } from "./arrivals";
 import { showsMoments } from "./Moment";
 import css from "./Result.module.css";
 
@@ -26,32 +27,43 @@ interface ResultProps {
   links?: boolean;
   /** The next step, before all links. */
   onward?: ComponentChildren;
+  /**
+   * Whether the reader plays on: then the result of a Shift stays until it is closed. Otherwise it
+   * goes with the next Shift's first turn.
+   */
+  playing?: boolean;
+  /** The reader has begun an action of the next Shift. */
+  acted?: boolean;
+}
+
+/** The result to show: the game's once it is over, otherwise the last Shift's. */
+export function Result({ table, own, links = true, onward, playing = false, acted = false }: ResultProps) {
+  const result = table.results.at(-1);
+  const { closed, close } = useClosing(table, acted);
+  const reader = links ? own : undefined;
+  const ways = links && <Ways table={table} onward={onward} />;
+  if (table.phase === "gameOver") return <GameResult table={table} own={reader} profiles={!links} ways={ways} />;
+  if (table.phase === "aborted") return <Aborted table={table} ways={ways} />;
+  if (!result || (playing ? closed : table.phase === "pizza")) return null;
+  return <ShiftTable table={table} own={reader} result={result} onClose={playing ? close : undefined} />;
 }
 
 /**
- * The result to show: the game's once it is over, otherwise the last Shift's: for players until they
- * close it or act in the next one, for others until that one's first turn.
+ * Whether the result of the last Shift has been closed, by a button or by an action in the next one.
+ * What ended before the page was opened, or while it was away, counts as closed.
  */
-export function Result({ table, own, links = true, onward }: ResultProps) {
-  const result = table.results.at(-1);
-  const player = links ? own : undefined;
-  const { closed, close } = useClosing(table, player, result?.shift ?? 0);
-  const ways = links && <Ways table={table} onward={onward} />;
-  if (table.phase === "gameOver") return <GameResult table={table} own={player} profiles={!links} ways={ways} />;
-  if (table.phase === "aborted") return <Aborted table={table} ways={ways} />;
-  if (!result || closed || (player === undefined && table.phase === "pizza")) return null;
-  return <ShiftTable table={table} own={player} result={result} onClose={player === undefined ? undefined : close} />;
-}
-
-/** Whether a player has seen enough of the last Shift's result. */
-function useClosing({ phase, seats }: TableState, player: number | undefined, shift: number) {
-  // What ended before the page was opened is not shown again.
-  const [last, setLast] = useState(phase === "pizza" ? shift : 0);
-  const acted = phase === "pizza" && player !== undefined && seats[player]?.lastMove !== undefined;
+function useClosing(table: TableState, acted: boolean) {
+  // A correction at a table with real cards may change it, and makes new values of all.
+  const result = JSON.stringify(table.results.at(-1));
+  const [seen, setSeen] = useState(table.phase === "pizza" ? result : undefined);
+  const close = () => setSeen(result);
+  useArrivals(table, (_, caughtUp) => {
+    if (caughtUp && table.phase === "pizza") close();
+  });
   useEffect(() => {
-    if (acted) setLast(shift);
-  }, [acted, shift]);
-  return { closed: last === shift, close: () => setLast(shift) };
+    if (acted) close();
+  }, [acted, result]);
+  return { closed: seen === result, close };
 }
 
 /** The main step, and links. An aborted game has no replay. */
@@ -108,7 +120,7 @@ function ShiftTable({ table, own, result, onClose }: ShiftTableProps) {
       {result.adjudicated && <p class="soft">{words.adjudicated}</p>}
       {onClose && (
         <div class={css.ways}>
-          <Button onClick={onClose}>{words.close}</Button>
+          <Button onClick={onClose}>{t().common.close}</Button>
         </div>
       )}
     </section>
@@ -162,7 +174,6 @@ function GameResult({ table, own, profiles, ways }: EndProps & { own: number | u
 function Curve({ table: { results, seats } }: { table: TableState }) {
   const points = results.map((result) => result.points);
   if (results.length < 2 || results[0]?.shift !== 1 || results.at(-1)?.shift !== results.length) return null;
-  const top = Math.max(...points.flat());
   return (
     <Chart
       label={t().table.result.curve}
@@ -171,8 +182,7 @@ function Curve({ table: { results, seats } }: { table: TableState }) {
         parts: [[[0, 0], ...points.map((of, index) => [index + 1, of[seat] ?? 0] as const)]],
       }))}
       width={results.length}
-      top={top}
-      scale={[0, top].map((value) => ({ value, text: String(value) }))}
+      top={Math.max(...points.flat())}
     />
   );
 }

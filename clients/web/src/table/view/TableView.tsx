@@ -154,7 +154,15 @@ export function TableView(props: TableViewProps) {
         <div class={css.centre}>
           <Board table={table} />
           <Moment table={table} />
-          <Result table={table} own={own} links={!props.replayed} onward={props.onward} />
+          <Result
+            key={table.gameId}
+            table={table}
+            own={own}
+            links={!props.replayed}
+            onward={props.onward}
+            playing={own !== undefined && !props.replayed && !props.untimed}
+            acted={table.phase === "pizza" && (deciding.picked.size > 0 || (sending && !props.autoPassing))}
+          />
         </div>
         <div class={`${css.side} sheet`}>
           <Now

@@ -3,8 +3,8 @@
 
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { Card } from "../../parts/Card";
-import { MOST_AT_ONCE } from "../model/log";
 import type { LogEntry, TableState } from "../model/state";
+import { useArrivals } from "./arrivals";
 import { showsMoments } from "./Moment";
 import css from "./Travel.module.css";
 
@@ -17,18 +17,13 @@ interface Gift extends Extract<LogEntry, { kind: "gave" }> {
 
 export function Travel({ table }: { table: TableState }) {
   const [gifts, setGifts] = useState<readonly Gift[]>([]);
-  const last = table.log.at(-1)?.sequence ?? 0;
-  const seen = useRef(last);
-  useEffect(() => {
-    const since = seen.current;
-    seen.current = last;
-    // A reader who catches up does not see the past.
-    if (last - since > MOST_AT_ONCE || !showsMoments()) return;
+  useArrivals(table, (since, caughtUp) => {
+    if (caughtUp || !showsMoments()) return;
     const given = table.log.flatMap(({ entry, sequence }) =>
       entry.kind === "gave" && sequence > since ? [{ ...entry, sequence }] : [],
     );
     if (given.length > 0) setGifts((before) => [...before, ...given]);
-  }, [last]);
+  });
   const arrived = (sequence: number) => setGifts((before) => before.filter((gift) => gift.sequence !== sequence));
   return (
     <>

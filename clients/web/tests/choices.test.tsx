@@ -9,10 +9,10 @@ import { afterEach, expect, test, vi } from "vitest";
 import { analysisApi, recordApi } from "../src/api/client";
 import { EvaluateResponseSchema } from "../src/gen/chefshat/v1/analysis_service_pb";
 import { GetRecordResponseSchema } from "../src/gen/chefshat/v1/record_service_pb";
+import { choices, compared, costliest, estimatedChoices, finest } from "../src/replay/choices";
 import { filmOf } from "../src/replay/frames";
 import { Graph } from "../src/replay/Graph";
 import { Highlights } from "../src/replay/Highlights";
-import { choices, costliest, finest, judged } from "../src/replay/judging";
 import { legalActions } from "../src/table/model/actions";
 import { root, settle } from "./mounted";
 import { recorded } from "./record";
@@ -24,7 +24,7 @@ const ALL = choices(FILM);
 const CHOICE = { decisions: 4, frame: 9, shift: 1, seat: 2, taken: 7 };
 
 const worth = (action: number, points: number, standardError = 0.05) =>
-  ({ action, points, standardError }) as Parameters<typeof judged>[1][number];
+  ({ action, points, standardError }) as Parameters<typeof compared>[1][number];
 
 /** The server answers by the number of decisions before the one asked for. */
 function answers(points: (decisions: number, action: number) => number) {
@@ -61,28 +61,28 @@ test("every decision with several legal actions is a choice, of one seat or of a
 });
 
 test("a choice is compared with the best other one, and chance is not noteworthy", () => {
-  expect(judged(CHOICE, [worth(7, 1), worth(8, 1.5), worth(9, 2)])).toMatchObject({
+  expect(compared(CHOICE, [worth(7, 1), worth(8, 1.5), worth(9, 2)])).toMatchObject({
     other: 9,
     won: -1,
     noteworthy: true,
   });
-  expect(judged(CHOICE, [worth(7, 2), worth(8, 1.5), worth(9, 1)])).toMatchObject({
+  expect(compared(CHOICE, [worth(7, 2), worth(8, 1.5), worth(9, 1)])).toMatchObject({
     other: 8,
     won: 0.5,
     noteworthy: true,
   });
-  expect(judged(CHOICE, [worth(7, 1), worth(8, 1.1)])?.noteworthy).toBe(false);
-  expect(judged(CHOICE, [worth(7, 1, 0.5), worth(8, 2, 0.5)])?.noteworthy).toBe(false);
-  expect(judged(CHOICE, [worth(8, 2)])).toBeUndefined();
-  expect(judged(CHOICE, [worth(7, 2)])).toBeUndefined();
+  expect(compared(CHOICE, [worth(7, 1), worth(8, 1.1)])?.noteworthy).toBe(false);
+  expect(compared(CHOICE, [worth(7, 1, 0.5), worth(8, 2, 0.5)])?.noteworthy).toBe(false);
+  expect(compared(CHOICE, [worth(8, 2)])).toBeUndefined();
+  expect(compared(CHOICE, [worth(7, 2)])).toBeUndefined();
 });
 
 test("the costliest come first, and only what is noteworthy is listed", () => {
   const of = (won: number, noteworthy = true) => ({ ...CHOICE, points: 1, other: 8, won, noteworthy });
-  const judgements = [of(-0.3), of(0.4), of(-0.9), of(-2, false), of(0.7), of(3, false)];
-  expect(costliest(judgements, 1).map(({ won }) => won)).toEqual([-0.9]);
-  expect(costliest(judgements, 9).map(({ won }) => won)).toEqual([-0.9, -0.3]);
-  expect(finest(judgements)?.won).toBe(0.7);
+  const estimated = [of(-0.3), of(0.4), of(-0.9), of(-2, false), of(0.7), of(3, false)];
+  expect(costliest(estimated, 1).map(({ won }) => won)).toEqual([-0.9]);
+  expect(costliest(estimated, 9).map(({ won }) => won)).toEqual([-0.9, -0.3]);
+  expect(finest(estimated)?.won).toBe(0.7);
   expect(finest([of(3, false)])).toBeUndefined();
 });
 
@@ -91,7 +91,9 @@ test("the graph asks while it is open, and its list and its picture lead to the 
   const evaluate = answers((decisions, action) => (decisions === worst?.decisions && action !== worst.taken ? 3 : 1));
   const onGo = vi.fn();
   const table = FILM.at(0).table;
-  await act(() => render(<Graph gameId="g" film={FILM} table={table} decisions={3} onGo={onGo} />, root));
+  await act(() =>
+    render(<Graph gameId="g" film={FILM} table={table} perspective="all" decisions={3} onGo={onGo} />, root),
+  );
   await settle();
   expect(evaluate).not.toHaveBeenCalled();
   await open();
@@ -99,39 +101,93 @@ test("the graph asks while it is open, and its list and its picture lead to the 
   expect(evaluate).toHaveBeenCalledTimes(ALL.length);
   const turning = [...root.querySelectorAll<HTMLElement>('[data-part~="turning-points"] button')];
   expect(turning).toHaveLength(1);
-  expect(turning[0]?.textContent).toMatch(/^Shift 1, .+; .+ was worth 2\.0 points more$/);
+  expect(turning[0]?.textContent).toMatch(/^Shift 1, .+: .+ \(better by 2\.0 points: .+\)$/);
   await act(() => turning[0]?.click());
   expect(onGo).toHaveBeenLastCalledWith(worst?.frame);
   const svg = root.querySelector("svg");
   expect(svg?.querySelectorAll("path[style]")).toHaveLength(table.seats.length);
+  if (svg) svg.getBoundingClientRect = () => new DOMRect(100, 0, 400, 80);
   await act(() => {
-    svg?.dispatchEvent(new MouseEvent("click", { bubbles: true, clientX: 0 }));
+    svg?.dispatchEvent(new MouseEvent("click", { bubbles: true, clientX: 300 }));
   });
-  expect(onGo).toHaveBeenLastCalledWith(0);
+  expect(onGo).toHaveBeenLastCalledWith(FILM.after(Math.round(FILM.decisions / 2)));
 });
 
-test("a decision that cannot be estimated is left out, any other error is said", async () => {
-  const evaluate = answers(() => 1);
-  const good = evaluate.getMockImplementation();
-  const fail = (code: Code) =>
-    (async function* () {
-      yield* [];
-      throw new ConnectError("no", code);
-    })();
-  let calls = 0;
-  evaluate.mockImplementation((...args) => {
-    calls += 1;
-    if (calls === 2) return fail(Code.InvalidArgument);
-    if (calls === 4) return fail(Code.ResourceExhausted);
-    return good?.(...args) ?? fail(Code.Internal);
-  });
+test("from a seat the graph has the decisions of that seat alone", async () => {
+  answers((decisions, action) =>
+    ALL.some((choice) => choice.decisions === decisions && choice.taken === action) ? 1 : 2,
+  );
+  const { table } = FILM.at(0);
   await act(() =>
-    render(<Graph gameId="g" film={FILM} table={FILM.at(0).table} decisions={0} onGo={() => {}} />, root),
+    render(<Graph gameId="g" film={FILM} {...{ table }} perspective={1} decisions={0} onGo={() => {}} />, root),
   );
   await open();
+  await answered();
+  const turning = [...root.querySelectorAll('[data-part~="turning-points"] button')].map(
+    ({ textContent }) => textContent,
+  );
+  expect(turning.length).toBeGreaterThan(1);
+  expect(turning.filter((line) => !line.includes(`, ${table.seats[1]?.name}: `))).toEqual([]);
+});
+
+/** A server that refuses the calls with these numbers, from 1. */
+function refuses(codes: Record<number, ConnectError>) {
+  const evaluate = answers(() => 1);
+  const answer = evaluate.getMockImplementation();
+  let calls = 0;
+  evaluate.mockImplementation(async function* (...args) {
+    calls += 1;
+    const code = codes[calls];
+    if (code) throw code;
+    if (answer) yield* answer(...args);
+  });
+  return evaluate;
+}
+
+const graph = () =>
+  act(() =>
+    render(
+      <Graph gameId="g" film={FILM} table={FILM.at(0).table} perspective="all" decisions={0} onGo={() => {}} />,
+      root,
+    ),
+  );
+
+test("a decision that cannot be estimated is left out, any other error is said and the rest resumed", async () => {
+  const evaluate = refuses({
+    2: new ConnectError("no position", Code.InvalidArgument),
+    4: new ConnectError("no such game", Code.NotFound),
+  });
+  await graph();
+  await open();
   for (let turn = 0; turn < 9 && !root.querySelector('[role="alert"]'); turn += 1) await settle();
-  expect(root.querySelector('[role="alert"]')?.textContent).not.toBe("");
-  expect(calls).toBe(4);
+  expect(root.querySelector('[role="alert"]')?.textContent).toBe("no such game");
+  expect(root.textContent).toContain(`3 of ${ALL.length} decisions estimated`);
+  await act(() => root.querySelector<HTMLElement>('[data-part~="button"]')?.click());
+  await answered();
+  expect(root.querySelector('[role="alert"]')).toBeNull();
+  expect(root.textContent).toContain("No decision clearly cost points.");
+  expect(evaluate).toHaveBeenCalledTimes(ALL.length + 1);
+});
+
+test("a game of which nothing can be estimated is not called one without a mistake", async () => {
+  vi.spyOn(analysisApi, "evaluate").mockImplementation(async function* () {
+    yield* [];
+    throw new ConnectError("hands unknown", Code.InvalidArgument);
+  });
+  await graph();
+  await open();
+  await answered();
+  expect(root.textContent).toContain("The server cannot estimate this game.");
+});
+
+test("what the server may soon answer is asked again", async () => {
+  vi.useFakeTimers({ toFake: ["setTimeout"], shouldAdvanceTime: true, advanceTimeDelta: 500 });
+  const evaluate = refuses({ 2: new ConnectError("away", Code.Unavailable) });
+  const found: unknown[] = [];
+  for await (const choice of estimatedChoices("g", ALL.slice(0, 3), new AbortController().signal)) found.push(choice);
+  vi.useRealTimers();
+  expect(evaluate).toHaveBeenCalledTimes(4);
+  expect(found).not.toContain(undefined);
 });
 
 test("at the end of a game a player asks for the best and the costliest own decision", async () => {
@@ -159,5 +215,5 @@ test("at the end of a game a player asks for the best and the costliest own deci
   expect(links.map((link) => link.getAttribute("href"))).toEqual(
     [best, worst].map((choice) => `/replay/g?decision=${(choice?.decisions ?? 0) + 1}`),
   );
-  expect(root.textContent).toMatch(/Your best decision, in Shift 1: .+, worth 1\.5 points more than .+/);
+  expect(root.textContent).toMatch(/Your best decision, in Shift 1: .+ \(better than .+ by 1\.5 points\)/);
 });
