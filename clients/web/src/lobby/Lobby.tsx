@@ -10,6 +10,7 @@ import { t } from "../i18n";
 import { ButtonLink } from "../parts/Button";
 import { MoreButton } from "../parts/MoreButton";
 import { Notice } from "../parts/Notice";
+import { pathOf } from "../router";
 import { JoinForm } from "./JoinForm";
 import css from "./Lobby.module.css";
 import { QuickGame } from "./QuickGame";
@@ -53,6 +54,7 @@ export function Lobby() {
           <h2>{words.make.title}</h2>
           <p>{words.make.text}</p>
           <ButtonLink href="/new">{words.make.link}</ButtonLink>
+          <a href={pathOf({ page: "studies" })}>{words.make.studies}</a>
         </section>
       </div>
       {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}

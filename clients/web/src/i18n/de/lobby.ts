@@ -119,6 +119,7 @@ export const lobby: Texts["lobby"] = {
     title: "Raum erstellen",
     text: "Wähle, wer spielt, nach welchen Regeln und wie schnell. Lade dann Personen, Roboter, Agenten und Sprachmodelle ein.",
     link: "Raum erstellen…",
+    studies: "Studien mit Teilnehmenden",
     name: "Name des Raums",
     namePlaceholder: "Freitagabend",
     cards: "Karten",

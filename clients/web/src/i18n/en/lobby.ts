@@ -118,6 +118,7 @@ export const lobby = {
     title: "Create a room",
     text: "Choose who plays, by which rules, and how fast. Then invite people, robots, agents and language models.",
     link: "Create a room…",
+    studies: "Studies with participants",
     name: "Name of the room",
     namePlaceholder: "Friday evening",
     cards: "Cards",

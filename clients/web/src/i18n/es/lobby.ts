@@ -119,6 +119,7 @@ export const lobby: Texts["lobby"] = {
     title: "Crear una sala",
     text: "Elige quién juega, con qué reglas y a qué ritmo. Después invita a personas, robots, agentes y modelos de lenguaje.",
     link: "Crear una sala…",
+    studies: "Estudios con participantes",
     name: "Nombre de la sala",
     namePlaceholder: "Viernes por la noche",
     cards: "Cartas",

@@ -119,6 +119,7 @@ export const lobby: Texts["lobby"] = {
     title: "Crea una stanza",
     text: "Scegli chi gioca, con quali regole e a che ritmo. Poi invita persone, robot, agenti e modelli linguistici.",
     link: "Crea una stanza…",
+    studies: "Studi con partecipanti",
     name: "Nome della stanza",
     namePlaceholder: "Venerdì sera",
     cards: "Carte",
