@@ -32,6 +32,11 @@ export interface PageProps<Name extends Route["page"]> {
   route: Extract<Route, { page: Name }>;
 }
 
+/** Whether the address is that of a tournament's wall view, which has no frame: with `?wall`. */
+export function isWall({ page }: Route): boolean {
+  return page === "tournament" && new URLSearchParams(location.search).has("wall");
+}
+
 /** Parses a path such as "/rooms/0123". */
 export function routeOf(path: string): Route {
   const parts = path.split("/").filter((part) => part !== "");

@@ -4,7 +4,7 @@ import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { hidden } from "../hiding";
 import { t } from "../i18n";
-import type { Route } from "../router";
+import { isWall, type Route } from "../router";
 import { Announcer } from "./Announcer";
 import { Drawing } from "./Drawing";
 import css from "./Layout.module.css";
@@ -35,7 +35,7 @@ export function Layout({ here, children }: LayoutProps) {
   );
   useTab(`${pageName(here)} · ${words.name}`);
   return (
-    <div class={css.layout} data-part="layout" data-page={here.page}>
+    <div class={css.layout} data-part="layout" data-page={isWall(here) ? "wall" : here.page}>
       <a class={css.skip} href="#content">
         {words.skipToContent}
       </a>

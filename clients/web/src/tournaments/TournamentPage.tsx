@@ -8,7 +8,7 @@ import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefs
 import { languageOf, t } from "../i18n";
 import { ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
-import { type PageProps, pathOf, readdress } from "../router";
+import { isWall, type PageProps, pathOf, readdress } from "../router";
 import { Bracket } from "./Bracket";
 import { Countdown } from "./Countdown";
 import { Entrants } from "./Entrants";
@@ -47,16 +47,16 @@ export function TournamentPage({ route }: PageProps<"tournament">) {
     };
     return <WhichPlace {...{ held, brought, decide }} />;
   }
-  return followed ? <Followed followed={followed} /> : null;
+  return followed ? <Followed followed={followed} wall={isWall(route)} /> : null;
 }
 
-function Followed({ followed }: { followed: FollowedTournament }) {
+function Followed({ followed, wall }: { followed: FollowedTournament; wall: boolean }) {
   const { live, following } = followed;
   const { link, fault } = following;
   if (link.value === "failed") return <Notice kind="fault">{fault.value && wordsOf(fault.value)}</Notice>;
   if (!live.value) return <p class="soft">{t().common.loading}</p>;
   const lost = link.value === "lost" && <Notice kind="fault">{t().tournaments.part.lost}</Notice>;
-  if (new URLSearchParams(location.search).has("wall")) {
+  if (wall) {
     return (
       <>
         {lost}

@@ -33,7 +33,6 @@ const EVERY_MS = 9_000;
 export function Wall({ live }: { live: LiveTournament }) {
   const { tournament } = live;
   const words = t().tournaments;
-  useWithoutFrame();
   const code = tournament.state === TournamentState.OPEN ? codeFor(tournament.tournamentId) : undefined;
   return (
     <div class={css.wall}>
@@ -147,16 +146,6 @@ function Fitted({ children }: { children: ComponentChildren }) {
       {children}
     </div>
   );
-}
-
-/** Hides the frame of all pages while the wall view is shown. */
-function useWithoutFrame(): void {
-  useEffect(() => {
-    document.documentElement.dataset.wall = "";
-    return () => {
-      delete document.documentElement.dataset.wall;
-    };
-  }, []);
 }
 
 /** Splits a list into parts of about equal length, none longer than `most`. */
