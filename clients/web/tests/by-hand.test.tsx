@@ -16,10 +16,11 @@ import {
   ReplaceParticipantResponseSchema,
   ResumeTournamentResponseSchema,
 } from "../src/gen/chefshat/v1/tournament_service_pb";
+import { t } from "../src/i18n";
+import { WhichOne } from "../src/lobby/WhichOne";
 import { forgetAll, remember } from "../src/store";
 import { ManageGames, ManageParticipants, Pause } from "../src/tournaments/ByHand";
 import { hostedTournament, placeLinks, removeParticipant, replaceByPerson } from "../src/tournaments/hosting";
-import { WhichPlace } from "../src/tournaments/OwnPlace";
 import { root, settle } from "./mounted";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
@@ -108,7 +109,7 @@ test("a device asks which of two places it shall have", async () => {
   const decide = vi.fn();
   const held = { ticket: TICKET, participant: 0, name: "Ada" };
   const brought = { ticket: "ef".repeat(48), participant: 1, name: "Bo" };
-  await act(() => render(<WhichPlace {...{ held, brought, decide }} />, root));
+  await act(() => render(<WhichOne {...{ held, brought, decide }} words={t().tournaments.part.which} />, root));
   expect(root.textContent).toContain("this device loses the place of Ada");
   await press("Continue as Ada");
   await press("Take part as Bo");

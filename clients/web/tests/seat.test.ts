@@ -3,7 +3,16 @@
 
 import { beforeEach, expect, test } from "vitest";
 import { codeIn } from "../src/lobby/JoinForm";
-import { giveUpSeat, heldSeat, hostedRoom, roomOfCode } from "../src/lobby/seat";
+import {
+  decideSeat,
+  giveUpSeat,
+  type HeldSeat,
+  heldSeat,
+  hostedRoom,
+  linkToSeat,
+  roomOfCode,
+  seatFromLink,
+} from "../src/lobby/seat";
 import { forgetAll, remember, remembered } from "../src/store";
 
 beforeEach(forgetAll);
@@ -22,6 +31,43 @@ test("a seat is stored until it is given up", () => {
   expect(heldSeat("room1")).toBeNull();
   expect(roomOfCode("BCDF2345")).toBeNull();
 });
+
+const BO: HeldSeat = { ticket: "ab".repeat(48), seat: 3, name: "Bo & Çem" };
+const open = (held: HeldSeat) => {
+  const { pathname, hash } = new URL(linkToSeat("room1", held));
+  expect(pathname).toBe("/rooms/room1");
+  history.replaceState(null, "", pathname + hash);
+};
+
+test("a link brings a seat to another device and leaves the address", () => {
+  open(BO);
+  expect(seatFromLink("room1")).toBeNull();
+  expect(heldSeat("room1")).toEqual(BO);
+  expect(location.hash).toBe("");
+});
+
+test.each([
+  ["stays without an answer", undefined, HELD, true],
+  ["stays if the person wants it to", null, HELD, false],
+  ["is replaced if the person wants it to be", BO, BO, false],
+] as const)("the seat that this device already has %s", (_, chosen, expected, stillInAddress) => {
+  open(HELD);
+  seatFromLink("room1");
+  open(BO);
+  expect(seatFromLink("room1")).toEqual(BO);
+  if (chosen !== undefined) decideSeat("room1", chosen);
+  expect(heldSeat("room1")).toEqual(expected);
+  expect(location.hash !== "").toBe(stillInAddress);
+});
+
+test.each(["", "#seat=", "#seat=%5B1%5D", "#seat=%", "#place=%5B%22a%22%2C1%2C%22b%22%5D"])(
+  "a link without a seat brings none: %s",
+  (hash) => {
+    history.replaceState(null, "", `/rooms/room1${hash}`);
+    expect(seatFromLink("room1")).toBeNull();
+    expect(heldSeat("room1")).toBeNull();
+  },
+);
 
 test.each(["", "null", "3", "[]", "{", '{"ticket":1}'])("%j is neither a seat nor a room", (kept) => {
   remember("seat.room1", kept);

@@ -10,7 +10,9 @@ import { Again } from "../lobby/Again";
 import { Doorway } from "../lobby/Doorway";
 import { HostInvite } from "../lobby/HostInvite";
 import { LeaveButton, LeaveDialog } from "../lobby/Leaving";
-import { giveUpSeat, heldSeat } from "../lobby/seat";
+import { MoveToDevice } from "../lobby/MoveToDevice";
+import { decideSeat, giveUpSeat, type HeldSeat, heldSeat, linkToSeat, seatFromLink } from "../lobby/seat";
+import { WhichOne } from "../lobby/WhichOne";
 import { Button } from "../parts/Button";
 import { ErrorPage } from "../parts/ErrorPage";
 import { Notice } from "../parts/Notice";
@@ -23,6 +25,18 @@ import { type Session, startSession } from "./session";
 /** The page. */
 export function RoomPage({ route }: PageProps<"room">) {
   const { roomId } = route;
+  const [brought, setBrought] = useState(() => seatFromLink(roomId));
+  const held = brought && heldSeat(roomId);
+  if (!held) return <RoomView roomId={roomId} />;
+  const decide = (chosen: HeldSeat | null) => {
+    decideSeat(roomId, chosen);
+    setBrought(null);
+  };
+  return <WhichOne {...{ held, brought, decide }} words={t().lobby.moving.which} />;
+}
+
+/** The room, once it is known which seat of it this device has. */
+function RoomView({ roomId }: { roomId: string }) {
   const [table, setTable] = useState<TableState | undefined>(undefined);
   const [session, setSession] = useState<Session | undefined>(undefined);
   const [ticket, setTicket] = useState("");
@@ -92,6 +106,8 @@ function Held({ session }: { session: Session }) {
   );
   const waiting = table.phase === "waiting";
   const others = table.seats.some((seat) => isTaken(seat) && seat.seat !== own && seat.builtIn === "");
+  const held = heldSeat(roomId);
+  const move = (look: "tool" | "button") => held && <MoveToDevice address={linkToSeat(roomId, held)} look={look} />;
   const leave = <LeaveButton roomId={roomId} look={waiting ? "button" : "tool"} onClick={() => setLeaving(true)} />;
   return (
     <>
@@ -109,7 +125,14 @@ function Held({ session }: { session: Session }) {
       <Seated
         acting={session}
         banner={banner}
-        tools={!isOver(table) && leave}
+        tools={
+          !isOver(table) && (
+            <>
+              {move("tool")}
+              {leave}
+            </>
+          )
+        }
         onward={
           <>
             <Highlights table={table} own={own} />
@@ -119,6 +142,7 @@ function Held({ session }: { session: Session }) {
         below={
           <>
             <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />
+            {move("button")}
             {leave}
           </>
         }

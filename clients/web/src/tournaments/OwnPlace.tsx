@@ -1,9 +1,9 @@
 // What a participant can do about its own place: postpone a game that is due, leave the tournament,
-// and choose between the place of this device and another one that a link brings.
+// and play on another device.
 
 import { type TournamentGame, TournamentGameState, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
-import joinCss from "../lobby/Join.module.css";
+import { MoveToDevice } from "../lobby/MoveToDevice";
 import { useAttempt } from "../parts/attempt";
 import { Button } from "../parts/Button";
 import { ConfirmButton } from "../parts/ConfirmButton";
@@ -11,7 +11,7 @@ import { Notice } from "../parts/Notice";
 import css from "./ByHand.module.css";
 import type { LiveTournament } from "./following";
 import { useGames } from "./following";
-import { forgetPlace, type HeldPlace, leaveTournament, postponeOwnGame } from "./place";
+import { forgetPlace, type HeldPlace, leaveTournament, linkToPlace, postponeOwnGame } from "./place";
 import { seatOf } from "./structure";
 
 interface OwnPlaceProps {
@@ -35,6 +35,7 @@ export function OwnPlace({ held, live, onLeft }: OwnPlaceProps) {
   return (
     <div class={css.row} data-part="own-place">
       {!open && <Postpone held={held} live={live} />}
+      <MoveToDevice address={linkToPlace(tournamentId, held)} look="button" />
       <ConfirmButton label={words.leave} confirm={words.leaveDo} act={leave}>
         {open ? words.leaveOpen : words.leavePlaying}
       </ConfirmButton>
@@ -57,29 +58,6 @@ function Postpone({ held, live }: Omit<OwnPlaceProps, "onLeft">) {
       </Button>
       {fault && <Notice kind="fault">{fault}</Notice>}
     </>
-  );
-}
-
-interface WhichPlaceProps {
-  held: HeldPlace;
-  brought: HeldPlace;
-  /** The place from the link, or null to stay with the own one. */
-  decide: (chosen: HeldPlace | null) => void;
-}
-
-/** Asks which place to use when a link brings one to a device that already has another. */
-export function WhichPlace({ held, brought, decide }: WhichPlaceProps) {
-  const words = t().tournaments.part.which;
-  return (
-    <section class={`sheet ${joinCss.page}`} data-part="which-place">
-      <h1>{words.title}</h1>
-      <p>{words.text(held.name, brought.name)}</p>
-      <p class="soft">{words.lost(held.name)}</p>
-      <Button look="main" onClick={() => decide(null)}>
-        {words.stay(held.name)}
-      </Button>
-      <Button onClick={() => decide(brought)}>{words.take(brought.name)}</Button>
-    </section>
   );
 }
 

@@ -6,6 +6,7 @@ import { useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
 import { type Tournament, TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { languageOf, t } from "../i18n";
+import { WhichOne } from "../lobby/WhichOne";
 import { ButtonLink } from "../parts/Button";
 import { Notice } from "../parts/Notice";
 import { isWall, type PageProps, pathOf, readdress } from "../router";
@@ -23,7 +24,6 @@ import {
 import { hostedTournament } from "./hosting";
 import { JoinTournament } from "./JoinTournament";
 import { Organiser } from "./Organiser";
-import { WhichPlace } from "./OwnPlace";
 import { Participation } from "./Participation";
 import { decidePlace, type HeldPlace, heldPlace, placeFromLink } from "./place";
 import { Rounds } from "./Rounds";
@@ -45,7 +45,7 @@ export function TournamentPage({ route }: PageProps<"tournament">) {
       decidePlace(tournamentId, chosen);
       setBrought(null);
     };
-    return <WhichPlace {...{ held, brought, decide }} />;
+    return <WhichOne {...{ held, brought, decide }} words={t().tournaments.part.which} />;
   }
   return followed ? <Followed followed={followed} wall={isWall(route)} /> : null;
 }

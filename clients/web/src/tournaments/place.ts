@@ -4,6 +4,7 @@
 import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
 import { keepSecret } from "../api/secrets";
 import { ParticipantKind, Visibility } from "../gen/chefshat/v1/room_pb";
+import { broughtBy, linkBringing } from "../lobby/bringing";
 import { canonical } from "../lobby/seat";
 import { nameKey } from "../name-key";
 import { pathOf, readdress } from "../router";
@@ -44,16 +45,12 @@ export async function postponeOwnGame(tournamentId: string, { ticket }: HeldPlac
   await tournamentApi.postponeGame({ tournamentId, ticket, game }, { timeoutMs: CALL_LIMIT_MS });
 }
 
-/** The parts of an address that bring a place; see `placeFromLink`. */
-const MARK = "place=";
+/** The kind of what a link brings. */
+const KIND = "place";
 
-/**
- * The address that brings a place to another device. The place comes after "#", which browsers send
- * to no server.
- */
+/** The address that brings a place to another device. */
 export function linkToPlace(tournamentId: string, { ticket, participant, name }: HeldPlace): string {
-  const place = encodeURIComponent(JSON.stringify([ticket, participant, name]));
-  return `${location.origin}${pathOf({ page: "tournament", tournamentId })}#${MARK}${place}`;
+  return linkBringing(pathOf({ page: "tournament", tournamentId }), KIND, [ticket, participant, name]);
 }
 
 /**
@@ -62,12 +59,9 @@ export function linkToPlace(tournamentId: string, { ticket, participant, name }:
  * would lose the other.
  */
 export function placeFromLink(tournamentId: string): HeldPlace | null {
-  const [given] = location.hash
-    .replace(/^#/, "")
-    .split("&")
-    .filter((part) => part.startsWith(MARK));
-  if (!given) return null;
-  const brought = parsed(given.slice(MARK.length));
+  const given = broughtBy(KIND);
+  if (given === undefined) return null;
+  const brought = given && { ticket: given[0], participant: given[1], name: given[2] };
   const held = heldPlace(tournamentId);
   if (brought && held && held.ticket !== brought.ticket) return brought;
   decidePlace(tournamentId, brought);
@@ -81,16 +75,6 @@ export function decidePlace(tournamentId: string, chosen: HeldPlace | null): voi
   remember(`tournament.${tournamentId}`, JSON.stringify(chosen));
   // Whether it is needed is not known yet.
   keepSecret(chosen.ticket, { visibility: Visibility.PRIVATE });
-}
-
-/** The place in a link; null if the link was cut. */
-function parsed(text: string): HeldPlace | null {
-  try {
-    const [ticket, participant, name]: unknown[] = JSON.parse(decodeURIComponent(text));
-    return asPlace({ ticket, participant, name });
-  } catch {
-    return null;
-  }
 }
 
 /** Joins as a person; `key` is that of the name. Returns the tournament's id. */

@@ -4,7 +4,7 @@
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { Visibility } from "../../src/gen/chefshat/v1/room_pb";
-import { sitDown } from "./play";
+import { byClicks, nextDecision, sitDown } from "./play";
 import { clientsOf, newRoom } from "./rooms";
 import { browser, person, server, useStage } from "./stage";
 
@@ -38,6 +38,29 @@ test("a room is created, and a guest with its invitation takes the seat reserved
   const seat = host.page.getByRole("listitem").filter({ hasText: "Rosa" });
   await seat.getByText("person", { exact: true }).waitFor();
   expect([...host.faults, ...guest.faults]).toEqual([]);
+});
+
+test("a seat moves to another device, and back", async () => {
+  const { code } = await newRoom(server, { seats: ["person", "greedy", "random", "greedy"] });
+  const laptop = await person(browser);
+  const phone = await person(browser, { viewport: { width: 390, height: 844 } });
+  await sitDown(laptop.page, server, code, "Rosa");
+  const decision = await nextDecision(laptop.page);
+  await laptop.page.getByRole("button", { name: "Play on another device…" }).click();
+  await laptop.page.getByRole("img", { name: "QR code of the link" }).waitFor();
+  const link = await laptop.page.locator('[data-part~="invite-link"]').textContent();
+  await laptop.page.keyboard.press("Escape");
+
+  await phone.page.goto(link ?? "");
+  expect(await nextDecision(phone.page)).toBe(decision);
+  expect(new URL(phone.page.url()).hash).toBe("");
+  await laptop.page.getByText("This seat is in use in another window or on another device.").waitFor();
+  await byClicks(phone.page);
+  const later = await nextDecision(phone.page, decision);
+  await laptop.page.getByRole("button", { name: "Play here" }).click();
+  expect(await nextDecision(laptop.page, decision)).toBe(later);
+  await phone.page.getByText("This seat is in use in another window or on another device.").waitFor();
+  expect([...laptop.faults, ...phone.faults]).toEqual([]);
 });
 
 test("the link to the content leaves the page and what was typed as they are", async () => {

@@ -86,6 +86,21 @@ export const lobby: Texts["lobby"] = {
     closePlaying: "Die Partie endet für alle, ohne Ergebnis.",
     aborted: "Die Partie endete ohne Ergebnis.",
   },
+  moving: {
+    title: "Auf einem anderen Gerät spielen…",
+    text: "Scanne diesen Code mit dem anderen Gerät oder öffne dort den Link: Dann spielt es für dich, und dieses kann wieder übernehmen. Zeig ihn niemandem: Wer ihn hat, kann für dich spielen.",
+    link: "Link",
+    qr: "QR-Code des Links",
+    which: {
+      title: "Welchen Platz möchtest du verwenden?",
+      text: (held, brought) =>
+        `Auf diesem Gerät spielt schon ${held} an diesem Tisch. Der Link bringt den Platz von ${brought}.`,
+      lost: (held) =>
+        `Ein Gerät spielt an einem Tisch für eine Person. Wenn du den Link hier verwendest, verliert dieses Gerät den Platz von ${held}.`,
+      stay: (held) => `Als ${held} weitermachen`,
+      take: (brought) => `Als ${brought} spielen`,
+    },
+  },
   leaving: {
     leave: "Gehen…",
     leaveOrClose: "Gehen oder Raum schließen…",

@@ -307,7 +307,7 @@ export const table: Texts["table"] = {
   link: {
     connecting: "Verbindung wird hergestellt…",
     lost: "Verbindung verloren. Wird wiederhergestellt…",
-    superseded: "Dieser Platz wird in einem anderen Fenster benutzt.",
+    superseded: "Dieser Platz wird in einem anderen Fenster oder auf einem anderen Gerät benutzt.",
     takeBack: "Hier spielen",
     substituted: "Du warst weg: Ein eingebauter Agent spielt für dich.",
     resume: "Ich bin wieder da",

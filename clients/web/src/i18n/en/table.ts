@@ -302,7 +302,7 @@ export const table = {
   link: {
     connecting: "Connecting…",
     lost: "Connection lost. Reconnecting…",
-    superseded: "This seat is in use in another window.",
+    superseded: "This seat is in use in another window or on another device.",
     takeBack: "Play here",
     substituted: "You were away: a built-in agent plays for you.",
     resume: "I am back",

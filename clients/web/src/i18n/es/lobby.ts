@@ -86,6 +86,21 @@ export const lobby: Texts["lobby"] = {
     closePlaying: "La partida termina para todos, sin resultado.",
     aborted: "La partida terminó sin resultado.",
   },
+  moving: {
+    title: "Jugar en otro dispositivo…",
+    text: "Escanea este código con el otro dispositivo o abre allí el enlace: entonces juega por ti, y este puede retomar el asiento. No lo enseñes a nadie: quien lo tenga puede jugar por ti.",
+    link: "Enlace",
+    qr: "Código QR del enlace",
+    which: {
+      title: "¿Qué asiento quieres usar?",
+      text: (held, brought) =>
+        `En este dispositivo, ${held} ya juega en esta mesa. El enlace trae el asiento de ${brought}.`,
+      lost: (held) =>
+        `Un dispositivo juega en una mesa por una sola persona. Si usas el enlace aquí, este dispositivo pierde el asiento de ${held}.`,
+      stay: (held) => `Continuar como ${held}`,
+      take: (brought) => `Jugar como ${brought}`,
+    },
+  },
   leaving: {
     leave: "Irse…",
     leaveOrClose: "Irse o cerrar la sala…",

@@ -307,7 +307,7 @@ export const table: Texts["table"] = {
   link: {
     connecting: "Conectando…",
     lost: "Conexión perdida. Reconectando…",
-    superseded: "Este asiento se está usando en otra ventana.",
+    superseded: "Este asiento se está usando en otra ventana o en otro dispositivo.",
     takeBack: "Jugar aquí",
     substituted: "No estabas: un agente integrado juega por ti.",
     resume: "Ya estoy aquí",

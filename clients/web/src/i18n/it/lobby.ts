@@ -86,6 +86,21 @@ export const lobby: Texts["lobby"] = {
     closePlaying: "La partita finisce per tutti, senza risultato.",
     aborted: "La partita è finita senza risultato.",
   },
+  moving: {
+    title: "Gioca su un altro dispositivo…",
+    text: "Scansiona questo codice con l’altro dispositivo o apri lì il link: allora gioca per te, e questo può riprendere il posto. Non mostrarlo a nessuno: chi lo ha può giocare per te.",
+    link: "Link",
+    qr: "Codice QR del link",
+    which: {
+      title: "Quale posto vuoi usare?",
+      text: (held, brought) =>
+        `Su questo dispositivo ${held} gioca già a questo tavolo. Il link porta il posto di ${brought}.`,
+      lost: (held) =>
+        `Un dispositivo gioca a un tavolo per una sola persona. Se usi il link qui, questo dispositivo perde il posto di ${held}.`,
+      stay: (held) => `Continua come ${held}`,
+      take: (brought) => `Gioca come ${brought}`,
+    },
+  },
   leaving: {
     leave: "Lascia…",
     leaveOrClose: "Lascia o chiudi la stanza…",

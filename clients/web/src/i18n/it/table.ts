@@ -309,7 +309,7 @@ export const table: Texts["table"] = {
   link: {
     connecting: "Connessione…",
     lost: "Connessione persa. Riconnessione…",
-    superseded: "Questo posto è in uso in un’altra finestra.",
+    superseded: "Questo posto è in uso in un’altra finestra o su un altro dispositivo.",
     takeBack: "Gioca qui",
     substituted: "Non c’eri: un agente integrato gioca al tuo posto.",
     resume: "Eccomi",

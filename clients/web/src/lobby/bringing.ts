@@ -1,0 +1,31 @@
+// Links that bring a seat or a place to another device. What they bring comes after "#", which
+// browsers send to no server.
+
+/** A ticket, the number of the seat or participant, and its name. */
+export type Brought = readonly [ticket: string, number: number, name: string];
+
+/** The address at a path of this page that brings something, under a name for its kind. */
+export function linkBringing(path: string, kind: string, brought: Brought): string {
+  return `${location.origin}${path}#${kind}=${encodeURIComponent(JSON.stringify(brought))}`;
+}
+
+/** What the address brings; null if the link was cut, undefined if it brings nothing of this kind. */
+export function broughtBy(kind: string): Brought | null | undefined {
+  const mark = `${kind}=`;
+  const [given] = location.hash
+    .replace(/^#/, "")
+    .split("&")
+    .filter((part) => part.startsWith(mark));
+  return given ? parsed(given.slice(mark.length)) : undefined;
+}
+
+function parsed(text: string): Brought | null {
+  try {
+    const [ticket, number, name]: unknown[] = JSON.parse(decodeURIComponent(text));
+    return typeof ticket === "string" && typeof number === "number" && typeof name === "string"
+      ? [ticket, number, name]
+      : null;
+  } catch {
+    return null;
+  }
+}
