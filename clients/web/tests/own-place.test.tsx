@@ -37,8 +37,8 @@ afterEach(() => {
   vi.restoreAllMocks();
 });
 
-const BO: HeldPlace = { ticket: "ab".repeat(48), participant: 3, name: "Bo & Çem" };
-const ADA: HeldPlace = { ticket: "cd".repeat(48), participant: 1, name: "Ada" };
+const BO: HeldPlace = { ticket: `${ID}${"ab".repeat(32)}`, participant: 3, name: "Bo & Çem" };
+const ADA: HeldPlace = { ticket: `${ID}${"cd".repeat(32)}`, participant: 1, name: "Ada" };
 const open = (held: HeldPlace) => {
   const { pathname, hash } = new URL(linkToPlace(ID, held));
   history.replaceState(null, "", pathname + hash);

@@ -4,8 +4,12 @@ import { render } from "preact";
 import { act } from "preact/test-utils";
 import { expect, test } from "vitest";
 import { tableOf } from "../src/attend/words";
+import { DecisionKind } from "../src/gen/chefshat/v1/decision_pb";
+import { actionOf } from "../src/table/model/actions";
+import type { OpenDecision } from "../src/table/model/live";
 import type { TableState } from "../src/table/model/state";
 import { Result } from "../src/table/view/Result";
+import { TableView } from "../src/table/view/TableView";
 import { root } from "./mounted";
 import { DEALT, stateOf } from "./table-state";
 
@@ -53,6 +57,18 @@ test("a player's action closes it for good", async () => {
   expect(shown()).toBeUndefined();
   await show({ ...NEXT, results: [{ ...shift(1), order: [0, 2, 1, 3] }] }, 0, PLAYING);
   expect(shown()).toBe("Shift 1");
+});
+
+test("who leads the Shift closes it by the first card picked", async () => {
+  const hand = [{ kind: "face" as const, face: 11 }];
+  const seats = ENDED.seats.map((seat) => (seat.seat === 0 ? { ...seat, hand, cardsLeft: 1 } : seat));
+  const legal = [actionOf({ kind: "play", face: 11, quantity: 1, jokers: 0 }, 11)];
+  const decision = { id: 7n, kind: DecisionKind.TURN, hand, legal, requirement: undefined } as unknown as OpenDecision;
+  const dealt: TableState = { ...ENDED, faces: 11, phase: "dealt", seats };
+  await act(() => render(<TableView table={dealt} own={0} decision={decision} onAnswer={() => {}} />, root));
+  expect(root.querySelector('[data-part~="result"] h2')?.textContent).toBe("Shift 1");
+  await act(() => root.querySelector<HTMLElement>('[data-part~="hand-card"]')?.click());
+  expect(root.querySelector('[data-part~="result"] h2')).toBeNull();
 });
 
 test("what ended while the reader was away is not shown during the next Shift", async () => {

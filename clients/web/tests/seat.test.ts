@@ -17,32 +17,33 @@ import { forgetAll, remember, remembered } from "../src/store";
 
 beforeEach(forgetAll);
 
-const HELD = { ticket: "secret", seat: 2, name: "Rosa" };
+const ROOM = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
+const HELD = { ticket: `${ROOM}${"cd".repeat(32)}`, seat: 2, name: "Rosa" };
 
 test("a seat is stored until it is given up", () => {
-  remember("seat.room1", JSON.stringify(HELD));
-  remember("code.BCDF2345", "room1");
-  expect(heldSeat("room1")).toEqual(HELD);
+  remember(`seat.${ROOM}`, JSON.stringify(HELD));
+  remember("code.BCDF2345", ROOM);
+  expect(heldSeat(ROOM)).toEqual(HELD);
   expect(heldSeat("room2")).toBeNull();
-  expect(roomOfCode("bcdf-2345")).toBe("room1");
+  expect(roomOfCode("bcdf-2345")).toBe(ROOM);
   remember("code.OTHER234", "room2");
-  giveUpSeat("room1");
+  giveUpSeat(ROOM);
   expect([...remembered().keys()]).toEqual(["code.OTHER234"]);
-  expect(heldSeat("room1")).toBeNull();
+  expect(heldSeat(ROOM)).toBeNull();
   expect(roomOfCode("BCDF2345")).toBeNull();
 });
 
-const BO: HeldSeat = { ticket: "ab".repeat(48), seat: 3, name: "Bo & Çem" };
+const BO: HeldSeat = { ticket: `${ROOM}${"ab".repeat(32)}`, seat: 3, name: "Bo & Çem" };
 const open = (held: HeldSeat) => {
-  const { pathname, hash } = new URL(linkToSeat("room1", held));
-  expect(pathname).toBe("/rooms/room1");
+  const { pathname, hash } = new URL(linkToSeat(ROOM, held));
+  expect(pathname).toBe(`/rooms/${ROOM}`);
   history.replaceState(null, "", pathname + hash);
 };
 
 test("a link brings a seat to another device and leaves the address", () => {
   open(BO);
-  expect(seatFromLink("room1")).toBeNull();
-  expect(heldSeat("room1")).toEqual(BO);
+  expect(seatFromLink(ROOM)).toBeNull();
+  expect(heldSeat(ROOM)).toEqual(BO);
   expect(location.hash).toBe("");
 });
 
@@ -52,28 +53,36 @@ test.each([
   ["is replaced if the person wants it to be", BO, BO, false],
 ] as const)("the seat that this device already has %s", (_, chosen, expected, stillInAddress) => {
   open(HELD);
-  seatFromLink("room1");
+  seatFromLink(ROOM);
   open(BO);
-  expect(seatFromLink("room1")).toEqual(BO);
-  if (chosen !== undefined) decideSeat("room1", chosen);
-  expect(heldSeat("room1")).toEqual(expected);
+  expect(seatFromLink(ROOM)).toEqual(BO);
+  if (chosen !== undefined) decideSeat(ROOM, chosen);
+  expect(heldSeat(ROOM)).toEqual(expected);
   expect(location.hash !== "").toBe(stillInAddress);
 });
 
-test.each(["", "#seat=", "#seat=%5B1%5D", "#seat=%", "#place=%5B%22a%22%2C1%2C%22b%22%5D"])(
-  "a link without a seat brings none: %s",
-  (hash) => {
-    history.replaceState(null, "", `/rooms/room1${hash}`);
-    expect(seatFromLink("room1")).toBeNull();
-    expect(heldSeat("room1")).toBeNull();
-  },
-);
+const bringing = (...brought: unknown[]) => `#seat=${encodeURIComponent(JSON.stringify(brought))}`;
+
+test.each([
+  "",
+  "#seat=",
+  "#seat=%5B1%5D",
+  "#seat=%",
+  bringing(...Object.values(BO)).replace("seat", "place"),
+  bringing("x", 0, "Ada"),
+  bringing("ab".repeat(48), 0, "of another room"),
+  bringing(BO.ticket, "0", "Ada"),
+])("a link without a seat brings none: %s", (hash) => {
+  history.replaceState(null, "", `/rooms/${ROOM}${hash}`);
+  expect(seatFromLink(ROOM)).toBeNull();
+  expect(heldSeat(ROOM)).toBeNull();
+});
 
 test.each(["", "null", "3", "[]", "{", '{"ticket":1}'])("%j is neither a seat nor a room", (kept) => {
-  remember("seat.room1", kept);
-  remember("hosted.room1", kept);
-  expect(heldSeat("room1")).toBeNull();
-  expect(hostedRoom("room1")).toBeNull();
+  remember(`seat.${ROOM}`, kept);
+  remember(`hosted.${ROOM}`, kept);
+  expect(heldSeat(ROOM)).toBeNull();
+  expect(hostedRoom(ROOM)).toBeNull();
 });
 
 test.each([

@@ -77,6 +77,6 @@ function kept(): Kept[] {
 }
 
 /** Whether a value may be a secret: the server refuses anything else. */
-function isSecret(value: unknown): value is string {
+export function isSecret(value: unknown): value is string {
   return typeof value === "string" && /^[0-9a-f]{96}$/.test(value);
 }

@@ -1,6 +1,8 @@
 // Links that bring a seat or a place to another device. What they bring comes after "#", which
 // browsers send to no server.
 
+import { isSecret } from "../api/secrets";
+
 /** A ticket, the number of the seat or participant, and its name. */
 export type Brought = readonly [ticket: string, number: number, name: string];
 
@@ -9,22 +11,25 @@ export function linkBringing(path: string, kind: string, brought: Brought): stri
   return `${location.origin}${path}#${kind}=${encodeURIComponent(JSON.stringify(brought))}`;
 }
 
-/** What the address brings; null if the link was cut, undefined if it brings nothing of this kind. */
-export function broughtBy(kind: string): Brought | null | undefined {
+/**
+ * What the address brings for a room or tournament; null if the link was cut or is another's,
+ * undefined if it brings nothing of this kind.
+ */
+export function broughtBy(kind: string, id: string): Brought | null | undefined {
   const mark = `${kind}=`;
   const [given] = location.hash
     .replace(/^#/, "")
     .split("&")
     .filter((part) => part.startsWith(mark));
-  return given ? parsed(given.slice(mark.length)) : undefined;
+  return given ? parsed(given.slice(mark.length), id) : undefined;
 }
 
-function parsed(text: string): Brought | null {
+function parsed(text: string, id: string): Brought | null {
   try {
     const [ticket, number, name]: unknown[] = JSON.parse(decodeURIComponent(text));
-    return typeof ticket === "string" && typeof number === "number" && typeof name === "string"
-      ? [ticket, number, name]
-      : null;
+    // A ticket begins with the id of its room or tournament.
+    if (!isSecret(ticket) || !ticket.startsWith(id)) return null;
+    return Number.isInteger(number) && typeof name === "string" ? [ticket, Number(number), name] : null;
   } catch {
     return null;
   }

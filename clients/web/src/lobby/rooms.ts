@@ -12,6 +12,7 @@ import {
   Visibility,
 } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
+import { giveUpSeat } from "./seat";
 
 /** Requests the rooms in a state, newest first. Aborted rooms are left out. */
 export function roomsIn(state: RoomState): AskPage<Room> {
@@ -32,7 +33,9 @@ export async function openRooms(roomIds: readonly string[], signal: AbortSignal)
       if (room?.state === RoomState.WAITING || room?.state === RoomState.PLAYING) return [room];
       over.add(roomId);
     } catch (error) {
-      if (faultOf(error).reason === "ROOM_UNKNOWN") over.add(roomId);
+      if (faultOf(error).reason !== "ROOM_UNKNOWN") return [];
+      over.add(roomId);
+      giveUpSeat(roomId);
     }
     return [];
   };

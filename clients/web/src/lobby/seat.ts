@@ -61,7 +61,7 @@ export function linkToSeat(roomId: string, { ticket, seat, name }: HeldSeat): st
  * is returned instead, and stays in the address until `decideSeat`: taking it would lose the other.
  */
 export function seatFromLink(roomId: string): HeldSeat | null {
-  const given = broughtBy(KIND);
+  const given = broughtBy(KIND, roomId);
   if (given === undefined) return null;
   const brought = given && { ticket: given[0], seat: given[1], name: given[2] };
   const held = heldSeat(roomId);

@@ -74,7 +74,9 @@ export function Graph({ gameId, film, table, perspective, decisions, onGo }: Gra
           </ol>
         </>
       )}
-      {done && turning.length === 0 && <p class="soft">{estimated.length > 0 ? words.none : words.unknown}</p>}
+      {done && turning.length === 0 && (
+        <p class="soft">{asked.length > 0 && estimates.estimated.length === 0 ? words.unknown : words.none}</p>
+      )}
     </details>
   );
 }

@@ -42,12 +42,12 @@ function Found({ gameId, own, faces }: { gameId: string; own: number; faces: num
   return (
     <section ref={section} class={css.highlights} data-part="highlights" tabIndex={-1} aria-label={words.ask}>
       {fault && <p role="alert">{fault}</p>}
-      {!fault && !done && <EstimatingProgress estimates={estimates} all={asked.length} />}
+      {film && !done && <EstimatingProgress estimates={estimates} all={asked.length} />}
       {done && (
         <ul>
           {best && line(best, words.best(best.shift))}
           {worst && line(worst, words.worst(worst.shift))}
-          {!best && !worst && <li>{words.none}</li>}
+          {!best && !worst && <li>{estimates.estimated.length > 0 ? words.none : t().replay.graph.unknown}</li>}
         </ul>
       )}
     </section>

@@ -10,7 +10,7 @@ import { Again } from "../lobby/Again";
 import { Doorway } from "../lobby/Doorway";
 import { HostInvite } from "../lobby/HostInvite";
 import { LeaveButton, LeaveDialog } from "../lobby/Leaving";
-import { MoveToDevice } from "../lobby/MoveToDevice";
+import { MoveButton, MoveDialog } from "../lobby/MoveToDevice";
 import { decideSeat, giveUpSeat, type HeldSeat, heldSeat, linkToSeat, seatFromLink } from "../lobby/seat";
 import { WhichOne } from "../lobby/WhichOne";
 import { Button } from "../parts/Button";
@@ -39,23 +39,24 @@ export function RoomPage({ route }: PageProps<"room">) {
 function RoomView({ roomId }: { roomId: string }) {
   const [table, setTable] = useState<TableState | undefined>(undefined);
   const [session, setSession] = useState<Session | undefined>(undefined);
-  const [ticket, setTicket] = useState("");
+  const [held, setHeld] = useState<HeldSeat | null>(null);
   const [fault, setFault] = useState("");
   const ended = useRef<TableState | undefined>(undefined);
 
   useEffect(() => {
     let left = false;
     let started: Session | undefined;
+    let held: HeldSeat | null = null;
     const load = async () => {
       try {
         const { room } = await roomApi.getRoom({ roomId }, { timeoutMs: CALL_LIMIT_MS });
         if (left || !room) return;
         const table = tableFromRoom(room);
-        const held = heldSeat(roomId);
+        held = heldSeat(roomId);
         started = held ? startSession(held, table) : undefined;
         setTable(table);
         setSession(started);
-        setTicket(held?.ticket ?? "");
+        setHeld(held);
       } catch (thrown) {
         const fault = faultOf(thrown);
         if (fault.reason === "ROOM_UNKNOWN") giveUpSeat(roomId);
@@ -67,7 +68,8 @@ function RoomView({ roomId }: { roomId: string }) {
     return () => {
       left = true;
       started?.stop();
-      if (ended.current?.roomId === roomId) giveUpSeat(roomId);
+      // Unless a link has brought another seat since.
+      if (ended.current?.roomId === roomId && heldSeat(roomId)?.ticket === held?.ticket) giveUpSeat(roomId);
     };
   }, [roomId]);
 
@@ -83,21 +85,22 @@ function RoomView({ roomId }: { roomId: string }) {
     // The seat was given up, here or in another tab, or went to others while this page was away:
     // show the room from outside. Delete the stored seat unless another tab has taken a new one
     // since.
-    if (session && heldSeat(roomId)?.ticket === ticket) giveUpSeat(roomId);
+    if (session && heldSeat(roomId)?.ticket === held?.ticket) giveUpSeat(roomId);
     session?.stop();
     setSession(undefined);
   }, [vacated]);
 
   if (fault) return <ErrorPage title={t().table.title} words={fault} />;
   if (!table) return <p class="soft">{t().common.loading}</p>;
-  if (session) return <Held session={session} />;
+  if (session && held) return <Held session={session} held={held} />;
   return <Doorway roomId={roomId} />;
 }
 
 /** The table from this device's seat. */
-function Held({ session }: { session: Session }) {
-  const { table, own } = session.live.value;
+function Held({ session, held }: { session: Session; held: HeldSeat }) {
+  const { table, own, attachment } = session.live.value;
   const { roomId } = table;
+  const [moving, setMoving] = useState(false);
   const [leaving, setLeaving] = useState(false);
   const banner = (
     <>
@@ -106,8 +109,7 @@ function Held({ session }: { session: Session }) {
   );
   const waiting = table.phase === "waiting";
   const others = table.seats.some((seat) => isTaken(seat) && seat.seat !== own && seat.builtIn === "");
-  const held = heldSeat(roomId);
-  const move = (look: "tool" | "button") => held && <MoveToDevice address={linkToSeat(roomId, held)} look={look} />;
+  const move = <MoveButton look={waiting ? "button" : "tool"} onClick={() => setMoving(true)} />;
   const leave = <LeaveButton roomId={roomId} look={waiting ? "button" : "tool"} onClick={() => setLeaving(true)} />;
   return (
     <>
@@ -122,13 +124,17 @@ function Held({ session }: { session: Session }) {
           onClose={() => setLeaving(false)}
         />
       )}
+      {/* Once the other device has the seat, nobody needs to see the link. */}
+      {moving && attachment.kind !== "superseded" && !isOver(table) && (
+        <MoveDialog address={linkToSeat(roomId, held)} onClose={() => setMoving(false)} />
+      )}
       <Seated
         acting={session}
         banner={banner}
         tools={
           !isOver(table) && (
             <>
-              {move("tool")}
+              {move}
               {leave}
             </>
           )
@@ -142,7 +148,7 @@ function Held({ session }: { session: Session }) {
         below={
           <>
             <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />
-            {move("button")}
+            {move}
             {leave}
           </>
         }

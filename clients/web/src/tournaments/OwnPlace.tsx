@@ -35,7 +35,7 @@ export function OwnPlace({ held, live, onLeft }: OwnPlaceProps) {
   return (
     <div class={css.row} data-part="own-place">
       {!open && <Postpone held={held} live={live} />}
-      <MoveToDevice address={linkToPlace(tournamentId, held)} look="button" />
+      <MoveToDevice address={linkToPlace(tournamentId, held)} />
       <ConfirmButton label={words.leave} confirm={words.leaveDo} act={leave}>
         {open ? words.leaveOpen : words.leavePlaying}
       </ConfirmButton>

@@ -59,7 +59,7 @@ export function linkToPlace(tournamentId: string, { ticket, participant, name }:
  * would lose the other.
  */
 export function placeFromLink(tournamentId: string): HeldPlace | null {
-  const given = broughtBy(KIND);
+  const given = broughtBy(KIND, tournamentId);
   if (given === undefined) return null;
   const brought = given && { ticket: given[0], participant: given[1], name: given[2] };
   const held = heldPlace(tournamentId);

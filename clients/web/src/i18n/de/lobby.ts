@@ -88,7 +88,7 @@ export const lobby: Texts["lobby"] = {
   },
   moving: {
     title: "Auf einem anderen Gerät spielen…",
-    text: "Scanne diesen Code mit dem anderen Gerät oder öffne dort den Link: Dann spielt es für dich, und dieses kann wieder übernehmen. Zeig ihn niemandem: Wer ihn hat, kann für dich spielen.",
+    text: "Scanne diesen Code mit dem anderen Gerät oder öffne dort den Link: Dann spielst du dort und kannst hier wieder übernehmen. Zeig ihn niemandem: Wer ihn hat, kann an deiner Stelle spielen.",
     link: "Link",
     qr: "QR-Code des Links",
     which: {

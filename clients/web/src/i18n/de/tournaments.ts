@@ -175,7 +175,7 @@ export const tournaments: Texts["tournaments"] = {
     over: "Das Turnier ist zu Ende. Danke fürs Mitspielen.",
     connecting: "Verbindung wird hergestellt…",
     lost: "Verbindung verloren. Wird wiederhergestellt…",
-    superseded: "Du nimmst in einem anderen Fenster teil.",
+    superseded: "Du nimmst in einem anderen Fenster oder auf einem anderen Gerät teil.",
     takeBack: "Hier teilnehmen",
     begins: (place) => `Deine Partie beginnt: ${place}.`,
     back: "Zurück zur Rangliste",

@@ -87,13 +87,13 @@ export const lobby = {
   },
   moving: {
     title: "Play on another device…",
-    text: "Scan this code with the other device, or open the link there: it then plays for you, and this one can take over again. Show it to nobody: whoever has it can play for you.",
+    text: "Scan this code with the other device, or open the link there: you then play there, and can take over again on this one. Show it to nobody: whoever has it can play in your place.",
     link: "Link",
     qr: "QR code of the link",
     which: {
       title: "Which seat do you want to use?",
       text: (held: string, brought: string) =>
-        `On this device, ${held} plays at this table. The link brings the seat of ${brought}.`,
+        `On this device, ${held} already plays at this table. The link brings the seat of ${brought}.`,
       lost: (held: string) =>
         `A device plays for one person at a table. If you use the link here, this device loses the seat of ${held}.`,
       stay: (held: string) => `Continue as ${held}`,

@@ -172,7 +172,7 @@ export const tournaments = {
     over: "The tournament is over. Thank you for playing.",
     connecting: "Connecting…",
     lost: "Connection lost. Reconnecting…",
-    superseded: "You are taking part in another window.",
+    superseded: "You are taking part in another window or on another device.",
     takeBack: "Take part here",
     begins: (place: string) => `Your game starts: ${place}.`,
     back: "Back to the standings",

@@ -88,7 +88,7 @@ export const lobby: Texts["lobby"] = {
   },
   moving: {
     title: "Jugar en otro dispositivo…",
-    text: "Escanea este código con el otro dispositivo o abre allí el enlace: entonces juega por ti, y este puede retomar el asiento. No lo enseñes a nadie: quien lo tenga puede jugar por ti.",
+    text: "Escanea este código con el otro dispositivo o abre allí el enlace: entonces juegas allí, y puedes volver a este. No lo enseñes a nadie: quien lo tenga puede jugar en tu lugar.",
     link: "Enlace",
     qr: "Código QR del enlace",
     which: {

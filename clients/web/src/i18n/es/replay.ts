@@ -56,8 +56,8 @@ export const replay: Texts["replay"] = {
     turningPoint: (shift, name, words) => `Shift ${shift}, ${name}: ${words}`,
     gift: (card) => `${card} como regalo`,
     pass: "pasar",
-    cost: (taken, other, points) => `${taken} (${points.toFixed(1).replace(".", ",")} puntos mejor: ${other})`,
-    gained: (taken, other, points) => `${taken} (${points.toFixed(1).replace(".", ",")} puntos mejor que ${other})`,
+    cost: (taken, other, points) => `${taken} (${points.toFixed(1).replace(".", ",")} puntos más: ${other})`,
+    gained: (taken, other, points) => `${taken} (${points.toFixed(1).replace(".", ",")} puntos más que ${other})`,
   },
   highlights: {
     ask: "Mi mejor y mi peor decisión",

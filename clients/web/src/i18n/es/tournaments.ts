@@ -178,7 +178,7 @@ export const tournaments: Texts["tournaments"] = {
     over: "El torneo ha terminado. Gracias por jugar.",
     connecting: "Conectando…",
     lost: "Conexión perdida. Reconectando…",
-    superseded: "Participas en otra ventana.",
+    superseded: "Participas en otra ventana o en otro dispositivo.",
     takeBack: "Participar aquí",
     begins: (place) => `Tu partida empieza: ${place}.`,
     back: "Volver a la clasificación",

@@ -88,7 +88,7 @@ export const lobby: Texts["lobby"] = {
   },
   moving: {
     title: "Gioca su un altro dispositivo…",
-    text: "Scansiona questo codice con l’altro dispositivo o apri lì il link: allora gioca per te, e questo può riprendere il posto. Non mostrarlo a nessuno: chi lo ha può giocare per te.",
+    text: "Scansiona questo codice con l’altro dispositivo o apri lì il link: allora giochi lì, e puoi tornare su questo. Non mostrarlo a nessuno: chi lo ha può giocare al tuo posto.",
     link: "Link",
     qr: "Codice QR del link",
     which: {

@@ -56,8 +56,8 @@ export const replay: Texts["replay"] = {
     turningPoint: (shift, name, words) => `Shift ${shift}, ${name}: ${words}`,
     gift: (card) => `${card} come dono`,
     pass: "passare",
-    cost: (taken, other, points) => `${taken} (meglio di ${points.toFixed(1).replace(".", ",")} punti: ${other})`,
-    gained: (taken, other, points) => `${taken} (meglio di ${other}, di ${points.toFixed(1).replace(".", ",")} punti)`,
+    cost: (taken, other, points) => `${taken} (${other}: ${points.toFixed(1).replace(".", ",")} punti in più)`,
+    gained: (taken, other, points) => `${taken} (${points.toFixed(1).replace(".", ",")} punti in più di ${other})`,
   },
   highlights: {
     ask: "La mia decisione migliore e la peggiore",

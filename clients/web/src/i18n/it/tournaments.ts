@@ -172,7 +172,7 @@ export const tournaments: Texts["tournaments"] = {
     over: "Il torneo è finito. Grazie per aver giocato.",
     connecting: "Connessione…",
     lost: "Connessione persa. Riconnessione…",
-    superseded: "Stai partecipando in un’altra finestra.",
+    superseded: "Stai partecipando in un’altra finestra o su un altro dispositivo.",
     takeBack: "Partecipa qui",
     begins: (place) => `La tua partita inizia: ${place}.`,
     back: "Torna alla classifica",

@@ -161,7 +161,11 @@ export function TableView(props: TableViewProps) {
             links={!props.replayed}
             onward={props.onward}
             playing={own !== undefined && !props.replayed && !props.untimed}
-            acted={table.phase === "pizza" && (deciding.picked.size > 0 || (sending && !props.autoPassing))}
+            acted={
+              // The first turn of a Shift is open before its first pizza begins.
+              (table.phase === "pizza" || decision?.kind === DecisionKind.TURN) &&
+              (deciding.picked.size > 0 || (sending && !props.autoPassing))
+            }
           />
         </div>
         <div class={`${css.side} sheet`}>
