@@ -42,6 +42,27 @@ def test_a_game_is_that_of_a_vector_env(game: Any) -> None:
         assert sum(state.returns()) == game.utility_sum()
 
 
+def test_rules_are_parameters() -> None:
+    importlib.import_module("chefshat.envs.open_spiel")
+    chosen = {"players": 3, "faces": 5, "jokers": 1, "max_idle_pizzas": 1, "max_turns": 60}
+    small = pyspiel.load_game("python_chefshat", {"deals": 2, **chosen})
+    assert small.num_players() == 3
+    assert small.max_game_length() == 60 + 4 * 3
+    with chefshat.VectorEnv(seed=1, rules={"preset": "paper", "target_shifts": 1, **chosen}, total_games=1) as env:
+        assert small.num_distinct_actions() == env.num_actions
+        state = small.new_initial_state()
+        state.apply_action(1)
+        while not state.is_terminal():
+            assert state.legal_actions() == np.flatnonzero(env.batch.masks[0]).tolist()
+            action = state.legal_actions()[-1]
+            state.apply_action(action)
+            env.step([action])
+    # Without jokers, as distinct from the preset's number.
+    assert pyspiel.load_game("python_chefshat", {"jokers": 0}).sizes.card_kinds == 12
+    with pytest.raises(chefshat.ChefsHatError, match="choose 4 to 15"):
+        pyspiel.load_game("python_chefshat", {"faces": 3})
+
+
 def test_clones_are_independent_and_observations_are_those_of_the_player(game: Any) -> None:
     state = game.new_initial_state()
     state.apply_action(3)

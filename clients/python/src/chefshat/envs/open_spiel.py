@@ -1,6 +1,7 @@
 """The game as a Python game of OpenSpiel: importing this module registers "python_chefshat".
 
     game = pyspiel.load_game("python_chefshat", {"shifts": 1, "deals": 1000})
+    small = pyspiel.load_game("python_chefshat", {"players": 3, "faces": 5, "jokers": 0})
 
 The first move is chance: it chooses one of `deals` seeds, each of which determines the deals of the whole game. Everything else is
 decisions of players, so histories, serialized states and clones work as in other games. A clone plays its history again when it is
@@ -33,6 +34,9 @@ from chefshat.vector import VectorEnv
 
 NAME = "python_chefshat"
 _PARAMETERS: dict[str, Any] = {"rules": "paper", "shifts": 1, "deals": 1000, "history": 512}
+# Rules other than the preset's, and the value that stands for the preset's own: a parameter of OpenSpiel has one.
+_RULES = {"players": 0, "faces": 0, "jokers": -1, "max_idle_pizzas": 0, "max_turns": 0}
+_PARAMETERS |= _RULES
 # Of the environment: more than the actions between two decisions of a player, so that none is missed.
 _WIDTH = 1024
 _TYPE = pyspiel.GameType(
@@ -155,13 +159,21 @@ class _Position:
 
 
 class ChefsHatGame(pyspiel.Game):  # type: ignore[misc]  # OpenSpiel has no types.
-    """The game, with the parameters `rules` (a preset), `shifts` (the number of Shifts) and `deals`."""
+    """The game.
+
+    Its parameters are `rules` (a preset), `shifts` (the number of Shifts), `deals`, `history`, and rules that differ from the
+    preset's: `players` (2 to 6), `faces` (4 to 15), `jokers` (0 to 2), `max_idle_pizzas` and `max_turns`, as in `RuleSet`.
+
+    Raises:
+        ChefsHatError: RULE_SET_REFUSED: there is no such rule set.
+    """
 
     def __init__(self, params: Mapping[str, Any] | None = None) -> None:
         given = {**_PARAMETERS, **(params or {})}
+        rules = {name: given[name] for name, unset in _RULES.items() if given[name] != unset}
         self.options: dict[str, Any] = {
             "games": 1,
-            "rules": {"preset": given["rules"], "target_shifts": given["shifts"]},
+            "rules": {"preset": given["rules"], "target_shifts": given["shifts"], **rules},
         }
         self.deals, self.shifts, self.history = (int(given[name]) for name in ("deals", "shifts", "history"))
         with VectorEnv(seed=0, **self.options) as env:
