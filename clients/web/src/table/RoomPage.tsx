@@ -102,6 +102,11 @@ function Held({ session, held }: { session: Session; held: HeldSeat }) {
   const { roomId } = table;
   const [moving, setMoving] = useState(false);
   const [leaving, setLeaving] = useState(false);
+  // Once the other device has the seat, nobody needs to see the link.
+  const superseded = attachment.kind === "superseded";
+  useEffect(() => {
+    if (superseded) setMoving(false);
+  }, [superseded]);
   const banner = (
     <>
       <Banner session={session} />
@@ -124,10 +129,7 @@ function Held({ session, held }: { session: Session; held: HeldSeat }) {
           onClose={() => setLeaving(false)}
         />
       )}
-      {/* Once the other device has the seat, nobody needs to see the link. */}
-      {moving && attachment.kind !== "superseded" && !isOver(table) && (
-        <MoveDialog address={linkToSeat(roomId, held)} onClose={() => setMoving(false)} />
-      )}
+      {moving && !isOver(table) && <MoveDialog address={linkToSeat(roomId, held)} onClose={() => setMoving(false)} />}
       <Seated
         acting={session}
         banner={banner}
