@@ -6,12 +6,12 @@ import type { MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS, roomApi } from "../api/client";
 import { keepSecret } from "../api/secrets";
 import { keepTableTicket } from "../attend/ticket";
-import { ParticipantKind, type Room, Visibility } from "../gen/chefshat/v1/room_pb";
+import { ParticipantKind, type Room } from "../gen/chefshat/v1/room_pb";
 import type { CreateRoomRequestSchema } from "../gen/chefshat/v1/room_service_pb";
 import { nameKey } from "../name-key";
-import { pathOf, readdress } from "../router";
+import { pathOf } from "../router";
 import { recall, recallObject, remember, remembered } from "../store";
-import { broughtBy, linkBringing } from "./bringing";
+import { linksBringing } from "./bringing";
 
 /** A seat of this device. */
 export interface HeldSeat {
@@ -48,36 +48,19 @@ export function giveUpSeat(roomId: string): void {
   for (const name of codesOf(roomId)) remember(name, null);
 }
 
-/** The kind of what a link brings. */
-const KIND = "seat";
-
-/** The address that brings a seat to another device. */
-export function linkToSeat(roomId: string, { ticket, seat, name }: HeldSeat): string {
-  return linkBringing(pathOf({ page: "room", roomId }), KIND, [ticket, seat, name]);
-}
-
-/**
- * Stores the seat that the address brings, if any. If this device has another seat in the room, it
- * is returned instead, and stays in the address until `decideSeat`: taking it would lose the other.
- */
-export function seatFromLink(roomId: string): HeldSeat | null {
-  const given = broughtBy(KIND, roomId);
-  if (given === undefined) return null;
-  const brought = given && { ticket: given[0], seat: given[1], name: given[2] };
-  const held = heldSeat(roomId);
-  if (brought && held && held.ticket !== brought.ticket) return brought;
-  decideSeat(roomId, brought);
-  return null;
-}
-
-/** Removes the seat that the address brings from the address; stores the chosen one, if any. */
-export function decideSeat(roomId: string, chosen: HeldSeat | null): void {
-  readdress(location.search);
-  if (!chosen) return;
-  remember(SEAT + roomId, JSON.stringify(chosen));
-  // Whether it is needed is not known yet.
-  keepSecret(chosen.ticket, { visibility: Visibility.PRIVATE });
-}
+/** Links that bring a seat to another device. */
+export const {
+  linkTo: linkToSeat,
+  fromLink: seatFromLink,
+  decide: decideSeat,
+} = linksBringing<HeldSeat>({
+  name: "seat",
+  path: (roomId) => pathOf({ page: "room", roomId }),
+  key: (roomId) => SEAT + roomId,
+  held: heldSeat,
+  numberOf: ({ seat }) => seat,
+  withNumber: (holding, seat) => ({ ...holding, seat }),
+});
 
 /** Frees a seat before the game starts, and deletes it here. */
 export async function giveBackSeat(roomId: string): Promise<void> {

@@ -30,7 +30,8 @@ interface GraphProps {
 
 export function Graph({ gameId, film, table, perspective, decisions, onGo }: GraphProps) {
   const [shown, setShown] = useState(false);
-  const top = useMemo(() => mostPoints(film), [film]);
+  // Nothing is computed for those who never open it.
+  const top = useMemo(() => (shown ? mostPoints(film) : 1), [film, shown]);
   const asked = useMemo(() => (shown ? choices(film) : []), [film, shown]);
   const estimates = useEstimatedChoices(gameId, asked);
   // Only a seat itself knows what it gave, or might have declared.

@@ -3,11 +3,11 @@
 
 import { CALL_LIMIT_MS, tournamentApi } from "../api/client";
 import { keepSecret } from "../api/secrets";
-import { ParticipantKind, Visibility } from "../gen/chefshat/v1/room_pb";
-import { broughtBy, linkBringing } from "../lobby/bringing";
+import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
+import { linksBringing } from "../lobby/bringing";
 import { canonical } from "../lobby/seat";
 import { nameKey } from "../name-key";
-import { pathOf, readdress } from "../router";
+import { pathOf } from "../router";
 import { recallObject, remember } from "../store";
 
 /** A place of this device in a tournament. */
@@ -45,37 +45,19 @@ export async function postponeOwnGame(tournamentId: string, { ticket }: HeldPlac
   await tournamentApi.postponeGame({ tournamentId, ticket, game }, { timeoutMs: CALL_LIMIT_MS });
 }
 
-/** The kind of what a link brings. */
-const KIND = "place";
-
-/** The address that brings a place to another device. */
-export function linkToPlace(tournamentId: string, { ticket, participant, name }: HeldPlace): string {
-  return linkBringing(pathOf({ page: "tournament", tournamentId }), KIND, [ticket, participant, name]);
-}
-
-/**
- * Stores the place that the address brings, if any. If this device has another place in the
- * tournament, it is returned instead, and stays in the address until `decidePlace`: taking it
- * would lose the other.
- */
-export function placeFromLink(tournamentId: string): HeldPlace | null {
-  const given = broughtBy(KIND, tournamentId);
-  if (given === undefined) return null;
-  const brought = given && { ticket: given[0], participant: given[1], name: given[2] };
-  const held = heldPlace(tournamentId);
-  if (brought && held && held.ticket !== brought.ticket) return brought;
-  decidePlace(tournamentId, brought);
-  return null;
-}
-
-/** Removes the place that the address brings from the address; stores the chosen one, if any. */
-export function decidePlace(tournamentId: string, chosen: HeldPlace | null): void {
-  readdress(location.search);
-  if (!chosen) return;
-  remember(`tournament.${tournamentId}`, JSON.stringify(chosen));
-  // Whether it is needed is not known yet.
-  keepSecret(chosen.ticket, { visibility: Visibility.PRIVATE });
-}
+/** Links that bring a place to another device. */
+export const {
+  linkTo: linkToPlace,
+  fromLink: placeFromLink,
+  decide: decidePlace,
+} = linksBringing<HeldPlace>({
+  name: "place",
+  path: (tournamentId) => pathOf({ page: "tournament", tournamentId }),
+  key: (tournamentId) => `tournament.${tournamentId}`,
+  held: heldPlace,
+  numberOf: ({ participant }) => participant,
+  withNumber: (holding, participant) => ({ ...holding, participant }),
+});
 
 /** Joins as a person; `key` is that of the name. Returns the tournament's id. */
 export async function takePlace(tournamentId: string, code: string, name: string, key = nameKey()): Promise<string> {

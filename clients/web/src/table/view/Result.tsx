@@ -99,24 +99,14 @@ function ShiftTable({ table, own, result, onClose }: ShiftTableProps) {
   return (
     <section class={`${css.result} sheet`} data-part="result" aria-label={words.shift(result.shift)}>
       <h2>{words.shift(result.shift)}</h2>
-      <table>
-        <thead>
-          <tr>
-            <th scope="col">{words.place}</th>
-            <th scope="col">{words.name}</th>
-            <th scope="col">{words.points}</th>
-            <th scope="col">{words.total}</th>
-          </tr>
-        </thead>
-        <tbody>
-          {result.order.map((seat, index) => (
-            <Row key={seat} table={table} own={own} seat={seat} place={index + 1}>
-              <td class="number">+{result.shiftPoints[seat] ?? 0}</td>
-              <td class="number">{result.points[seat] ?? 0}</td>
-            </Row>
-          ))}
-        </tbody>
-      </table>
+      <Ranking points={[words.points, words.total]}>
+        {result.order.map((seat, index) => (
+          <Row key={seat} table={table} own={own} seat={seat} place={index + 1}>
+            <td class="number">+{result.shiftPoints[seat] ?? 0}</td>
+            <td class="number">{result.points[seat] ?? 0}</td>
+          </Row>
+        ))}
+      </Ranking>
       {result.adjudicated && <p class="soft">{words.adjudicated}</p>}
       {onClose && (
         <div class={css.ways}>
@@ -147,22 +137,13 @@ function GameResult({ table, own, profiles, ways }: EndProps & { own: number | u
         {winner !== undefined && (winner === own ? words.youWon : words.wins(distinctName(table, winner)))}
       </h2>
       <div class={css.summary}>
-        <table>
-          <thead>
-            <tr>
-              <th scope="col">{words.place}</th>
-              <th scope="col">{words.name}</th>
-              <th scope="col">{words.points}</th>
-            </tr>
-          </thead>
-          <tbody>
-            {table.standings.map(({ seat, place, points }) => (
-              <Row key={seat} table={table} own={own} seat={seat} place={place} profile={profiles}>
-                <td class="number">{points}</td>
-              </Row>
-            ))}
-          </tbody>
-        </table>
+        <Ranking points={[words.points]}>
+          {table.standings.map(({ seat, place, points }) => (
+            <Row key={seat} table={table} own={own} seat={seat} place={place} profile={profiles}>
+              <td class="number">{points}</td>
+            </Row>
+          ))}
+        </Ranking>
         <Curve table={table} />
       </div>
       {ways}
@@ -211,6 +192,25 @@ function Aborted({ table, ways }: EndProps) {
       <p>{words.aborted[table.abortReason]}</p>
       {ways}
     </section>
+  );
+}
+
+/** The seats by place, a row each; `points`: the headings of the columns after place and name. */
+function Ranking({ points, children }: { points: readonly string[]; children: ComponentChildren }) {
+  const words = t().table.result;
+  return (
+    <table>
+      <thead>
+        <tr>
+          {[words.place, words.name, ...points].map((heading) => (
+            <th scope="col" key={heading}>
+              {heading}
+            </th>
+          ))}
+        </tr>
+      </thead>
+      <tbody>{children}</tbody>
+    </table>
   );
 }
 
