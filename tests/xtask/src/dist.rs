@@ -14,26 +14,23 @@ use crate::notices::{FILE as NOTICES, notices};
 use crate::places::{DEPLOYMENT, Places};
 use crate::setup::{self, at};
 use crate::steps::Steps;
-use crate::wheels::{self, published, tool};
-
-/// The programs: the server, and what only some need beside it.
-const PROGRAMS: [&str; 2] = ["chefshat", "chefshat-lab"];
+use crate::wheels::{self, PROGRAMS};
 
 /// The version of everything.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// Where the programs run: on every Linux of these processors, without libraries.
+/// What archives and Debian packages are made for.
 const PLATFORMS: [Platform; 2] = [
     Platform {
-        target: "x86_64-unknown-linux-musl",
-        name: "x86_64-linux",
+        processor: wheels::PROCESSORS[0],
         debian: "amd64",
     },
     Platform {
-        target: "aarch64-unknown-linux-musl",
-        name: "aarch64-linux",
+        processor: wheels::PROCESSORS[1],
         debian: "arm64",
     },
 ];
+/// Cargo's profile of what is published.
+const PROFILE: &str = "dist";
 /// The crates that others build on.
 const CRATES: [&str; 3] = ["chefshat-proto", "chefshat-engine", "chefshat-client"];
 /// Shells with completion scripts, and where Debian keeps them.
@@ -48,9 +45,7 @@ const NAMESPACE: &str = "chefshat-release";
 /// A processor for which the programs are built.
 struct Platform {
     /// Rust's word for it.
-    target: &'static str,
-    /// In the names of files.
-    name: &'static str,
+    processor: &'static str,
     /// Debian's word for it.
     debian: &'static str,
 }
@@ -59,14 +54,14 @@ impl Platform {
     /// That of this machine, on which the program can say what it has.
     fn host() -> Result<&'static Self, Failure> {
         let arch = std::env::consts::ARCH;
-        let host = |platform: &&Self| platform.name.starts_with(arch);
+        let host = |platform: &&Self| platform.processor == arch;
         (PLATFORMS.iter().find(host))
             .ok_or_else(|| Failure::new(format!("no release is made on {arch}")))
     }
 
     /// The name of its archive.
     fn archive_name(&self) -> String {
-        format!("chefshat-{VERSION}-{}", self.name)
+        format!("chefshat-{VERSION}-{}-linux", self.processor)
     }
 }
 
@@ -86,13 +81,9 @@ pub(crate) fn run(
             .try_for_each(|folder| emptied(folder))
     })?;
 
-    for platform in &PLATFORMS {
-        let target = platform.target;
-        steps.run(&format!("set up {target}"), || setup::target(target))?;
-    }
     book::run(places, steps)?;
     // With the page, which the binary contains.
-    wheels::run(places, steps, &wheels::PROCESSORS, "dist", false)?;
+    wheels::run(places, steps, &wheels::PROCESSORS, PROFILE, false)?;
     steps.run("copy the wheels", || {
         wheels::built(&places.wheels())?
             .iter()
@@ -107,15 +98,7 @@ pub(crate) fn run(
         host: Platform::host()?,
     };
     for platform in &PLATFORMS {
-        let target = platform.target;
-        let mut build = release.static_programs(platform);
-        steps.program(&format!("static programs, {target}"), &mut build)?;
-        steps.run("check that they are static and name no folder", || {
-            release.check_static(platform)
-        })?;
-    }
-    for platform in &PLATFORMS {
-        let name = platform.name;
+        let name = platform.processor;
         steps.run(&format!("licences of what {name} contains"), || {
             release.notices(platform)
         })?;
@@ -168,55 +151,25 @@ struct Release<'a> {
 }
 
 impl Release<'_> {
-    fn static_programs(&self, platform: &Platform) -> Command {
-        let mut build = published(self.places, tool(self.places, "cargo-zigbuild", ""));
-        build.args(["zigbuild", "--locked", "--profile", "dist"]);
-        build.args(["--target", platform.target]);
-        for program in PROGRAMS {
-            build.args(["--package", program, "--bin", program]);
-            build.args(["--features", &format!("{program}/dist")]);
-        }
-        build
-    }
-
     /// The program that runs here.
     fn binary(&self) -> PathBuf {
         self.program(self.host, PROGRAMS[0])
     }
 
     fn program(&self, platform: &Platform, name: &str) -> PathBuf {
-        let built = self.places.target.join(platform.target);
-        built.join("dist").join(name)
-    }
-
-    fn check_static(&self, platform: &Platform) -> Result<(), Failure> {
-        PROGRAMS
-            .iter()
-            .try_for_each(|name| self.check_program(&self.program(platform, name)))
-    }
-
-    fn check_program(&self, binary: &Path) -> Result<(), Failure> {
-        let mut readelf = Command::new("readelf");
-        let headers = read(readelf.arg("--program-headers").arg(binary))?;
-        let shown = binary.display();
-        if headers.contains("INTERP") {
-            return Err(Failure::new(format!("{shown} needs libraries")));
-        }
-        let bytes = fs::read(binary).map_err(|error| at(binary, &error))?;
-        let root = format!("{}/server/", self.places.root.display());
-        match bytes.windows(root.len()).any(|it| it == root.as_bytes()) {
-            true => Err(Failure::new(format!("{shown} names the folder {root}"))),
-            false => Ok(()),
-        }
+        wheels::program(self.places, platform.processor, PROFILE, name)
     }
 
     /// Where the licences of what a platform's programs contain are.
     fn notices_of(&self, platform: &Platform) -> PathBuf {
-        self.stage.join("notices").join(platform.name).join(NOTICES)
+        self.stage
+            .join("notices")
+            .join(platform.processor)
+            .join(NOTICES)
     }
 
     fn notices(&self, platform: &Platform) -> Result<(), Failure> {
-        let text = notices(self.places, platform.target)?;
+        let text = notices(self.places, &wheels::static_target(platform.processor))?;
         write(&self.notices_of(platform), &text)
     }
 
@@ -386,7 +339,7 @@ impl Release<'_> {
         cyclonedx
             .arg(&manifest)
             .args(["--format", "json", "--quiet", "--target"])
-            .arg(self.host.target);
+            .arg(wheels::static_target(self.host.processor));
         cyclonedx.args(["--override-filename", "contents"]);
         cyclonedx.env("SOURCE_DATE_EPOCH", &self.date);
         run_command(&mut cyclonedx)?;

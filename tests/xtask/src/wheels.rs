@@ -13,8 +13,13 @@ use crate::setup::{self, at};
 use crate::steps::Steps;
 use crate::web;
 
-/// The oldest systems on which the wheels with programs run: glibc 2.17, those of numpy's wheels.
+/// The oldest systems on which the module runs: glibc 2.17, those of numpy's wheels.
 const PLATFORM: &str = "manylinux_2_17";
+/// Those of the wheel with the programs, which are static: the oldest that numpy's wheels name.
+const STATIC_PLATFORMS: [&str; 2] = [PLATFORM, "musllinux_1_2"];
+
+/// The programs: the server, and what only some need beside it.
+pub(crate) const PROGRAMS: [&str; 2] = ["chefshat", "chefshat-lab"];
 
 /// The processors for which a release has wheels.
 pub(crate) const PROCESSORS: [&str; 2] = ["x86_64", "aarch64"];
@@ -22,8 +27,10 @@ pub(crate) const PROCESSORS: [&str; 2] = ["x86_64", "aarch64"];
 /// That of this machine, on which its wheels can be tried.
 pub(crate) const HOST: [&str; 1] = [std::env::consts::ARCH];
 
-/// The packages built by maturin, from Rust.
-const BUILT_FROM_RUST: [&str; 2] = ["clients/python/native", "clients/python/server"];
+/// The module, built by maturin from Rust.
+const MODULE: &str = "clients/python/native";
+/// The programs, built by it as well.
+const SERVER: &str = "clients/python/server";
 /// The packages in Python alone.
 const PURE: [&str; 2] = ["clients/python", "clients/robot"];
 
@@ -46,16 +53,24 @@ pub(crate) fn run(
         Ok(())
     })?;
     for processor in processors {
-        let target = target(processor);
-        steps.run(&format!("set up {target}"), || setup::target(&target))?;
-        for package in BUILT_FROM_RUST {
+        let platforms = [
+            (MODULE, target(processor), &STATIC_PLATFORMS[..1]),
+            (SERVER, static_target(processor), &STATIC_PLATFORMS),
+        ];
+        for (package, target, compatible) in platforms {
+            steps.run(&format!("set up {target}"), || setup::target(&target))?;
             let mut maturin = published(places, tool(places, "maturin", package));
             maturin.args(["build", "--profile", profile, "--target", &target]);
             maturin.arg("--out").arg(&wheels);
             // Zig links against the old glibc, and maturin refuses what needs a newer one.
-            maturin.args(["--zig", "--compatibility", PLATFORM]);
+            maturin.args(["--zig", "--compatibility"]).args(compatible);
             steps.program(&format!("wheel of {package}, {processor}"), &mut maturin)?;
         }
+        steps.run("check that programs are static and name no folder", || {
+            PROGRAMS
+                .iter()
+                .try_for_each(|name| check(places, &program(places, processor, profile, name)))
+        })?;
     }
     for package in PURE {
         let mut hatchling = tool(places, "hatchling", package);
@@ -64,11 +79,14 @@ pub(crate) fn run(
     }
     steps.run("licences of what they contain", || {
         for processor in processors {
-            let notices = notices(places, &target(processor))?;
+            let of_module = notices(places, &target(processor))?;
+            let of_programs = notices(places, &static_target(processor))?;
             let ending = format!("_{processor}.whl");
             for wheel in built(&wheels)? {
                 if wheel.to_string_lossy().ends_with(&ending) {
-                    add_notices(places, &wheel, &notices)?;
+                    let is_static = has_programs(&wheel);
+                    let notices = if is_static { &of_programs } else { &of_module };
+                    add_notices(places, &wheel, notices)?;
                 }
             }
         }
@@ -144,9 +162,31 @@ fn add_notices(places: &Places, wheel: &Path, notices: &str) -> Result<(), Failu
     run_command(pack.arg("--dest-dir").arg(places.wheels()))
 }
 
-/// Checks that a wheel runs on every system that its name promises.
+/// A program of the server's wheel, which is also that of archives, packages and images.
+pub(crate) fn program(places: &Places, processor: &str, profile: &str, name: &str) -> PathBuf {
+    let built = places.target.join(static_target(processor));
+    built.join(profile).join(name)
+}
+
+/// Checks that a program needs nothing of a system, and tells nothing of that which built it.
+fn check(places: &Places, program: &Path) -> Result<(), Failure> {
+    let mut readelf = Command::new("readelf");
+    let headers = read(readelf.arg("--program-headers").arg(program))?;
+    let shown = program.display();
+    if headers.contains("INTERP") {
+        return Err(Failure::new(format!("{shown} needs libraries")));
+    }
+    let bytes = fs::read(program).map_err(|error| at(program, &error))?;
+    let root = format!("{}/server/", places.root.display());
+    match bytes.windows(root.len()).any(|it| it == root.as_bytes()) {
+        true => Err(Failure::new(format!("{shown} names the folder {root}"))),
+        false => Ok(()),
+    }
+}
+
+/// Checks that the module runs on every system that the name of its wheel promises.
 fn audit(places: &Places, wheel: &Path) -> Result<(), Failure> {
-    if is_pure(wheel) {
+    if is_pure(wheel) || has_programs(wheel) {
         return Ok(());
     }
     let found = read(tool(places, "auditwheel", "").arg("show").arg(wheel))?;
@@ -161,9 +201,18 @@ fn audit(places: &Places, wheel: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What programs in wheels are built for: Linux with glibc.
+/// What the module is built for: Linux with glibc.
 fn target(processor: &str) -> String {
     format!("{processor}-unknown-linux-gnu")
+}
+
+/// What programs are built for: every Linux, without libraries.
+pub(crate) fn static_target(processor: &str) -> String {
+    format!("{processor}-unknown-linux-musl")
+}
+
+fn has_programs(wheel: &Path) -> bool {
+    wheel.to_string_lossy().contains(STATIC_PLATFORMS[1])
 }
 
 fn is_pure(wheel: &Path) -> bool {
@@ -184,7 +233,7 @@ pub(crate) fn built(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
 
 /// The environment of a build whose program others run: it names its commit, and no folder of this
 /// machine.
-pub(crate) fn published(places: &Places, mut build: Command) -> Command {
+fn published(places: &Places, mut build: Command) -> Command {
     if let Ok(commit) = read(git(places).args(["log", "-1", "--format=%h %cs"])) {
         build.env("CHEFSHAT_COMMIT", commit);
     }
@@ -202,7 +251,7 @@ pub(crate) fn published(places: &Places, mut build: Command) -> Command {
 }
 
 /// A program of the builders' environment, in a folder of the source tree.
-pub(crate) fn tool(places: &Places, name: &str, folder: &str) -> Command {
+fn tool(places: &Places, name: &str, folder: &str) -> Command {
     let programs = places.wheel_tools().join("bin");
     let mut command = Command::new(programs.join(name));
     let path = std::env::var_os("PATH").unwrap_or_default();
