@@ -79,6 +79,16 @@ def test_clones_are_independent_and_observations_are_those_of_the_player(game: A
     assert len(clone.history()) == len(state.history()) + 1
 
 
+def test_an_illegal_action_costs_no_other_state(game: Any) -> None:
+    state = game.new_initial_state()
+    state.apply_action(3)
+    (illegal, *_) = set(range(game.num_distinct_actions())) - set(state.legal_actions())
+    clone = state.clone()
+    with pytest.raises(ValueError, match=f"action {illegal} is not legal here"):
+        state.apply_action(illegal)
+    clone.apply_action(clone.legal_actions()[0])
+
+
 def test_information_states_have_perfect_recall(game: Any) -> None:
     chance = np.random.default_rng(2)
     legal_of: dict[str, list[int]] = {}
@@ -124,11 +134,12 @@ def test_an_information_state_shows_a_gift_to_giver_and_receiver_alone(game: Any
     for world, gift in zip(worlds, state.legal_actions()[:2], strict=True):
         world.apply_action(gift)
     same_for: dict[str, bool] = {}
+    env = chefshat.VectorEnv(seed=0, rules=RULES, total_games=1, history=1024)
     while len(same_for) < 4:
         first, second = worlds
         player = first.current_player()
         assert second.current_player() == player
-        seen = first.position.env().batch
+        seen = env.restore([0], [first.position.state])
         if seen.kinds[0] == chefshat.pb.DECISION_KIND_TURN:
             texts = [world.information_state_string(player) for world in worlds]
             tensors = [world.information_state_tensor(player) for world in worlds]
@@ -137,4 +148,81 @@ def test_an_information_state_shows_a_gift_to_giver_and_receiver_alone(game: Any
         action = max(set(first.legal_actions()) & set(second.legal_actions()))
         for world in worlds:
             world.apply_action(action)
+    env.close()
     assert same_for == {"ROLE_CHEF": False, "ROLE_SOUS_CHEF": True, "ROLE_WAITER": True, "ROLE_DISHWASHER": False}
+
+
+def test_resampling_draws_what_the_player_cannot_tell_apart(game: Any) -> None:
+    state = game.new_initial_state()
+    state.apply_action(5)
+    chance = np.random.default_rng(5)
+    drawn_hands: set[str] = set()
+    checked = 0
+    while not state.is_terminal():
+        player = state.current_player()
+        if chance.random() < 0.2:
+            before = state.information_state_string(player)
+            drawn = state.resample_from_infostate(player, chance.random)
+            assert drawn.information_state_string(player) == before
+            assert drawn.information_state_tensor(player) == state.information_state_tensor(player)
+            assert drawn.observation_tensor(player) == state.observation_tensor(player)
+            assert drawn.current_player() == player
+            assert drawn.legal_actions() == state.legal_actions()
+            drawn_hands.add(drawn.information_state_string((player + 1) % 4))
+            # As it was before, although the other is played to the end.
+            while not drawn.is_terminal():
+                drawn.apply_action(int(chance.choice(drawn.legal_actions())))
+            assert sum(drawn.returns()) == game.utility_sum()
+            assert state.information_state_string(player) == before
+            checked += 1
+        state.apply_action(int(chance.choice(state.legal_actions())))
+    assert checked > 20
+    assert len(drawn_hands) > 10
+
+
+def test_resampling_is_for_the_player_who_decides(game: Any) -> None:
+    state = game.new_initial_state()
+    with pytest.raises(ValueError, match="player 0 does not decide here"):
+        state.resample_from_infostate(0, lambda: 0.5)
+    state.apply_action(1)
+    other = (state.current_player() + 1) % 4
+    with pytest.raises(ValueError, match=f"resample for current_player\\(\\), {state.current_player()}"):
+        state.resample_from_infostate(other, lambda: 0.5)
+
+
+def test_drawn_deals_are_as_likely_as_those_of_the_sampler() -> None:
+    """On a deck so small that each deal is drawn often."""
+    importlib.import_module("chefshat.envs.open_spiel")
+    small = pyspiel.load_game("python_chefshat", {"players": 3, "faces": 4, "jokers": 0, "deals": 5})
+    state = small.new_initial_state()
+    state.apply_action(4)
+    player = state.current_player()
+    left = (player + 1) % 3
+    hands, counts = np.unique(state.position.possible().sample(20_000, seed=1)[:, left], axis=0, return_counts=True)
+    expected = {" ".join(map(str, hand)): count / 20_000 for hand, count in zip(hands.tolist(), counts, strict=True)}
+    assert len(expected) > 5
+    chance = np.random.default_rng(9)
+    drawn_counts = dict.fromkeys(expected, 0)
+    for _ in range(800):
+        drawn = state.resample_from_infostate(player, chance.random)
+        drawn.apply_action(drawn.legal_actions()[0])
+        assert drawn.current_player() == left
+        drawn_counts[drawn.information_state_string(left).split("hand ")[1].split(";")[0]] += 1
+    for hand, share in expected.items():
+        assert abs(drawn_counts[hand] - 800 * share) < 4 * np.sqrt(800 * share * (1 - share)) + 1
+
+
+def test_is_mcts_of_openspiel_plays() -> None:
+    importlib.import_module("chefshat.envs.open_spiel")
+    game = pyspiel.load_game("python_chefshat", {"deals": 3})
+    mcts = importlib.import_module("open_spiel.python.algorithms.mcts")
+    ismcts = importlib.import_module("open_spiel.python.algorithms.ismcts")
+    random = np.random.RandomState(3)
+    evaluator = mcts.RandomRolloutEvaluator(n_rollouts=1, random_state=random)
+    bot = ismcts.ISMCTSBot(game=game, uct_c=5.0, evaluator=evaluator, max_simulations=8, random_state=random)
+    state = game.new_initial_state()
+    state.apply_action(2)
+    for _ in range(5):
+        action = bot.step(state)
+        assert action in state.legal_actions()
+        state.apply_action(action)

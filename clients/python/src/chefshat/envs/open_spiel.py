@@ -4,8 +4,11 @@
     small = pyspiel.load_game("python_chefshat", {"players": 3, "faces": 5, "jokers": 0})
 
 The first move is chance: it chooses one of `deals` seeds, each of which determines the deals of the whole game. Everything else is
-decisions of players, so histories, serialized states and clones work as in other games. A clone plays its history again when it is
-used; for speed use `VectorEnv`.
+decisions of players, so histories, serialized states and clones work as in other games. A clone takes the same time after any
+number of moves; for speed use `VectorEnv`.
+
+`resample_from_infostate` draws from all deals that agree with what the player who decides knows, each equally likely, with
+`chefshat.search`: search by sampled deals, such as OpenSpiel's IS-MCTS, needs nothing else.
 
 A player's observation is that of its current or last decision, in the form "table"; zeros before its first.
 
@@ -14,8 +17,9 @@ and all actions that it may know (`chefshat.history`), until its current or last
 complete. The tensor has tokens of the latest `history` actions of each Shift, by default 512; ordinary Shifts have some 100.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -26,7 +30,7 @@ try:
 except ImportError as error:
     raise ImportError("chefshat.envs.open_spiel needs OpenSpiel: pip install open_spiel") from error
 
-from chefshat import history
+from chefshat import history, search
 from chefshat.batch import Batch
 from chefshat.columns import Situations, Sizes
 from chefshat.learn import features
@@ -57,7 +61,7 @@ _TYPE = pyspiel.GameType(
 )
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _Shift:
     """What a player knows of a Shift.
 
@@ -90,72 +94,134 @@ class _Shift:
         return np.concatenate([self.hand, [self.had_golden, self.got_golden], padding, tokens.ravel()]).astype(np.float32)
 
 
+@dataclass(frozen=True, slots=True)
 class _Position:
-    """A game after some decisions; plays them when it is first looked at. Copies share nothing."""
+    """A game at a decision, or after its end.
 
-    def __init__(self, options: Mapping[str, Any], deal: int, actions: list[int]) -> None:
-        self._options = options
-        self._deal = deal
-        self._actions = actions
-        self._env: VectorEnv | None = None
-        # The observation of each player at its last decision.
-        self._seen: dict[int, NDArray[np.float32]] = {}
-        # What each player knows of each Shift, by its number.
-        self._known: dict[int, dict[int, _Shift]] = {}
+    Attributes:
+        state: the game, as an environment saves it; nothing after the end.
+        player: who decides; `TERMINAL` after the end.
+        legal: the legal actions, ascending.
+        points: those of each player; zeros before the end.
+        seen: the observation of each player at its last decision.
+        known: what each player knows of each Shift, by its number.
+        searched: here, the possible deals of the player who decides, once counted.
+    """
+
+    state: bytes
+    player: int
+    legal: list[int]
+    points: list[float]
+    seen: dict[int, NDArray[np.float32]]
+    known: dict[int, dict[int, _Shift]]
+    searched: list[search.Position] = field(default_factory=list)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "_Position":
+        """Returns itself: nothing changes it."""
+        return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _Position, (self._options, self._deal, list(self._actions))
+        return _Position, (self.state, self.player, self.legal, self.points, self.seen, self.known)
 
-    def env(self) -> VectorEnv:
-        """Returns the game, after the decisions."""
-        if self._env is None:
-            self._env = VectorEnv(seed=self._deal, total_games=1, history=_WIDTH, **self._options)
-            self._advance()
-            for action in self._actions:
-                self._env.step([action])
-                self._advance()
-        return self._env
+    def possible(self) -> search.Position:
+        """Returns the possible deals of the player who decides."""
+        if not self.searched:
+            self.searched.append(search.position(self.state))
+        return self.searched[0]
 
-    def take(self, action: int) -> None:
-        """Takes a decision."""
-        self.env().step([action])
-        self._advance()
-        self._actions.append(action)
 
-    def seen(self, player: int) -> NDArray[np.float32]:
-        """Returns the observation of a player at its current or last decision."""
-        sizes = self.env().sizes
-        return self._seen.get(player, np.zeros(features.table_width(sizes.players, sizes.faces), np.float32))
+class _Games(threading.local):
+    """The environment in which a thread takes the decisions of all positions: each is restored before its decision.
 
-    def known(self, player: int) -> list[_Shift]:
-        """Returns what a player knows of each Shift, up to its current or last decision."""
-        self.env()
-        return list(self._known.get(player, {}).values())
+    Attributes:
+        options: of the environment.
+        sizes: of its columns.
+    """
 
-    def _advance(self) -> None:
-        env = self._env
-        assert env is not None, "the callers made it"
-        self._look(env.batch)
+    def __init__(self, options: Mapping[str, Any], sizes: Sizes) -> None:
+        self.options, self.sizes = options, sizes
+        self._env: VectorEnv | None = None
+        # Where the environment stands.
+        self._state = b""
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "_Games":
+        """Returns itself: clones share it."""
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _Games, (self.options, self.sizes)
+
+    def begun(self, **start: Any) -> _Position:  # noqa: ANN401 # Options of a VectorEnv.
+        """Returns the first decision of a game that begins in this way."""
+        self._env = VectorEnv(total_games=1, history=_WIDTH, **start, **self.options)
+        return self._found(self._env, _Position(b"", 0, [], [], {}, {}))
+
+    def after(self, position: _Position, action: int) -> _Position:
+        """Returns the position after a decision.
+
+        Raises:
+            ValueError: the action is not legal.
+        """
+        if action not in position.legal:
+            raise ValueError(f"action {action} is not legal here: choose one of {position.legal}")
+        if self._env is None or self._state != position.state:
+            if self._env is None:
+                self._env = VectorEnv(seed=0, total_games=1, history=_WIDTH, **self.options)
+            self._env.restore([0], [position.state])
+        self._env.step([action])
+        return self._found(self._env, position)
+
+    def drawn(self, position: _Position, seed: int) -> _Position:
+        """Returns the same decision, with another deal that the player who decides cannot tell from this one.
+
+        All that agree with what it knows are equally likely; later Shifts are dealt anew.
+        """
+        player = position.player
+        ((hands, actions),) = position.possible().starts(1, seed)
+        drawn = self.begun(seed=seed, starts=[(hands, [])])
+        # Cards that the player gave are drawn as a set; it knows in which order it gave them.
+        seats, taken = history.parts_of(list(position.known[player].values())[-1].actions, self.sizes)
+        own = iter(taken[seats == player].tolist())
+        for action in actions:
+            # It also knows what it gave without a choice.
+            drawn = self.after(drawn, next(filter(drawn.legal.__contains__, own)) if drawn.player == player else action)
+        # Earlier Shifts are not drawn again.
+        earlier = {seat: {**position.known.get(seat, {}), **shifts} for seat, shifts in drawn.known.items()}
+        return replace(drawn, known={**position.known, **earlier}, seen={**position.seen, **drawn.seen})
+
+    def _found(self, env: VectorEnv, before: _Position) -> _Position:
+        seen, known = dict(before.seen), {player: dict(shifts) for player, shifts in before.known.items()}
+        _look(env.batch, seen, known)
         while len(env.batch) == 0 and not env.batch.done:
-            self._look(env.step(np.zeros(0, np.uint16)))
+            _look(env.step(np.zeros(0, np.uint16)), seen, known)
+        batch = env.batch
+        if batch.done:
+            self._state = b""
+            points = [float(points) for points in batch.endings.observations.points[-1]]
+            return _Position(b"", int(pyspiel.PlayerId.TERMINAL), [], points, seen, known)
+        (self._state,) = env.save()
+        legal = np.flatnonzero(batch.masks[0]).tolist()
+        return _Position(self._state, int(batch.seats[0]), legal, [0.0] * env.sizes.players, seen, known)
 
-    def _look(self, batch: Batch) -> None:
-        # The end of a Shift comes before the first decision of the next.
-        for situations in (batch.endings, batch):
-            if situations is batch or batch.done:
-                for player, row in zip(situations.seats.tolist(), features.table_of(situations), strict=True):
-                    self._seen[player] = np.asarray(row, np.float32)
-            for row, player in enumerate(situations.seats.tolist()):
-                self._learn(self._known.setdefault(player, {}), situations, row)
 
-    def _learn(self, known: dict[int, _Shift], situations: Situations, row: int) -> None:
-        seen = situations.observations
-        golden = bool(seen.golden[row])
-        empty = np.zeros(0, np.uint16)
-        shift = known.setdefault(int(seen.shifts[row]), _Shift(seen.hands[row], golden, golden, empty))
-        shift.got_golden |= golden
-        new = int(seen.history_counts[row]) - len(shift.actions)
-        shift.actions = np.concatenate([shift.actions, seen.history[row, _WIDTH - new :]])
+def _look(batch: Batch, seen: dict[int, NDArray[np.float32]], known: dict[int, dict[int, _Shift]]) -> None:
+    # The end of a Shift comes before the first decision of the next.
+    for situations in (batch.endings, batch):
+        if situations is batch or batch.done:
+            for player, row in zip(situations.seats.tolist(), features.table_of(situations), strict=True):
+                seen[player] = np.asarray(row, np.float32)
+        for row, player in enumerate(situations.seats.tolist()):
+            _learn(known.setdefault(player, {}), situations, row)
+
+
+def _learn(known: dict[int, _Shift], situations: Situations, row: int) -> None:
+    observed = situations.observations
+    golden = bool(observed.golden[row])
+    number = int(observed.shifts[row])
+    shift = known.get(number, _Shift(observed.hands[row], golden, golden, np.zeros(0, np.uint16)))
+    new = int(observed.history_counts[row]) - len(shift.actions)
+    actions = np.concatenate([shift.actions, observed.history[row, _WIDTH - new :]])
+    known[number] = replace(shift, got_golden=shift.got_golden | golden, actions=actions)
 
 
 class ChefsHatGame(pyspiel.Game):  # type: ignore[misc]  # OpenSpiel has no types.
@@ -171,14 +237,12 @@ class ChefsHatGame(pyspiel.Game):  # type: ignore[misc]  # OpenSpiel has no type
     def __init__(self, params: Mapping[str, Any] | None = None) -> None:
         given = {**_PARAMETERS, **(params or {})}
         rules = {name: given[name] for name, unset in _RULES.items() if given[name] != unset}
-        self.options: dict[str, Any] = {
-            "games": 1,
-            "rules": {"preset": given["rules"], "target_shifts": given["shifts"], **rules},
-        }
+        options: dict[str, Any] = {"games": 1, "rules": {"preset": given["rules"], "target_shifts": given["shifts"], **rules}}
         self.deals, self.shifts, self.history = (int(given[name]) for name in ("deals", "shifts", "history"))
-        with VectorEnv(seed=0, **self.options) as env:
+        with VectorEnv(seed=0, **options) as env:
             self.sizes = env.sizes
             points, turns, self.texts = list(env.rules.points), env.rules.max_turns, env.action_texts
+        self.games = _Games(options, self.sizes)
         shifts = self.shifts
         info = pyspiel.GameInfo(
             num_distinct_actions=self.sizes.num_actions,
@@ -206,19 +270,18 @@ class ChefsHatState(pyspiel.State):  # type: ignore[misc]
 
     def __init__(self, game: ChefsHatGame) -> None:
         super().__init__(game)
-        self._options, self._deals, self._texts = game.options, game.deals, game.texts
+        self._games, self._deals, self._texts = game.games, game.deals, game.texts
         self.position: _Position | None = None
 
     def current_player(self) -> int:
         """Returns the player who decides."""
         if self.position is None:
             return int(pyspiel.PlayerId.CHANCE)
-        batch = self.position.env().batch
-        return int(pyspiel.PlayerId.TERMINAL) if len(batch) == 0 else int(batch.seats[0])
+        return self.position.player
 
     def is_terminal(self) -> bool:
         """Returns whether the game is over."""
-        return self.position is not None and len(self.position.env().batch) == 0
+        return self.position is not None and not self.position.state
 
     def chance_outcomes(self) -> list[tuple[int, float]]:
         """Returns the deals, which are equally probable."""
@@ -226,19 +289,35 @@ class ChefsHatState(pyspiel.State):  # type: ignore[misc]
 
     def returns(self) -> list[float]:
         """Returns the points of each player; zeros before the end."""
-        if not self.is_terminal() or self.position is None:
-            return [0.0] * self.num_players()
-        return [float(points) for points in self.position.env().batch.endings.observations.points[-1]]
+        return [0.0] * self.num_players() if self.position is None else self.position.points
 
     def _legal_actions(self, player: int) -> list[int]:
         assert self.position is not None, "a player decides after the deal"
-        return [int(action) for action in np.flatnonzero(self.position.env().batch.masks[0])]
+        return list(self.position.legal)
+
+    def resample_from_infostate(self, player: int, uniform: Callable[[], float]) -> "ChefsHatState":
+        """Returns a state that a player cannot tell from this one, with its cards of the others drawn: see the module.
+
+        Its history is still that of this state, with the chance outcome of the true deal.
+
+        Args:
+            player: the player, who has to be the one who decides.
+            uniform: draws numbers from [0, 1).
+
+        Raises:
+            ValueError: another player decides.
+        """
+        if self.position is None or player != self.position.player:
+            raise ValueError(f"player {player} does not decide here: resample for current_player(), {self.current_player()}")
+        state: ChefsHatState = self.clone()
+        state.position = self._games.drawn(self.position, int(uniform() * 2**53))
+        return state
 
     def _apply_action(self, action: int) -> None:
         if self.position is None:
-            self.position = _Position(self._options, action, [])
+            self.position = self._games.begun(seed=action)
         else:
-            self.position.take(action)
+            self.position = self._games.after(self.position, action)
 
     def _action_to_string(self, player: int, action: int) -> str:
         if player == pyspiel.PlayerId.CHANCE or self.position is None:
@@ -281,16 +360,17 @@ class ChefsHatObserver:
         if state.position is None:
             return
         if self._has_recall:
-            for row, shift in zip(self.dict["shifts"], state.position.known(player), strict=False):
+            shifts = state.position.known.get(player, {}).values()
+            for row, shift in zip(self.dict["shifts"], shifts, strict=False):
                 row[:] = shift.tensor(player, self._game.sizes, self._game.history)
-        else:
-            self.tensor[:] = state.position.seen(player)
+        elif player in state.position.seen:
+            self.tensor[:] = state.position.seen[player]
 
     def string_from(self, state: ChefsHatState, player: int) -> str:
         """Returns the observation or information state as text."""
         if self._has_recall:
-            known = [] if state.position is None else state.position.known(player)
-            return "\n".join([f"player {player}", *(shift.text(self._game.sizes, self._game.texts) for shift in known)])
+            known = {} if state.position is None else state.position.known.get(player, {})
+            return "\n".join([f"player {player}", *(shift.text(self._game.sizes, self._game.texts) for shift in known.values())])
         self.set_from(state, player)
         return " ".join(f"{number:g}" for number in self.tensor)
 
