@@ -103,7 +103,7 @@ class _Position:
         player: who decides; `TERMINAL` after the end.
         legal: the legal actions, ascending.
         points: those of each player; zeros before the end.
-        seen: the observation of each player at its last decision.
+        seen: what each player saw at its last decision: a table, and its row.
         known: what each player knows of each Shift, by its number.
         searched: here, the possible deals of the player who decides, once counted.
     """
@@ -112,7 +112,7 @@ class _Position:
     player: int
     legal: list[int]
     points: list[float]
-    seen: dict[int, NDArray[np.float32]]
+    seen: dict[int, tuple[Situations, int]]
     known: dict[int, dict[int, _Shift]]
     searched: list[search.Position] = field(default_factory=list)
 
@@ -204,13 +204,12 @@ class _Games(threading.local):
         return _Position(self._state, int(batch.seats[0]), legal, [0.0] * env.sizes.players, seen, known)
 
 
-def _look(batch: Batch, seen: dict[int, NDArray[np.float32]], known: dict[int, dict[int, _Shift]]) -> None:
+def _look(batch: Batch, seen: dict[int, tuple[Situations, int]], known: dict[int, dict[int, _Shift]]) -> None:
     # The end of a Shift comes before the first decision of the next.
     for situations in (batch.endings, batch):
-        if situations is batch or batch.done:
-            for player, row in zip(situations.seats.tolist(), features.table_of(situations), strict=True):
-                seen[player] = np.asarray(row, np.float32)
         for row, player in enumerate(situations.seats.tolist()):
+            if situations is batch or batch.done:
+                seen[player] = situations, row
             _learn(known.setdefault(player, {}), situations, row)
 
 
@@ -364,7 +363,8 @@ class ChefsHatObserver:
             for row, shift in zip(self.dict["shifts"], shifts, strict=False):
                 row[:] = shift.tensor(player, self._game.sizes, self._game.history)
         elif player in state.position.seen:
-            self.tensor[:] = state.position.seen[player]
+            situations, row = state.position.seen[player]
+            self.tensor[:] = features.table_of(situations)[row]
 
     def string_from(self, state: ChefsHatState, player: int) -> str:
         """Returns the observation or information state as text."""
