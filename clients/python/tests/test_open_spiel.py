@@ -1,6 +1,8 @@
 """The game in OpenSpiel: its own simulation test, and the same game as without it. Runs where OpenSpiel is installed."""
 
 import importlib
+import itertools
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,8 +23,17 @@ def game() -> Any:
     return pyspiel.load_game("python_chefshat", {"deals": 20, "shifts": 2})
 
 
-def test_openspiel_accepts_the_game(game: Any) -> None:
-    pyspiel.random_sim_test(game, num_sims=1, serialize=True, verbose=False)
+@pytest.fixture(scope="module")
+def smallest() -> Any:
+    """A game with a tree that fits into memory, with all deals."""
+    importlib.import_module("chefshat.envs.open_spiel")
+    rules = {"players": 2, "faces": 4, "jokers": 0, "max_idle_pizzas": 1, "max_turns": 4}
+    return pyspiel.load_game("python_chefshat", {"deals": 0, **rules})
+
+
+def test_openspiel_accepts_the_game(game: Any, smallest: Any) -> None:
+    for it in (game, smallest):
+        pyspiel.random_sim_test(it, num_sims=1, serialize=True, verbose=False)
 
 
 def test_a_game_is_that_of_a_vector_env(game: Any) -> None:
@@ -226,3 +237,93 @@ def test_is_mcts_of_openspiel_plays() -> None:
         action = bot.step(state)
         assert action in state.legal_actions()
         state.apply_action(action)
+
+
+def test_all_deals_are_as_likely_as_in_a_deck(smallest: Any) -> None:
+    outcomes = smallest.new_initial_state().chance_outcomes()
+    assert sum(chance for _, chance in outcomes) == pytest.approx(1)
+    # By dealing each order of the ten cards: player 0 has five of them, and the last is the Golden card.
+    cards = [1, 2, 2, 3, 3, 3, 4, 4, 4, 5]
+    counted: dict[tuple[int, ...], int] = {}
+    for chosen in itertools.combinations(cards, 5):
+        counted[chosen] = counted.get(chosen, 0) + 1
+    found = {}
+    for script, chance in zip(smallest.starts, smallest.chances, strict=True):
+        cards_of = list(script.hands[0].cards)
+        found[(*cards_of[:-1], 5) if script.hands[0].golden else tuple(cards_of)] = chance
+    assert found == pytest.approx({hand: count / 252 for hand, count in counted.items()})
+
+
+def test_all_deals_are_for_one_shift_of_a_small_deck() -> None:
+    for parameters, words in [
+        ({"shifts": 2}, "is for one Shift"),
+        ({}, "more than 10000 deals"),
+        ({"deals": -1}, "1 or more deals"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            pyspiel.load_game("python_chefshat", {"deals": 0, **parameters})
+
+
+def test_cfr_of_openspiel_finds_what_brute_force_confirms(smallest: Any) -> None:
+    """The distance from an equilibrium falls, and is what a search of all best responses in this game finds."""
+    gambit = importlib.import_module("open_spiel.python.algorithms.gambit")
+    # The same tree as a game of OpenSpiel's own, which is fast.
+    tree = pyspiel.load_efg_game(gambit.export_gambit(smallest))
+    solver = pyspiel.CFRPlusSolver(tree)
+    distances = []
+    for iterations in (1, 20, 200):
+        for _ in range(iterations):
+            solver.evaluate_and_update_policy()
+        distances.append(pyspiel.nash_conv(tree, solver.average_policy(), use_state_get_policy=True))
+    assert distances[0] > 10 * distances[2] > 0
+    policy = solver.average_policy()
+    root = tree_of(smallest.new_initial_state(), tree.new_initial_state(), policy)
+    assert sum(best_response(root, player) for player in range(2)) - smallest.utility_sum() == pytest.approx(distances[2], abs=1e-9)
+
+
+@dataclass
+class Node:
+    """A state of a game tree, with the chances of its children under a policy; a player is negative where none decides."""
+
+    player: int
+    known: str
+    returns: list[float]
+    children: list[tuple["Node", float]]
+
+
+def tree_of(state: Any, same: Any, policy: Any) -> Node:
+    """Returns a state and all that follow; `same`: this state in the game that the policy is for."""
+    chances: dict[int, float] = {}
+    if state.is_chance_node():
+        chances = dict(state.chance_outcomes())
+    elif not state.is_terminal():
+        chances = policy.action_probabilities(same)
+    # Actions of the two games have the same order.
+    children = [
+        (tree_of(state.child(action), same.child(other), policy), chances[action if state.is_chance_node() else other])
+        for action, other in zip(state.legal_actions(), same.legal_actions(), strict=True)
+    ]
+    player = state.current_player()
+    return Node(player, state.information_state_string() if player >= 0 else "", state.returns(), children)
+
+
+def best_response(root: Node, player: int) -> float:
+    """Returns the most that a player gets against the others' policy, by trying all that it can do with what it knows."""
+
+    def best(histories: list[tuple[Node, float]]) -> float:
+        found = 0.0
+        undecided: dict[str, list[tuple[Node, float]]] = {}
+        while histories:
+            node, reach = histories.pop()
+            if node.player == player:
+                undecided.setdefault(node.known, []).append((node, reach))
+            elif not node.children:
+                found += reach * node.returns[player]
+            else:
+                histories += [(child, reach * chance) for child, chance in node.children]
+        for same in undecided.values():
+            choices = range(len(same[0][0].children))
+            found += max(best([(node.children[choice][0], reach) for node, reach in same]) for choice in choices)
+        return found
+
+    return best([(root, 1.0)])

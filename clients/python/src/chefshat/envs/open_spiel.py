@@ -1,11 +1,12 @@
 """The game as a Python game of OpenSpiel: importing this module registers "python_chefshat".
 
     game = pyspiel.load_game("python_chefshat", {"shifts": 1, "deals": 1000})
-    small = pyspiel.load_game("python_chefshat", {"players": 3, "faces": 5, "jokers": 0})
+    rules = {"players": 2, "faces": 4, "jokers": 0, "max_idle_pizzas": 1, "max_turns": 6}
+    small = pyspiel.load_game("python_chefshat", {"deals": 0, **rules})
 
-The first move is chance: it chooses one of `deals` seeds, each of which determines the deals of the whole game. Everything else is
-decisions of players, so histories, serialized states and clones work as in other games. A clone takes the same time after any
-number of moves; for speed use `VectorEnv`.
+The first move is chance: it chooses one of `deals` seeds, each of which determines the deals of the whole game; or, with `deals` 0
+and one Shift of a small deck, one of all deals, each as likely as it is. Everything else is decisions of players, so histories,
+serialized states and clones work as in other games. A clone takes the same time after any number of moves. `VectorEnv` is faster.
 
 `resample_from_infostate` draws from all deals that agree with what the player who decides knows, each equally likely, with
 `chefshat.search`: search by sampled deals, such as OpenSpiel's IS-MCTS, needs nothing else.
@@ -17,8 +18,10 @@ and all actions that it may know (`chefshat.history`), until its current or last
 complete. The tensor has tokens of the latest `history` actions of each Shift, by default 512; ordinary Shifts have some 100.
 """
 
+import itertools
+import math
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -30,7 +33,7 @@ try:
 except ImportError as error:
     raise ImportError("chefshat.envs.open_spiel needs OpenSpiel: pip install open_spiel") from error
 
-from chefshat import history, search
+from chefshat import history, pb, search
 from chefshat.batch import Batch
 from chefshat.columns import Situations, Sizes
 from chefshat.learn import features
@@ -41,6 +44,8 @@ _PARAMETERS: dict[str, Any] = {"rules": "paper", "shifts": 1, "deals": 1000, "hi
 # Rules other than the preset's, and the value that stands for the preset's own: a parameter of OpenSpiel has one.
 _RULES = {"players": 0, "faces": 0, "jokers": -1, "max_idle_pizzas": 0, "max_turns": 0}
 _PARAMETERS |= _RULES
+# The most deals of a game that has all of them.
+_MAX_DEALS = 10_000
 # Of the environment: more than the actions between two decisions of a player, so that none is missed.
 _WIDTH = 1024
 _TYPE = pyspiel.GameType(
@@ -204,6 +209,52 @@ class _Games(threading.local):
         return _Position(self._state, int(batch.seats[0]), legal, [0.0] * env.sizes.players, seen, known)
 
 
+def _every_deal(sizes: Sizes, opening: int) -> tuple[list[pb.ScriptedShift], list[float]]:
+    """Returns all deals of the first Shift and their probabilities: docs/rules.md §3.1.
+
+    Raises:
+        ValueError: there are more than `_MAX_DEALS`, or a drawn seat opens.
+    """
+    if opening != pb.OPENING_GOLDEN:
+        raise ValueError("deals 0 needs rules by which the Golden card opens: choose the number of deals")
+    # The Golden card, which is dealt in any case, is a kind of its own, the last one.
+    deck = (*range(1, sizes.faces), sizes.faces - 1, sizes.jokers, 1)
+
+    def chosen(left: tuple[int, ...], cards: int) -> Iterator[tuple[int, ...]]:
+        if not left:
+            yield ()
+            return
+        # As many of the first kind that the others can make up the rest.
+        for count in range(max(0, cards - sum(left[1:])), min(left[0], cards) + 1):
+            for others in chosen(left[1:], cards - count):
+                yield (count, *others)
+
+    def hands(left: tuple[int, ...], seats: int) -> Iterator[tuple[tuple[tuple[int, ...], ...], int]]:
+        if seats == 0:
+            if left[-1] == 0:
+                yield (), 1
+            return
+        for hand in chosen(left, sizes.hand_size):
+            ways = math.prod(map(math.comb, left, hand))
+            rest = tuple(have - taken for have, taken in zip(left, hand, strict=True))
+            for others, count in hands(rest, seats - 1):
+                yield (hand, *others), ways * count
+
+    found = list(itertools.islice(hands(deck, sizes.players), _MAX_DEALS + 1))
+    if len(found) > _MAX_DEALS:
+        raise ValueError(f"there are more than {_MAX_DEALS} deals: choose fewer faces or players, or the number of deals")
+    scripts = []
+    for dealt, _ in found:
+        script = pb.ScriptedShift(shift=1)
+        for seat, (*counts, jokers, golden) in enumerate(dealt):
+            counts[-1] += golden
+            cards = np.repeat(np.arange(1, sizes.faces + 2), [*counts, jokers]).tolist()
+            script.hands.add(seat=seat, cards=cards, golden=bool(golden))
+        scripts.append(script)
+    total = sum(ways for _, ways in found)
+    return scripts, [ways / total for _, ways in found]
+
+
 def _look(batch: Batch, seen: dict[int, tuple[Situations, int]], known: dict[int, dict[int, _Shift]]) -> None:
     # The end of a Shift comes before the first decision of the next.
     for situations in (batch.endings, batch):
@@ -226,11 +277,19 @@ def _learn(known: dict[int, _Shift], situations: Situations, row: int) -> None:
 class ChefsHatGame(pyspiel.Game):  # type: ignore[misc]  # OpenSpiel has no types.
     """The game.
 
-    Its parameters are `rules` (a preset), `shifts` (the number of Shifts), `deals`, `history`, and rules that differ from the
-    preset's: `players` (2 to 6), `faces` (4 to 15), `jokers` (0 to 2), `max_idle_pizzas` and `max_turns`, as in `RuleSet`.
+    Its parameters are `rules` (a preset), `shifts` (the number of Shifts), `deals` (0: all), `history`, and rules that differ from
+    the preset's: `players` (2 to 6), `faces` (4 to 15), `jokers` (0 to 2), `max_idle_pizzas` and `max_turns`, as in `RuleSet`.
+
+    Attributes:
+        sizes: of the columns of observations.
+        texts: the words of each action.
+        games: what takes decisions.
+        starts: with `deals` 0, all deals; otherwise none.
+        chances: the probability of each outcome of chance.
 
     Raises:
         ChefsHatError: RULE_SET_REFUSED: there is no such rule set.
+        ValueError: `deals` is negative, or 0 with several Shifts or too many deals.
     """
 
     def __init__(self, params: Mapping[str, Any] | None = None) -> None:
@@ -241,11 +300,15 @@ class ChefsHatGame(pyspiel.Game):  # type: ignore[misc]  # OpenSpiel has no type
         with VectorEnv(seed=0, **options) as env:
             self.sizes = env.sizes
             points, turns, self.texts = list(env.rules.points), env.rules.max_turns, env.action_texts
+            opening = env.rules.opening
         self.games = _Games(options, self.sizes)
         shifts = self.shifts
+        if self.deals < 0 or (self.deals == 0 and shifts > 1):
+            raise ValueError("choose 1 or more deals; 0, for all of them, is for one Shift")
+        self.starts, self.chances = ([], [1 / self.deals] * self.deals) if self.deals else _every_deal(self.sizes, opening)
         info = pyspiel.GameInfo(
             num_distinct_actions=self.sizes.num_actions,
-            max_chance_outcomes=self.deals,
+            max_chance_outcomes=len(self.chances),
             num_players=self.sizes.players,
             min_utility=float(shifts * min(points)),
             max_utility=float(shifts * max(points)),
@@ -269,7 +332,7 @@ class ChefsHatState(pyspiel.State):  # type: ignore[misc]
 
     def __init__(self, game: ChefsHatGame) -> None:
         super().__init__(game)
-        self._games, self._deals, self._texts = game.games, game.deals, game.texts
+        self._games, self._texts = game.games, game.texts
         self.position: _Position | None = None
 
     def current_player(self) -> int:
@@ -283,8 +346,8 @@ class ChefsHatState(pyspiel.State):  # type: ignore[misc]
         return self.position is not None and not self.position.state
 
     def chance_outcomes(self) -> list[tuple[int, float]]:
-        """Returns the deals, which are equally probable."""
-        return [(deal, 1 / self._deals) for deal in range(self._deals)]
+        """Returns the deals and their probabilities."""
+        return list(enumerate(self.get_game().chances))
 
     def returns(self) -> list[float]:
         """Returns the points of each player; zeros before the end."""
@@ -314,7 +377,8 @@ class ChefsHatState(pyspiel.State):  # type: ignore[misc]
 
     def _apply_action(self, action: int) -> None:
         if self.position is None:
-            self.position = self._games.begun(seed=action)
+            starts = self.get_game().starts
+            self.position = self._games.begun(seed=action, starts=[(starts[action], [])] if starts else None)
         else:
             self.position = self._games.after(self.position, action)
 
