@@ -13,20 +13,20 @@ from chefshat import history
 
 pyspiel = pytest.importorskip("pyspiel")
 pytest.importorskip("chefshat_native")
+# Registers the game.
+importlib.import_module("chefshat.envs.open_spiel")
 
 RULES = {"preset": "paper", "target_shifts": 2}
 
 
 @pytest.fixture(scope="module")
 def game() -> Any:
-    importlib.import_module("chefshat.envs.open_spiel")
     return pyspiel.load_game("python_chefshat", {"deals": 20, "shifts": 2})
 
 
 @pytest.fixture(scope="module")
 def smallest() -> Any:
     """A game with a tree that fits into memory, with all deals."""
-    importlib.import_module("chefshat.envs.open_spiel")
     rules = {"players": 2, "faces": 4, "jokers": 0, "max_idle_pizzas": 1, "max_turns": 4}
     return pyspiel.load_game("python_chefshat", {"deals": 0, **rules})
 
@@ -54,7 +54,6 @@ def test_a_game_is_that_of_a_vector_env(game: Any) -> None:
 
 
 def test_rules_are_parameters() -> None:
-    importlib.import_module("chefshat.envs.open_spiel")
     chosen = {"players": 3, "faces": 5, "jokers": 1, "max_idle_pizzas": 1, "max_turns": 60}
     small = pyspiel.load_game("python_chefshat", {"deals": 2, **chosen})
     assert small.num_players() == 3
@@ -203,7 +202,6 @@ def test_resampling_is_for_the_player_who_decides(game: Any) -> None:
 
 def test_drawn_deals_are_as_likely_as_those_of_the_sampler() -> None:
     """On a deck so small that each deal is drawn often."""
-    importlib.import_module("chefshat.envs.open_spiel")
     small = pyspiel.load_game("python_chefshat", {"players": 3, "faces": 4, "jokers": 0, "deals": 5})
     state = small.new_initial_state()
     state.apply_action(4)
@@ -224,7 +222,6 @@ def test_drawn_deals_are_as_likely_as_those_of_the_sampler() -> None:
 
 
 def test_is_mcts_of_openspiel_plays() -> None:
-    importlib.import_module("chefshat.envs.open_spiel")
     game = pyspiel.load_game("python_chefshat", {"deals": 3})
     mcts = importlib.import_module("open_spiel.python.algorithms.mcts")
     ismcts = importlib.import_module("open_spiel.python.algorithms.ismcts")

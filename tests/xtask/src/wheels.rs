@@ -54,7 +54,7 @@ pub(crate) fn run(
     })?;
     for processor in processors {
         let platforms = [
-            (MODULE, target(processor), &STATIC_PLATFORMS[..1]),
+            (MODULE, target(processor), &[PLATFORM][..]),
             (SERVER, static_target(processor), &STATIC_PLATFORMS),
         ];
         for (package, target, compatible) in platforms {

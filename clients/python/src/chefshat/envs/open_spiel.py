@@ -158,8 +158,8 @@ class _Games(threading.local):
 
     def begun(self, **start: Any) -> _Position:  # noqa: ANN401 # Options of a VectorEnv.
         """Returns the first decision of a game that begins in this way."""
-        self._env = VectorEnv(total_games=1, history=_WIDTH, **start, **self.options)
-        return self._found(self._env, _Position(b"", 0, [], [], {}, {}))
+        env = VectorEnv(total_games=1, history=_WIDTH, **start, **self.options)
+        return self._found(env, _Position(b"", 0, [], [], {}, {}))
 
     def after(self, position: _Position, action: int) -> _Position:
         """Returns the position after a decision.
@@ -169,12 +169,14 @@ class _Games(threading.local):
         """
         if action not in position.legal:
             raise ValueError(f"action {action} is not legal here: choose one of {position.legal}")
-        if self._env is None or self._state != position.state:
-            if self._env is None:
-                self._env = VectorEnv(seed=0, total_games=1, history=_WIDTH, **self.options)
-            self._env.restore([0], [position.state])
-        self._env.step([action])
-        return self._found(self._env, position)
+        # If the decision is interrupted, nothing is left that stands elsewhere than it says.
+        env, self._env = self._env, None
+        if env is None:
+            env, self._state = VectorEnv(seed=0, total_games=1, history=_WIDTH, **self.options), b""
+        if self._state != position.state:
+            env.restore([0], [position.state])
+        env.step([action])
+        return self._found(env, position)
 
     def drawn(self, position: _Position, seed: int) -> _Position:
         """Returns the same decision, with another deal that the player who decides cannot tell from this one.
@@ -200,11 +202,11 @@ class _Games(threading.local):
         while len(env.batch) == 0 and not env.batch.done:
             _look(env.step(np.zeros(0, np.uint16)), seen, known)
         batch = env.batch
+        self._state = b"" if batch.done else env.save()[0]
+        self._env = env
         if batch.done:
-            self._state = b""
             points = [float(points) for points in batch.endings.observations.points[-1]]
             return _Position(b"", int(pyspiel.PlayerId.TERMINAL), [], points, seen, known)
-        (self._state,) = env.save()
         legal = np.flatnonzero(batch.masks[0]).tolist()
         return _Position(self._state, int(batch.seats[0]), legal, [0.0] * env.sizes.players, seen, known)
 
