@@ -15956,9 +15956,9 @@ pub struct ListedStarts {
 /// Saved games as the start of games. In copies decisions are not kept for records.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct SavedStart {
-    /// States, as in VectorStates, of running games with the same rules, seats, rewards, decisions,
-    /// rule for invalid actions, shift_statistics and history: at least one, at most `games`. The game
-    /// with index i is a copy of the state at i modulo their number.
+    /// States, as in VectorStates, of running games with the same rules, rewards, decisions, rule for
+    /// invalid actions, shift_statistics and history: at least one, at most `games`. The game with
+    /// index i is a copy of the state at i modulo their number. Others may play in it.
     #[prost(bytes = "vec", repeated, tag = "1")]
     pub states: ::prost::alloc::vec::Vec<::prost::alloc::vec::Vec<u8>>,
     /// Whether a copy continues exactly as the saved game would: with its seed, and with the random
@@ -16141,7 +16141,9 @@ pub struct VectorRestore {
     #[prost(bytes = "vec", tag = "1")]
     pub games: ::prost::alloc::vec::Vec<u8>,
     /// The state of each, in the same order, from a stream whose setup differs at most in the number
-    /// of games, seeds, starts, episodes and skip_forced. One for each game.
+    /// of games, seeds, starts, episodes and skip_forced, and, unless games are recorded, in who plays
+    /// which seat. An agent that takes a seat over begins its random choices from the game's seed. One
+    /// for each game.
     #[prost(bytes = "vec", repeated, tag = "2")]
     pub states: ::prost::alloc::vec::Vec<::prost::alloc::vec::Vec<u8>>,
 }

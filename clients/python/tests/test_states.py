@@ -151,6 +151,20 @@ def test_forks_are_copies(anywhere: str | None) -> None:
         assert env.save() == before
 
 
+def test_others_take_seats_over(anywhere: str | None) -> None:
+    others = OPTIONS | {"client_seats": [1], "opponents": ["greedy", "trained", "greedy"]}
+    with VectorEnv(anywhere, 3, **OPTIONS) as env, VectorEnv(anywhere, 3, **others) as other:
+        played(env, 37, 1)
+        states = env.save()
+        batch = other.restore([0, 2], [states[0], states[2]])
+        assert (batch.seats == 1).all()
+        assert (batch.observations.shifts[batch.games != 1] >= env.batch.observations.shifts[0]).all()
+        played(other, 20, 2)
+        # Back where they came from.
+        env.restore([1], other.save([2]))
+        played(env, 20, 3)
+
+
 def test_what_cannot_be_restored_is_refused(anywhere: str | None) -> None:
     with VectorEnv(anywhere, 2, **OPTIONS) as env:
         states = env.save()

@@ -194,7 +194,7 @@ impl VectorGames {
     }
 
     /// Replaces these games, in ascending order, by saved ones. Each continues exactly as the saved
-    /// game would, with its index, until its end. The game that follows has the index that is higher
+    /// game would, with its index, until its end; where others play here, they take over. The game that follows has the index that is higher
     /// by the number of games here, and the seed that it has here. The batch contains all open
     /// decisions; a restored game has not begun anew, so it is not among the beginnings.
     ///
@@ -218,10 +218,16 @@ impl VectorGames {
         if kept + states.iter().map(SavedGame::kept).sum::<u64>() > MAX_RECORDED {
             return Err(StepError::RecordsTooLong.into());
         }
-        for (&game, state) in games.iter().zip(states) {
+        let terms = self.setup.terms();
+        let mut taken_over = Vec::new();
+        for (&game, mut state) in games.iter().zip(states) {
+            if state.is_reseated(&terms) {
+                state.reseat(&terms);
+                taken_over.push(game);
+            }
             self.slots[game as usize].restore(state);
         }
-        Ok(self.begin_some(&[]))
+        Ok(self.advance_some(&taken_over, |_, _, _| {}))
     }
 
     /// `times` copies of each of these games as games of their own, with the first batch: game i is
@@ -253,14 +259,23 @@ impl VectorGames {
 
     /// Restarts some games, in ascending order, with their next indices.
     fn begin_some(&mut self, games: &[u32]) -> Batch {
+        self.advance_some(games, Slot::begin_next)
+    }
+
+    /// Advances some games, in ascending order, after `first`.
+    fn advance_some(
+        &mut self,
+        games: &[u32],
+        first: impl Fn(&mut Slot, &VectorSetup, &mut Part) + Sync,
+    ) -> Batch {
         let setup = &self.setup;
         let (pool, waiting, step) = (self.pool.as_ref(), &mut self.waiting, self.step);
         let part = blocks::run(&mut self.slots, setup, pool, waiting, step, |slot, part| {
-            let begins = games.binary_search(&slot.number()).is_ok();
-            if begins {
-                slot.begin_next(setup, part);
+            let advances = games.binary_search(&slot.number()).is_ok();
+            if advances {
+                first(slot, setup, part);
             }
-            begins
+            advances
         });
         self.finished(part)
     }

@@ -91,6 +91,24 @@ impl RunningGame {
             .collect()
     }
 
+    /// Has the agents of other terms continue. Seats with the same agent keep it as it is; another one
+    /// begins here, from the game's seed. A decision that is no longer the client's is theirs, without
+    /// the attempts at it so far.
+    pub(super) fn reseat(&mut self, before: &Terms, here: &Terms) {
+        let mut agents = RunningGame::agents(here, self.seed);
+        for (seat, (agent, kept)) in agents.iter_mut().zip(&self.agents).enumerate() {
+            if before.agents[Seat::new(seat)] == here.agents[Seat::new(seat)] {
+                agent.clone_from(kept);
+            }
+        }
+        self.agents = agents;
+        let is_theirs = |open: &mut Open| here.agents[open.decision.seat].is_some();
+        if let Some(open) = self.open.take_if(is_theirs) {
+            self.rewards[open.decision.seat] += open.reward;
+            self.attempts.clear();
+        }
+    }
+
     /// Deals later Shifts from another seed, from which agents choose at random as well.
     pub(super) fn reseed(&mut self, terms: &Terms, seed: Seed) {
         self.seed = seed;

@@ -49,7 +49,8 @@ pub struct Difference {
 
 /// The options that decide what a state contains, or which of its values are valid. Episodes, the
 /// number of games, seeds, starts, and whether forced decisions are skipped are not among them: they
-/// may differ where a state is restored, and apply from there.
+/// may differ where a state is restored, and apply from there. So may the agents, unless games are
+/// recorded.
 #[derive(Copy, Clone, Eq, PartialEq, Debug)]
 pub(super) struct Terms {
     pub(super) rules: RuleSet,
@@ -99,7 +100,9 @@ impl Terms {
         let idle = (saved_rules.max_idle_pizzas, rules.max_idle_pizzas);
         differs!("max_idle_pizzas", idle.0, idle.1);
         differs!("max_turns", saved_rules.max_turns, rules.max_turns);
-        differs!("list of seats", agents(self), agents(here));
+        if here.records {
+            differs!("list of seats", agents(self), agents(here));
+        }
         differs!("reward scheme", scheme(self), scheme(here));
         differs!("choice of decisions", self.decisions, here.decisions);
         differs!("rule for invalid actions", self.invalid, here.invalid);

@@ -40,6 +40,11 @@ impl SavedGame {
         self.index
     }
 
+    /// The game with the cards of all seats; `None` if it is over.
+    pub fn game(&self) -> Option<&Game> {
+        self.running.as_ref().map(|running| &running.game)
+    }
+
     /// Number of decisions and attempts kept of the game.
     pub(super) fn kept(&self) -> u64 {
         self.running.as_ref().map_or(0, |running| running.kept)
@@ -48,6 +53,19 @@ impl SavedGame {
     /// The game; `None` if it is over.
     pub(super) fn running(&self) -> Option<&RunningGame> {
         self.running.as_ref()
+    }
+
+    /// Whether others play here.
+    pub(super) fn is_reseated(&self, here: &Terms) -> bool {
+        self.terms.agents != here.agents
+    }
+
+    /// Has the agents of these terms continue the game.
+    pub(super) fn reseat(&mut self, here: &Terms) {
+        if let Some(running) = &mut self.running {
+            running.reseat(&self.terms, here);
+        }
+        self.terms.agents = here.agents;
     }
 
     /// The game as it is restored.
@@ -90,6 +108,10 @@ impl SavedGame {
         let running = self.running.as_mut().ok_or(StateError::Over)?;
         running.forget_decisions();
         self.terms.records = false;
-        self.check(terms)
+        self.check(terms)?;
+        if self.is_reseated(terms) {
+            self.reseat(terms);
+        }
+        Ok(())
     }
 }

@@ -282,9 +282,9 @@ class SavedStart(_message.Message):
     """
     @_builtins.property
     def states(self) -> _containers.RepeatedScalarFieldContainer[_builtins.bytes]:
-        """States, as in VectorStates, of running games with the same rules, seats, rewards, decisions,
-        rule for invalid actions, shift_statistics and history: at least one, at most `games`. The game
-        with index i is a copy of the state at i modulo their number.
+        """States, as in VectorStates, of running games with the same rules, rewards, decisions, rule for
+        invalid actions, shift_statistics and history: at least one, at most `games`. The game with
+        index i is a copy of the state at i modulo their number. Others may play in it.
         """
 
     def __init__(
@@ -596,7 +596,9 @@ class VectorRestore(_message.Message):
     @_builtins.property
     def states(self) -> _containers.RepeatedScalarFieldContainer[_builtins.bytes]:
         """The state of each, in the same order, from a stream whose setup differs at most in the number
-        of games, seeds, starts, episodes and skip_forced. One for each game.
+        of games, seeds, starts, episodes and skip_forced, and, unless games are recorded, in who plays
+        which seat. An agent that takes a seat over begins its random choices from the game's seed. One
+        for each game.
         """
 
     def __init__(
