@@ -141,7 +141,17 @@ class Position:
     ) -> dict[str, NDArray[Any]]:
         """Estimates what actions are worth. `policy`: an agent's name, or the bytes of a network file. 0: no limit."""
 
+    def outcomes(
+        self, actions: Sequence[int], policy: str | bytes, *, first: int, deals: int, threads: int, seed: int
+    ) -> tuple[NDArray[np.uint32], NDArray[np.uint8]]:
+        """Points and places of the seat for each action in `deals` of these deals, from `first` on: a row for each deal."""
+
     def __reduce__(self) -> NoReturn: ...
+
+def play_states(
+    states: Sequence[bytes], policies: Sequence[str | bytes], *, threads: int, seed: int
+) -> tuple[NDArray[np.uint32], NDArray[np.uint8]]:
+    """Points and places of all seats in the Shift of each state, played on by one agent or one for each seat."""
 
 def trained_network() -> bytes:
     """The file of the network of the built-in agent "trained". `chefshat.learn.network.load("trained")` reads it."""

@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import chefshat
 from chefshat import ChefsHatError, VectorEnv, history, pb, search
-from chefshat.search import Estimates, Position
+from chefshat.estimates import Estimates, Outcomes
+from chefshat.search import Position
 
 pytest.importorskip("chefshat_native")
 
@@ -261,3 +263,150 @@ def test_the_search_agent_beats_greedy() -> None:
 def test_own_rollouts(capsys: pytest.CaptureFixture[str]) -> None:
     sample_module("own_rollouts").main(games=2, deals=4)
     assert "points a Shift" in capsys.readouterr().out
+
+
+def test_the_sample_that_improves_a_policy(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("safetensors")
+    sample_module("improved_policy").main(shifts=2, rollouts=16)
+    assert "points a Shift" in capsys.readouterr().out
+
+
+def busy_position(actions: int = 4) -> Position:
+    """Returns the first decision among more than this number of actions."""
+    return next(position for _, position in positions(2) if len(position.legal_actions) > actions)
+
+
+def test_outcomes_are_what_estimates_are_means_of() -> None:
+    position = busy_position()
+    tried = position.outcomes(30, seed=1)
+    assert tried.points.shape == tried.places.shape == (30, len(position.legal_actions))
+    worth = np.array(position.rules.points)
+    assert (tried.points == worth[tried.places.astype(int) - 1]).all()
+    found = position.evaluate(deals=30, seed=1)
+    assert same(found, tried.estimates())
+    assert same(found, position.evaluate(deals=30, seed=1, threads=1))
+    np.testing.assert_allclose(found.points, tried.points.mean(axis=0))
+    np.testing.assert_allclose(found.standard_errors, tried.points.std(axis=0, ddof=1) / np.sqrt(30))
+    # A budget of rollouts is spent on the same deals, four at first.
+    fewest, first = position.evaluate(1, seed=1), Outcomes(tried.actions, tried.points[:4], tried.places[:4]).estimates()
+    for name in Estimates.__dataclass_fields__:
+        np.testing.assert_allclose(getattr(fewest, name), getattr(first, name), atol=1e-12)
+    assert position.evaluate(deals=1).standard_errors.max() == np.inf
+
+
+def test_weights_of_deals() -> None:
+    position = busy_position()
+    hands, tried = position.sample(40, seed=2), position.outcomes(40, seed=2)
+    # Deals in which the seat on the left holds a joker, and no others.
+    likely = hands[:, (position.seat + 1) % 4, -1] > 0
+    assert 2 < likely.sum() < 38
+    found = position.evaluate(deals=40, seed=2, weights=3.0 * likely)
+    kept = Outcomes(tried.actions, tried.points[likely], tried.places[likely]).estimates()
+    for name in ("points", "standard_errors", "gains", "gain_errors", "places"):
+        np.testing.assert_allclose(getattr(found, name), getattr(kept, name), err_msg=name)
+    for wrong in (np.ones(39), np.zeros(40), np.full(40, np.nan), [-1.0, *np.ones(39)]):
+        with pytest.raises(ValueError, match="a finite number of 0 or more for each of the 40 deals"):
+            tried.estimates(wrong)
+
+
+def test_worlds_played_on() -> None:
+    # The deals of a position as games of their own, with the cards of all seats.
+    position = busy_position()
+    tried = position.outcomes(16, agent="greedy", seed=3)
+    compared = 0
+    with VectorEnv(games=16, starts=position.starts(16, seed=3), rules=position.rules, episode="game", seed=1) as worlds:
+        states = worlds.save()
+        for column, action in enumerate(position.legal_actions):
+            ended = worlds.step(np.full(16, action)).totals.shifts
+            points, places = search.play_on(worlds.save(), "greedy")
+            assert np.array_equal(np.sort(places), np.tile(np.arange(1, 5), (16, 1)))
+            if ended == worlds.restore(np.arange(16), states).totals.shifts and not compared:
+                # `greedy` draws no random numbers, so it plays alike here and there.
+                assert (points[:, position.seat] == tried.points[:, column]).all()
+                compared += 1
+    assert compared
+    mixed: list[search.Agent] = ["random", "greedy", "trained", NETWORK / "table-actions.safetensors"]
+    one, again = (search.play_on(states, mixed, seed=7, threads=threads) for threads in (1, 0))
+    np.testing.assert_array_equal(one, again)
+    assert not np.array_equal(one[0], search.play_on(states, mixed, seed=8)[0])
+    assert search.play_on([], "greedy")[0].shape == (0, 0)
+    with pytest.raises(ChefsHatError, match="there is no agent"):
+        search.play_on(states, "Greedy")
+    with pytest.raises(ChefsHatError, match="3 agents for 4 seats"):
+        search.play_on(states, ["greedy"] * 3)
+    with pytest.raises(ChefsHatError, match="not a state of a game"):
+        search.play_on([b"nothing"])
+
+
+def test_leaves_are_the_next_decisions() -> None:
+    position = busy_position()
+    seen = []
+
+    def half(batch: chefshat.Batch) -> NDArray[np.float64]:
+        assert (batch.seats == position.seat).all()
+        seen.append(batch.observations.hands.sum())
+        return np.full(len(batch), 2.5)
+
+    found = position.outcomes(12, leaf=half, seed=4)
+    valued = np.isnan(found.places)
+    assert valued.any()
+    assert (found.points[valued] == 2.5).all()
+    assert (position.evaluate(deals=12, leaf=half, seed=4).points == found.points.mean(axis=0)).all()
+    # Who plays its last card has no further decision, and a place in all deals.
+    last = next(
+        position for env, position in positions(2) if env.batch.observations.hands.sum() == 1 and len(position.legal_actions) > 1
+    )
+    asked = len(seen)
+    left = last.outcomes(5, leaf=half, actions=last.legal_actions[:1].tolist())
+    assert len(seen) == asked
+    assert (left.places == left.places[0, 0]).all()
+    assert (left.points == last.rules.points[int(left.places[0, 0]) - 1]).all()
+    for wrong in (lambda batch: np.zeros(len(batch) + 1), lambda batch: np.full(len(batch), np.nan)):
+        with pytest.raises(ValueError, match="leaf has to return a finite number"):
+            position.outcomes(2, leaf=wrong)
+
+
+def test_a_prior_shares_the_rollouts() -> None:
+    position = busy_position(8)
+    legal = position.legal_actions
+    prior = np.linspace(1, 2, len(legal))
+    found = position.evaluate(400, prior=prior, considered=4, seed=1)
+    tried = found.rollouts > 0
+    assert (found.actions == legal).all()
+    assert (tried == (prior > prior[-5])).all()
+    assert np.isnan(found.points[~tried]).all()
+    assert 380 <= found.rollouts.sum() <= 400
+    # The likeliest stays and is what gains refer to.
+    assert (found.rollouts[-1], found.gains[-1], found.gain_errors[-1]) == (found.rollouts.max(), 0, 0)
+    assert (found.rollouts == found.rollouts.max()).sum() == 2
+    assert found.best in legal[found.rollouts == found.rollouts.max()]
+    # The deals are those of an evaluation of all.
+    most = int(found.rollouts.max())
+    same_deals = position.evaluate(deals=most, actions=[int(legal[-1])], seed=1)
+    assert same_deals.points[0] == pytest.approx(found.points[-1])
+    improved = found.improved(prior)
+    assert improved.sum() == pytest.approx(1)
+    assert (improved > 0).all()
+    assert improved[np.nanargmax(found.points)] > prior[np.nanargmax(found.points)] / prior.sum()
+    certain = np.eye(len(legal))[2]
+    assert (position.evaluate(40, prior=certain).improved(certain) == certain).all()
+    zeros = np.zeros(3)
+    flat = Estimates(np.arange(3, dtype=np.uint16), zeros, zeros, zeros, zeros, zeros, np.array([4, 4, 0], np.uint64))
+    np.testing.assert_allclose(flat.improved([0.5, 0.25, 0.25]), [0.5, 0.25, 0.25])
+    for wrong in (prior[1:], -prior, np.zeros(len(legal))):
+        with pytest.raises(ValueError, match="give the probability of each"):
+            position.evaluate(40, prior=wrong)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"deals": 4, "rollouts": 4}, "deals is a budget of its own"),
+        ({"deals": 0}, "draw 1"),
+        ({"rollouts": 4, "weights": [1, 1]}, "weights and leaf need deals"),
+        ({"time_ms": 4, "prior": [1.0]}, "a prior needs rollouts"),
+    ],
+)
+def test_budgets_that_contradict(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        busy_position().evaluate(**options)

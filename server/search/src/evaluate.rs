@@ -2,7 +2,7 @@
 //! seat knows. Every action is tried in the same deals with the same random choices of the agents,
 //! so that luck cancels out of their differences.
 
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 
 use chefshat_engine::ActionId;
 use rayon::ThreadPool;
@@ -246,6 +246,26 @@ fn halve(active: &mut Vec<usize>, estimates: &[Estimate]) {
     active.truncate(active.len().div_ceil(2).max(2));
 }
 
+/// What each action brings in each of these deals, which are those of an evaluation with this seed:
+/// for each deal a row by action. A pool of threads does not change the result.
+///
+/// # Panics
+/// If an action is not legal.
+pub fn outcomes(
+    sampler: &Sampler,
+    actions: &[ActionId],
+    policy: &RolloutPolicy,
+    seed: [u8; 32],
+    deals: Range<u64>,
+    pool: Option<&ThreadPool>,
+) -> Vec<Vec<Worth>> {
+    let of_deal = |deal| worths_in(sampler, actions, policy, seed, deal).collect();
+    match pool {
+        Some(pool) => pool.install(|| deals.into_par_iter().map(of_deal).collect()),
+        None => deals.map(of_deal).collect(),
+    }
+}
+
 /// Tries actions in one deal.
 fn evaluate_in(
     sampler: &Sampler,
@@ -254,19 +274,29 @@ fn evaluate_in(
     seed: [u8; 32],
     world: u64,
 ) -> Vec<Estimate> {
-    let mut chance = Chance::stream(seed, world);
-    let game = sampler.game(&mut chance).closing_copy();
-    let (agents, seat) = (chance.seed(), sampler.knowledge().seat());
     let mut reference = None;
-    actions
-        .iter()
-        .map(|&action| {
-            let worth = rollout(game.clone(), action, seat, policy, agents);
+    (actions.iter())
+        .zip(worths_in(sampler, actions, policy, seed, world))
+        .map(|(&action, worth)| {
             let mut estimate = Estimate::new(action);
             estimate.add(worth, *reference.get_or_insert(worth));
             estimate
         })
         .collect()
+}
+
+/// What each action brings in one deal.
+fn worths_in(
+    sampler: &Sampler,
+    actions: &[ActionId],
+    policy: &RolloutPolicy,
+    seed: [u8; 32],
+    world: u64,
+) -> impl Iterator<Item = Worth> {
+    let mut chance = Chance::stream(seed, world);
+    let game = sampler.game(&mut chance).closing_copy();
+    let (agents, seat) = (chance.seed(), sampler.knowledge().seat());
+    (actions.iter()).map(move |&action| rollout(game.clone(), action, seat, policy, agents))
 }
 
 /// Expected cards in each hand, by seat and kind (faces ascending, then jokers), over deals of the

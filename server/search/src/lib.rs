@@ -13,9 +13,11 @@ mod sampler;
 mod table;
 
 pub use agent::{Choice, Decisions, MARGIN, Searchers, named_agent, show_nothing, suggested};
-pub use evaluate::{Allocation, Estimate, Evaluation, LikelyHands, Method, evaluate, likely_hands};
+pub use evaluate::{
+    Allocation, Estimate, Evaluation, LikelyHands, Method, evaluate, likely_hands, outcomes,
+};
 pub use history::ShiftHistory;
 pub use knowledge::{Knowledge, KnowledgeError, World};
 pub use own_time::OwnTime;
-pub use rollout::{RolloutPolicy, Worth, rollout};
+pub use rollout::{RolloutPolicy, Worth, play_on, rollout};
 pub use sampler::{Chance, Sampler};

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use chefshat_agents::{AgentKind, BuiltInAgent, Network};
-use chefshat_engine::{ActionId, Event, Game, MAX_SEATS, Seat, Viewer};
+use chefshat_engine::{ActionId, BySeat, Event, Game, MAX_SEATS, Seat, Viewer};
 
 /// The agents that play all seats in rollouts.
 #[derive(Clone, Debug)]
@@ -29,7 +29,7 @@ impl RolloutPolicy {
 }
 
 /// What a Shift was worth to a seat.
-#[derive(Copy, Clone, Eq, PartialEq, Debug)]
+#[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
 pub struct Worth {
     /// Points of the Shift.
     pub points: u32,
@@ -49,11 +49,7 @@ pub fn rollout(
     policy: &RolloutPolicy,
     seed: [u8; 32],
 ) -> Worth {
-    let mut agents: [BuiltInAgent; MAX_SEATS] = std::array::from_fn(|index| {
-        let mut seed = seed;
-        seed[0] ^= index as u8;
-        policy.agent(seed)
-    });
+    let mut agents = Agents::new(|_| policy, seed);
     let mut place = None;
     let mut action = action;
     loop {
@@ -72,12 +68,63 @@ pub fn rollout(
                 place,
             };
         }
+        action = agents.decide(&game);
+    }
+}
+
+/// Lets agents, one policy for each seat, play a game that ends with its Shift to that end. `seed`
+/// determines their random choices.
+///
+/// # Panics
+/// If no decision is open, or there is not one policy for each seat.
+pub fn play_on(mut game: Game, policies: &[RolloutPolicy], seed: [u8; 32]) -> BySeat<Worth> {
+    let players = game.rules().players();
+    assert_eq!(policies.len(), players, "there is a policy for each seat");
+    let mut agents = Agents::new(|seat| &policies[seat % players], seed);
+    let mut order = None;
+    while order.is_none() {
+        let action = agents.decide(&game);
+        game.apply(action, |event| {
+            if let Event::ShiftEnded(end) = event {
+                order = Some(end.order);
+            }
+        })
+        .expect("a legal action");
+    }
+    let order = order.expect("the Shift has ended");
+    let mut worths = BySeat::filled(players, Worth::default());
+    for seat in worths.seats() {
+        let place = order.place_of(seat).expect("every seat has a place");
+        worths[seat] = Worth {
+            points: game.rules().points(place),
+            place,
+        };
+    }
+    worths
+}
+
+/// The agents of all seats.
+struct Agents([BuiltInAgent; MAX_SEATS]);
+
+impl Agents {
+    fn new<'a>(policy: impl Fn(usize) -> &'a RolloutPolicy, seed: [u8; 32]) -> Agents {
+        Agents(std::array::from_fn(|seat| {
+            let mut own = seed;
+            own[0] ^= seat as u8;
+            policy(seat).agent(own)
+        }))
+    }
+
+    /// What the seat that decides does.
+    fn decide(&mut self, game: &Game) -> ActionId {
         let decision = game.decision().expect("the Shift is not over");
         let legal = game.legal_actions();
-        let observation = game.observe(Viewer::Seat(decision.seat));
-        action = match legal.len() {
+        match legal.len() {
             1 => legal.nth(0).expect("a legal action"),
-            _ => agents[decision.seat.index()].decide(&observation, &legal),
-        };
+            _ => {
+                let observation = game.observe(Viewer::Seat(decision.seat));
+                self.0[decision.seat.index()].decide(&observation, &legal)
+            }
+        }
     }
 }

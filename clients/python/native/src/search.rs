@@ -1,6 +1,7 @@
 //! Search from what one seat knows. A state has the cards of all seats; what its seat may not know is
 //! dropped when a [`Position`] is created, and `chefshat_search` gets the rest.
 
+use std::ops::Range;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -12,7 +13,7 @@ use chefshat_record::convert::{
 };
 use chefshat_search::{
     Allocation, Chance, Estimate, Knowledge, KnowledgeError, Method, RolloutPolicy, Sampler,
-    ShiftHistory, evaluate, likely_hands,
+    ShiftHistory, Worth, evaluate, likely_hands, outcomes, play_on,
 };
 use chefshat_simulation::vector::SavedGame;
 use chefshat_vector::RequestError;
@@ -20,12 +21,18 @@ use numpy::PyArray1;
 use prost::Message as _;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use rayon::prelude::*;
 
 use crate::games::{caught, decode, refused};
 use crate::threads::pool;
 
 /// Time between two looks whether the user interrupts the program.
 const SIGNAL_INTERVAL: Duration = Duration::from_millis(100);
+/// Deals and states that are played between two such looks.
+const CHUNK: u64 = 256;
+
+/// The points and places of Shifts, one row after the other.
+type Shifts<'py> = (Bound<'py, PyArray1<u32>>, Bound<'py, PyArray1<u8>>);
 
 /// What a seat knows at its decision, and all deals that are consistent with it.
 #[pyclass(module = "chefshat_native", frozen)]
@@ -156,18 +163,13 @@ impl Position {
     ) -> PyResult<Bound<'py, PyDict>> {
         let start = Instant::now();
         let method = Method {
-            policy: self.policy(policy).map_err(|error| refused(py, error))?,
+            policy: rollout_policy(policy, self.rule_set()).map_err(|error| refused(py, error))?,
             allocation: match halving {
                 true => Allocation::Halving,
                 false => Allocation::Uniform,
             },
         };
-        let actions: Vec<ActionId> = actions.into_iter().map(ActionId::new).collect();
-        let legal = self.sampler.legal_actions();
-        if actions.is_empty() || !actions.iter().all(|action| legal.contains(*action)) {
-            let words = "give at least one action, and only legal ones";
-            return Err(refused(py, field("actions", words)));
-        }
+        let actions = self.legal(actions).map_err(|error| refused(py, error))?;
         let pool = pool(threads);
         let interrupts = Interrupts::new();
         let progress = |done: u64| {
@@ -188,6 +190,30 @@ impl Position {
         estimates(py, &found)
     }
 
+    /// Points and places of the seat for each action in each of `deals` deals from `first` on, which
+    /// are those of `sample` and `evaluate` with this seed: a row by action for each deal.
+    #[pyo3(signature = (actions, policy, *, first, deals, threads, seed))]
+    #[allow(clippy::too_many_arguments, reason = "Python names them")]
+    fn outcomes<'py>(
+        &self,
+        py: Python<'py>,
+        actions: Vec<u16>,
+        policy: Policy,
+        first: u64,
+        deals: u64,
+        threads: usize,
+        seed: u64,
+    ) -> PyResult<Shifts<'py>> {
+        let policy = rollout_policy(policy, self.rule_set()).map_err(|error| refused(py, error))?;
+        let actions = self.legal(actions).map_err(|error| refused(py, error))?;
+        let pool = pool(threads);
+        in_chunks(py, deals, |part| {
+            let part = first + part.start..first + part.end;
+            let (sampler, pool) = (&self.sampler, pool.as_deref());
+            outcomes(sampler, &actions, &policy, bytes(seed), part, pool).concat()
+        })
+    }
+
     fn __reduce__(&self) -> PyResult<()> {
         Err(pyo3::exceptions::PyTypeError::new_err(
             "a position cannot be pickled or copied: create it from its state or situation",
@@ -197,7 +223,7 @@ impl Position {
 
 /// The agents of rollouts.
 #[derive(FromPyObject)]
-enum Policy {
+pub(crate) enum Policy {
     Name(String),
     File(Vec<u8>),
 }
@@ -230,23 +256,115 @@ impl Position {
         self.sampler.knowledge().seat()
     }
 
-    fn policy(&self, policy: Policy) -> Result<RolloutPolicy, RequestError> {
-        match policy {
-            Policy::Name(name) => RolloutPolicy::from_name(&name).ok_or_else(|| {
-                let words = format!(
-                    "there is no agent {name:?}: choose random, greedy or trained, or the path of a network file"
-                );
-                field("agent", words)
-            }),
-            Policy::File(bytes) => {
-                let network = Network::from_bytes(&bytes);
-                let network = network.map_err(|error| field("agent", error.to_string()))?;
-                if !network.fits(self.rule_set()) {
-                    let words = "the network was trained for other rules";
-                    return Err(field("agent", words));
-                }
-                Ok(RolloutPolicy::Network(Arc::new(network)))
+    /// These actions, which have to be legal, and at least one.
+    fn legal(&self, actions: Vec<u16>) -> Result<Vec<ActionId>, RequestError> {
+        let actions: Vec<ActionId> = actions.into_iter().map(ActionId::new).collect();
+        let legal = self.sampler.legal_actions();
+        if actions.is_empty() || !actions.iter().all(|action| legal.contains(*action)) {
+            let words = "give at least one action, and only legal ones";
+            return Err(field("actions", words));
+        }
+        Ok(actions)
+    }
+}
+
+/// Points and places of all seats in the Shift of each state, played on by agents of these policies,
+/// one for each seat or one for all: a row by seat for each state. The random choices at the state
+/// with number i follow from the seed and i.
+#[pyfunction]
+#[pyo3(signature = (states, policies, *, threads, seed))]
+pub(crate) fn play_states<'py>(
+    py: Python<'py>,
+    states: Vec<Bound<'py, PyBytes>>,
+    policies: Vec<Policy>,
+    threads: usize,
+    seed: u64,
+) -> PyResult<Shifts<'py>> {
+    let games = (states.iter().enumerate())
+        .map(|(number, state)| {
+            let saved = SavedGame::from_bytes(state.as_bytes()).map_err(RequestError::from)?;
+            let running = saved.game().filter(|game| game.decision().is_some());
+            let game = running
+                .ok_or_else(|| field("states", format!("state {number}: its game is over")))?;
+            Ok(game.closing_copy())
+        })
+        .collect::<Result<Vec<_>, RequestError>>()
+        .map_err(|error| refused(py, error))?;
+    let Some(rules) = games.first().map(|game| *game.rules()) else {
+        return in_chunks(py, 0, |_| Vec::new());
+    };
+    let players = rules.players();
+    if games.iter().any(|game| game.rules().players() != players) {
+        let words = "give states of games with the same number of players";
+        return Err(refused(py, field("states", words)));
+    }
+    let policies = (policies.into_iter())
+        .map(|policy| rollout_policy(policy, &rules))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(|error| refused(py, error))?;
+    let policies = match &policies[..] {
+        [all] => vec![all.clone(); players],
+        each if each.len() == players => policies,
+        other => {
+            let words = format!(
+                "{} agents for {players} seats: give one for each, or one for all",
+                other.len()
+            );
+            return Err(refused(py, field("agent", words)));
+        }
+    };
+    let pool = pool(threads);
+    in_chunks(py, games.len() as u64, |part| {
+        let played = |number: u64| {
+            let game = games[number as usize].clone();
+            play_on(game, &policies, stream(seed, number).seed())
+        };
+        let shifts: Vec<_> = match &pool {
+            Some(pool) => pool.install(|| part.into_par_iter().map(played).collect()),
+            None => part.map(played).collect(),
+        };
+        shifts
+            .iter()
+            .flat_map(|worths| worths.values().copied())
+            .collect()
+    })
+}
+
+/// Plays `all` deals or states, a chunk at a time, until the user interrupts the program.
+fn in_chunks(
+    py: Python<'_>,
+    all: u64,
+    play: impl Fn(Range<u64>) -> Vec<Worth> + Sync,
+) -> PyResult<Shifts<'_>> {
+    let mut worths = Vec::new();
+    for first in (0..all).step_by(CHUNK as usize) {
+        let part = first..all.min(first + CHUNK);
+        worths.extend(py.detach(|| caught(|| play(part)))?);
+        py.check_signals()?;
+    }
+    let points = PyArray1::from_iter(py, worths.iter().map(|worth| worth.points));
+    Ok((
+        points,
+        PyArray1::from_iter(py, worths.iter().map(|worth| worth.place)),
+    ))
+}
+
+fn rollout_policy(policy: Policy, rules: &RuleSet) -> Result<RolloutPolicy, RequestError> {
+    match policy {
+        Policy::Name(name) => RolloutPolicy::from_name(&name).ok_or_else(|| {
+            let words = format!(
+                "there is no agent {name:?}: choose random, greedy or trained, or the path of a network file"
+            );
+            field("agent", words)
+        }),
+        Policy::File(bytes) => {
+            let network = Network::from_bytes(&bytes);
+            let network = network.map_err(|error| field("agent", error.to_string()))?;
+            if !network.fits(rules) {
+                let words = "the network was trained for other rules";
+                return Err(field("agent", words));
             }
+            Ok(RolloutPolicy::Network(Arc::new(network)))
         }
     }
 }

@@ -5,18 +5,20 @@ that the seat may not know are dropped before anything is computed, so two games
 results. The computation needs the package `chefshat-native`; `Client.evaluate` estimates a live decision on a server without it.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chefshat import pb
 from chefshat.decision import Decision
 from chefshat.errors import ChefsHatError
-from chefshat.vector import VectorEnv
+from chefshat.estimates import Estimates, Outcomes, checked_prior, mean_and_error, scores
+from chefshat.opponents import selected
+from chefshat.vector import Batch, VectorEnv
 from chefshat.vector_setup import NETWORK_SUFFIX, network_content
 
 if TYPE_CHECKING:
@@ -27,6 +29,8 @@ MAX_STEPS = 4_000_000
 #: The most deals of a call.
 MAX_DEALS = 100_000
 _MAX_SEED = 2**64 - 1
+# Deals that are played to leaves at a time.
+_LEAF_GAMES = 4096
 
 
 class Wrapper(Protocol):
@@ -38,6 +42,12 @@ class Wrapper(Protocol):
 
 
 At: TypeAlias = "VectorEnv | Wrapper | Decision | bytes"
+
+Agent: TypeAlias = str | Path
+"""Who plays on: "random", "greedy", "trained", or the path of a network file."""
+
+Leaf: TypeAlias = Callable[[Batch], ArrayLike]
+"""Values decisions: given the R rows of a batch at which the seat decides, returns (R,) the points it expects of the Shift."""
 
 
 def position(at: At, row: int = 0, *, max_steps: int = MAX_STEPS) -> "Position":
@@ -53,49 +63,42 @@ def position(at: At, row: int = 0, *, max_steps: int = MAX_STEPS) -> "Position":
         ChefsHatError: NATIVE_MISSING without `chefshat-native`; STATES_REFUSED if the state has no decision or a history that is
             too short; ANALYSIS_REFUSED if there are too many deals to count.
     """
-    try:
-        import chefshat_native
-    except ModuleNotFoundError as error:
-        words = (
-            "search needs the package chefshat-native: pip install 'chefshat[native]', or ask a server for the estimates of a live "
-            "decision with Client.evaluate"
-        )
-        raise ChefsHatError("NATIVE_MISSING", words) from error
+    native = _native()
     try:
         if isinstance(at, Decision):
-            return Position(chefshat_native.Position.of_situation(at.situation().SerializeToString(), max_steps))
-        return Position(chefshat_native.Position.of_state(_state(at, row), max_steps))
-    except chefshat_native.Refused as error:
+            return Position(native.Position.of_situation(at.situation().SerializeToString(), max_steps))
+        return Position(native.Position.of_state(_state(at, row), max_steps))
+    except native.Refused as error:
         raise ChefsHatError(*error.args) from None
 
 
-@dataclass(frozen=True)
-class Estimates:
-    """What actions are worth, in their order. Every action was tried in the same deals.
+def play_on(
+    states: Sequence[bytes], agent: Agent | Sequence[Agent] = "greedy", *, threads: int = 0, seed: int = 0
+) -> tuple[NDArray[np.uint32], NDArray[np.uint8]]:
+    """Plays games on from their states to the end of the Shift, built-in agents or networks on all seats.
 
-    Attributes:
-        actions: (A,) the actions.
-        points: mean points of the Shift.
-        standard_errors: of `points`; infinite after fewer than two rollouts.
-        gains: mean of the points gained over the first action in the same deals.
-        gain_errors: standard errors of `gains`.
-        places: mean place in the Shift, from 1.
-        rollouts: number of rollouts of each action, at least 4.
+    The agents see what their seats may; the caller who has the states knows the cards of all.
+
+    Args:
+        states: S states, as `VectorEnv.save` returns them, of games with the same number of seats.
+        agent: who plays: one for all N seats, or one for each.
+        threads: 0: one for each core. The result does not depend on them.
+        seed: of the agents' random choices; those of each state are others.
+
+    Returns:
+        (S, N) points and (S, N) places, from 1, of every seat.
+
+    Raises:
+        ChefsHatError: STATES_REFUSED or ANALYSIS_REFUSED says what is wrong with a state or an agent.
     """
-
-    actions: NDArray[np.uint16]
-    points: NDArray[np.float64]
-    standard_errors: NDArray[np.float64]
-    gains: NDArray[np.float64]
-    gain_errors: NDArray[np.float64]
-    places: NDArray[np.float64]
-    rollouts: NDArray[np.uint64]
-
-    @property
-    def best(self) -> int:
-        """The action with the most points among those with the most rollouts."""
-        tried = self.rollouts == self.rollouts.max()
-        return int(self.actions[np.where(tried, self.points, -np.inf).argmax()])
+    native = _native()
+    agents = [agent] if isinstance(agent, (str, Path)) else list(agent)
+    try:
+        points, places = native.play_states(list(states), [_policy(one) for one in agents], threads=threads, seed=_seed(seed))
+    except native.Refused as error:
+        raise ChefsHatError(*error.args) from None
+    shape = (len(states), -1 if len(states) else 0)
+    return points.reshape(shape), places.reshape(shape)
 
 
 class Position:
@@ -147,44 +150,202 @@ class Position:
         rollouts: int | None = None,
         *,
         time_ms: int | None = None,
-        agent: str | Path = "greedy",
+        deals: int | None = None,
+        agent: Agent = "greedy",
         actions: Sequence[int] | None = None,
         halving: bool = False,
+        prior: ArrayLike | None = None,
+        considered: int = 16,
+        weights: ArrayLike | None = None,
+        leaf: Leaf | None = None,
         threads: int = 0,
         seed: int = 0,
     ) -> Estimates:
         """Estimates what actions are worth, by playing on from possible deals to the end of the Shift.
 
+        The budget is `rollouts`, `time_ms`, both, or `deals`.
+
         Args:
             rollouts: the budget in all: the result depends on the seed and not on the threads. Every action is tried in 4 deals at
                 least.
-            time_ms: the budget in milliseconds; one of both has to be given.
+            time_ms: the budget in milliseconds.
+            deals: every action is tried in the deals that `sample(deals, seed)` draws. See `outcomes`, whose means these are.
             agent: who plays all seats in the rollouts: "random", "greedy", "trained", or the path of a network file.
-            actions: the actions to try; gains refer to the first of them. Default: all legal ones.
+            actions: the A actions to try; gains refer to the first of them. Default: all legal ones.
             halving: whether the worse half of the actions is dropped again and again (sequential halving); the first one stays.
+            prior: (A,) probabilities of the actions, for instance of a network (`learn.network.Network.logits_of`). Needs
+                `rollouts`: those `considered` actions that are likeliest share them by sequential halving, and the likeliest stays;
+                gains refer to it. What is dropped is decided by points and prior as in `Estimates.improved`.
+            considered: how many actions a `prior` lets in.
+            weights: (deals,) how likely each of the `deals` is, see `Outcomes.estimates`.
+            leaf: with `deals`, values the seat's next decision instead of playing on, see `outcomes`.
             threads: 0: one for each core.
             seed: of the deals and of the agents' random choices.
         """
+        if deals is None and (weights is not None or leaf is not None):
+            raise ValueError("weights and leaf need deals: a number of deals, in which every action is tried")
+        if deals is not None:
+            if rollouts or time_ms or halving or prior is not None:
+                raise ValueError("deals is a budget of its own: leave out rollouts, time_ms, halving and prior")
+            tried = self.outcomes(deals, agent=agent, actions=actions, leaf=leaf, threads=threads, seed=seed)
+            return tried.estimates(weights)
         if not (rollouts or time_ms) or (rollouts or 0) < 0 or (time_ms or 0) < 0:
-            raise ValueError("give a budget: a number of rollouts, time_ms, or both, above 0")
-        is_file = isinstance(agent, Path) or agent.endswith(NETWORK_SUFFIX)
-        policy = network_content(agent) if is_file else str(agent)
-        chosen = self.legal_actions if actions is None else np.asarray(actions)
-        import chefshat_native
-
+            raise ValueError("give a budget: a number of rollouts, time_ms, or both, above 0; or deals")
+        if prior is not None:
+            if not rollouts or time_ms or halving or considered < 1:
+                raise ValueError(
+                    "a prior needs rollouts, shares them by halving, and considers 1 action or more: leave out the rest"
+                )
+            chosen = self._chosen(actions)
+            return self._by_prior(rollouts, chosen, checked_prior(prior, len(chosen)), considered, agent, threads, seed)
+        native = _native()
         try:
             columns = self._native.evaluate(
-                chosen.tolist(),
-                policy,
+                self._chosen(actions).tolist(),
+                _policy(agent),
                 rollouts=rollouts or 0,
                 time_ms=time_ms or 0,
                 halving=halving,
                 threads=threads,
                 seed=_seed(seed),
             )
-        except chefshat_native.Refused as error:
+        except native.Refused as error:
             raise ChefsHatError(*error.args) from None
         return Estimates(**columns)
+
+    def outcomes(
+        self,
+        deals: int,
+        *,
+        agent: Agent = "greedy",
+        actions: Sequence[int] | None = None,
+        leaf: Leaf | None = None,
+        threads: int = 0,
+        seed: int = 0,
+    ) -> Outcomes:
+        """Tries every action in the same deals, and returns what each brought in each of them.
+
+        Args:
+            deals: D: those that `sample(deals, seed)` draws.
+            agent: who plays all seats.
+            actions: the A actions to try. Default: all legal ones.
+            leaf: values the seat's next decision in the Shift, with what the seat then may know; no deal is played further. The
+                agents' random choices are others than without it.
+            threads: 0: one for each core; a leaf's deals are played by one for each core.
+            seed: of the deals and of the agents' random choices.
+        """
+        chosen = self._chosen(actions)
+        if leaf is not None:
+            return self._to_leaves(leaf, chosen, _checked(deals), agent, seed)
+        points, places = self._shifts(chosen, 0, _checked(deals), agent, threads, seed)
+        return Outcomes(chosen, points, places)
+
+    def _chosen(self, actions: Sequence[int] | None) -> NDArray[np.uint16]:
+        if actions is None:
+            return self.legal_actions
+        chosen = np.asarray(actions)
+        if not len(chosen) or not np.isin(chosen, self.legal_actions).all():
+            raise ChefsHatError("ANALYSIS_REFUSED", "actions: give at least one action, and only legal ones")
+        return chosen.astype(np.uint16)
+
+    def _shifts(
+        self, actions: NDArray[np.uint16], first: int, deals: int, agent: Agent, threads: int, seed: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Returns points and places, (deals, A) each, in deals from `first` on."""
+        native = _native()
+        try:
+            found = self._native.outcomes(
+                actions.tolist(), _policy(agent), first=first, deals=deals, threads=threads, seed=_seed(seed)
+            )
+        except native.Refused as error:
+            raise ChefsHatError(*error.args) from None
+        points, places = (column.reshape(deals, len(actions)).astype(np.float64) for column in found)
+        return points, places
+
+    def _to_leaves(self, leaf: Leaf, actions: NDArray[np.uint16], deals: int, agent: Agent, seed: int) -> Outcomes:
+        """Plays to the seat's next decision."""
+        points, places = np.full((2, deals, len(actions)), np.nan)
+        worth = np.array(self.rules.points, np.float64)
+        for first in range(0, deals, _LEAF_GAMES):
+            starts = self.starts(min(deals, first + _LEAF_GAMES), seed)[first:]
+            part = slice(first, first + len(starts))
+            options: Any = {"client_seats": [self.seat], "opponents": agent, "rules": self.rules, "starts": starts}
+            with VectorEnv(games=len(starts), seed=_seed(seed), **options) as env:
+                states = env.save()
+                for column, action in enumerate(actions):
+                    batch = env.step(np.full(len(starts), action))
+                    ended, at = np.unique(batch.endings.games, return_index=True)
+                    reached = batch.endings.places_taken[at]
+                    places[part, column][ended] = reached
+                    points[part, column][ended] = worth[reached - 1]
+                    rows = np.flatnonzero(~np.isin(batch.games, ended))
+                    if len(rows):
+                        values = np.asarray(leaf(selected(batch, rows)), np.float64)
+                        if values.shape != (len(rows),) or not np.isfinite(values).all():
+                            raise ValueError(f"leaf has to return a finite number for each of the {len(rows)} rows")
+                        points[part, column][batch.games[rows]] = values
+                    env.restore(np.arange(len(starts)), states)
+        return Outcomes(actions, points, places)
+
+    def _by_prior(
+        self,
+        rollouts: int,
+        chosen: NDArray[np.uint16],
+        prior: NDArray[np.float64],
+        considered: int,
+        agent: Agent,
+        threads: int,
+        seed: int,
+    ) -> Estimates:
+        """Shares rollouts among the likeliest actions by sequential halving."""
+        likeliest = np.argsort(-prior, kind="stable")[:considered]
+        active, first = likeliest, likeliest[0]
+        rounds = max(1, int(np.ceil(np.log2(len(active)))))
+        # An action is tried in the first deals, as many as its round lets it.
+        points, places = np.empty((2, 0, len(chosen)))
+        spent = 0
+        for left in range(rounds, 0, -1):
+            more = max(1 if spent else 4, (rollouts - spent) // (left * len(active)))
+            found = self._shifts(chosen[active], len(points), more, agent, threads, seed)
+            new = np.full((2, more, len(chosen)), np.nan)
+            new[:, :, active] = found
+            points, places = np.concatenate([points, new[0]]), np.concatenate([places, new[1]])
+            spent += more * len(active)
+            if left > 1:
+                by_score = np.argsort(-scores(points[:, active].mean(axis=0), prior[active], len(points)), kind="stable")
+                others = by_score[by_score > 0]
+                active = active[[0, *others[: max(2, (len(active) + 1) // 2) - 1]]]
+        rollouts_of = np.isfinite(points).sum(axis=0)
+        columns = np.full((5, len(chosen)), np.nan)
+        for action in likeliest:
+            tried = slice(0, rollouts_of[action])
+            share = np.full(rollouts_of[action], 1 / rollouts_of[action])
+            gains = points[tried, action] - points[tried, first]
+            columns[:, action] = (
+                *mean_and_error(points[tried, action], share),
+                *mean_and_error(gains, share),
+                share @ places[tried, action],
+            )
+        points_of, errors, gains_of, gain_errors, places_of = columns
+        return Estimates(chosen, points_of, errors, gains_of, gain_errors, places_of, rollouts_of.astype(np.uint64))
+
+
+def _native() -> ModuleType:
+    try:
+        import chefshat_native
+    except ModuleNotFoundError as error:
+        words = (
+            "search needs the package chefshat-native: pip install 'chefshat[native]', or ask a server for the estimates of a live "
+            "decision with Client.evaluate"
+        )
+        raise ChefsHatError("NATIVE_MISSING", words) from error
+    return chefshat_native
+
+
+def _policy(agent: Agent) -> str | bytes:
+    """Returns an agent as the engine takes it."""
+    is_file = isinstance(agent, Path) or agent.endswith(NETWORK_SUFFIX)
+    return network_content(agent) if is_file else str(agent)
 
 
 def _state(at: VectorEnv | Wrapper | bytes, row: int) -> bytes:

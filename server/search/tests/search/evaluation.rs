@@ -3,7 +3,8 @@
 use chefshat_agents::{AgentKind, AgentMaker as _, Budget, BuiltInAgent, MonteCarlo};
 use chefshat_engine::{ActionId, BySeat, Cards, RuleSet, RuleSetSpec, Script, Seat};
 use chefshat_search::{
-    Allocation, Estimate, Method, RolloutPolicy, Sampler, Searchers, evaluate, likely_hands,
+    Allocation, Chance, Estimate, Method, RolloutPolicy, Sampler, Searchers, evaluate,
+    likely_hands, outcomes, play_on,
 };
 
 use crate::scenario::{Moment, Scenario};
@@ -242,4 +243,46 @@ fn without_the_history_the_agent_plays_as_its_prior() {
         greedy.decide(&moment.observation, &legal)
     );
     assert_eq!(moment.seat, Seat::new(1));
+}
+
+#[test]
+fn outcomes_are_those_of_an_evaluation() {
+    let scenario = Scenario::random(rules(6, 4), 3, Some(&[2, 0, 3, 1]));
+    let moment = busiest(&scenario);
+    let sampler = sampler(&scenario, moment);
+    let legal: Vec<ActionId> = scenario.legal(moment).iter().collect();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build();
+    let pool = pool.expect("threads start");
+    let seed = [5; 32];
+    let found = |deals, pool| outcomes(&sampler, &legal, &METHOD.policy, seed, deals, pool);
+    let four = found(0..4, None);
+    assert_eq!(four, found(0..4, Some(&pool)));
+    assert_eq!(four[2..], found(2..4, None));
+    let estimates = evaluate(&sampler, &legal, &METHOD, seed, None, spend(1));
+    for (index, estimate) in estimates.iter().enumerate() {
+        let points: u32 = four.iter().map(|worths| worths[index].points).sum();
+        assert_eq!(estimate.points(), f64::from(points) / 4.0);
+    }
+}
+
+#[test]
+fn agents_play_a_game_on_from_where_it_stands() {
+    let scenario = Scenario::random(rules(6, 3), 4, None);
+    let sampler = sampler(&scenario, 0);
+    let game = sampler.game(&mut Chance::stream([1; 32], 0)).closing_copy();
+    let kinds = [AgentKind::Random, AgentKind::Greedy, AgentKind::Random];
+    let policies = kinds.map(RolloutPolicy::Kind);
+    let played = |seed| {
+        let worths = play_on(game.clone(), &policies, [seed; 32]);
+        let mut places: Vec<u8> = worths.values().map(|worth| worth.place).collect();
+        places.sort_unstable();
+        assert_eq!(places, [1, 2, 3]);
+        for worth in worths.values() {
+            assert_eq!(worth.points, scenario.rules.points(worth.place));
+        }
+        worths
+    };
+    assert_eq!(played(1), played(1));
+    let first = played(0);
+    assert!((1..20).any(|seed| played(seed) != first));
 }
