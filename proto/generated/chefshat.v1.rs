@@ -16038,6 +16038,9 @@ pub struct VectorSetup {
     /// history is at most 524288.
     #[prost(uint32, tag = "20")]
     pub history: u32,
+    /// Whether batches have the hands of all seats: for a critic in training, or for analysis.
+    #[prost(bool, tag = "23")]
+    pub all_hands: bool,
     /// Network files that `opponents` name, each at least once: at most one for each seat that the
     /// client does not play. Their numbers of players, faces and cards dealt are those of the games.
     /// Over the network, the setup with all files has at most max_vector_message_bytes: enough for two
@@ -16209,6 +16212,9 @@ pub struct VectorStarted {
     /// Width of the column `history`.
     #[prost(uint32, tag = "7")]
     pub history: u32,
+    /// Whether batches have the column `all_hands`.
+    #[prost(bool, tag = "8")]
+    pub all_hands: bool,
 }
 /// The decisions that wait for the client, one per row, and what happened since the previous batch.
 /// A game has at most one row. It has none if it is over and no other follows, or in the rare case
@@ -16259,6 +16265,10 @@ pub struct VectorBatch {
     /// Counts since the stream began.
     #[prost(message, optional, tag = "14")]
     pub totals: ::core::option::Option<VectorTotals>,
+    /// u8, N(F+1) wide: the cards in the hand of each seat by face, jokers last, one seat after the
+    /// other; empty unless the setup requests it. More than the seat that decides may know.
+    #[prost(bytes = "bytes", tag = "15")]
+    pub all_hands: ::prost::bytes::Bytes,
 }
 /// Observations, one per row. Observation explains the values.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]

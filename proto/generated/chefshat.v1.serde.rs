@@ -48093,6 +48093,9 @@ impl serde::Serialize for VectorBatch {
         if self.totals.is_some() {
             len += 1;
         }
+        if !self.all_hands.is_empty() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.VectorBatch", len)?;
         if self.step != 0 {
             #[allow(clippy::needless_borrow)]
@@ -48150,6 +48153,11 @@ impl serde::Serialize for VectorBatch {
         if let Some(v) = self.totals.as_ref() {
             struct_ser.serialize_field("totals", v)?;
         }
+        if !self.all_hands.is_empty() {
+            #[allow(clippy::needless_borrow)]
+            #[allow(clippy::needless_borrows_for_generic_args)]
+            struct_ser.serialize_field("allHands", pbjson::private::base64::encode(&self.all_hands).as_str())?;
+        }
         struct_ser.end()
     }
 }
@@ -48175,6 +48183,8 @@ impl<'de> serde::Deserialize<'de> for VectorBatch {
             "beginnings",
             "shifts",
             "totals",
+            "all_hands",
+            "allHands",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -48193,6 +48203,7 @@ impl<'de> serde::Deserialize<'de> for VectorBatch {
             Beginnings,
             Shifts,
             Totals,
+            AllHands,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -48228,6 +48239,7 @@ impl<'de> serde::Deserialize<'de> for VectorBatch {
                             "beginnings" => Ok(GeneratedField::Beginnings),
                             "shifts" => Ok(GeneratedField::Shifts),
                             "totals" => Ok(GeneratedField::Totals),
+                            "allHands" | "all_hands" => Ok(GeneratedField::AllHands),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -48261,6 +48273,7 @@ impl<'de> serde::Deserialize<'de> for VectorBatch {
                 let mut beginnings__ = None;
                 let mut shifts__ = None;
                 let mut totals__ = None;
+                let mut all_hands__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Step => {
@@ -48363,6 +48376,14 @@ impl<'de> serde::Deserialize<'de> for VectorBatch {
                             }
                             totals__ = map_.next_value()?;
                         }
+                        GeneratedField::AllHands => {
+                            if all_hands__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("allHands"));
+                            }
+                            all_hands__ = 
+                                Some(map_.next_value::<::pbjson::private::BytesDeserialize<_>>()?.0)
+                            ;
+                        }
                     }
                 }
                 Ok(VectorBatch {
@@ -48380,6 +48401,7 @@ impl<'de> serde::Deserialize<'de> for VectorBatch {
                     beginnings: beginnings__,
                     shifts: shifts__,
                     totals: totals__,
+                    all_hands: all_hands__.unwrap_or_default(),
                 })
             }
         }
@@ -48947,6 +48969,9 @@ impl serde::Serialize for VectorSetup {
         if self.history != 0 {
             len += 1;
         }
+        if self.all_hands {
+            len += 1;
+        }
         if !self.networks.is_empty() {
             len += 1;
         }
@@ -49012,6 +49037,9 @@ impl serde::Serialize for VectorSetup {
         if self.history != 0 {
             struct_ser.serialize_field("history", &self.history)?;
         }
+        if self.all_hands {
+            struct_ser.serialize_field("allHands", &self.all_hands)?;
+        }
         if !self.networks.is_empty() {
             struct_ser.serialize_field("networks", &self.networks)?;
         }
@@ -49076,6 +49104,8 @@ impl<'de> serde::Deserialize<'de> for VectorSetup {
             "shiftStatistics",
             "records",
             "history",
+            "all_hands",
+            "allHands",
             "networks",
             "base_seed",
             "baseSeed",
@@ -49104,6 +49134,7 @@ impl<'de> serde::Deserialize<'de> for VectorSetup {
             ShiftStatistics,
             Records,
             History,
+            AllHands,
             Networks,
             BaseSeed,
             GameSeeds,
@@ -49147,6 +49178,7 @@ impl<'de> serde::Deserialize<'de> for VectorSetup {
                             "shiftStatistics" | "shift_statistics" => Ok(GeneratedField::ShiftStatistics),
                             "records" => Ok(GeneratedField::Records),
                             "history" => Ok(GeneratedField::History),
+                            "allHands" | "all_hands" => Ok(GeneratedField::AllHands),
                             "networks" => Ok(GeneratedField::Networks),
                             "baseSeed" | "base_seed" => Ok(GeneratedField::BaseSeed),
                             "gameSeeds" | "game_seeds" => Ok(GeneratedField::GameSeeds),
@@ -49188,6 +49220,7 @@ impl<'de> serde::Deserialize<'de> for VectorSetup {
                 let mut shift_statistics__ = None;
                 let mut records__ = None;
                 let mut history__ = None;
+                let mut all_hands__ = None;
                 let mut networks__ = None;
                 let mut seeds__ = None;
                 let mut start__ = None;
@@ -49294,6 +49327,12 @@ impl<'de> serde::Deserialize<'de> for VectorSetup {
                                 Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
                             ;
                         }
+                        GeneratedField::AllHands => {
+                            if all_hands__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("allHands"));
+                            }
+                            all_hands__ = Some(map_.next_value()?);
+                        }
                         GeneratedField::Networks => {
                             if networks__.is_some() {
                                 return Err(serde::de::Error::duplicate_field("networks"));
@@ -49359,6 +49398,7 @@ impl<'de> serde::Deserialize<'de> for VectorSetup {
                     shift_statistics: shift_statistics__.unwrap_or_default(),
                     records: records__.unwrap_or_default(),
                     history: history__.unwrap_or_default(),
+                    all_hands: all_hands__.unwrap_or_default(),
                     networks: networks__.unwrap_or_default(),
                     seeds: seeds__,
                     start: start__,
@@ -49397,6 +49437,9 @@ impl serde::Serialize for VectorStarted {
         if self.history != 0 {
             len += 1;
         }
+        if self.all_hands {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.VectorStarted", len)?;
         if let Some(v) = self.rules.as_ref() {
             struct_ser.serialize_field("rules", v)?;
@@ -49421,6 +49464,9 @@ impl serde::Serialize for VectorStarted {
         if self.history != 0 {
             struct_ser.serialize_field("history", &self.history)?;
         }
+        if self.all_hands {
+            struct_ser.serialize_field("allHands", &self.all_hands)?;
+        }
         struct_ser.end()
     }
 }
@@ -49443,6 +49489,8 @@ impl<'de> serde::Deserialize<'de> for VectorStarted {
             "base_seed",
             "baseSeed",
             "history",
+            "all_hands",
+            "allHands",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -49454,6 +49502,7 @@ impl<'de> serde::Deserialize<'de> for VectorStarted {
             BuiltInAgents,
             BaseSeed,
             History,
+            AllHands,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -49482,6 +49531,7 @@ impl<'de> serde::Deserialize<'de> for VectorStarted {
                             "builtInAgents" | "built_in_agents" => Ok(GeneratedField::BuiltInAgents),
                             "baseSeed" | "base_seed" => Ok(GeneratedField::BaseSeed),
                             "history" => Ok(GeneratedField::History),
+                            "allHands" | "all_hands" => Ok(GeneratedField::AllHands),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -49508,6 +49558,7 @@ impl<'de> serde::Deserialize<'de> for VectorStarted {
                 let mut built_in_agents__ = None;
                 let mut base_seed__ = None;
                 let mut history__ = None;
+                let mut all_hands__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Rules => {
@@ -49561,6 +49612,12 @@ impl<'de> serde::Deserialize<'de> for VectorStarted {
                                 Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
                             ;
                         }
+                        GeneratedField::AllHands => {
+                            if all_hands__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("allHands"));
+                            }
+                            all_hands__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(VectorStarted {
@@ -49571,6 +49628,7 @@ impl<'de> serde::Deserialize<'de> for VectorStarted {
                     built_in_agents: built_in_agents__.unwrap_or_default(),
                     base_seed: base_seed__,
                     history: history__.unwrap_or_default(),
+                    all_hands: all_hands__.unwrap_or_default(),
                 })
             }
         }

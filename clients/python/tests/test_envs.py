@@ -166,7 +166,7 @@ def test_an_episode_of_one_seat(toy: FakeVector) -> None:
     env.reset()
     env.step(150)
     env.reset()
-    assert toy.requests[-1].reset.all
+    assert toy.requests[-1].reset.games == bytes(4)
     env.reset(seed=5)
     assert toy.requests[-1].reset.base_seed == 5
     env.close()
@@ -387,4 +387,49 @@ def test_a_shift_adjudicated_at_the_turn_limit_terminates(anywhere: str | None) 
         _, _, terminated, truncated, info = env.step(env.action_space.sample(info["action_mask"]))
     assert (terminated, truncated) == (True, False)
     assert info["place"] in range(1, 5)
+    env.close()
+
+
+def test_the_state_has_all_hands(anywhere: str | None) -> None:
+    env = chefshat.make("pettingzoo", address=anywhere, all_hands=True, observation="classic")
+    pettingzoo.test.api_test(env, num_cycles=20)
+    env.reset(seed=1)
+    deck = np.array([*range(1, 12), 2])
+    for agent in env.agent_iter(200):
+        *_, ended, cut, _ = env.last()
+        state = env.state()
+        assert env.state_space.contains(state)
+        hands = state[-48:].reshape(4, 12) * deck
+        if not (ended or cut):
+            seat = env.possible_agents.index(agent)
+            seen = env.unwrapped.vector.batch.observations
+            np.testing.assert_allclose(hands[0], seen.hands[0], atol=1e-5)
+            np.testing.assert_allclose(hands.sum(axis=1), np.roll(seen.cards_left[0], -seat), atol=1e-5)
+        env.step(None if ended or cut else env.action_space(agent).sample(env.observe(agent)["action_mask"]))
+    env.close()
+    with pytest.raises(ValueError, match="all_hands=True"):
+        chefshat.make("pettingzoo", address=anywhere).unwrapped.state()
+
+
+@pytest.mark.parametrize("kind", ["gymnasium", "pettingzoo"])
+def test_a_new_game_where_it_is_asked_for(anywhere: str | None, kind: str) -> None:
+    env: Any = chefshat.make(kind, address=anywhere)
+    shifts = env.unwrapped.vector
+
+    def play() -> None:
+        while not len(shifts.batch.endings):
+            env.step(int(shifts.batch.masks[0].argmax()))
+
+    env.reset(seed=1)
+    play()
+    env.reset()
+    assert shifts.batch.observations.shifts[0] == 2
+    play()
+    env.reset(options={"new_game": True})
+    seen = shifts.batch.observations
+    assert (seen.shifts[0], seen.points[0].sum()) == (1, 0)
+    # Also before the first step.
+    hands = seen.hands.tolist()
+    env.reset(options={"new_game": True})
+    assert shifts.batch.observations.hands.tolist() != hands
     env.close()

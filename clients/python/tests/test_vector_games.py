@@ -1,5 +1,6 @@
 """`VectorEnv` in this process and on the real server: invariants of games, and refusals."""
 
+import pickle
 from collections import Counter
 from typing import Any
 
@@ -173,7 +174,7 @@ def test_games_start_with_given_hands(anywhere: str | None) -> None:
 @pytest.mark.parametrize(
     ("options", "reason", "says"),
     [
-        ({"games": 10**6}, "SETUP_REFUSED", "[0-9]"),
+        ({"games": 2**32 - 1}, "SETUP_REFUSED", "play "),
         ({"client_seats": [4]}, "SETUP_REFUSED", "seat"),
         ({"opponents": "nobody", "client_seats": [0]}, "SETUP_REFUSED", "nobody"),
         ({"rules": {"faces": 40}}, "RULE_SET_REFUSED", "40"),
@@ -194,6 +195,55 @@ def test_an_illegal_action_is_reported_with_its_row(anywhere: str | None) -> Non
         with pytest.raises(ChefsHatError) as refused:
             env.step(actions)
         assert refused.value.reason == "ILLEGAL_ACTION"
-        assert "2" in refused.value.metadata.values()
-        with pytest.raises(ChefsHatError, match="ENV_ENDED"):
-            env.step(actions)
+        assert refused.value.metadata["row"] == "2"
+        # It costs that row another choice, and the others nothing.
+        before = env.save()
+        actions[2] = env.batch.masks[2].argmax()
+        assert env.batch.step == 1
+        assert env.save() == before
+        assert env.step(actions).step == 2
+        assert env.batch.totals.client_decisions == 4
+        # Nor does one of a decision that is left open.
+        illegal = env.batch.masks.argmin(axis=1)
+        assert env.step(illegal, leave_open=np.ones(4, np.bool_)).totals.client_decisions == 4
+
+
+def test_threads_change_nothing(anywhere: str | None) -> None:
+    if anywhere is not None:
+        with pytest.raises(ValueError, match="a server chooses its own"):
+            VectorEnv(anywhere, threads=2)
+        return
+    shown = []
+    for threads in (0, 1, 3):
+        with VectorEnv(games=400, client_seats=[0], opponents="greedy", seed=2, threads=threads) as env:
+            env.sample(seed=1)
+            for _ in range(20):
+                env.step(env.sample())
+            shown.append(env.batch.observations.hands.tolist())
+    assert shown[0] == shown[1] == shown[2]
+    with pytest.raises(ValueError, match="threads is a number of threads"):
+        VectorEnv(threads=-1)
+
+
+def test_games_in_this_process_are_limited_by_its_memory() -> None:
+    pytest.importorskip("chefshat_native")
+    # A server takes 16,384 seats, 524,288 actions of histories and 16,384 seeds.
+    seeds = [number.to_bytes(32, "little") for number in range(20_000)]
+    with VectorEnv(games=20_000, client_seats=[0], history=64, seed=seeds) as env:
+        assert len(env.batch) == 20_000
+    with pytest.raises(ChefsHatError, match="MiB of memory are free: play fewer at a time"):
+        VectorEnv(games=2**32 - 1)
+
+
+def test_the_hands_of_all_seats(anywhere: str | None) -> None:
+    with VectorEnv(anywhere, 6, seed=3, all_hands=True) as env:
+        for _ in range(150):
+            batch = env.batch
+            hands = batch.all_hands.reshape(len(batch), 4, 12)
+            assert (hands[np.arange(len(batch)), batch.seats] == batch.observations.hands).all()
+            assert (hands.sum(axis=2) == batch.observations.cards_left).all()
+            env.step(env.sample())
+        assert pickle.loads(pickle.dumps(env.batch)).all_hands.tolist() == env.batch.all_hands.tolist()
+    with VectorEnv(anywhere, 6, seed=3) as env:
+        assert env.batch.all_hands.shape == (6, 0)
+        assert "all_hands" not in env.batch.as_dict()

@@ -36,6 +36,8 @@ pub const MAX_VECTOR_STREAMS: usize = 128;
 /// Most seats played on all vector streams together, games times seats: about 5 KB each. The
 /// default share of one caller is as many as one stream may have.
 pub const MAX_VECTOR_SEATS_IN_ALL: usize = 163_840;
+/// Most seats played on one vector stream, games times seats.
+pub const MAX_VECTOR_SEATS: usize = Limits::OF_SERVER.seats_played as usize;
 /// Most game seeds in one message.
 pub const MAX_VECTOR_SEEDS: usize = Limits::OF_SERVER.seeds;
 /// Most games of a vector stream with records.

@@ -66,6 +66,7 @@ pub fn batch_to_proto(batch: Batch, statistics: bool) -> v1::VectorBatch {
             shifts: batch.totals.shifts,
             games: batch.totals.games,
         }),
+        all_hands: batch.all_hands.into(),
     }
 }
 
@@ -95,12 +96,11 @@ mod tests {
     use chefshat_agents::{AgentKind, game_seed};
     use chefshat_engine::{ActionId, DecisionKind, Role, RuleSetSpec, Stop};
     use chefshat_record::convert::decision_kind;
-    use chefshat_simulation::vector::{
-        MAX_HISTORY_ENTRIES, MAX_SEATS_PLAYED, Seeds, VectorGames, VectorSetup,
-    };
+    use chefshat_simulation::vector::{Seeds, VectorGames, VectorSetup};
     use prost::Message as _;
 
     use crate::batch::*;
+    use crate::setup::Limits;
 
     fn actions(batch: &Batch) -> Vec<ActionId> {
         let width = batch.masks.len() / batch.rows as usize;
@@ -177,6 +177,10 @@ mod tests {
 
     #[test]
     fn the_largest_batch_fits_its_limit() {
+        let (seats, entries) = (
+            Limits::OF_SERVER.seats_played,
+            Limits::OF_SERVER.history_entries,
+        );
         // All columns at their widest, and two Shifts of one turn each ended in every game.
         let spec = RuleSetSpec {
             players: 6,
@@ -189,13 +193,14 @@ mod tests {
         let agents = [None, random, random, random, random, random];
         let setup = VectorSetup::new(
             spec.validate().unwrap(),
-            MAX_SEATS_PLAYED,
+            seats as u32,
             &agents,
             Seeds::List(vec![game_seed(1, 1)].into()),
         )
         .unwrap()
         .with_statistics(true)
-        .with_history((MAX_HISTORY_ENTRIES / MAX_SEATS_PLAYED) as u16)
+        .with_all_hands(true)
+        .with_history((entries / seats) as u16)
         .unwrap();
         let (mut games, mut batch) = VectorGames::new(setup);
         let mut most = 0;
@@ -210,7 +215,7 @@ mod tests {
             let message = batch_to_proto(std::mem::take(&mut batch), true);
             most = most.max(message.encoded_len());
             assert!(message.encoded_len() <= MAX_BATCH_BYTES);
-            assert!(shifts <= 3 * MAX_SEATS_PLAYED);
+            assert!(u64::from(shifts) <= 3 * seats);
             batch.rows = rows;
             batch.masks = message.action_masks.to_vec();
         }

@@ -20,6 +20,12 @@ use crate::states::states_from_proto;
 /// What a setup may ask for.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
+    /// Most games times the client's seats in each.
+    pub seats_played: u64,
+    /// Most entries of the history columns of one decision of each of these seats.
+    pub history_entries: u64,
+    /// Most bytes of the games and their batches ([`VectorSetup::memory`]).
+    pub memory: u64,
     /// Most seeds in a list.
     pub seeds: usize,
     /// Most parallel games with records.
@@ -31,17 +37,28 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Those of games in process.
-    pub const IN_PROCESS: Limits = Limits {
+    /// Those of games in process, beside this number of bytes of memory.
+    pub const fn in_process(memory: u64) -> Limits {
+        Limits {
+            seats_played: u64::MAX,
+            history_entries: u64::MAX,
+            memory,
+            seeds: usize::MAX,
+            recorded_games: u32::MAX,
+            recorded_shifts: u32::MAX,
+            network_multiplications: u64::MAX,
+        }
+    }
+
+    /// Those of a server, whose clients share its memory and its processors.
+    pub const OF_SERVER: Limits = Limits {
+        seats_played: 16_384,
+        history_entries: 1 << 19,
+        memory: u64::MAX,
         seeds: 16_384,
         recorded_games: 256,
         recorded_shifts: 1_000,
-        network_multiplications: u64::MAX,
-    };
-    /// Those of a server: the same, except for networks, whose clients share its processors.
-    pub const OF_SERVER: Limits = Limits {
         network_multiplications: 1 << 20,
-        ..Limits::IN_PROCESS
     };
 }
 
@@ -189,12 +206,44 @@ fn read(
     .with_records(message.records)
     .with_history(u16::try_from(message.history).unwrap_or(u16::MAX))
     .map_err(problem)?
-    .with_start(start)
-    .map_err(problem)?;
+    .with_all_hands(message.all_hands);
+    // Before anything is laid out for each game.
+    check_size(&setup, limits)?;
+    let setup = setup.with_start(start).map_err(problem)?;
     if message.records {
         check_records(&setup, dealt, limits)?;
     }
     Ok(setup)
+}
+
+/// Checks how much the games take.
+fn check_size(setup: &VectorSetup, limits: &Limits) -> Result<(), FieldProblem> {
+    let (games, seats) = (setup.games(), setup.seats_played());
+    if seats > limits.seats_played {
+        let words = format!(
+            "{games} games with {} of the client's seats: play at most {} games times seats",
+            setup.client_seats().count(),
+            limits.seats_played
+        );
+        return Err(FieldProblem::new("games", words));
+    }
+    let history = setup.history();
+    if seats * u64::from(history) > limits.history_entries {
+        let words = format!(
+            "a history of {history} actions: choose at most {} actions over the client's seats of all games",
+            limits.history_entries
+        );
+        return Err(FieldProblem::new("history", words));
+    }
+    if setup.memory() > limits.memory {
+        let words = format!(
+            "{games} games with their batches take about {} MiB, and {} MiB of memory are free: play fewer at a time, or with a shorter history",
+            setup.memory() >> 20,
+            limits.memory >> 20
+        );
+        return Err(FieldProblem::new("games", words));
+    }
+    Ok(())
 }
 
 /// The answer to a setup.
@@ -213,6 +262,7 @@ pub fn started_to_proto(setup: &VectorSetup) -> v1::VectorStarted {
             Seeds::List(_) => None,
         },
         history: setup.history().into(),
+        all_hands: setup.all_hands(),
     }
 }
 
@@ -285,7 +335,7 @@ fn problem(error: SetupError) -> FieldProblem {
     let field = match &error {
         SetupError::Seats { .. } | SetupError::NoClient => "client_seats",
         SetupError::ClientsSeat(_) | SetupError::UnfitNetwork { .. } => "networks",
-        SetupError::Games { .. } => "games",
+        SetupError::NoGames => "games",
         SetupError::Total { .. } => "total_games",
         SetupError::NoSeeds => "game_seeds",
         SetupError::Script(_) => "scripted",
@@ -325,6 +375,43 @@ pub(crate) fn seeds_from_proto(
 #[cfg(test)]
 mod tests {
     use crate::setup::*;
+
+    #[test]
+    fn games_take_a_limited_part_of_a_server_and_the_memory_of_a_process() {
+        let check = |games, client_seats: &[u32], history, limits: &Limits| {
+            let message = v1::VectorSetup {
+                games,
+                client_seats: client_seats.to_vec(),
+                history,
+                ..v1::VectorSetup::default()
+            };
+            let (rules, start) = start_from_proto(&message).unwrap().unwrap();
+            setup_from_proto(&message, rules, start, Seeds::Base(1), limits)
+                .map(|setup| setup.memory() >> 20)
+                .map_err(|error| error.message)
+        };
+        let server = Limits::OF_SERVER;
+        assert!(check(4_096, &[], 32, &server).is_ok());
+        assert!(check(16_384, &[2], 32, &server).is_ok());
+        let words = "games: 4097 games with 4 of the client's seats: play at most 16384";
+        assert!(
+            check(4_097, &[], 0, &server)
+                .unwrap_err()
+                .starts_with(words)
+        );
+        let words = "history: a history of 33 actions: choose at most 524288 actions";
+        assert!(
+            check(4_096, &[], 33, &server)
+                .unwrap_err()
+                .starts_with(words)
+        );
+        // More than a server takes, and as much as there is room for.
+        let free = Limits::in_process(1 << 30);
+        let taken = check(50_000, &[0], 64, &free).unwrap();
+        assert!((50..1_000).contains(&taken), "{taken} MiB");
+        let words = "and 1024 MiB of memory are free: play fewer at a time";
+        assert!(check(u32::MAX, &[], 0, &free).unwrap_err().contains(words));
+    }
 
     #[test]
     fn lists_of_seeds_are_limited() {

@@ -56,11 +56,12 @@ impl Games {
     fn begin(py: Python<'_>, setup: &[u8], threads: usize) -> PyResult<(Self, Batch)> {
         let message = decode::<v1::VectorSetup>("setup", setup)?;
         let pool = pool(threads);
+        let limits = Limits::in_process(free_memory());
         let begun = py.detach(|| {
             caught(|| {
-                let seeds = seeds_from_setup(&message, &Limits::IN_PROCESS, random_seed)?;
+                let seeds = seeds_from_setup(&message, &limits, random_seed)?;
                 let (rules, start) = start_from_proto(&message)?.ok_or_else(no_records_here)?;
-                let setup = setup_from_proto(&message, rules, start, seeds, &Limits::IN_PROCESS)?;
+                let setup = setup_from_proto(&message, rules, start, seeds, &limits)?;
                 let started = started_to_proto(&setup).encode_to_vec();
                 let (games, mut columns) = VectorGames::on(setup, pool);
                 let records = records(&games, &mut columns);
@@ -121,8 +122,8 @@ impl Games {
     /// Executes a serialized `VectorReset` and returns the next batch.
     fn reset(&self, py: Python<'_>, reset: &[u8]) -> PyResult<Batch> {
         let message = decode::<v1::VectorReset>("reset", reset)?;
-        let request =
-            Request::reset(&message, &Limits::IN_PROCESS).map_err(|error| refused(py, error))?;
+        let limits = Limits::in_process(u64::MAX);
+        let request = Request::reset(&message, &limits).map_err(|error| refused(py, error))?;
         self.execute(py, request, false)
     }
 
@@ -187,7 +188,7 @@ impl Games {
             caught(|| {
                 let mut columns = request.execute(games)?;
                 let records = records(games, &mut columns);
-                Ok(Batch::new(columns, records, games.setup()))
+                Ok::<_, RequestError>(Batch::new(columns, records, games.setup()))
             })
         };
         let done = match self.is_fast {
@@ -196,9 +197,12 @@ impl Games {
         };
         match done {
             Ok(Ok(batch)) => Ok(batch),
-            // As over the network, a refused request ends the games; so does a panic.
+            // As over the network, a refused request ends the games, and so does a panic. An illegal
+            // action has changed nothing: Python would not have sent it.
             Ok(Err(error)) => {
-                *state = None;
+                if error.reason != "ILLEGAL_ACTION" {
+                    *state = None;
+                }
                 Err(refused(py, error))
             }
             Err(panic) => {
@@ -301,6 +305,25 @@ pub(crate) fn refused(py: Python<'_>, error: RequestError) -> PyErr {
         }
     }
     PyErr::new::<Refused, _>((error.reason, error.message, metadata.unbind()))
+}
+
+/// Bytes of memory that are free, for this process and on this machine; without a limit where the
+/// system does not say.
+fn free_memory() -> u64 {
+    let read = |path: &str| std::fs::read_to_string(path).ok();
+    let number = |text: String| text.trim().parse::<u64>().ok();
+    let machine = read("/proc/meminfo").and_then(|text| {
+        let line = text
+            .lines()
+            .find_map(|line| line.strip_prefix("MemAvailable:"))?;
+        let kibibytes = line.trim().strip_suffix("kB")?;
+        Some(number(kibibytes.to_owned())?.saturating_mul(1024))
+    });
+    let group = read("/sys/fs/cgroup/memory.max")
+        .and_then(number)
+        .zip(read("/sys/fs/cgroup/memory.current").and_then(number))
+        .map(|(most, used)| most.saturating_sub(used));
+    machine.into_iter().chain(group).min().unwrap_or(u64::MAX)
 }
 
 fn random_seed() -> u64 {

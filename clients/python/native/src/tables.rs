@@ -37,6 +37,7 @@ pub(crate) fn layouts<'py>(py: Python<'py>, setup: &VectorSetup) -> PyResult<Bou
         "hands" | "played" | "gave" | "received" => cards,
         "mask_bits" => mask,
         "boards" => 3,
+        "all_hands" => setup.all_hands_width(),
         "history" => 2 * usize::from(setup.history()),
         "history_counts" => 4 * usize::from(setup.history().min(1)),
         "seeds" => 32,
@@ -161,6 +162,7 @@ fn decisions(batch: &mut Columns) -> Named<Vec<u8>> {
         ("seats", std::mem::take(&mut batch.seats)),
         ("kinds", std::mem::take(&mut batch.kinds)),
         ("mask_bits", std::mem::take(&mut batch.masks)),
+        ("all_hands", std::mem::take(&mut batch.all_hands)),
     ];
     observed(wide, narrow, seen)
 }

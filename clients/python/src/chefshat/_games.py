@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 from chefshat import pb
 from chefshat.address import ServerAddress
 from chefshat.batch import Batch
+from chefshat.errors import ChefsHatError
+from chefshat.masks import is_legal
 
 # The most bytes of a message that a server takes (`max_vector_message_bytes`), and of the states in one, beside which their games
 # have room.
@@ -19,7 +21,7 @@ LEAVE_OPEN = 0xFFFF
 
 
 class Games(Protocol):
-    """Games stepped in batches. A method that raises an error has ended them, unless its reason is GAMES_IN_USE.
+    """Games stepped in batches. A method that raises an error has ended them, unless its reason is GAMES_IN_USE or ILLEGAL_ACTION.
 
     Attributes:
         server: the server that plays them; None: this process.
@@ -73,6 +75,18 @@ def checked(actions: ArrayLike, batch: Batch) -> NDArray[np.uint16]:
         if not 0 <= array[wrong] < size:
             raise ValueError(f"row {wrong} has the action {array[wrong]}; actions are 0..={size - 1}")
     return array.astype("<u2", copy=False)
+
+
+def check_legal(actions: NDArray[np.uint16], batch: Batch) -> None:
+    """Raises ILLEGAL_ACTION if an action is illegal. `LEAVE_OPEN` is none of them."""
+    taken = actions != LEAVE_OPEN
+    legal = is_legal(batch.mask_bits, np.where(taken, actions, 0)) | ~taken
+    if not legal.all():
+        row = int(legal.argmin())
+        game, seat = batch.games[row], batch.seats[row]
+        words = f'choose one of batch.masks[{row}], or let such decisions be asked again (invalid="ask_again")'
+        words = f"row {row} (game {game}, seat {seat}): action {actions[row]} is not legal; {words}"
+        raise ChefsHatError("ILLEGAL_ACTION", words, {"row": str(row), "game": str(game), "seat": str(seat)})
 
 
 def checked_rows(argument: str, rows: ArrayLike, batch: Batch) -> NDArray[np.bool_]:

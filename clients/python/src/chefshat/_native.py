@@ -118,9 +118,9 @@ class NativeGames:
 
     server: ServerAddress | None = None
 
-    def __init__(self, setup: pb.VectorSetup) -> None:
+    def __init__(self, setup: pb.VectorSetup, threads: int) -> None:
         try:
-            self._games, self._first = chefshat_native.Games.begin(setup.SerializeToString())
+            self._games, self._first = chefshat_native.Games.begin(setup.SerializeToString(), threads)
         except chefshat_native.Refused as error:
             _raise(error)
         self.started = pb.VectorStarted.FromString(self._games.started)

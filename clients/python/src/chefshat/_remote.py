@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chefshat import channels, pb
-from chefshat._games import MAX_STATES_BYTES, checked
+from chefshat._games import MAX_STATES_BYTES, check_legal, checked
 from chefshat._gen.chefshat.v1.vector_service_pb2_grpc import VectorServiceStub
 from chefshat.address import ServerAddress
 from chefshat.batch import Batch, GameRecord
@@ -90,6 +90,9 @@ class RemoteGames:
             raise
         self.started = started.started
         self._sizes = Sizes.of(self.started)
+        # Whether the server would end the stream for an illegal action.
+        self._refuses = setup.invalid_actions != pb.INVALID_ACTION_RULE_ASK_AGAIN
+        self._latest: Batch
 
     def first(self) -> Batch:
         """Returns the first batch."""
@@ -101,6 +104,8 @@ class RemoteGames:
 
     def take(self, actions: NDArray[np.uint16]) -> Batch:
         """Takes actions, of which `LEAVE_OPEN` takes none, and returns the next batch."""
+        if self._refuses:
+            check_legal(actions, self._latest)
         self._outbox.put(pb.RunRequest(actions=pb.VectorActions(actions=actions.tobytes())))
         return self._receive_batch()
 
@@ -157,6 +162,7 @@ class RemoteGames:
                 batch = Batch(message.rows, self._sizes, MessageContent(message))
                 batch.message = message
                 batch.records = tuple(records)
+                self._latest = batch
                 return batch
             if not response.HasField("record"):
                 raise ChefsHatError("PROTOCOL_VIOLATED", "the server sent neither a batch nor a record")

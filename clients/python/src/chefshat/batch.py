@@ -101,6 +101,10 @@ class Batch(Situations):
     rewards = Column[np.float32]("<f4")
     """(R,): sum of the seat's rewards since it last decided and since its episode began."""
 
+    all_hands = Column[np.uint8]("u1", "all_hands")
+    """(R, N(F+1)): the cards in the hand of each seat, one seat after the other, with `all_hands=True`: more than the row's seat
+    may know. `all_hands.reshape(-1, N, F+1)` has a dimension for the seats."""
+
     #: The records of the games that have ended, if the env was created with `records=True`.
     records: tuple[GameRecord, ...] = ()
     _transitions: Transitions | None = None

@@ -42,6 +42,7 @@ class Sizes:
         num_actions: A, the number of actions of any kind.
         turn_actions: T, the number of actions of a turn; they come first, and the last of them is passing.
         history: the width of the column `history`; 0: there is none.
+        has_all_hands: whether there is the column `all_hands`.
     """
 
     players: int
@@ -51,6 +52,7 @@ class Sizes:
     num_actions: int
     turn_actions: int
     history: int = 0
+    has_all_hands: bool = False
 
     @classmethod
     def of(cls, started: pb.VectorStarted | pb.GameStarted) -> Self:
@@ -62,8 +64,9 @@ class Sizes:
             hand_size=started.hand_size,
             num_actions=started.action_space.size,
             turn_actions=started.action_space.turn_actions,
-            # A live game has no such column.
+            # A live game has no such columns.
             history=started.history if isinstance(started, pb.VectorStarted) else 0,
+            has_all_hands=isinstance(started, pb.VectorStarted) and started.all_hands,
         )
 
     @property
@@ -75,6 +78,11 @@ class Sizes:
     def card_kinds(self) -> int:
         """F+1: the faces and the joker."""
         return self.faces + 1
+
+    @property
+    def all_hands(self) -> int:
+        """N(F+1), the width of the column `all_hands`; 0: there is none."""
+        return self.players * self.card_kinds if self.has_all_hands else 0
 
     @property
     def mask_bytes(self) -> int:

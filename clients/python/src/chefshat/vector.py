@@ -50,8 +50,10 @@ __all__ = [
 LOCAL = "local"
 
 
-# The arguments that say where games are played: address, token, certificates.
-_Place: TypeAlias = "tuple[str | ServerAddress | None, str | None, Path | str | None]"
+# The arguments that say where games are played: address, token, certificates, threads of this process.
+_Place: TypeAlias = "tuple[str | ServerAddress | None, str | None, Path | str | None, int]"
+# Errors after which the games are as they were.
+_UNCHANGED = ("GAMES_IN_USE", "ILLEGAL_ACTION")
 
 
 class VectorEnv:
@@ -61,8 +63,9 @@ class VectorEnv:
     A server ends an environment after an hour without an answer (CLIENT_IDLE), and serves 64 of them at a time.
 
     Every method raises `ChefsHatError` with a reason if a request is refused. Then the environment has ended, and every further
-    call raises an error: create a new one. Only GAMES_IN_USE, for a call while another thread steps the games, changes nothing. An
-    environment cannot be pickled or copied: `fork` copies its games, `save` returns their states.
+    call raises an error: create a new one. Only GAMES_IN_USE, for a call while another thread steps the games, and ILLEGAL_ACTION,
+    which names the row and its game, change nothing. An environment cannot be pickled or copied: `fork` copies its games, `save`
+    returns their states.
 
     Attributes:
         server: the server that plays the games; None: this process.
@@ -84,6 +87,7 @@ class VectorEnv:
         ca: Path | str | None = None,
         transitions: bool = False,
         reward_function: RewardFunction | None = None,
+        threads: int = 0,
         **options: Unpack[VectorOptions],
     ) -> None:
         """Starts the games and fetches the first batch.
@@ -94,13 +98,16 @@ class VectorEnv:
                 installed, or else as "local".
             token: sent with every call; None: that of the environment variable CHEFSHAT_TOKEN, if set.
             ca: PEM file of the certificate authorities to trust; None: that of CHEFSHAT_CA, or else the system's.
-            games: n. Games times client seats is limited by the server (`max_vector_seats`).
+            games: n. Games times client seats is limited by the server (`max_vector_seats`), and in this process by the memory.
             transitions: whether batches have `transitions`. They take some 200 bytes for each seat of each game.
             reward_function: computes rewards from the columns of the transitions, instead of the server's.
+            threads: how many of this process step the games; 0: one for each core. They do not change what is played.
             options: see `VectorOptions`.
         """
+        if threads < 0:
+            raise ValueError(f"threads is a number of threads, or 0 for one for each core, not {threads}")
         inside, policies = split(options)
-        self._start(vector_setup(games, inside), policies, (address, token, ca), transitions, reward_function)
+        self._start(vector_setup(games, inside), policies, (address, token, ca, threads), transitions, reward_function)
 
     def _start(
         self,
@@ -368,8 +375,8 @@ class VectorEnv:
         return batch
 
     def _fail(self, error: BaseException) -> None:
-        """Ends the environment with an error, unless the games were left as they were for another thread."""
-        if isinstance(error, ChefsHatError) and error.reason == "GAMES_IN_USE":
+        """Ends the environment with an error, unless the games are as they were."""
+        if isinstance(error, ChefsHatError) and error.reason in _UNCHANGED:
             return
         # After an interrupt the response may still come.
         known = error if isinstance(error, ChefsHatError) else ChefsHatError("INTERRUPTED", "a step was interrupted")
@@ -383,10 +390,11 @@ def _begin(
     address: str | ServerAddress | None,
     token: str | None,
     ca: Path | str | None,
+    threads: int,
 ) -> Games:
     """Begins games in this process or on a server."""
     if policies is not None:
-        inside = _begin(setup, None, address, token, ca)
+        inside = _begin(setup, None, address, token, ca, threads)
         try:
             return PolicyGames(inside, policies)
         except BaseException:
@@ -395,7 +403,9 @@ def _begin(
     if address is None and importlib.util.find_spec("chefshat_native") is not None:
         from chefshat._native import NativeGames
 
-        return NativeGames(setup)
+        return NativeGames(setup, threads)
+    if threads:
+        raise ValueError("threads are those of games in this process: a server chooses its own")
     from chefshat._remote import RemoteGames
 
     if address is None or address == LOCAL:

@@ -25,7 +25,6 @@ in turn; None: random."""
 NETWORK_SUFFIX = ".safetensors"
 MAX_NETWORK_BYTES = 64 << 20
 _SEED_BYTES = 32
-_MAX_SEEDS = 16384
 _MAX_BASE_SEED = 2**64 - 1
 
 
@@ -54,7 +53,8 @@ class VectorOptions(TypedDict, total=False):
         decisions: "all" (default), or "turns": only the first T actions.
         other_decisions: with "turns": the built-in agent that takes the other decisions; default: the default action is taken.
         skip_forced: whether decisions with one legal action are taken without asking.
-        invalid: effect of an illegal action: "error" (default) ends the stream; "ask_again" counts it, rewards it and asks again.
+        invalid: effect of an illegal action: "error" (default): `step` raises ILLEGAL_ACTION and takes none of the actions;
+            "ask_again" counts it, rewards it and asks again.
         max_invalid_attempts: with "ask_again": invalid attempts after which the default action is taken; 0 (default): unlimited.
         total_games: total number of games; 0 (default): unlimited.
         seed: a base seed, the games' seeds, or None (default) for random ones. See `Seed`.
@@ -66,6 +66,8 @@ class VectorOptions(TypedDict, total=False):
         shift_statistics: whether batches have `shifts`.
         records: whether batches have the `records` of games that have ended.
         history: K, the width of the column `observations.history`: the latest actions of the Shift; 0 (default): there is none.
+        all_hands: whether batches have `all_hands`, the hands of all seats: for a critic that sees more than the actor, or for
+            analysis.
     """
 
     client_seats: Sequence[int] | None
@@ -86,6 +88,7 @@ class VectorOptions(TypedDict, total=False):
     shift_statistics: bool
     records: bool
     history: int
+    all_hands: bool
 
 
 def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
@@ -122,6 +125,7 @@ def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
         shift_statistics=options.get("shift_statistics", False),
         records=options.get("records", False),
         history=options.get("history", 0),
+        all_hands=options.get("all_hands", False),
         # A branch has the record's rules.
         rules=None if branch is not None else rule_set(rules),
     )
@@ -194,8 +198,8 @@ def put_seed(request: Seeded, seed: Seed) -> None:
         return
     if isinstance(seed, (str, bytes, bool)) or not isinstance(seed, Sequence):
         raise TypeError("a seed is a number, or a list of the games' seeds of 32 bytes each")
-    if not 1 <= len(seed) <= _MAX_SEEDS:
-        raise ValueError(f"give 1..={_MAX_SEEDS} seeds, not {len(seed)}; later games reuse them in turn")
+    if not seed:
+        raise ValueError("give one seed or more; later games reuse them in turn")
     for number, one in enumerate(seed):
         if not isinstance(one, bytes) or len(one) != _SEED_BYTES:
             raise ValueError(f"seed {number} is not {_SEED_BYTES} bytes")

@@ -9,7 +9,6 @@ use chefshat_proto::v1::{
     self, server_service_client::ServerServiceClient, server_service_server::ServerService,
 };
 use chefshat_record::convert::{FieldProblem, action_space, rules_to_proto};
-use chefshat_simulation::vector::MAX_SEATS_PLAYED;
 use chefshat_tournament::{MAX_GAMES, MAX_PARTICIPANTS};
 use tonic::{Request, Response, Status};
 
@@ -24,8 +23,8 @@ use chefshat_base::clock::since_epoch;
 use chefshat_hosting::config::{
     MAX_ANALYSES, MAX_ANALYSIS_ROLLOUTS, MAX_ANALYSIS_TIME, MAX_FOLLOWERS, MAX_SEATS_PER_STREAM,
     MAX_SEATS_PER_WATCH, MAX_STREAMS_PER_CONNECTION, MAX_TOURNAMENTS, MAX_VECTOR_BATCH_BYTES,
-    MAX_VECTOR_NETWORK_MULTIPLICATIONS, MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEATS_IN_ALL,
-    MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS, ServerConfig,
+    MAX_VECTOR_NETWORK_MULTIPLICATIONS, MAX_VECTOR_RECORDED_GAMES, MAX_VECTOR_SEATS,
+    MAX_VECTOR_SEATS_IN_ALL, MAX_VECTOR_SEEDS, MAX_VECTOR_STREAMS, ServerConfig,
 };
 use chefshat_hosting::room::MAX_SPECTATORS;
 use chefshat_wire::convert;
@@ -51,7 +50,7 @@ impl Info {
             ("max_vector_message_bytes", MAX_VECTOR_MESSAGE_BYTES),
             ("max_vector_streams", MAX_VECTOR_STREAMS),
             ("max_vector_batch_bytes", MAX_VECTOR_BATCH_BYTES),
-            ("max_vector_seats", MAX_SEATS_PLAYED as usize),
+            ("max_vector_seats", MAX_VECTOR_SEATS),
             ("max_vector_seats_in_all", MAX_VECTOR_SEATS_IN_ALL),
             ("max_vector_seeds", MAX_VECTOR_SEEDS),
             (

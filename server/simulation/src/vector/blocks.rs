@@ -59,7 +59,7 @@ pub(super) fn run(
         });
         part.batch.sort_by_game();
         for slot in slots {
-            slot.write_row(&mut part);
+            slot.write_row(setup, &mut part);
         }
         part
     };

@@ -38,6 +38,8 @@ pub struct Batch {
     pub observations: ObservationColumns,
     /// ceil(A/8) bytes wide: legal actions.
     pub masks: Vec<u8>,
+    /// u8 by seat and card: the hands of all seats; empty unless the setup asks for them.
+    pub all_hands: Vec<u8>,
     /// Episodes that ended.
     pub endings: Endings,
     /// Games that began.
@@ -208,6 +210,7 @@ pub(super) struct Row<'a> {
     pub(super) observation: &'a Observation,
     pub(super) history: Option<&'a History>,
     pub(super) legal: &'a Mask,
+    pub(super) all_hands: Option<&'a BySeat<Cards>>,
 }
 
 /// An ended episode of a seat, as a row.
@@ -248,6 +251,7 @@ impl Batch {
                 ..Endings::default()
             },
             masks: of(mask_bytes),
+            all_hands: of(setup.all_hands_width()),
             mask_bytes,
             ..Batch::default()
         }
@@ -267,6 +271,7 @@ impl Batch {
         self.attempts.extend(next.attempts);
         self.rewards.extend(next.rewards);
         self.masks.extend(next.masks);
+        self.all_hands.extend(next.all_hands);
     }
 
     /// Sorts what happened by game, but not the rows of open decisions. What happened in a game keeps
@@ -294,6 +299,9 @@ impl Batch {
         let last = words.next().map_or([0; 8], |word| word.to_le_bytes());
         self.masks
             .extend(last.into_iter().take(self.mask_bytes % 8));
+        for hand in row.all_hands.into_iter().flat_map(BySeat::values) {
+            self.all_hands.extend(hand.counts(row.observation.faces));
+        }
     }
 }
 

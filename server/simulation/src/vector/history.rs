@@ -12,8 +12,6 @@ use chefshat_engine::{
 
 /// The most entries of a history column.
 pub const MAX_HISTORY: u16 = 1024;
-/// The most entries of the history columns of one decision of every seat of the client's games.
-pub const MAX_HISTORY_ENTRIES: u32 = 1 << 19;
 /// Entries kept at least, so that an exchange is complete in them.
 const LEAST_KEPT: usize = 16;
 

@@ -44,14 +44,14 @@ use rayon::ThreadPool;
 
 pub use columns::{Batch, Beginnings, Endings, ObservationColumns, PlayedGame, Shifts, Totals};
 pub use error::{MAX_RECORDED, STATE_VERSION, StateError, StepError};
-pub use history::{MAX_HISTORY, MAX_HISTORY_ENTRIES};
+pub use history::MAX_HISTORY;
 pub use opponent::Opponent;
 use part::{OpenRow, Part};
 pub use saved::SavedGame;
 pub use seen::SeenShift;
 pub use setup::{Episode, VectorSetup};
 use slot::Slot;
-pub use start::{MAX_SEATS_PLAYED, Seeds, SetupError, Start, StartPoint};
+pub use start::{Seeds, SetupError, Start, StartPoint};
 pub use terms::{Decisions, Difference, InvalidActions};
 use waiting::Waiting;
 

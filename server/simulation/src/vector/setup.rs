@@ -5,14 +5,18 @@ use std::sync::Arc;
 
 use chefshat_engine::{ActionId, BySeat, Event, Game, RewardScheme, RuleSet, Seat, Seed};
 
-use chefshat_agents::{AgentKind, Network};
+use chefshat_agents::{AgentKind, BuiltInAgent, Network};
 
 use super::error::StateError;
-use super::history::{MAX_HISTORY, MAX_HISTORY_ENTRIES};
+use super::history::MAX_HISTORY;
 use super::opponent::Opponent;
 use super::saved::SavedGame;
-use super::start::{MAX_SEATS_PLAYED, Seeds, SetupError, Start, StartPoint};
+use super::slot::Slot;
+use super::start::{Seeds, SetupError, Start, StartPoint};
 use super::terms::{Decisions, InvalidActions, Terms};
+
+/// Bytes of a row of a batch without the columns that a setup asks for, at most.
+const LEAST_ROW: usize = 256;
 
 /// The scope of an episode.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
@@ -43,6 +47,7 @@ pub struct VectorSetup {
     statistics: bool,
     records: bool,
     history: u16,
+    all_hands: bool,
 }
 
 /// Checks the numbers of games, seats and seeds.
@@ -51,9 +56,8 @@ fn check_sizes<A>(games: u32, agents: &BySeat<Option<A>>, seeds: &Seeds) -> Resu
     if seats == 0 {
         return Err(SetupError::NoClient);
     }
-    let played = u64::from(games) * seats as u64;
-    if !(1..=u64::from(MAX_SEATS_PLAYED)).contains(&played) {
-        return Err(SetupError::Games { games, seats });
+    if games == 0 {
+        return Err(SetupError::NoGames);
     }
     if matches!(seeds, Seeds::List(list) if list.is_empty()) {
         return Err(SetupError::NoSeeds);
@@ -98,6 +102,7 @@ impl VectorSetup {
             statistics: false,
             records: false,
             history: 0,
+            all_hands: false,
         })
     }
 
@@ -280,14 +285,17 @@ impl VectorSetup {
     /// them; 0 for none.
     ///
     /// # Errors
-    /// If it is above [`MAX_HISTORY`], or the columns of all seats are too large.
+    /// If it is above [`MAX_HISTORY`].
     pub fn with_history(self, history: u16) -> Result<VectorSetup, SetupError> {
-        let seats = self.client_seats().count() as u64;
-        let entries = u64::from(self.games) * seats * u64::from(history);
-        if history > MAX_HISTORY || entries > u64::from(MAX_HISTORY_ENTRIES) {
+        if history > MAX_HISTORY {
             return Err(SetupError::History(history));
         }
         Ok(VectorSetup { history, ..self })
+    }
+
+    /// Sets whether batches have the hands of all seats.
+    pub fn with_all_hands(self, all_hands: bool) -> VectorSetup {
+        VectorSetup { all_hands, ..self }
     }
 
     /// Sets whether decisions are kept for records.
@@ -404,6 +412,31 @@ impl VectorSetup {
     /// Width of the history column.
     pub fn history(&self) -> u16 {
         self.history
+    }
+
+    /// Games times the client's seats in each.
+    pub fn seats_played(&self) -> u64 {
+        u64::from(self.games) * self.client_seats().count() as u64
+    }
+
+    /// The bytes that the games and two batches of them take, roughly.
+    pub fn memory(&self) -> u64 {
+        let agents = self.rules.players() * size_of::<BuiltInAgent>();
+        let row = LEAST_ROW + self.all_hands_width() + 2 * usize::from(self.history);
+        // A decision, and the end of an episode for each seat.
+        let rows = u64::from(self.games) + self.seats_played();
+        u64::from(self.games) * (size_of::<Slot>() + agents) as u64 + 2 * rows * row as u64
+    }
+
+    /// Whether batches have the hands of all seats.
+    pub fn all_hands(&self) -> bool {
+        self.all_hands
+    }
+
+    /// Width of the column of all hands.
+    pub fn all_hands_width(&self) -> usize {
+        let cards = usize::from(self.rules.faces()) + 1;
+        usize::from(self.all_hands) * self.rules.players() * cards
     }
 
     /// The seeds of the games.

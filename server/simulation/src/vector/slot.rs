@@ -174,7 +174,7 @@ impl Slot {
     }
 
     /// Writes the row of the open decision, if there is one.
-    pub(super) fn write_row(&mut self, part: &mut Part) {
+    pub(super) fn write_row(&mut self, setup: &VectorSetup, part: &mut Part) {
         let Some(running) = &mut self.running else {
             return;
         };
@@ -191,6 +191,7 @@ impl Slot {
             observation: &running.game.observe(Viewer::Seat(seat)),
             history: running.history.as_ref(),
             legal: &open.legal,
+            all_hands: setup.all_hands().then(|| running.game.hands()),
         });
         part.open.push(OpenRow {
             game: self.number,

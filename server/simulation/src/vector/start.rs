@@ -7,11 +7,8 @@ use chefshat_engine::{ActionError, ActionId, Game, Script, ScriptError, Seat, Se
 use thiserror::Error;
 
 use super::error::{StateError, StepError};
-use super::history::{MAX_HISTORY, MAX_HISTORY_ENTRIES};
+use super::history::MAX_HISTORY;
 use super::saved::SavedGame;
-
-/// Maximum number of seats of one client: games times its seats in each.
-pub const MAX_SEATS_PLAYED: u32 = 16_384;
 
 /// The seeds of the games.
 #[derive(Clone, Eq, PartialEq, Debug)]
@@ -99,16 +96,9 @@ pub enum SetupError {
         /// Those of the games.
         here: [u8; 3],
     },
-    /// The number of games is 0 or too large.
-    #[error(
-        "{games} games with {seats} of the client's seats: play at least 1 game, and at most {MAX_SEATS_PLAYED} games times seats"
-    )]
-    Games {
-        /// Games asked for.
-        games: u32,
-        /// Seats of the client in each.
-        seats: usize,
-    },
+    /// The number of games is 0.
+    #[error("play at least 1 game")]
+    NoGames,
     /// The total number of games is below the number of parallel games.
     #[error("{total} games in total are fewer than the {games} parallel games")]
     Total {
@@ -124,9 +114,7 @@ pub enum SetupError {
     #[error("{0}")]
     Script(#[from] ScriptError),
     /// The history column is too wide.
-    #[error(
-        "a history of {0} actions: choose at most {MAX_HISTORY}, and at most {MAX_HISTORY_ENTRIES} actions over the client's seats of all games"
-    )]
+    #[error("a history of {0} actions: choose at most {MAX_HISTORY}")]
     History(u16),
     /// The list of starts is empty.
     #[error("the list of starts is empty: give at least one")]

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import NDArray
 
 from chefshat.address import ServerAddress
 
@@ -24,6 +25,7 @@ from chefshat.envs.illegal import with_limit
 from chefshat.envs.observing import Form, ObservationFunction, mask_space
 from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
 from chefshat.envs.single import RowReader
+from chefshat.learn import features
 from chefshat.vector import Batch, VectorEnv
 
 __all__ = ["env", "raw_env"]
@@ -45,8 +47,8 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
     An illegal action is an invalid attempt: it gets the reward of the scheme less `invalid_penalty`, and the same agent decides
     again; after 10 of them (`max_invalid_attempts`) the default action is taken. An agent gets the
     rewards since its last decision at its next decision, or at the end of the episode. Then all agents are done; `reset()` starts
-    the next Shift of the same game, or the next game if that is the episode. In the middle of an episode, or with a seed, it starts
-    a new game.
+    the next Shift of the same game, or the next game if that is the episode. In the middle of an episode, with a seed, or with
+    `options={"new_game": True}`, it starts a new game.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -79,6 +81,11 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
         self.possible_agents = [f"player_{seat}" for seat in range(sizes.players)]
         self.agents: list[str] = []
         self._form = Form(observation, sizes, self.vector.batch)
+        if sizes.has_all_hands:
+            width = features.table_width(sizes.players, sizes.faces) + sizes.all_hands
+            self.state_space = spaces.Box(0.0, 2.0, (width,), np.float32)
+            self._state = np.zeros(width, np.float32)
+            self._deck = np.array([*range(1, sizes.faces + 1), features.MAX_JOKERS], np.float32)
         seen = spaces.Dict({"observation": self._form.space, "action_mask": mask_space(sizes)})
         # Separate spaces, because each has its own seed.
         self._observation_spaces: dict[str, spaces.Space[Any]] = {agent: copy.deepcopy(seen) for agent in self.possible_agents}
@@ -107,13 +114,23 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
         seen = self._seen.get(agent)
         return {"observation": self._form.row(self._nothing, 0) if seen is None else seen, "action_mask": mask}
 
+    def state(self) -> NDArray[np.float32]:
+        """Returns what a centralised critic may see, with `all_hands=True`: more than any agent.
+
+        It is the "table" observation of the agent that decides, then the hands of all agents from that one on, each count as a
+        share of the deck's; at the end of an episode that of the last decision.
+        """
+        if not self.vector.sizes.has_all_hands:
+            raise ValueError("the state has the hands of all agents: create the environment with all_hands=True")
+        return self._state.copy()
+
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> None:
-        """Starts the next episode. The last seed given determines the games."""
+        """Starts the next episode. The last seed given determines the games. Options: `{"new_game": True}`."""
         check_open(self.vector)
         if seed is not None:
             self.vector.reset(seed)
-        elif self._stepped:
-            self.vector.reset()
+        elif self._stepped or (options or {}).get("new_game"):
+            self.vector.reset(games=[0])
         self._stepped = False
         self.agents = self.possible_agents.copy()
         self.rewards = dict.fromkeys(self.agents, 0.0)
@@ -166,6 +183,9 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
         observation, self._mask, reward, seat, kind, attempts = self._reader.read(batch)
         agent = self.possible_agents[seat]
         self.agent_selection = agent
+        if batch.sizes.has_all_hands:
+            hands = batch.all_hands.reshape(-1, len(self._deck)) / self._deck
+            self._state = np.concatenate([features.table_of(batch)[0], np.roll(hands, -seat, axis=0).ravel()])
         self._seen[agent] = observation
         self.infos[agent] = {"kind": kind, "invalid_attempts": attempts}
         return reward

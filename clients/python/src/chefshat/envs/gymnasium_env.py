@@ -62,8 +62,9 @@ class ChefsHatEnv(NotCopied, gymnasium.Env[Any, Any]):
     the scheme (-1 by "validity" and the paper's) less `invalid_penalty`, and the decision is asked again; after 10 of them
     (`max_invalid_attempts`) the default action is taken.
 
-    An episode is a Shift, or a game. After the end of a Shift `reset()` continues with the next Shift of the same game; in the
-    middle of an episode, or with a seed, it starts a new game. `terminated` means that the episode has ended with places, also if
+    An episode is a Shift, or a game. After the end of a Shift `reset()` continues with the next Shift of the same game, so that
+    roles, the exchange and special actions come up; in the middle of an episode, with a seed, or with `options={"new_game": True}`,
+    it starts a new game, whose first Shift has none of them. `terminated` means that the episode has ended with places, also if
     its last Shift was adjudicated at the turn limit; `truncated` that it was cut off without. `info` also has: "kind" (a value of
     `pb.DecisionKind`), "invalid_attempts" (at this decision), and at the end of an episode "place", from 1.
     """
@@ -113,13 +114,18 @@ class ChefsHatEnv(NotCopied, gymnasium.Env[Any, Any]):
         self._stepped = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Starts the next episode. The last seed given determines the games and the opponents' random choices."""
+        """Starts the next episode. The last seed given determines the games and the opponents' random choices.
+
+        Args:
+            seed: begins the sequence of games of this seed; None: it continues.
+            options: `{"new_game": True}`: the episode begins a game.
+        """
         check_open(self.vector)
         super().reset(seed=seed)
         if seed is not None:
             self.vector.reset(seed)
-        elif self._running and self._stepped:
-            self.vector.reset()
+        elif (self._running and self._stepped) or (options or {}).get("new_game"):
+            self.vector.reset(games=[0])
         wait_for_a_row(self.vector)
         self._running = True
         self._stepped = False

@@ -125,26 +125,7 @@ fn invalid_options_are_refused() {
     let new = |games, agents: &[Option<AgentKind>], seeds| {
         VectorSetup::new(rules(), games, agents, seeds).unwrap_err()
     };
-    assert!(matches!(
-        new(0, &kinds, Seeds::Base(1)),
-        SetupError::Games { .. }
-    ));
-    assert!(matches!(
-        new(4097, &kinds, Seeds::Base(1)),
-        SetupError::Games { .. }
-    ));
-    assert!(VectorSetup::new(rules(), 4096, &kinds, Seeds::Base(1)).is_ok());
-    let one = [
-        None,
-        Some(AgentKind::Random),
-        Some(AgentKind::Random),
-        Some(AgentKind::Random),
-    ];
-    assert!(VectorSetup::new(rules(), 16_384, &one, Seeds::Base(1)).is_ok());
-    assert!(matches!(
-        new(16_385, &one, Seeds::Base(1)),
-        SetupError::Games { .. }
-    ));
+    assert_eq!(new(0, &kinds, Seeds::Base(1)), SetupError::NoGames);
     assert!(matches!(
         new(1, &kinds[..3], Seeds::Base(1)),
         SetupError::Seats {

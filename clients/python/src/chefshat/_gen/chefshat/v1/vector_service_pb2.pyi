@@ -354,6 +354,7 @@ class VectorSetup(_message.Message):
     SHIFT_STATISTICS_FIELD_NUMBER: _builtins.int
     RECORDS_FIELD_NUMBER: _builtins.int
     HISTORY_FIELD_NUMBER: _builtins.int
+    ALL_HANDS_FIELD_NUMBER: _builtins.int
     NETWORKS_FIELD_NUMBER: _builtins.int
     games: _builtins.int
     """Number of parallel games n, at least 1. Games times client seats is at most max_vector_seats;
@@ -398,6 +399,8 @@ class VectorSetup(_message.Message):
     """Width of the column `history`, at most 1024; 0: there is none. Games times client seats times
     history is at most 524288.
     """
+    all_hands: _builtins.bool
+    """Whether batches have the hands of all seats: for a critic in training, or for analysis."""
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set; unset with `branch`, whose record has it."""
@@ -467,11 +470,12 @@ class VectorSetup(_message.Message):
         shift_statistics: _builtins.bool = ...,
         records: _builtins.bool = ...,
         history: _builtins.int = ...,
+        all_hands: _builtins.bool = ...,
         networks: _abc.Iterable[Global___NetworkFile] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "game_seeds", b"game_seeds", "listed", b"listed", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "start", b"start"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["base_seed", b"base_seed", "branch", b"branch", "client_seats", b"client_seats", "decisions", b"decisions", "episode", b"episode", "game_seeds", b"game_seeds", "games", b"games", "history", b"history", "invalid_actions", b"invalid_actions", "listed", b"listed", "max_invalid_attempts", b"max_invalid_attempts", "networks", b"networks", "opponents", b"opponents", "other_decisions", b"other_decisions", "records", b"records", "reward_scheme", b"reward_scheme", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "shift_statistics", b"shift_statistics", "skip_forced", b"skip_forced", "start", b"start", "total_games", b"total_games"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["all_hands", b"all_hands", "base_seed", b"base_seed", "branch", b"branch", "client_seats", b"client_seats", "decisions", b"decisions", "episode", b"episode", "game_seeds", b"game_seeds", "games", b"games", "history", b"history", "invalid_actions", b"invalid_actions", "listed", b"listed", "max_invalid_attempts", b"max_invalid_attempts", "networks", b"networks", "opponents", b"opponents", "other_decisions", b"other_decisions", "records", b"records", "reward_scheme", b"reward_scheme", "rules", b"rules", "saved", b"saved", "scripted", b"scripted", "seeds", b"seeds", "shift_statistics", b"shift_statistics", "skip_forced", b"skip_forced", "start", b"start", "total_games", b"total_games"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType_seeds: _TypeAlias = _typing.Literal["base_seed", "game_seeds"]  # noqa: Y015
     _WhichOneofArgType_seeds: _TypeAlias = _typing.Literal["seeds", b"seeds"]  # noqa: Y015
@@ -702,12 +706,15 @@ class VectorStarted(_message.Message):
     BUILT_IN_AGENTS_FIELD_NUMBER: _builtins.int
     BASE_SEED_FIELD_NUMBER: _builtins.int
     HISTORY_FIELD_NUMBER: _builtins.int
+    ALL_HANDS_FIELD_NUMBER: _builtins.int
     hand_size: _builtins.int
     """Cards dealt to a hand, H."""
     base_seed: _builtins.int
     """The base seed; unset if `game_seeds` was set."""
     history: _builtins.int
     """Width of the column `history`."""
+    all_hands: _builtins.bool
+    """Whether batches have the column `all_hands`."""
     @_builtins.property
     def rules(self) -> _rules_pb2.RuleSet:
         """The rule set, every field set."""
@@ -736,10 +743,11 @@ class VectorStarted(_message.Message):
         built_in_agents: _abc.Iterable[_builtins.str] | None = ...,
         base_seed: _builtins.int | None = ...,
         history: _builtins.int = ...,
+        all_hands: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["_base_seed", b"_base_seed", "action_space", b"action_space", "base_seed", b"base_seed", "rules", b"rules"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["_base_seed", b"_base_seed", "action_space", b"action_space", "base_seed", b"base_seed", "built_in_agents", b"built_in_agents", "client_seats", b"client_seats", "hand_size", b"hand_size", "history", b"history", "rules", b"rules"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["_base_seed", b"_base_seed", "action_space", b"action_space", "all_hands", b"all_hands", "base_seed", b"base_seed", "built_in_agents", b"built_in_agents", "client_seats", b"client_seats", "hand_size", b"hand_size", "history", b"history", "rules", b"rules"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     _WhichOneofReturnType__base_seed: _TypeAlias = _typing.Literal["base_seed"]  # noqa: Y015
     _WhichOneofArgType__base_seed: _TypeAlias = _typing.Literal["_base_seed", b"_base_seed"]  # noqa: Y015
@@ -770,6 +778,7 @@ class VectorBatch(_message.Message):
     BEGINNINGS_FIELD_NUMBER: _builtins.int
     SHIFTS_FIELD_NUMBER: _builtins.int
     TOTALS_FIELD_NUMBER: _builtins.int
+    ALL_HANDS_FIELD_NUMBER: _builtins.int
     step: _builtins.int
     """Number of the batch, from 1."""
     rows: _builtins.int
@@ -791,6 +800,10 @@ class VectorBatch(_message.Message):
     action_masks: _builtins.bytes
     """Legal actions, ceil(A/8) bytes wide: bit i%8 of byte i/8 is action i (numpy.unpackbits with
     bitorder="little").
+    """
+    all_hands: _builtins.bytes
+    """u8, N(F+1) wide: the cards in the hand of each seat by face, jokers last, one seat after the
+    other; empty unless the setup requests it. More than the seat that decides may know.
     """
     @_builtins.property
     def observations(self) -> Global___ObservationColumns:
@@ -829,10 +842,11 @@ class VectorBatch(_message.Message):
         beginnings: Global___GameBeginnings | None = ...,
         shifts: Global___ShiftStatistics | None = ...,
         totals: Global___VectorTotals | None = ...,
+        all_hands: _builtins.bytes = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["beginnings", b"beginnings", "endings", b"endings", "observations", b"observations", "shifts", b"shifts", "totals", b"totals"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["action_masks", b"action_masks", "attempts", b"attempts", "beginnings", b"beginnings", "done", b"done", "endings", b"endings", "games", b"games", "kinds", b"kinds", "observations", b"observations", "rewards", b"rewards", "rows", b"rows", "seats", b"seats", "shifts", b"shifts", "step", b"step", "totals", b"totals"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["action_masks", b"action_masks", "all_hands", b"all_hands", "attempts", b"attempts", "beginnings", b"beginnings", "done", b"done", "endings", b"endings", "games", b"games", "kinds", b"kinds", "observations", b"observations", "rewards", b"rewards", "rows", b"rows", "seats", b"seats", "shifts", b"shifts", "step", b"step", "totals", b"totals"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
