@@ -16035,7 +16035,7 @@ pub struct VectorSetup {
     #[prost(bool, tag = "18")]
     pub records: bool,
     /// Width of the column `history`, at most 1024; 0: there is none. Games times client seats times
-    /// history is at most 524288.
+    /// history is at most 524288 over the network.
     #[prost(uint32, tag = "20")]
     pub history: u32,
     /// Whether batches have the hands of all seats: for a critic in training, or for analysis.
@@ -16046,7 +16046,7 @@ pub struct VectorSetup {
     /// Over the network, the setup with all files has at most max_vector_message_bytes: enough for two
     /// of the size of "trained"; and a decision takes at most max_vector_network_multiplications: as
     /// many as there are weights, with the units of each hidden layer counted up to the next multiple
-    /// of 32. A state can be restored where the same files play the same seats.
+    /// of 32.
     #[prost(message, repeated, tag = "22")]
     pub networks: ::prost::alloc::vec::Vec<NetworkFile>,
     /// The source of the games' seeds; unset: a random base seed, which `started` reports.

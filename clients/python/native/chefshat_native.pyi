@@ -122,8 +122,8 @@ class Position:
     def sample(self, deals: int, seed: int) -> NDArray[np.uint8]:
         """Draws deals: the cards that each seat then holds, one after the other."""
 
-    def starts(self, deals: int, seed: int) -> list[bytes]:
-        """Draws the same deals as serialized `ListedStart`s."""
+    def starts(self, deals: int, seed: int, *, first: int = 0) -> list[bytes]:
+        """Draws the same deals, from `first` on, as serialized `ListedStart`s."""
 
     def expected_hands(self, deals: int, seed: int) -> NDArray[np.float64]:
         """The cards that each seat holds on average over these deals, one seat after the other."""

@@ -336,9 +336,11 @@ def test_worlds_played_on() -> None:
         search.play_on(states, ["greedy"] * 3)
     with pytest.raises(ChefsHatError, match="not a state of a game"):
         search.play_on([b"nothing"])
+    with VectorEnv(rules={"faces": 10}) as other, pytest.raises(ChefsHatError, match="the same numbers of players, faces"):
+        search.play_on([states[0], *other.save()])
 
 
-def test_leaves_are_the_next_decisions() -> None:
+def test_leaves_are_the_next_decisions(monkeypatch: pytest.MonkeyPatch) -> None:
     position = busy_position()
     seen = []
 
@@ -361,6 +363,13 @@ def test_leaves_are_the_next_decisions() -> None:
     assert len(seen) == asked
     assert (left.places == left.places[0, 0]).all()
     assert (left.points == last.rules.points[int(left.places[0, 0]) - 1]).all()
+    # In parts, on any number of threads: the random choices are those of each deal.
+    options: dict[str, Any] = {"agent": "random", "leaf": lambda batch: batch.observations.cards_left.sum(axis=1), "seed": 4}
+    whole = position.outcomes(12, **options)
+    assert len(np.unique(whole.points)) > 3
+    monkeypatch.setattr(search, "_LEAF_GAMES", 5)
+    in_parts = position.outcomes(12, threads=1, **options)
+    np.testing.assert_array_equal(in_parts.points, whole.points)
     for wrong in (lambda batch: np.zeros(len(batch) + 1), lambda batch: np.full(len(batch), np.nan)):
         with pytest.raises(ValueError, match="leaf has to return a finite number"):
             position.outcomes(2, leaf=wrong)
@@ -404,7 +413,8 @@ def test_a_prior_shares_the_rollouts() -> None:
         ({"deals": 4, "rollouts": 4}, "deals is a budget of its own"),
         ({"deals": 0}, "draw 1"),
         ({"rollouts": 4, "weights": [1, 1]}, "weights and leaf need deals"),
-        ({"time_ms": 4, "prior": [1.0]}, "a prior needs rollouts"),
+        ({"time_ms": 4, "prior": [1.0]}, "leave out time_ms and halving"),
+        ({"rollouts": 100_001, "prior": [1.0]}, r"a prior needs 1\.\.=100000 rollouts"),
     ],
 )
 def test_budgets_that_contradict(options: dict[str, Any], words: str) -> None:

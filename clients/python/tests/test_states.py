@@ -151,18 +151,38 @@ def test_forks_are_copies(anywhere: str | None) -> None:
         assert env.save() == before
 
 
+OTHERS: dict[str, Any] = OPTIONS | {"client_seats": [1], "opponents": ["greedy", "trained", "greedy"]}
+
+
 def test_others_take_seats_over(anywhere: str | None) -> None:
-    others = OPTIONS | {"client_seats": [1], "opponents": ["greedy", "trained", "greedy"]}
-    with VectorEnv(anywhere, 3, **OPTIONS) as env, VectorEnv(anywhere, 3, **others) as other:
-        played(env, 37, 1)
-        states = env.save()
-        batch = other.restore([0, 2], [states[0], states[2]])
+    with VectorEnv(anywhere, 3, **OPTIONS) as env, VectorEnv(anywhere, 3, **OTHERS) as other:
+        # Some Shifts, in which the agents of seat 1 would have been rewarded.
+        played(env, 150, 1)
+        shifts = env.batch.observations.shifts[env.batch.games == 2]
+        batch = other.restore([0, 2], env.save([0, 2]))
         assert (batch.seats == 1).all()
-        assert (batch.observations.shifts[batch.games != 1] >= env.batch.observations.shifts[0]).all()
+        row = batch.games == 2
+        assert batch.observations.shifts[row] - shifts in (0, 1)
+        assert batch.rewards[row] == 0 or len(batch.endings)
         played(other, 20, 2)
         # Back where they came from.
         env.restore([1], other.save([2]))
         played(env, 20, 3)
+
+
+@pytest.mark.server
+def test_what_happens_on_the_way_to_the_next_decision_is_kept(real_address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("chefshat_native")
+    monkeypatch.setattr("chefshat._remote.MAX_STATES_BYTES", 1000)
+    endings = 0
+    with VectorEnv(None, 7, **OPTIONS) as env, VectorEnv(None, 7, **OTHERS) as here, VectorEnv(real_address, 7, **OTHERS) as there:
+        for seed in range(150):
+            played(env, 1, seed)
+            states = env.save()
+            found, expected = there.restore(range(7), states), here.restore(range(7), states)
+            check_equal([shown(found)], [shown(expected)])
+            endings += len(found.endings)
+    assert endings > 2
 
 
 def test_what_cannot_be_restored_is_refused(anywhere: str | None) -> None:

@@ -27,6 +27,8 @@ use crate::threads::pool;
 
 /// Most games whose step is fast.
 const MAX_FAST_GAMES: u32 = 8;
+/// Free memory in bytes where the system does not say.
+const ASSUMED_FREE_MEMORY: u64 = 8 << 30;
 
 create_exception!(
     chefshat_native,
@@ -198,7 +200,7 @@ impl Games {
         match done {
             Ok(Ok(batch)) => Ok(batch),
             // As over the network, a refused request ends the games, and so does a panic. An illegal
-            // action has changed nothing: Python would not have sent it.
+            // action has changed nothing; to a server it is not sent.
             Ok(Err(error)) => {
                 if error.reason != "ILLEGAL_ACTION" {
                     *state = None;
@@ -307,23 +309,28 @@ pub(crate) fn refused(py: Python<'_>, error: RequestError) -> PyErr {
     PyErr::new::<Refused, _>((error.reason, error.message, metadata.unbind()))
 }
 
-/// Bytes of memory that are free, for this process and on this machine; without a limit where the
-/// system does not say.
+/// Bytes of memory that are free on this machine, and in the control group (version 2) of this
+/// process, which can take pages of files back.
 fn free_memory() -> u64 {
     let read = |path: &str| std::fs::read_to_string(path).ok();
-    let number = |text: String| text.trim().parse::<u64>().ok();
-    let machine = read("/proc/meminfo").and_then(|text| {
-        let line = text
-            .lines()
-            .find_map(|line| line.strip_prefix("MemAvailable:"))?;
-        let kibibytes = line.trim().strip_suffix("kB")?;
-        Some(number(kibibytes.to_owned())?.saturating_mul(1024))
-    });
-    let group = read("/sys/fs/cgroup/memory.max")
-        .and_then(number)
-        .zip(read("/sys/fs/cgroup/memory.current").and_then(number))
-        .map(|(most, used)| most.saturating_sub(used));
-    machine.into_iter().chain(group).min().unwrap_or(u64::MAX)
+    let number = |text: &str| text.trim().parse::<u64>().ok();
+    let line = |text: &str, name: &str| {
+        let found = text.lines().find_map(|line| line.strip_prefix(name))?;
+        number(found.trim().trim_end_matches(" kB"))
+    };
+    let machine = read("/proc/meminfo").and_then(|text| line(&text, "MemAvailable:"));
+    let group = || {
+        let most = number(&read("/sys/fs/cgroup/memory.max")?)?;
+        let used = number(&read("/sys/fs/cgroup/memory.current")?)?;
+        let of_files = line(&read("/sys/fs/cgroup/memory.stat")?, "inactive_file ")?;
+        Some(most.saturating_sub(used.saturating_sub(of_files)))
+    };
+    let machine = machine.map(|kibibytes| kibibytes.saturating_mul(1024));
+    machine
+        .into_iter()
+        .chain(group())
+        .min()
+        .unwrap_or(ASSUMED_FREE_MEMORY)
 }
 
 fn random_seed() -> u64 {

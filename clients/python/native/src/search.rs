@@ -113,9 +113,10 @@ impl Position {
         Ok(PyArray1::from_vec(py, hands))
     }
 
-    /// Draws the same deals as serialized `ListedStart`s: the start of the Shift, and the actions
-    /// from there to the decision.
-    fn starts(&self, py: Python<'_>, deals: u64, seed: u64) -> PyResult<Vec<Vec<u8>>> {
+    /// Draws the same deals, from `first` on, as serialized `ListedStart`s: the start of the Shift,
+    /// and the actions from there to the decision.
+    #[pyo3(signature = (deals, seed, *, first = 0))]
+    fn starts(&self, py: Python<'_>, deals: u64, seed: u64, first: u64) -> PyResult<Vec<Vec<u8>>> {
         let knowledge = self.sampler.knowledge();
         let start = |deal| {
             let world = self.sampler.world(&mut stream(seed, deal));
@@ -130,7 +131,7 @@ impl Position {
             }
             .encode_to_vec()
         };
-        py.detach(|| caught(|| (0..deals).map(start).collect()))
+        py.detach(|| caught(|| (first..first + deals).map(start).collect()))
     }
 
     /// The cards that each seat holds on average over these deals, one seat after the other.
@@ -294,8 +295,9 @@ pub(crate) fn play_states<'py>(
         return in_chunks(py, 0, |_| Vec::new());
     };
     let players = rules.players();
-    if games.iter().any(|game| game.rules().players() != players) {
-        let words = "give states of games with the same number of players";
+    let size = |rules: &RuleSet| (rules.players(), rules.faces(), rules.hand_size());
+    if games.iter().any(|game| size(game.rules()) != size(&rules)) {
+        let words = "give states of games with the same numbers of players, faces and cards dealt";
         return Err(refused(py, field("states", words)));
     }
     let policies = (policies.into_iter())

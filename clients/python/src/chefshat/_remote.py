@@ -18,6 +18,7 @@ from chefshat.columns import Beginnings, Endings, ShiftStatistics, Sizes, Totals
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
 from chefshat.masks import sample_by
 from chefshat.network import grpc
+from chefshat.opponents import joined
 
 # Maximum bytes of a message: the largest batch has a quarter of them (`max_vector_batch_bytes`), a part of a record far fewer.
 MAX_BATCH_BYTES = 64 * 1024 * 1024
@@ -128,13 +129,16 @@ class RemoteGames:
 
     def restore(self, games: NDArray[np.uint32], states: Sequence[bytes]) -> Batch:
         """Replaces games, in ascending order, by saved ones and returns the next batch."""
-        first, size = 0, 0
+        parts, first, size = [], 0, 0
         for place, state in enumerate(states):
             size += len(state)
             if place > first and size > MAX_STATES_BYTES:
-                self._restore(games[first:place], states[first:place])
+                parts.append(self._restore(games[first:place], states[first:place]))
                 first, size = place, len(state)
-        return self._restore(games[first:], states[first:])
+        last = self._restore(games[first:], states[first:])
+        if not parts:
+            return last
+        return joined([*parts, last], self._sizes, last.step, np.ones(self._sizes.players, np.bool_))
 
     def _restore(self, games: NDArray[np.uint32], states: Sequence[bytes]) -> Batch:
         self._outbox.put(pb.RunRequest(restore=pb.VectorRestore(games=games.tobytes(), states=states)))

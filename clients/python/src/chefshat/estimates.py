@@ -42,7 +42,7 @@ class Outcomes:
 
 @dataclass(frozen=True)
 class Estimates:
-    """What actions are worth, in their order. Every action was tried in the same deals.
+    """What actions are worth, in their order. All were tried in the same deals, some perhaps only in the first of them.
 
     Attributes:
         actions: (A,) the actions.

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from chefshat import pb
 from chefshat._games import LEAVE_OPEN, Games, checked
 from chefshat.address import ServerAddress
-from chefshat.batch import Batch, GameRecord
+from chefshat.batch import Batch
 from chefshat.columns import Beginnings, Endings, ShiftStatistics, Sizes, Table, Totals
 from chefshat.errors import ChefsHatError
 from chefshat.masks import is_legal
@@ -170,11 +170,7 @@ class PolicyGames:
             parts.append(batch)
         self._step += 1
         self._latest = batch
-        settled = Batch(len(batch), self._sizes, _Joined(parts, self._step, self._learner, self._taken))
-        settled.source = partial(getattr, batch)
-        settled.observations.source = partial(getattr, batch.observations)
-        settled.records = _records(parts)
-        return settled
+        return joined(parts, self._sizes, self._step, self._learner, self._taken)
 
     def _ask(self, policy: Policy, batch: Batch) -> NDArray[np.uint16]:
         """Returns the actions that a function chooses. Raises `ChefsHatError` for anything else."""
@@ -205,6 +201,24 @@ def selected(batch: Batch, rows: NDArray[np.intp]) -> Batch:
     chosen.source = lambda name: getattr(batch, name)[rows]
     chosen.observations.source = lambda name: getattr(batch.observations, name)[rows]
     return chosen
+
+
+def joined(parts: list[Batch], sizes: Sizes, step: int, learner: NDArray[np.bool_], taken: int = 0) -> Batch:
+    """Returns the rows of the last batch, with what has happened in all of them.
+
+    Args:
+        parts: the batches, in order.
+        sizes: the numbers that determine the widths of columns.
+        step: number of the batch.
+        learner: (N,) the seats whose endings it has.
+        taken: decisions so far that were not the learner's.
+    """
+    last = parts[-1]
+    whole = Batch(len(last), sizes, _Joined(parts, step, learner, taken))
+    whole.source = partial(getattr, last)
+    whole.observations.source = partial(getattr, last.observations)
+    whole.records = tuple(record for part in parts for record in part.records)
+    return whole
 
 
 class _Joined:
@@ -247,7 +261,3 @@ def _by_game(tables: list[AnyTable]) -> AnyTable:
         return filled[0]
     joined = type(filled[0]).concatenated(filled)
     return joined.take(np.argsort(joined.games, kind="stable"))  # type: ignore[attr-defined] # All have games.
-
-
-def _records(parts: list[Batch]) -> tuple[GameRecord, ...]:
-    return tuple(record for part in parts for record in part.records)

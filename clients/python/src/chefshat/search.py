@@ -137,8 +137,7 @@ class Position:
 
         Create it with `rules=position.rules` and as many games as are needed: game i begins with the start `i % deals`.
         """
-        listed = map(pb.ListedStart.FromString, self._native.starts(_checked(deals), _seed(seed)))
-        return [(start.hands, np.frombuffer(start.actions, "<u2").tolist()) for start in listed]
+        return self._starts(0, _checked(deals), seed)
 
     def expected_hands(self, deals: int = 500, seed: int = 0) -> NDArray[np.float64]:
         """Returns (N, F+1): the cards that each seat holds on average over the deals that `sample` draws."""
@@ -166,16 +165,16 @@ class Position:
         The budget is `rollouts`, `time_ms`, both, or `deals`.
 
         Args:
-            rollouts: the budget in all: the result depends on the seed and not on the threads. Every action is tried in 4 deals at
-                least.
+            rollouts: the budget in all: the result depends on the seed and not on the threads. Every action that is tried at all is
+                tried in 4 deals at least.
             time_ms: the budget in milliseconds.
             deals: every action is tried in the deals that `sample(deals, seed)` draws. See `outcomes`, whose means these are.
             agent: who plays all seats in the rollouts: "random", "greedy", "trained", or the path of a network file.
             actions: the A actions to try; gains refer to the first of them. Default: all legal ones.
             halving: whether the worse half of the actions is dropped again and again (sequential halving); the first one stays.
             prior: (A,) probabilities of the actions, for instance of a network (`learn.network.Network.logits_of`). Needs
-                `rollouts`: those `considered` actions that are likeliest share them by sequential halving, and the likeliest stays;
-                gains refer to it. What is dropped is decided by points and prior as in `Estimates.improved`.
+                `rollouts`, at most 100,000: those `considered` actions that are likeliest share them by sequential halving, and the
+                likeliest stays; gains refer to it. What is dropped is decided by points and prior as in `Estimates.improved`.
             considered: how many actions a `prior` lets in.
             weights: (deals,) how likely each of the `deals` is, see `Outcomes.estimates`.
             leaf: with `deals`, values the seat's next decision instead of playing on, see `outcomes`.
@@ -192,10 +191,10 @@ class Position:
         if not (rollouts or time_ms) or (rollouts or 0) < 0 or (time_ms or 0) < 0:
             raise ValueError("give a budget: a number of rollouts, time_ms, or both, above 0; or deals")
         if prior is not None:
-            if not rollouts or time_ms or halving or considered < 1:
-                raise ValueError(
-                    "a prior needs rollouts, shares them by halving, and considers 1 action or more: leave out the rest"
-                )
+            if time_ms or halving:
+                raise ValueError("a prior shares rollouts by halving: leave out time_ms and halving")
+            if not rollouts or rollouts > MAX_DEALS or considered < 1:
+                raise ValueError(f"a prior needs 1..={MAX_DEALS} rollouts, and considers 1 action or more")
             chosen = self._chosen(actions)
             return self._by_prior(rollouts, chosen, checked_prior(prior, len(chosen)), considered, agent, threads, seed)
         native = _native()
@@ -229,14 +228,14 @@ class Position:
             deals: D: those that `sample(deals, seed)` draws.
             agent: who plays all seats.
             actions: the A actions to try. Default: all legal ones.
-            leaf: values the seat's next decision in the Shift, with what the seat then may know; no deal is played further. The
-                agents' random choices are others than without it.
-            threads: 0: one for each core; a leaf's deals are played by one for each core.
+            leaf: values the seat's next decision among several actions in the Shift, with what the seat then may know but the
+                history; no deal is played further. The agents' random choices are others than without it.
+            threads: 0: one for each core.
             seed: of the deals and of the agents' random choices.
         """
         chosen = self._chosen(actions)
         if leaf is not None:
-            return self._to_leaves(leaf, chosen, _checked(deals), agent, seed)
+            return self._to_leaves(leaf, chosen, _checked(deals), agent, threads, seed)
         points, places = self._shifts(chosen, 0, _checked(deals), agent, threads, seed)
         return Outcomes(chosen, points, places)
 
@@ -262,30 +261,45 @@ class Position:
         points, places = (column.reshape(deals, len(actions)).astype(np.float64) for column in found)
         return points, places
 
-    def _to_leaves(self, leaf: Leaf, actions: NDArray[np.uint16], deals: int, agent: Agent, seed: int) -> Outcomes:
+    def _to_leaves(self, leaf: Leaf, actions: NDArray[np.uint16], deals: int, agent: Agent, threads: int, seed: int) -> Outcomes:
         """Plays to the seat's next decision."""
         points, places = np.full((2, deals, len(actions)), np.nan)
         worth = np.array(self.rules.points, np.float64)
         for first in range(0, deals, _LEAF_GAMES):
-            starts = self.starts(min(deals, first + _LEAF_GAMES), seed)[first:]
-            part = slice(first, first + len(starts))
-            options: Any = {"client_seats": [self.seat], "opponents": agent, "rules": self.rules, "starts": starts}
-            with VectorEnv(games=len(starts), seed=_seed(seed), **options) as env:
+            count = min(deals - first, _LEAF_GAMES)
+            options: Any = {"client_seats": [self.seat], "opponents": agent, "rules": self.rules, "threads": threads}
+            options["skip_forced"] = len(self.legal_actions) > 1
+            seeds = [_seed(seed).to_bytes(8, "little") + deal.to_bytes(24, "little") for deal in range(first, first + count)]
+            with VectorEnv(games=count, seed=seeds, starts=self._starts(first, count, seed), **options) as env:
                 states = env.save()
                 for column, action in enumerate(actions):
-                    batch = env.step(np.full(len(starts), action))
-                    ended, at = np.unique(batch.endings.games, return_index=True)
-                    reached = batch.endings.places_taken[at]
-                    places[part, column][ended] = reached
-                    points[part, column][ended] = worth[reached - 1]
-                    rows = np.flatnonzero(~np.isin(batch.games, ended))
-                    if len(rows):
-                        values = np.asarray(leaf(selected(batch, rows)), np.float64)
-                        if values.shape != (len(rows),) or not np.isfinite(values).all():
-                            raise ValueError(f"leaf has to return a finite number for each of the {len(rows)} rows")
-                        points[part, column][batch.games[rows]] = values
-                    env.restore(np.arange(len(starts)), states)
+                    part = slice(first, first + count), column
+                    batch = env.step(np.full(count, action))
+                    # A game may need several steps, if the other seats have many decisions.
+                    while not self._take_leaves(leaf, batch, worth, points[part], places[part]):
+                        batch = env.step(np.zeros(len(batch), np.uint16), leave_open=np.ones(len(batch), np.bool_))
+                    env.restore(np.arange(count), states)
         return Outcomes(actions, points, places)
+
+    def _take_leaves(
+        self, leaf: Leaf, batch: Batch, worth: NDArray[np.float64], points: NDArray[np.float64], places: NDArray[np.float64]
+    ) -> bool:
+        """Sets points and places of the games that have come to a leaf, or to the end of the Shift. Returns whether all have."""
+        ended, at = np.unique(batch.endings.games, return_index=True)
+        new = np.isnan(points[ended])
+        ended, reached = ended[new], batch.endings.places_taken[at][new]
+        places[ended], points[ended] = reached, worth[reached - 1]
+        rows = np.flatnonzero(np.isnan(points[batch.games]))
+        if len(rows):
+            values = np.asarray(leaf(selected(batch, rows)), np.float64)
+            if values.shape != (len(rows),) or not np.isfinite(values).all():
+                raise ValueError(f"leaf has to return a finite number for each of the {len(rows)} rows")
+            points[batch.games[rows]] = values
+        return not np.isnan(points).any()
+
+    def _starts(self, first: int, deals: int, seed: int) -> list[tuple[pb.ScriptedShift, list[int]]]:
+        listed = map(pb.ListedStart.FromString, self._native.starts(deals, _seed(seed), first=first))
+        return [(start.hands, np.frombuffer(start.actions, "<u2").tolist()) for start in listed]
 
     def _by_prior(
         self,
@@ -299,35 +313,34 @@ class Position:
     ) -> Estimates:
         """Shares rollouts among the likeliest actions by sequential halving."""
         likeliest = np.argsort(-prior, kind="stable")[:considered]
-        active, first = likeliest, likeliest[0]
+        # The actions that are still tried, by their place among the likeliest.
+        active = np.arange(len(likeliest))
         rounds = max(1, int(np.ceil(np.log2(len(active)))))
         # An action is tried in the first deals, as many as its round lets it.
-        points, places = np.empty((2, 0, len(chosen)))
+        points, places = np.empty((2, 0, len(likeliest)))
         spent = 0
         for left in range(rounds, 0, -1):
             more = max(1 if spent else 4, (rollouts - spent) // (left * len(active)))
-            found = self._shifts(chosen[active], len(points), more, agent, threads, seed)
-            new = np.full((2, more, len(chosen)), np.nan)
-            new[:, :, active] = found
+            new = np.full((2, more, len(likeliest)), np.nan)
+            new[:, :, active] = self._shifts(chosen[likeliest[active]], len(points), more, agent, threads, seed)
             points, places = np.concatenate([points, new[0]]), np.concatenate([places, new[1]])
             spent += more * len(active)
             if left > 1:
-                by_score = np.argsort(-scores(points[:, active].mean(axis=0), prior[active], len(points)), kind="stable")
+                means = points[:, active].mean(axis=0)
+                by_score = np.argsort(-scores(means, prior[likeliest[active]], len(points)), kind="stable")
                 others = by_score[by_score > 0]
                 active = active[[0, *others[: max(2, (len(active) + 1) // 2) - 1]]]
-        rollouts_of = np.isfinite(points).sum(axis=0)
         columns = np.full((5, len(chosen)), np.nan)
-        for action in likeliest:
-            tried = slice(0, rollouts_of[action])
-            share = np.full(rollouts_of[action], 1 / rollouts_of[action])
-            gains = points[tried, action] - points[tried, first]
-            columns[:, action] = (
-                *mean_and_error(points[tried, action], share),
-                *mean_and_error(gains, share),
-                share @ places[tried, action],
-            )
+        rollouts_of = np.zeros(len(chosen), np.uint64)
+        for place, action in enumerate(likeliest):
+            tried = slice(0, np.isfinite(points[:, place]).sum())
+            share = np.full(tried.stop, 1 / tried.stop)
+            gains = points[tried, place] - points[tried, 0]
+            means_of = mean_and_error(points[tried, place], share), mean_and_error(gains, share)
+            columns[:, action] = *means_of[0], *means_of[1], share @ places[tried, place]
+            rollouts_of[action] = tried.stop
         points_of, errors, gains_of, gain_errors, places_of = columns
-        return Estimates(chosen, points_of, errors, gains_of, gain_errors, places_of, rollouts_of.astype(np.uint64))
+        return Estimates(chosen, points_of, errors, gains_of, gain_errors, places_of, rollouts_of)
 
 
 def _native() -> ModuleType:

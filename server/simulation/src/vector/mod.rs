@@ -194,9 +194,10 @@ impl VectorGames {
     }
 
     /// Replaces these games, in ascending order, by saved ones. Each continues exactly as the saved
-    /// game would, with its index, until its end; where others play here, they take over. The game that follows has the index that is higher
-    /// by the number of games here, and the seed that it has here. The batch contains all open
-    /// decisions; a restored game has not begun anew, so it is not among the beginnings.
+    /// game would, with its index, until its end; other agents than those saved continue from here,
+    /// and play to the client's next decision. The game that follows has the index that is higher by
+    /// the number of games here, and the seed that it has here. The batch contains all open decisions;
+    /// a restored game has not begun anew, so it is not among the beginnings.
     ///
     /// # Errors
     /// If the games do not exist or are not ascending, or a state cannot be continued here. Then
@@ -235,7 +236,7 @@ impl VectorGames {
     /// `seeds`. These games are unchanged.
     ///
     /// # Errors
-    /// If a game does not exist or is over, or there are too many copies.
+    /// If a game does not exist or is over, or there are no copies.
     pub fn fork(
         &self,
         games: &[u32],

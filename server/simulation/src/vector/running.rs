@@ -91,9 +91,9 @@ impl RunningGame {
             .collect()
     }
 
-    /// Has the agents of other terms continue. Seats with the same agent keep it as it is; another one
-    /// begins here, from the game's seed. A decision that is no longer the client's is theirs, without
-    /// the attempts at it so far.
+    /// Replaces the agents by those of other terms. Seats with the same agent keep it as it is; another
+    /// one begins here, from the game's seed. Rewards of a seat whose player changes begin with 0, and a
+    /// decision that is no longer the client's is without the attempts at it so far.
     pub(super) fn reseat(&mut self, before: &Terms, here: &Terms) {
         let mut agents = RunningGame::agents(here, self.seed);
         for (seat, (agent, kept)) in agents.iter_mut().zip(&self.agents).enumerate() {
@@ -102,11 +102,13 @@ impl RunningGame {
             }
         }
         self.agents = agents;
-        let is_theirs = |open: &mut Open| here.agents[open.decision.seat].is_some();
-        if let Some(open) = self.open.take_if(is_theirs) {
-            self.rewards[open.decision.seat] += open.reward;
-            self.attempts.clear();
+        for seat in here.agents.seats() {
+            if before.agents[seat] != here.agents[seat] {
+                self.rewards[seat] = 0.0;
+            }
         }
+        let is_theirs = |open: &mut Open| here.agents[open.decision.seat].is_some();
+        self.open.take_if(is_theirs);
     }
 
     /// Deals later Shifts from another seed, from which agents choose at random as well.

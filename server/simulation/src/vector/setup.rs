@@ -8,15 +8,15 @@ use chefshat_engine::{ActionId, BySeat, Event, Game, RewardScheme, RuleSet, Seat
 use chefshat_agents::{AgentKind, BuiltInAgent, Network};
 
 use super::error::StateError;
-use super::history::MAX_HISTORY;
+use super::history::{Entry, MAX_HISTORY};
 use super::opponent::Opponent;
 use super::saved::SavedGame;
 use super::slot::Slot;
 use super::start::{Seeds, SetupError, Start, StartPoint};
 use super::terms::{Decisions, InvalidActions, Terms};
 
-/// Bytes of a row of a batch without the columns that a setup asks for, at most.
-const LEAST_ROW: usize = 256;
+/// Most bytes of a row of a batch without the columns that a setup asks for.
+const MAX_ROW_BYTES: usize = 256;
 
 /// The scope of an episode.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
@@ -249,7 +249,7 @@ impl VectorSetup {
     /// records.
     ///
     /// # Errors
-    /// If there are too many copies, or a game cannot be continued.
+    /// If there are no copies, or a game cannot be continued.
     pub fn forked(
         &self,
         games: Vec<SavedGame>,
@@ -422,10 +422,11 @@ impl VectorSetup {
     /// The bytes that the games and two batches of them take, roughly.
     pub fn memory(&self) -> u64 {
         let agents = self.rules.players() * size_of::<BuiltInAgent>();
-        let row = LEAST_ROW + self.all_hands_width() + 2 * usize::from(self.history);
+        let row = MAX_ROW_BYTES + self.all_hands_width() + 2 * usize::from(self.history);
         // A decision, and the end of an episode for each seat.
         let rows = u64::from(self.games) + self.seats_played();
-        u64::from(self.games) * (size_of::<Slot>() + agents) as u64 + 2 * rows * row as u64
+        let game = size_of::<Slot>() + agents + usize::from(self.history) * size_of::<Entry>();
+        u64::from(self.games) * game as u64 + 2 * rows * row as u64
     }
 
     /// Whether batches have the hands of all seats.

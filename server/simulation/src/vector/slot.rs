@@ -243,7 +243,9 @@ impl Slot {
             .expect("an action of the mask is legal");
         if let Some(scheme) = setup.scheme() {
             scheme.of_events(setup.rules(), &running.events, |seat, reward, _| {
-                running.rewards[seat] += reward;
+                if setup.agents()[seat].is_none() {
+                    running.rewards[seat] += reward;
+                }
             });
         }
         if let (Some(history), Some(seat)) = (&mut running.history, actor) {

@@ -55,12 +55,12 @@ impl SavedGame {
         self.running.as_ref()
     }
 
-    /// Whether others play here.
+    /// Whether the seats are played by others than in the saved game.
     pub(super) fn is_reseated(&self, here: &Terms) -> bool {
         self.terms.agents != here.agents
     }
 
-    /// Has the agents of these terms continue the game.
+    /// Replaces the agents by those of these terms.
     pub(super) fn reseat(&mut self, here: &Terms) {
         if let Some(running) = &mut self.running {
             running.reseat(&self.terms, here);

@@ -260,7 +260,7 @@ proptest! {
 fn others_continue_a_game() {
     let alone = |agents| against(agents, 1).with_rewards(Some(RewardScheme::Points));
     let (mut games, mut batch) = VectorGames::new(alone([AgentKind::Greedy; 3]));
-    for _ in 0..25 {
+    while batch.totals.shifts < 8 || batch.observations.places.contains(&1) {
         batch = games.step(&some_actions(&batch)).unwrap();
     }
     let states = games.save(&[0]).unwrap();
@@ -270,13 +270,26 @@ fn others_continue_a_game() {
     let all = all_client(1).with_rewards(Some(RewardScheme::Points));
     let (mut others, _) = VectorGames::new(all.clone());
     let there = others.restore(&[0], states.clone()).unwrap();
-    assert_eq!(there.masks, batch.masks);
+    assert_eq!(
+        (&there.masks, &there.rewards),
+        (&batch.masks, &batch.rewards)
+    );
     let back = others.save(&[0]).unwrap();
     let here = games.restore(&[0], back).unwrap();
     assert_eq!(here.masks, batch.masks);
     assert_eq!(games.save(&[0]).unwrap()[0].to_bytes(), bytes);
 
-    // Where the client's seat is an agent's, the game goes on to the next decision of the client.
+    // What the agents would have been rewarded for is not the client's.
+    let mut next = others.restore(&[0], states.clone()).unwrap();
+    let mut decided = 0;
+    while next.endings.rows == 0 {
+        assert_eq!(f32s(&next.rewards), [0.0]);
+        next = others.step(&some_actions(&next)).unwrap();
+        decided += 1;
+    }
+    assert!(decided > 4, "{decided}");
+
+    // Where the client's seat is an agent's, the game continues to the next decision of the client.
     let agents = [Some(AgentKind::Greedy), None, Some(AgentKind::Greedy), None];
     let setup = VectorSetup::new(rules(), 1, &agents, Seeds::Base(9)).unwrap();
     let (mut seats, _) = VectorGames::new(setup.with_rewards(Some(RewardScheme::Points)));
@@ -300,7 +313,7 @@ fn others_continue_a_game() {
     };
     assert_eq!(masks(&taken), [expected]);
 
-    // An agent that draws random numbers draws on where it plays on, and begins where it takes over.
+    // The random numbers of an agent that stays continue; those of a new one begin.
     let random = [AgentKind::Random, AgentKind::Greedy, AgentKind::Greedy];
     let (mut some, _) = VectorGames::new(alone(random));
     let mut batch = some.restore(&[0], states.clone()).unwrap();

@@ -397,7 +397,7 @@ class VectorSetup(_message.Message):
     """
     history: _builtins.int
     """Width of the column `history`, at most 1024; 0: there is none. Games times client seats times
-    history is at most 524288.
+    history is at most 524288 over the network.
     """
     all_hands: _builtins.bool
     """Whether batches have the hands of all seats: for a critic in training, or for analysis."""
@@ -443,7 +443,7 @@ class VectorSetup(_message.Message):
         Over the network, the setup with all files has at most max_vector_message_bytes: enough for two
         of the size of "trained"; and a decision takes at most max_vector_network_multiplications: as
         many as there are weights, with the units of each hidden layer counted up to the next multiple
-        of 32. A state can be restored where the same files play the same seats.
+        of 32.
         """
 
     def __init__(
