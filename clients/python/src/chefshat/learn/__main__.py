@@ -18,6 +18,7 @@ EXAMPLES = """examples:
   python -m chefshat.learn ppo --out strong.safetensors --minutes 30 --seed 1
   python -m chefshat.learn ppo --out exploiter.safetensors --games 0 --opponent-games 256 --opponents trained --minutes 30
   python -m chefshat.learn curve strong.jsonl --out strong.png
+  python -m chefshat.learn value strong.safetensors --out points.safetensors
   python -m chefshat.learn deep-q --out deep_q.safetensors --shifts 1000 --mask
   python -m chefshat.learn tune --out tuned.json --trials 50 --shifts 250
   python -m chefshat.learn evaluate strong.safetensors --opponents greedy --games 2000
@@ -170,6 +171,17 @@ def _evaluate(command: argparse.ArgumentParser) -> None:
     command.add_argument("--rules", default="paper", metavar="PRESET", help="the rule set")
 
 
+def _value(command: argparse.ArgumentParser) -> None:
+    command.add_argument("policy", type=Path, help="the network of the policy, or trained: that of the built-in agent")
+    command.add_argument("--out", type=Path, required=True, metavar="FILE", help="the network to write")
+    command.add_argument("--decisions", type=_count, default=500_000, help="decisions to learn from")
+    command.add_argument("--epochs", type=_count, default=10, help="passes over them")
+    command.add_argument("--width", type=_count, default=128, help="units of each of the two hidden layers")
+    _common(command)
+    command.add_argument("--rules", default="paper", metavar="PRESET", help="the rule set")
+    _force(command)
+
+
 def _curve(command: argparse.ArgumentParser) -> None:
     command.add_argument("log", type=Path, metavar="LOG", help="a log written by `ppo`")
     command.add_argument("--out", type=Path, required=True, metavar="PNG", help="the picture to write")
@@ -253,6 +265,7 @@ def _above_zero(text: str) -> float:
 # Name: module, summary, options.
 COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None]]] = {
     "ppo": ("ppo_command", "trains an agent by self-play with proximal policy optimisation", _ppo),
+    "value": ("value", "trains a network that knows how many points a policy brings", _value),
     "evaluate": ("evaluation", "plays a trained network on one seat against built-in agents", _evaluate),
     "deep-q": ("deep_q_command", "trains a Deep Q agent, the 2020 paper's, against built-in agents", _deep_q),
     "tune": ("tune", "searches hyper-parameters of the Deep Q agent", _tune),

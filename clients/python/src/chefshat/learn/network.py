@@ -10,7 +10,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple, Self, TypeAlias
+from typing import Literal, NamedTuple, Self, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,8 @@ from chefshat.masks import unpack
 FORMAT = "chefshat-network-1"
 # The built-in agent that is a network.
 TRAINED = "trained"
+# The points that it brings.
+TRAINED_POINTS = "trained_points"
 
 Floats = npt.NDArray[np.float32]
 Actions = npt.NDArray[np.uint16]
@@ -51,7 +53,7 @@ class NetworkInfo:
     Attributes:
         input: the function of `features` that computes its input.
         output: "actions": an output for each of the A actions; "turns": for the T actions of a turn; at other decisions the agent
-            takes the default action.
+            takes the default action; "points": the points that the seat expects of the Shift, which no agent can play.
         output_activation: activation of the last layer. It does not affect the actions chosen.
         masked: whether it was trained to choose only among legal actions. Agents that play it always do.
         players: seats of the rule set, N.
@@ -63,7 +65,7 @@ class NetworkInfo:
     """
 
     input: Literal["classic", "table"]
-    output: Literal["turns", "actions"]
+    output: Literal["turns", "actions", "points"]
     output_activation: Literal["none", "tanh"]
     masked: bool
     players: int
@@ -88,6 +90,8 @@ class NetworkInfo:
     @property
     def output_width(self) -> int:
         """Numbers of one row of outputs."""
+        if self.output == "points":
+            return 1
         return features.turn_actions(self.faces) if self.output == "turns" else features.num_actions(self.faces)
 
     def fits(self, players: int, faces: int, hand_size: int) -> bool:
@@ -113,7 +117,7 @@ class NetworkInfo:
         one_of("format", FORMAT)
         return cls(
             input="classic" if one_of("input", "classic", "table") == "classic" else "table",
-            output="turns" if one_of("output", "turns", "actions") == "turns" else "actions",
+            output=cast(Literal["turns", "actions", "points"], one_of("output", "turns", "actions", "points")),
             output_activation="tanh" if one_of("output_activation", "none", "tanh") == "tanh" else "none",
             masked=one_of("masked", "true", "false") == "true",
             players=number("players", 2, 6),
@@ -175,11 +179,22 @@ class Network:
             values = (np.fmax(values, 0) if number else values) @ weight.T + bias
         return values
 
+    def points_of(self, situations: Situations) -> Floats:
+        """Returns the points that the seat of each row expects of the Shift, (R,) float32, by a network whose output they are.
+
+        It is a `leaf` of `search.Position.evaluate`.
+        """
+        if self.info.output != "points":
+            raise ValueError(f"the network {self.info.name!r} has outputs for {self.info.output}: `value` trains one for points")
+        observations, seats, kinds, masks = situations.observations, situations.seats, situations.kinds, situations.mask_bits
+        return self._sums(self.inputs(observations, seats, kinds, masks))[:, 0]
+
     def logits_of(self, situations: Situations) -> Floats:
         """Returns the outputs of each row before their activation, (R, `info.output_width`) float32; -inf at illegal actions.
 
         The softmax of a row is the policy that `ppo` trained, of which `actions_of` takes the most likely action.
         """
+        self._check_chooses()
         observations, seats, kinds, masks = situations.observations, situations.seats, situations.kinds, situations.mask_bits
         sums = self._sums(self.inputs(observations, seats, kinds, masks))
         return np.where(unpack(masks, sums.shape[1]), sums, np.float32(-np.inf))
@@ -191,8 +206,13 @@ class Network:
 
         A network of output "turns" has no outputs for other decisions, at which agents take the server's default action.
         """
+        self._check_chooses()
         # Before the tanh, which preserves order but rounds values far from 0 to the same number.
         return best_legal(self._sums(self.inputs(observations, seats, kinds, mask_bits)), mask_bits)
+
+    def _check_chooses(self) -> None:
+        if self.info.output == "points":
+            raise ValueError(f"the network {self.info.name!r} knows points and chooses no actions")
 
     def actions_of(self, situations: Situations) -> Actions:
         """Returns the action of each row of a batch, or of `Decision.situations`: (R,) u16. See `actions`."""
@@ -244,6 +264,8 @@ def save(
 def load(path: str | os.PathLike[str]) -> Network:
     """Reads a network from a file, or that of the built-in agent: "trained", which is in chefshat-native.
 
+    "trained_points" is the network, in this package, that knows how many points `trained` brings.
+
     Raises:
         NetworkFileError: the file is not a network.
         OSError: it cannot be read.
@@ -253,6 +275,8 @@ def load(path: str | os.PathLike[str]) -> Network:
         import chefshat_native
 
         file = chefshat_native.trained_network()
+    elif os.fspath(path) == TRAINED_POINTS:
+        file = Path(__file__).with_name(f"{TRAINED_POINTS}.safetensors").read_bytes()
     else:
         check_readable(path, "network", "`python -m chefshat.learn ppo` or `deep-q` writes")
         file = Path(path).read_bytes()

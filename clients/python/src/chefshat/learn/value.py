@@ -1,0 +1,208 @@
+"""The command `value`: a network that says how many points a policy brings, from what the seat that decides may know.
+
+The policy plays all seats. In every Shift one seat of them takes, at a random decision, a random action: what follows is that
+policy's again, and shows situations to which it would not have come. Only those decisions are learned from.
+"""
+
+import argparse
+import dataclasses
+import json
+import sys
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import numpy.typing as npt
+import optax
+from google.protobuf.json_format import MessageToJson
+from tqdm import tqdm
+
+from chefshat import join_options, pb
+from chefshat.address import ServerAddress
+from chefshat.errors import ChefsHatError, failed
+from chefshat.learn import features, network, runs
+from chefshat.learn.mlp import Mlp, Params, to_layers
+from chefshat.learn.network import Network, NetworkFileError, NetworkInfo
+from chefshat.vector import VectorEnv
+
+# Parallel games.
+SIDE_BY_SIDE = 256
+# The random action is one of the first decisions, as many as a Shift rarely has more.
+EXPLORED = 20
+# The share of Shifts that measure what was learned from the others.
+MEASURED = 0.1
+MINIBATCH = 1024
+LEARNING_RATE = 1e-3
+
+
+@dataclass(frozen=True)
+class Learned:
+    """How well the points of Shifts that were not learned from are known. A constant, their mean, explains 0.
+
+    Attributes:
+        decisions: decisions learned from.
+        shifts: Shifts that they are from.
+        explained: share of the variance of points that the network explains, at most 1.
+        explained_by_cards: the same by the best linear function of the numbers of cards in all hands, for comparison.
+    """
+
+    decisions: int
+    shifts: int
+    explained: float
+    explained_by_cards: float
+
+    def __str__(self) -> str:
+        network, cards = 100 * self.explained, 100 * self.explained_by_cards
+        learned_from = f"learned from {self.decisions:,} decisions of {self.shifts:,} Shifts"
+        return f"explains {network:.1f} % of the variance of points, the numbers of cards {cards:.1f} % ({learned_from})"
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Decisions of Shifts that have ended.
+
+    Attributes:
+        inputs: (D, W) f16: `features.table` of each.
+        cards: (D, N) u8: cards in each hand, from that of the seat that decides on.
+        points: (D,) f32: points of its Shift.
+        shifts: (D,): the number of its Shift.
+    """
+
+    inputs: npt.NDArray[np.float16]
+    cards: npt.NDArray[np.uint8]
+    points: npt.NDArray[np.float32]
+    shifts: npt.NDArray[np.int64]
+
+
+def run(options: argparse.Namespace) -> int:
+    """Runs the command: plays, learns, writes the network and prints how well it knows. Returns the exit code."""
+    try:
+        if not options.force:
+            runs.refuse_to_replace(options.out)
+        policy = network.load(options.policy)
+        name = str(options.policy)
+        samples, rules = play(policy, name, options.decisions, options.seed, options.rules, join_options.server_if_any(options))
+        params, found = learn(samples, options.width, options.epochs, options.seed, float(max(rules.points)))
+        info = NetworkInfo(
+            input="table",
+            output="points",
+            output_activation="none",
+            masked=True,
+            players=rules.players,
+            faces=rules.faces,
+            jokers=rules.jokers,
+            rules=MessageToJson(rules, indent=None, sort_keys=True),
+            name=f"value of {policy.info.name or name}"[:64],
+            trained_by=runs.trained_by("", options.trained_by),
+        )
+        network.save(options.out, to_layers(params), info, dtype=np.float16)
+    except (ChefsHatError, NetworkFileError, OSError, ValueError) as error:
+        return failed(error, as_json=options.json)
+    print(json.dumps(dataclasses.asdict(found)) if options.json else f"{options.out} {found}")
+    return 0
+
+
+def play(
+    policy: Network, name: str, decisions: int, seed: int, rules: str | pb.RuleSet, address: str | ServerAddress | None
+) -> tuple[Samples, pb.RuleSet]:
+    """Plays until there are this many decisions to learn from. `name`: the policy for the other seats, see `VectorEnv`."""
+    if policy.info.output != "actions":
+        raise ValueError(f"{name} has outputs for {policy.info.output}: a value is that of a policy for all actions")
+    rng = np.random.default_rng(seed)
+    inputs: list[npt.NDArray[np.float16]] = []
+    cards: list[npt.NDArray[np.uint8]] = []
+    # Of each decision: its Shift, and its number in the Shift.
+    shifts_of: list[npt.NDArray[np.int64]] = []
+    numbers_of: list[npt.NDArray[np.int64]] = []
+    options = {"client_seats": [0], "opponents": name, "rules": rules, "skip_forced": True}
+    with VectorEnv(address, SIDE_BY_SIDE, seed=runs.SEED_STEP + seed, **options) as env:  # type: ignore[arg-type]
+        if not policy.info.fits(env.players, env.faces, env.hand_size):
+            raise ValueError(f"{name} plays with {policy.info.players} players and {policy.info.faces} faces, not in these games")
+        worth = np.array(env.rules.points, np.float32)
+        shift = np.arange(SIDE_BY_SIDE)
+        number = np.zeros(SIDE_BY_SIDE, np.int64)
+        explored = rng.integers(EXPLORED, size=SIDE_BY_SIDE)
+        # By Shift: its points, NaN until it has ended, and the decision after which it counts.
+        points, after, kept = [np.full(SIDE_BY_SIDE, np.nan, np.float32)], [explored], 0
+        with tqdm(total=decisions, unit=" decisions", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+            while kept < decisions:
+                batch = env.batch
+                games = batch.games
+                inputs.append(features.table_of(batch).astype(np.float16))
+                cards.append(batch.observations.cards_left)
+                shifts_of.append(shift[games])
+                numbers_of.append(number[games])
+                new = int(np.count_nonzero(number[games] > explored[games]))
+                kept += new
+                bar.update(new)
+                chosen = policy.actions_of(batch)
+                actions = np.where(number[games] == explored[games], env.sample(), chosen)
+                number[games] += 1
+                endings = env.step(actions).endings
+                ended, at = np.unique(endings.games, return_index=True)
+                if len(ended):
+                    begun = sum(map(len, points))
+                    known = np.concatenate(points)
+                    known[shift[ended]] = worth[endings.places_taken[at] - 1]
+                    shift[ended] = begun + np.arange(len(ended))
+                    number[ended] = 0
+                    explored[ended] = rng.integers(EXPLORED, size=len(ended))
+                    points = [known, np.full(len(ended), np.nan, np.float32)]
+                    after.append(explored[ended])
+        rules_used = env.rules
+    all_points, all_after = np.concatenate(points), np.concatenate(after)
+    shifts, numbers = np.concatenate(shifts_of), np.concatenate(numbers_of)
+    counts = (numbers > all_after[shifts]) & ~np.isnan(all_points[shifts])
+    samples = Samples(np.concatenate(inputs)[counts], np.concatenate(cards)[counts], all_points[shifts[counts]], shifts[counts])
+    return samples, rules_used
+
+
+def learn(samples: Samples, width: int, epochs: int, seed: int, most: float) -> tuple[Params, Learned]:
+    """Learns the points by least squares. `most`: the most points of a Shift, for the scale of the outputs."""
+    chance = np.random.default_rng(seed)
+    shifts, of = np.unique(samples.shifts, return_inverse=True)
+    measured = (chance.random(len(shifts)) < MEASURED)[of]
+    rows = np.flatnonzero(~measured)
+    if len(rows) < MINIBATCH or not measured.any():
+        raise ValueError(f"{len(samples.points)} decisions are too few to learn from: play more with --decisions")
+    mlp = Mlp((width, width, 1))
+    params = mlp.start(jax.random.key(seed), samples.inputs.shape[1])
+    steps = epochs * (len(rows) // MINIBATCH)
+    optimizer = optax.adam(optax.cosine_decay_schedule(LEARNING_RATE, steps))
+    state = optimizer.init(params)
+    update = jax.jit(partial(_update, mlp, optimizer))
+    with tqdm(total=steps, unit=" updates", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+        for _ in range(epochs):
+            order = chance.permutation(rows)
+            for first in range(0, len(rows) - MINIBATCH + 1, MINIBATCH):
+                part = order[first : first + MINIBATCH]
+                targets = samples.points[part] / most
+                params, state = update(params, state, samples.inputs[part].astype(np.float32), targets)
+                bar.update()
+    last = params[f"Dense_{len(params) - 1}"]
+    params = {**params, f"Dense_{len(params) - 1}": {name: most * array for name, array in last.items()}}
+    parts = np.array_split(samples.inputs[measured], 64)
+    expected = np.concatenate([np.asarray(mlp.of(params, jnp.asarray(part, jnp.float32)))[:, 0] for part in parts])
+    linear = np.column_stack([samples.cards, np.ones(len(samples.cards))])
+    slopes = np.linalg.lstsq(linear[rows].astype(np.float64), samples.points[rows], rcond=None)[0]
+    points = samples.points[measured]
+    explained = [float(1 - np.square(points - found).mean() / points.var()) for found in (expected, linear[measured] @ slopes)]
+    return params, Learned(len(rows), len(np.unique(samples.shifts[rows])), *explained)
+
+
+def _update(
+    mlp: Mlp,
+    optimizer: optax.GradientTransformation,
+    params: Params,
+    state: optax.OptState,
+    inputs: jax.Array,
+    targets: jax.Array,
+) -> tuple[Params, optax.OptState]:
+    def loss(params: Params) -> jax.Array:
+        return jnp.square(mlp.of(params, inputs)[:, 0] - targets).mean()
+
+    changes, state = optimizer.update(jax.grad(loss)(params), state)
+    updated: Params = optax.apply_updates(params, changes)
+    return updated, state

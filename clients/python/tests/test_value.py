@@ -1,0 +1,79 @@
+"""Networks that know the points of a policy: learning them, files, and their use in a search."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chefshat import VectorEnv, search
+from chefshat.learn import __main__ as command
+from chefshat.learn import network, value
+
+pytest.importorskip("chefshat_native")
+
+
+def test_the_command_learns_points(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "points.safetensors"
+    arguments = ["value", "trained", "--out", str(out), "--decisions", "12000", "--width", "32", "--json"]
+    assert command.main(arguments) == 0
+    found = json.loads(capsys.readouterr().out)
+    # More than a constant, and than the numbers of cards.
+    assert found["explained"] > found["explained_by_cards"] > 0.1
+    assert found["decisions"] > 10_000
+    net = network.load(out)
+    assert (net.info.output, net.info.name, net.info.players) == ("points", "value of trained", 4)
+    with VectorEnv(games=8, seed=1) as env:
+        assert net.points_of(env.batch).shape == (8,)
+        for choose in (net.actions_of, net.logits_of):
+            with pytest.raises(ValueError, match="knows points and chooses no actions"):
+                choose(env.batch)
+        with pytest.raises(ValueError, match="`value` trains one for points"):
+            network.load("trained").points_of(env.batch)
+    # A second one does not replace it, and no agent plays by it.
+    assert command.main(arguments) == 1
+    assert "--force" in capsys.readouterr().out
+    with pytest.raises(Exception, match="points"):
+        VectorEnv(client_seats=[0], opponents=str(out))
+    assert command.main(["value", str(out), "--out", str(tmp_path / "other")]) == 1
+    assert "has outputs for points" in capsys.readouterr().err
+
+
+def test_too_few_decisions() -> None:
+    samples, rules = value.play(network.load("trained"), "trained", 10, 1, "paper", None)
+    assert samples.inputs.shape[1] == network.load("trained").info.input_width
+    # Each is of a Shift with points, and no other comes before the random action.
+    assert set(samples.points) <= set(rules.points)
+    with pytest.raises(ValueError, match="too few to learn from"):
+        value.learn(samples, 8, 1, 1, 5)
+
+
+def test_the_value_of_trained() -> None:
+    points = network.load("trained_points")
+    expected: list[float] = []
+    reached: list[int] = []
+    policy = network.load("trained")
+    with VectorEnv(games=200, client_seats=[0], opponents="trained", seed=8, skip_forced=True) as env:
+        open_ones: dict[int, list[float]] = {}
+        while len(reached) < 1000:
+            for game, number in zip(env.batch.games, points.points_of(env.batch), strict=True):
+                open_ones.setdefault(int(game), []).append(float(number))
+            endings = env.step(policy.actions_of(env.batch)).endings
+            for game, place in zip(endings.games, endings.places_taken, strict=True):
+                known = open_ones.pop(int(game), [])
+                expected += known
+                reached += [env.rules.points[place - 1]] * len(known)
+    errors = np.square(np.array(expected) - reached).mean()
+    assert errors < 0.65 * np.var(reached)
+
+
+def test_leaves_valued_by_a_network() -> None:
+    points = network.load("trained_points")
+    with VectorEnv(seed=3, history=512) as env:
+        env.sample(seed=1)
+        while env.batch.masks[0].sum() < 8:
+            env.step(env.sample())
+        position = search.position(env)
+    leaf = position.evaluate(deals=100, leaf=points.points_of, agent="trained", seed=1)
+    played = position.evaluate(deals=400, agent="trained", seed=1)
+    assert np.corrcoef(leaf.points, played.points)[0, 1] > 0.8
