@@ -5,18 +5,14 @@ use std::sync::Arc;
 
 use chefshat_engine::{ActionId, BySeat, Event, Game, RewardScheme, RuleSet, Seat, Seed};
 
-use chefshat_agents::{AgentKind, BuiltInAgent, Network};
+use chefshat_agents::{AgentKind, Network};
 
 use super::error::StateError;
-use super::history::{Entry, MAX_HISTORY};
+use super::history::MAX_HISTORY;
 use super::opponent::Opponent;
 use super::saved::SavedGame;
-use super::slot::Slot;
 use super::start::{Seeds, SetupError, Start, StartPoint};
 use super::terms::{Decisions, InvalidActions, Terms};
-
-/// Most bytes of a row of a batch without the columns that a setup asks for.
-const MAX_ROW_BYTES: usize = 256;
 
 /// The scope of an episode.
 #[derive(Copy, Clone, Eq, PartialEq, Debug, Default)]
@@ -417,16 +413,6 @@ impl VectorSetup {
     /// Games times the client's seats in each.
     pub fn seats_played(&self) -> u64 {
         u64::from(self.games) * self.client_seats().count() as u64
-    }
-
-    /// The bytes that the games and two batches of them take, roughly.
-    pub fn memory(&self) -> u64 {
-        let agents = self.rules.players() * size_of::<BuiltInAgent>();
-        let row = MAX_ROW_BYTES + self.all_hands_width() + 2 * usize::from(self.history);
-        // A decision, and the end of an episode for each seat.
-        let rows = u64::from(self.games) + self.seats_played();
-        let game = size_of::<Slot>() + agents + usize::from(self.history) * size_of::<Entry>();
-        u64::from(self.games) * game as u64 + 2 * rows * row as u64
     }
 
     /// Whether batches have the hands of all seats.

@@ -6,7 +6,7 @@ use chefshat_engine::{
 };
 
 use super::columns::{Ending, PlayedGame, Row, places_taken};
-use super::history::History;
+use super::history::{Entry, History};
 use super::part::{OpenRow, Part, cost_of};
 use super::running::{Open, RunningGame};
 use super::saved::SavedGame;
@@ -14,12 +14,15 @@ use super::setup::{Episode, VectorSetup};
 use super::start::Start;
 use super::terms::Decisions;
 use super::waiting::Waiting;
-use chefshat_agents::{ask, is_wrong_action};
+use chefshat_agents::{BuiltInAgent, ask, is_wrong_action};
 use chefshat_engine::PlayedDecision;
 
 /// Maximum number of Shifts that end in one game within one step, not counting one that the
 /// client's action ends.
 const MAX_SHIFTS_PER_STEP: u64 = 2;
+
+/// Most bytes of a row of a batch without the columns that a setup asks for.
+const MAX_ROW_BYTES: usize = 256;
 
 /// A sequence of games with the same number.
 #[derive(Debug)]
@@ -30,6 +33,18 @@ pub(super) struct Slot {
     running: Option<RunningGame>,
     /// Shifts that have ended in this step, not counting one that the client's action ended.
     shifts: u64,
+}
+
+impl VectorSetup {
+    /// The bytes that the games and two batches of them take, roughly.
+    pub fn memory(&self) -> u64 {
+        let agents = self.rules().players() * size_of::<BuiltInAgent>();
+        let row = MAX_ROW_BYTES + self.all_hands_width() + 2 * usize::from(self.history());
+        // A decision, and the end of an episode for each seat.
+        let rows = u64::from(self.games()) + self.seats_played();
+        let game = size_of::<Slot>() + agents + usize::from(self.history()) * size_of::<Entry>();
+        u64::from(self.games()) * game as u64 + 2 * rows * row as u64
+    }
 }
 
 impl Slot {
