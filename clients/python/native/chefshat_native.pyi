@@ -153,6 +153,9 @@ def play_states(
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint8]]:
     """Points and places of all seats in the Shift of each state, played on by one agent or one for each seat."""
 
+def choose_actions(states: Sequence[bytes], policy: str | bytes, *, seed: int) -> NDArray[np.uint16]:
+    """What an agent of this policy does at the decision of each state."""
+
 def trained_network() -> bytes:
     """The file of the network of the built-in agent "trained". `chefshat.learn.network.load("trained")` reads it."""
 

@@ -1,10 +1,12 @@
 """The summary of an evaluation."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from chefshat import Batch
+from chefshat import Batch, ChefsHatError
 from chefshat.learn import network
 from chefshat.learn.evaluation import compare, evaluate, summed_up
 
@@ -51,3 +53,15 @@ def test_a_comparison_needs_no_luck_with_the_deals() -> None:
     assert "on 30 deals" in str(found)
     with pytest.raises(ValueError, match="at least 2"):
         compare(trained, first_legal, "greedy", deals=1)
+
+
+def test_built_in_agents_and_files_are_players() -> None:
+    pytest.importorskip("chefshat_native")
+    trained, greedy = (evaluate(player, "random", games=12, seed=3) for player in ("trained", "greedy"))
+    assert trained == evaluate(network.load("trained"), "random", games=12, seed=3)
+    assert greedy != trained
+    file = Path(__file__).resolve().parents[3] / "tests" / "fixtures" / "network" / "table-actions.safetensors"
+    compared = compare(file, "greedy", "greedy", deals=4, seed=1, seats=[0])
+    assert compared == compare(str(file), "greedy", "greedy", deals=4, seed=1, seats=[0])
+    with pytest.raises(ChefsHatError, match="there is no agent"):
+        evaluate("clever", "random", games=1)

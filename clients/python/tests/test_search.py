@@ -340,6 +340,25 @@ def test_worlds_played_on() -> None:
         search.play_on([states[0], *other.save()])
 
 
+def test_what_an_agent_would_do() -> None:
+    pytest.importorskip("safetensors")
+    from chefshat.learn import network
+
+    trained = network.load("trained")
+    with VectorEnv(games=30, seed=5) as env:
+        for _ in range(40):
+            states = env.save(env.batch.games)
+            assert (search.choose(states, "trained") == trained.actions_of(env.batch)).all()
+            drawn = search.choose(states, "random", seed=1)
+            assert env.batch.masks[np.arange(30), drawn].all()
+            assert (drawn == search.choose(states, "random", seed=1)).all()
+            env.step(search.choose(states, "greedy"))
+        assert (drawn != search.choose(states, "random", seed=2)).any()
+        with pytest.raises(ChefsHatError, match="there is no agent"):
+            search.choose(states, "clever")
+    assert search.choose([]).shape == (0,)
+
+
 def test_leaves_are_the_next_decisions(monkeypatch: pytest.MonkeyPatch) -> None:
     position = busy_position()
     seen = []

@@ -103,6 +103,14 @@ pub fn play_on(mut game: Game, policies: &[RolloutPolicy], seed: [u8; 32]) -> By
     worths
 }
 
+/// What an agent does at the open decision of a game. `seed` determines its random choices.
+///
+/// # Panics
+/// If no decision is open.
+pub fn choose(game: &Game, policy: &RolloutPolicy, seed: [u8; 32]) -> ActionId {
+    Agents::new(|_| policy, seed).decide(game)
+}
+
 /// The agents of all seats.
 struct Agents([BuiltInAgent; MAX_SEATS]);
 

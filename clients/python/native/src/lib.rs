@@ -18,7 +18,7 @@ mod chefshat_native {
     #[pymodule_export]
     use crate::games::{Games, Refused, action_texts, trained_network};
     #[pymodule_export]
-    use crate::search::{Position, play_states};
+    use crate::search::{Position, choose_actions, play_states};
     #[pymodule_export]
     use crate::tables::Batch;
 

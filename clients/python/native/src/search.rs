@@ -6,14 +6,14 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use chefshat_agents::Network;
-use chefshat_engine::{ActionId, Event, Observation, RuleSet, Seat};
+use chefshat_engine::{ActionId, Event, Game, Observation, RuleSet, Seat};
 use chefshat_proto::v1;
 use chefshat_record::convert::{
     FieldProblem, rules_from_proto, rules_to_proto, script_to_proto, situation_from_proto,
 };
 use chefshat_search::{
     Allocation, Chance, Estimate, Knowledge, KnowledgeError, Method, RolloutPolicy, Sampler,
-    ShiftHistory, Worth, evaluate, likely_hands, outcomes, play_on,
+    ShiftHistory, Worth, choose, evaluate, likely_hands, outcomes, play_on,
 };
 use chefshat_simulation::vector::SavedGame;
 use chefshat_vector::RequestError;
@@ -281,25 +281,11 @@ pub(crate) fn play_states<'py>(
     threads: usize,
     seed: u64,
 ) -> PyResult<Shifts<'py>> {
-    let games = (states.iter().enumerate())
-        .map(|(number, state)| {
-            let saved = SavedGame::from_bytes(state.as_bytes()).map_err(RequestError::from)?;
-            let running = saved.game().filter(|game| game.decision().is_some());
-            let game = running
-                .ok_or_else(|| field("states", format!("state {number}: its game is over")))?;
-            Ok(game.closing_copy())
-        })
-        .collect::<Result<Vec<_>, RequestError>>()
-        .map_err(|error| refused(py, error))?;
+    let games = open_games(&states).map_err(|error| refused(py, error))?;
     let Some(rules) = games.first().map(|game| *game.rules()) else {
         return in_chunks(py, 0, |_| Vec::new());
     };
     let players = rules.players();
-    let size = |rules: &RuleSet| (rules.players(), rules.faces(), rules.hand_size());
-    if games.iter().any(|game| size(game.rules()) != size(&rules)) {
-        let words = "give states of games with the same numbers of players, faces and cards dealt";
-        return Err(refused(py, field("states", words)));
-    }
     let policies = (policies.into_iter())
         .map(|policy| rollout_policy(policy, &rules))
         .collect::<Result<Vec<_>, _>>()
@@ -318,7 +304,7 @@ pub(crate) fn play_states<'py>(
     let pool = pool(threads);
     in_chunks(py, games.len() as u64, |part| {
         let played = |number: u64| {
-            let game = games[number as usize].clone();
+            let game = games[number as usize].closing_copy();
             play_on(game, &policies, stream(seed, number).seed())
         };
         let shifts: Vec<_> = match &pool {
@@ -330,6 +316,50 @@ pub(crate) fn play_states<'py>(
             .flat_map(|worths| worths.values().copied())
             .collect()
     })
+}
+
+/// What an agent of this policy does at the decision of each state. Its random choices at the state
+/// with number i follow from the seed and i.
+#[pyfunction]
+#[pyo3(signature = (states, policy, *, seed))]
+pub(crate) fn choose_actions<'py>(
+    py: Python<'py>,
+    states: Vec<Bound<'py, PyBytes>>,
+    policy: Policy,
+    seed: u64,
+) -> PyResult<Bound<'py, PyArray1<u16>>> {
+    let games = open_games(&states).map_err(|error| refused(py, error))?;
+    let Some(rules) = games.first().map(|game| *game.rules()) else {
+        return Ok(PyArray1::from_vec(py, Vec::new()));
+    };
+    let policy = rollout_policy(policy, &rules).map_err(|error| refused(py, error))?;
+    let chosen = |(number, game): (usize, &Game)| {
+        choose(game, &policy, stream(seed, number as u64).seed()).index()
+    };
+    let actions = py.detach(|| caught(|| games.iter().enumerate().map(chosen).collect()))?;
+    Ok(PyArray1::from_vec(py, actions))
+}
+
+/// The games of states, in all of which a decision is open, and which have the same size.
+fn open_games(states: &[Bound<'_, PyBytes>]) -> Result<Vec<Game>, RequestError> {
+    let size = |game: &Game| {
+        let rules = game.rules();
+        (rules.players(), rules.faces(), rules.hand_size())
+    };
+    let mut games: Vec<Game> = Vec::with_capacity(states.len());
+    for (number, state) in states.iter().enumerate() {
+        let saved = SavedGame::from_bytes(state.as_bytes())?;
+        let game = saved.game().filter(|game| game.decision().is_some());
+        let words = format!("state {number}: its game is over");
+        let game = game.ok_or_else(|| field("states", words))?;
+        if games.first().is_some_and(|first| size(first) != size(game)) {
+            let words =
+                "give states of games with the same numbers of players, faces and cards dealt";
+            return Err(field("states", words));
+        }
+        games.push(game.clone());
+    }
+    Ok(games)
 }
 
 /// Plays `all` deals or states, a chunk at a time, until the user interrupts the program.

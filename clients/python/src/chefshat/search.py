@@ -101,6 +101,29 @@ def play_on(
     return points.reshape(shape), places.reshape(shape)
 
 
+def choose(states: Sequence[bytes], agent: Agent = "greedy", *, seed: int = 0) -> NDArray[np.uint16]:
+    """Returns what an agent would do at the decision of each state, for instance to imitate it, or to compare it with another.
+
+    It sees what its seat may.
+
+    Args:
+        states: S states, as `VectorEnv.save` returns them, of games of one size.
+        agent: "random", "greedy", "trained", or the path of a network file.
+        seed: of its random choices; those at each state are others.
+
+    Returns:
+        (S,) actions.
+
+    Raises:
+        ChefsHatError: STATES_REFUSED or ANALYSIS_REFUSED says what is wrong with a state or the agent.
+    """
+    native = _native()
+    try:
+        return native.choose_actions(list(states), _policy(agent), seed=_seed(seed))  # type: ignore[no-any-return]
+    except native.Refused as error:
+        raise ChefsHatError(*error.args) from None
+
+
 class Position:
     """What a seat knows at its decision, and all deals that are consistent with it. Threads may share it.
 

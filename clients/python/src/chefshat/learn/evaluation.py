@@ -10,21 +10,27 @@ import json
 import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from pathlib import Path
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from chefshat import join_options
+from chefshat import join_options, search
 from chefshat.address import ServerAddress
 from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network as network_file
 from chefshat.learn.network import Network, NetworkFileError
 from chefshat.opponents import Policy
 from chefshat.vector import Rules, Seed, VectorEnv
+from chefshat.vector_setup import NETWORK_SUFFIX
 
 # Parallel games.
 SIDE_BY_SIDE = 256
+
+Player: TypeAlias = Network | Policy | str | Path
+"""Who is evaluated: a network, which takes the legal action with the highest output, or its file; a function that chooses actions;
+or the built-in agent "random", "greedy" or "trained", which needs `chefshat-native`."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +61,7 @@ class Evaluation:
 
 
 def evaluate(
-    player: Network | Policy,
+    player: Player,
     opponents: str | Sequence[str | Policy],
     *,
     games: int,
@@ -67,7 +73,7 @@ def evaluate(
     """Plays games with the player on one seat. With random deals all seats are equal; with given seeds they are not.
 
     Args:
-        player: a network, which takes the legal action with the highest output, or a function that chooses actions.
+        player: who is evaluated.
         opponents: built-in agents, network files or functions of the other seats, one for all or one for each.
         games: number of games.
         seat: the player's seat, from 0.
@@ -111,8 +117,8 @@ class Comparison:
 
 
 def compare(
-    first: Network | Policy,
-    second: Network | Policy,
+    first: Player,
+    second: Player,
     opponents: str | Sequence[str | Policy],
     *,
     deals: int,
@@ -127,8 +133,8 @@ def compare(
     `chefshat bench`.
 
     Args:
-        first: a network, or a function that chooses actions.
-        second: the player to compare it with.
+        first: a player.
+        second: the one to compare it with.
         opponents: as for `evaluate`.
         deals: number of deals, at least 2.
         seats: the seats from which each deal is played, from 0; None: all of four.
@@ -171,7 +177,7 @@ class _Played(NamedTuple):
 
 
 def _play(
-    player: Network | Policy,
+    player: Player,
     opponents: str | Sequence[str | Policy],
     games: int,
     seat: int,
@@ -180,6 +186,8 @@ def _play(
     address: str | ServerAddress | None,
 ) -> _Played:
     """Plays games with the player on a seat."""
+    if isinstance(player, Path) or (isinstance(player, str) and player.endswith(NETWORK_SUFFIX)):
+        player = network_file.load(player)
     network = player if isinstance(player, Network) else None
     with VectorEnv(
         address,
@@ -216,6 +224,8 @@ def _play(
                 break
             if isinstance(player, Network):
                 actions: npt.ArrayLike = player.actions_of(batch)
+            elif isinstance(player, str):
+                actions = search.choose(env.save(batch.games), player, seed=batch.step)
             else:
                 actions = player(batch)
             batch = env.step(actions)
