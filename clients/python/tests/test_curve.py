@@ -3,10 +3,12 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from chefshat.experiments.stats import interquartile_mean
 from chefshat.learn import __main__ as command
-from chefshat.learn.curve import figure
+from chefshat.learn.curve import figure, read
 
 
 def a_look(decisions: int, points: float) -> dict[str, object]:
@@ -26,11 +28,11 @@ LOG = "\n".join(
 
 
 def test_each_evaluation_is_a_point_with_its_interval() -> None:
-    (panel,) = figure(LOG).panels
+    (panel,) = figure([read(LOG)]).panels
     (line,) = panel.lines
     assert panel.title == "Against 3 greedy"
     assert (list(line.x), list(line.y)) == ([0.0, 2.0], [0.5, 3.0])
-    assert line.high[1] == pytest.approx(3.98)
+    assert line.high[1] == pytest.approx(3.98, abs=1e-3)
     assert panel.levels[0].y == 2.25
 
 
@@ -51,3 +53,41 @@ def test_the_command_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
         assert capsys.readouterr().err.startswith(f"error: {log}: this is not a log")
     assert command.main(["curve", str(tmp_path / "missing"), "--out", str(out)]) == 1
     assert capsys.readouterr().err.startswith("error: there is no file")
+
+
+def a_run(seed: int, points: float, **plan: object) -> str:
+    setup = {"event": "setup", "seed": seed, "plan": {"games": 256, "hyper": plan}, "rules": {"players": 4, "points": [5, 3, 1, 0]}}
+    return "\n".join(map(json.dumps, (setup, a_look(0, 0.5), a_look(2_000_000 + 1000 * seed, points))))
+
+
+def test_runs_that_differ_in_their_seed_are_one_line() -> None:
+    runs = [read(a_run(seed, points, clip=0.2)) for seed, points in enumerate([3.0, 9.0, 2.0, 2.5, -7.0])]
+    others = [read(a_run(seed, 4.0, clip=0.1)) for seed in range(2)]
+    (panel,) = figure([*runs, *others, read(a_run(9, 1.0, clip=0.3))]).panels
+    first, second, third = panel.lines
+    assert first.label == "clip 0.2: interquartile mean of 5 runs"
+    # The best and the worst are left out.
+    assert first.y == [0.5, pytest.approx(2.5)]
+    assert first.x[1] == pytest.approx(2.002)
+    assert first.low[1] < 2.5 < first.high[1]
+    assert (first.low[0], first.high[0]) == (0.5, 0.5)
+    assert (second.label, second.y[1], second.low[1]) == ("clip 0.1: interquartile mean of 2 runs", 4.0, 4.0)
+    assert third.label == "clip 0.3"
+    assert third.high[1] == pytest.approx(1.98, abs=1e-3)
+    shorter = read("\n".join(a_run(7, 1.0, clip=0.2).splitlines()[:2]))
+    with pytest.raises(ValueError, match="have 1 and 2 evaluations: give them one budget"):
+        figure([*runs, shorter])
+    against_random = read(a_run(8, 1.0).replace("greedy", "random"))
+    with pytest.raises(ValueError, match="against different opponents"):
+        figure([runs[0], against_random])
+
+
+def test_interquartile_means() -> None:
+    assert interquartile_mean(np.arange(8.0))[0] == 3.5
+    assert interquartile_mean(np.array([0.0, 1, 2, 3, 100]))[0] == 2
+    middle, low, high = interquartile_mean(np.random.default_rng(3).normal(7, 2, 400))
+    # The interval of a normal sample is about 4 standard errors wide, a little more than that of its mean.
+    assert 0.3 < high - low < 0.6
+    assert low < middle < high
+    with pytest.raises(ValueError, match="two runs or more"):
+        interquartile_mean(np.ones(1))

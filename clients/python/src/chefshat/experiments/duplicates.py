@@ -74,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True, metavar="PNG", help="the picture to write")
     parser.add_argument("--json", action="store_true", help="print one object of JSON")
     options = parser.parse_args(arguments)
-    return plots.draw_file(options.report, "report", PRINTED, figure, options.out, as_json=options.json)
+    return plots.draw_files([options.report], "report", PRINTED, figure, lambda found: found[0], options.out, as_json=options.json)
 
 
 if __name__ == "__main__":

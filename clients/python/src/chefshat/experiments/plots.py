@@ -5,7 +5,7 @@ import json
 from collections.abc import Callable, Sequence
 from math import ceil
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -16,6 +16,8 @@ from matplotlib.transforms import ScaledTranslation
 from chefshat.errors import failed
 from chefshat.experiments.results import Figure, Panel
 from chefshat.files import check_readable, write_atomically
+
+Read = TypeVar("Read")
 
 # The palette of Okabe and Ito, strongest contrasts first, without yellow, which is too pale on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -65,24 +67,38 @@ def png(figure: Figure) -> bytes:
     return out.getvalue()
 
 
-def draw_file(source: Path, what: str, origin: str, figure: Callable[[str], Figure], out: Path, *, as_json: bool) -> int:
-    """Draws a figure of a text file, for a command. Returns the exit code.
+def draw_files(
+    sources: Sequence[Path],
+    what: str,
+    origin: str,
+    read: Callable[[str], Read],
+    figure: Callable[[list[Read]], Figure],
+    out: Path,
+    *,
+    as_json: bool,
+) -> int:
+    """Draws a figure of text files, for a command. Returns the exit code.
 
     Args:
-        source: the file.
+        sources: the files.
         what: the kind of file, and `origin`, what writes it; see `check_readable`.
         origin: see `what`.
-        figure: creates the figure from the text. Raises ValueError if the text is wrong.
+        read: reads the text of a file. Raises ValueError if it is wrong.
+        figure: creates the figure from what was read. Raises ValueError if it does not fit together.
         out: the picture to write.
         as_json: whether to print JSON.
     """
+    found: list[Read] = []
     try:
-        check_readable(source, what, origin)
-        write_atomically(out, png(figure(source.read_text(encoding="utf-8"))))
-    except OSError as error:
+        for source in sources:
+            check_readable(source, what, origin)
+            try:
+                found.append(read(source.read_text(encoding="utf-8")))
+            except ValueError as error:
+                raise ValueError(f"{source}: {error}") from error
+        write_atomically(out, png(figure(found)))
+    except (OSError, ValueError) as error:
         return failed(error, as_json=as_json)
-    except ValueError as error:
-        return failed(ValueError(f"{source}: {error}"), as_json=as_json)
     print(json.dumps({"out": str(out)}) if as_json else f"wrote {out}")
     return 0
 

@@ -17,7 +17,7 @@ from chefshat import join_options
 EXAMPLES = """examples:
   python -m chefshat.learn ppo --out strong.safetensors --minutes 30 --seed 1
   python -m chefshat.learn ppo --out exploiter.safetensors --games 0 --opponent-games 256 --opponents trained --minutes 30
-  python -m chefshat.learn curve strong.jsonl --out strong.png
+  python -m chefshat.learn curve seed-*.jsonl --out curve.png
   python -m chefshat.learn value strong.safetensors --out points.safetensors
   python -m chefshat.learn deep-q --out deep_q.safetensors --shifts 1000 --mask
   python -m chefshat.learn tune --out tuned.json --trials 50 --shifts 250
@@ -149,7 +149,7 @@ def _ppo(command: argparse.ArgumentParser) -> None:
 
 
 def _force(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--force", action="store_true", help="replace the files of an earlier training")
+    command.add_argument("--force", action="store_true", help="replace existing files")
 
 
 def _common(command: argparse.ArgumentParser) -> None:
@@ -183,7 +183,13 @@ def _value(command: argparse.ArgumentParser) -> None:
 
 
 def _curve(command: argparse.ArgumentParser) -> None:
-    command.add_argument("log", type=Path, metavar="LOG", help="a log written by `ppo`")
+    command.add_argument(
+        "logs",
+        type=Path,
+        nargs="+",
+        metavar="LOG",
+        help="logs written by `ppo`; those that differ in nothing but their seed are one line, the interquartile mean of the runs",
+    )
     command.add_argument("--out", type=Path, required=True, metavar="PNG", help="the picture to write")
 
 
@@ -265,7 +271,7 @@ def _above_zero(text: str) -> float:
 # Name: module, summary, options.
 COMMANDS: dict[str, tuple[str, str, Callable[[argparse.ArgumentParser], None]]] = {
     "ppo": ("ppo_command", "trains an agent by self-play with proximal policy optimisation", _ppo),
-    "value": ("value", "trains a network that knows how many points a policy brings", _value),
+    "value": ("value", "trains a value network: the expected points of a policy", _value),
     "evaluate": ("evaluation", "plays a trained network on one seat against built-in agents", _evaluate),
     "deep-q": ("deep_q_command", "trains a Deep Q agent, the 2020 paper's, against built-in agents", _deep_q),
     "tune": ("tune", "searches hyper-parameters of the Deep Q agent", _tune),

@@ -1,57 +1,106 @@
-"""The command `curve`: draws the points per Shift at each evaluation of a training, from the log that `ppo` writes."""
+"""The command `curve`: draws the points per Shift at each evaluation of trainings, from the logs that `ppo` writes.
+
+Trainings that differ in nothing but their seed are one line: the interquartile mean of the runs.
+"""
 
 import argparse
 import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from chefshat.experiments import plots
 from chefshat.experiments.results import Figure, Level, Line, Panel
-
-# Half the width of a 95% interval, in standard errors.
-WIDTH_95 = 1.96
+from chefshat.experiments.stats import Z_95, interquartile_mean
 
 
-def figure(log: str) -> Figure:
-    """Returns the points per Shift at each evaluation, over the decisions of the training, with 95% intervals.
+@dataclass(frozen=True)
+class Run:
+    """A training.
 
-    Args:
-        log: the log, JSON lines.
-
-    Raises:
-        ValueError: this is not a log, or it has no evaluation.
+    Attributes:
+        plan: its settings by name, without the seed.
+        evaluations: the lines of its evaluations.
+        mean: the mean points of all seats; None if the log does not say.
     """
+
+    plan: Mapping[str, Any]
+    evaluations: Sequence[Mapping[str, Any]]
+    mean: float | None
+
+
+def read(log: str) -> Run:
+    """Reads a log, JSON lines. Raises ValueError if this is not a log, or if it has no evaluation."""
     try:
         lines = [dict(json.loads(line)) for line in log.splitlines()]
     except (ValueError, TypeError) as error:
         raise ValueError("this is not a log; `python -m chefshat.learn ppo` writes one next to its network, as .jsonl") from error
     evaluated = [line for line in lines if line.get("event") == "evaluation"]
-    rules = [line["rules"] for line in lines if line.get("event") == "setup"]
     if not evaluated:
         raise ValueError("the log has no evaluation; did the training end before the first?")
-    mean = Level(label="mean of all seats", y=sum(rules[0]["points"]) / rules[0]["players"]) if rules else None
-    panels = []
-    for number, evaluation in enumerate(evaluated[0]["evaluations"]):
-        opponents = evaluation["opponents"]
-        shown = [line["evaluations"][number] for line in evaluated]
-        line = Line(
-            label="the policy",
-            x=[line["decisions"] / 1e6 for line in evaluated],
-            y=[one["points"] for one in shown],
-            low=[one["points"] - WIDTH_95 * one["standard_error"] for one in shown],
-            high=[one["points"] + WIDTH_95 * one["standard_error"] for one in shown],
+    setup = next((line for line in lines if line.get("event") == "setup"), {})
+    rules, plan = setup.get("rules"), dict(setup.get("plan", {}))
+    hyper = plan.pop("hyper", {})
+    return Run({**plan, **hyper}, evaluated, sum(rules["points"]) / rules["players"] if rules else None)
+
+
+def figure(runs: Sequence[Run]) -> Figure:
+    """Returns the points per Shift at each evaluation, over the decisions of the training.
+
+    A line is one training, with 95% intervals of its evaluations; or the runs with the same settings, with the interquartile mean
+    and its interval over the runs. Raises ValueError if they have not been evaluated alike.
+    """
+    groups: list[list[Run]] = []
+    for run in runs:
+        group = next((group for group in groups if group[0].plan == run.plan), None)
+        groups.append([run]) if group is None else group.append(run)
+    opponents = [one["opponents"] for one in runs[0].evaluations[0]["evaluations"]]
+    for run in runs:
+        if [one["opponents"] for one in run.evaluations[0]["evaluations"]] != opponents:
+            raise ValueError("the trainings were evaluated against different opponents: draw them apart")
+    mean = runs[0].mean
+    panels = [
+        Panel(
+            title=f"Against {len(names)} {names[0]}",
+            x_label="decisions of the training, millions",
+            y_label="points per Shift",
+            lines=[_line(group, number, _label(group, groups)) for group in groups],
+            levels=[] if mean is None else [Level(label="mean of all seats", y=mean)],
         )
-        panels.append(
-            Panel(
-                title=f"Against {len(opponents)} {opponents[0]}",
-                x_label="decisions of the training, millions",
-                y_label="points per Shift",
-                lines=[line],
-                levels=[mean] if mean else [],
-            )
-        )
+        for number, names in enumerate(opponents)
+    ]
     return Figure(name="curve", title="Training by self-play: evaluations of the policy", panels=panels)
+
+
+def _label(group: Sequence[Run], groups: Sequence[Sequence[Run]]) -> str:
+    """Names what distinguishes the settings of a group."""
+    plan = group[0].plan
+    differing = [name for name, value in plan.items() if any(other[0].plan.get(name) != value for other in groups)]
+    label = ", ".join(f"{name} {plan[name]}" for name in differing) or "the policy"
+    return label if len(group) == 1 else f"{label}: interquartile mean of {len(group)} runs"
+
+
+def _line(group: Sequence[Run], number: int, label: str) -> Line:
+    """Returns the line of runs with the same settings against the opponents with this number."""
+    counts = {len(run.evaluations) for run in group}
+    if len(counts) > 1:
+        raise ValueError(
+            f"runs of the same settings have {' and '.join(map(str, sorted(counts)))} evaluations: give them one budget"
+        )
+    decisions = np.array([[line["decisions"] for line in run.evaluations] for run in group]) / 1e6
+    shown = [[line["evaluations"][number] for line in run.evaluations] for run in group]
+    points = np.array([[one["points"] for one in run] for run in shown])
+    if len(group) == 1:
+        errors = Z_95 * np.array([one["standard_error"] for one in shown[0]])
+        middle, low, high = points[0], points[0] - errors, points[0] + errors
+    else:
+        middle, low, high = np.transpose([interquartile_mean(column) for column in points.T])
+    return Line(label, decisions.mean(axis=0).tolist(), middle.tolist(), low.tolist(), high.tolist())
 
 
 def run(options: argparse.Namespace) -> int:
     """Runs the command. Returns the exit code."""
     origin = "`python -m chefshat.learn ppo` writes next to its network, as .jsonl"
-    return plots.draw_file(options.log, "log", origin, figure, options.out, as_json=options.json)
+    return plots.draw_files(options.logs, "log", origin, read, figure, options.out, as_json=options.json)
