@@ -1,5 +1,6 @@
-"""Networks that know the points of a policy: learning them, files, and their use in a search."""
+"""Value networks: their training, their files, and their use in a search."""
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -26,26 +27,35 @@ def test_the_command_learns_points(tmp_path: Path, capsys: pytest.CaptureFixture
     with VectorEnv(games=8, seed=1) as env:
         assert net.points_of(env.batch).shape == (8,)
         for choose in (net.actions_of, net.logits_of):
-            with pytest.raises(ValueError, match="knows points and chooses no actions"):
+            with pytest.raises(ValueError, match="chooses no actions"):
                 choose(env.batch)
         with pytest.raises(ValueError, match="`value` trains one for points"):
             network.load("trained").points_of(env.batch)
     # A second one does not replace it, and no agent plays by it.
     assert command.main(arguments) == 1
-    assert "--force" in capsys.readouterr().out
+    refused = capsys.readouterr().out
+    assert "--force" in refused
+    assert "--resume" not in refused
     with pytest.raises(Exception, match="points"):
         VectorEnv(client_seats=[0], opponents=str(out))
     assert command.main(["value", str(out), "--out", str(tmp_path / "other")]) == 1
     assert "has outputs for points" in capsys.readouterr().err
 
 
-def test_too_few_decisions() -> None:
-    samples, rules = value.play(network.load("trained"), "trained", 10, 1, "paper", None)
-    assert samples.inputs.shape[1] == network.load("trained").info.input_width
-    # Each is of a Shift with points, and no other comes before the random action.
+def test_samples_follow_from_the_seed() -> None:
+    trained = network.load("trained")
+    (samples, rules), (again, _) = (value.play(trained, Path("trained"), 1500, 1, "paper", None) for _ in range(2))
+    for name in ("inputs", "cards", "points", "shifts"):
+        assert np.array_equal(getattr(samples, name), getattr(again, name)), name
+    assert samples.inputs.shape == (len(samples.points), trained.info.input_width)
+    # All decisions of a Shift have its points, and who has fewer cards left than the others gets more of them.
+    for shift in np.unique(samples.shifts):
+        assert len(np.unique(samples.points[samples.shifts == shift])) == 1
     assert set(samples.points) <= set(rules.points)
+    more_cards = samples.cards[:, 0] - samples.cards[:, 1:].mean(axis=1)
+    assert np.corrcoef(more_cards, samples.points)[0, 1] < -0.3
     with pytest.raises(ValueError, match="too few to learn from"):
-        value.learn(samples, 8, 1, 1, 5)
+        value.learn(dataclasses.replace(samples, shifts=np.zeros_like(samples.shifts)), 8, 1, 1, 5)
 
 
 def test_the_value_of_trained() -> None:

@@ -208,11 +208,12 @@ impl Position {
         let policy = rollout_policy(policy, self.rule_set()).map_err(|error| refused(py, error))?;
         let actions = self.legal(actions).map_err(|error| refused(py, error))?;
         let pool = pool(threads);
-        in_chunks(py, deals, |part| {
+        let worths = in_chunks(py, deals, |part| {
             let part = first + part.start..first + part.end;
             let (sampler, pool) = (&self.sampler, pool.as_deref());
             outcomes(sampler, &actions, &policy, bytes(seed), part, pool).concat()
-        })
+        })?;
+        Ok(shifts(py, &worths))
     }
 
     fn __reduce__(&self) -> PyResult<()> {
@@ -283,7 +284,7 @@ pub(crate) fn play_states<'py>(
 ) -> PyResult<Shifts<'py>> {
     let games = open_games(&states).map_err(|error| refused(py, error))?;
     let Some(rules) = games.first().map(|game| *game.rules()) else {
-        return in_chunks(py, 0, |_| Vec::new());
+        return Ok(shifts(py, &[]));
     };
     let players = rules.players();
     let policies = (policies.into_iter())
@@ -302,20 +303,21 @@ pub(crate) fn play_states<'py>(
         }
     };
     let pool = pool(threads);
-    in_chunks(py, games.len() as u64, |part| {
+    let worths = in_chunks(py, games.len() as u64, |part| {
         let played = |number: u64| {
             let game = games[number as usize].closing_copy();
             play_on(game, &policies, stream(seed, number).seed())
         };
-        let shifts: Vec<_> = match &pool {
+        let played: Vec<_> = match &pool {
             Some(pool) => pool.install(|| part.into_par_iter().map(played).collect()),
             None => part.map(played).collect(),
         };
-        shifts
+        played
             .iter()
             .flat_map(|worths| worths.values().copied())
             .collect()
-    })
+    })?;
+    Ok(shifts(py, &worths))
 }
 
 /// What an agent of this policy does at the decision of each state. Its random choices at the state
@@ -333,10 +335,17 @@ pub(crate) fn choose_actions<'py>(
         return Ok(PyArray1::from_vec(py, Vec::new()));
     };
     let policy = rollout_policy(policy, &rules).map_err(|error| refused(py, error))?;
-    let chosen = |(number, game): (usize, &Game)| {
-        choose(game, &policy, stream(seed, number as u64).seed()).index()
-    };
-    let actions = py.detach(|| caught(|| games.iter().enumerate().map(chosen).collect()))?;
+    let pool = pool(0);
+    let actions = in_chunks(py, games.len() as u64, |part| {
+        let chosen = |number: u64| {
+            let game = &games[number as usize];
+            choose(game, &policy, stream(seed, number).seed()).index()
+        };
+        match &pool {
+            Some(pool) => pool.install(|| part.into_par_iter().map(chosen).collect()),
+            None => part.map(chosen).collect(),
+        }
+    })?;
     Ok(PyArray1::from_vec(py, actions))
 }
 
@@ -362,23 +371,27 @@ fn open_games(states: &[Bound<'_, PyBytes>]) -> Result<Vec<Game>, RequestError> 
     Ok(games)
 }
 
-/// Plays `all` deals or states, a chunk at a time, until the user interrupts the program.
-fn in_chunks(
+/// Works on `all` deals or states, a chunk at a time, until the user interrupts the program.
+fn in_chunks<T: Send>(
     py: Python<'_>,
     all: u64,
-    play: impl Fn(Range<u64>) -> Vec<Worth> + Sync,
-) -> PyResult<Shifts<'_>> {
-    let mut worths = Vec::new();
+    work: impl Fn(Range<u64>) -> Vec<T> + Sync,
+) -> PyResult<Vec<T>> {
+    let mut done = Vec::new();
     for first in (0..all).step_by(CHUNK as usize) {
         let part = first..all.min(first + CHUNK);
-        worths.extend(py.detach(|| caught(|| play(part)))?);
+        done.extend(py.detach(|| caught(|| work(part)))?);
         py.check_signals()?;
     }
+    Ok(done)
+}
+
+fn shifts<'py>(py: Python<'py>, worths: &[Worth]) -> Shifts<'py> {
     let points = PyArray1::from_iter(py, worths.iter().map(|worth| worth.points));
-    Ok((
+    (
         points,
         PyArray1::from_iter(py, worths.iter().map(|worth| worth.place)),
-    ))
+    )
 }
 
 fn rollout_policy(policy: Policy, rules: &RuleSet) -> Result<RolloutPolicy, RequestError> {

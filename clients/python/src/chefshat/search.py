@@ -80,7 +80,7 @@ def play_on(
     The agents see what their seats may; the caller who has the states knows the cards of all.
 
     Args:
-        states: S states, as `VectorEnv.save` returns them, of games with the same number of seats.
+        states: S states, as `VectorEnv.save` returns them, of games with the same numbers of seats, faces and cards dealt.
         agent: who plays: one for all N seats, or one for each.
         threads: 0: one for each core. The result does not depend on them.
         seed: of the agents' random choices; those of each state are others.
@@ -107,7 +107,7 @@ def choose(states: Sequence[bytes], agent: Agent = "greedy", *, seed: int = 0) -
     It sees what its seat may.
 
     Args:
-        states: S states, as `VectorEnv.save` returns them, of games of one size.
+        states: S states, as `VectorEnv.save` returns them, of games with the same numbers of seats, faces and cards dealt.
         agent: "random", "greedy", "trained", or the path of a network file.
         seed: of its random choices; those at each state are others.
 
@@ -252,7 +252,8 @@ class Position:
             agent: who plays all seats.
             actions: the A actions to try. Default: all legal ones.
             leaf: values the seat's next decision among several actions in the Shift, with what the seat then may know but the
-                history; no deal is played further. The agents' random choices are others than without it.
+                history; no deal is played further. (From a position with one action, its next decision.) The agents' random choices
+                are others than without it.
             threads: 0: one for each core.
             seed: of the deals and of the agents' random choices.
         """

@@ -291,8 +291,9 @@ class VectorEnv:
         Args:
             games: the games to replace, each once.
             states: the state of each, of an environment that differs at most in the number of games, seed, start (hands, branch),
-                episode, skip_forced and, without `records`, in who plays which seat: the new player of a seat decides from here on,
-                and its rewards begin with 0. STATES_REFUSED says what else differs.
+                episode, skip_forced and, without `records`, in who plays which seat: the new player of a seat decides from here on.
+                Rewards of a seat that a built-in agent or a network file played, or plays here, begin with 0. STATES_REFUSED says
+                what else differs.
         """
         self._check_open()
         chosen = self._numbers(games)

@@ -35,6 +35,7 @@ pub(super) struct Slot {
     shifts: u64,
 }
 
+// Here, because a slot is the largest part.
 impl VectorSetup {
     /// The bytes that the games and two batches of them take, roughly.
     pub fn memory(&self) -> u64 {

@@ -30,7 +30,7 @@ SIDE_BY_SIDE = 256
 
 Player: TypeAlias = Network | Policy | str | Path
 """Who is evaluated: a network, which takes the legal action with the highest output, or its file; a function that chooses actions;
-or the built-in agent "random", "greedy" or "trained", which needs `chefshat-native`."""
+or the built-in agent "random", "greedy" or "trained", by `chefshat-native`: "random" draws the same numbers for every seed."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,9 @@ def evaluate(
         address: where the games are played; see `VectorEnv`.
 
     Raises:
-        ChefsHatError: the games are refused, or the server does not answer.
+        ChefsHatError: the games are refused, the server does not answer, or there is no such agent.
+        NetworkFileError: the file of a player is not a network.
+        OSError: it cannot be read.
         ValueError: the network was trained for games of another size, or there is no such seat.
     """
     played = _play(player, opponents, games, seat, seed, rules, address)
@@ -143,7 +145,9 @@ def compare(
         address: where the games are played; see `VectorEnv`.
 
     Raises:
-        ChefsHatError: the games are refused, or the server does not answer.
+        ChefsHatError: the games are refused, the server does not answer, or there is no such agent.
+        NetworkFileError: the file of a player is not a network.
+        OSError: it cannot be read.
         ValueError: a network was trained for games of another size, there is no such seat, or fewer than two deals.
     """
     if deals < 2:

@@ -25,7 +25,7 @@ from chefshat.masks import unpack
 FORMAT = "chefshat-network-1"
 # The built-in agent that is a network.
 TRAINED = "trained"
-# The points that it brings.
+# Its value network.
 TRAINED_POINTS = "trained_points"
 
 Floats = npt.NDArray[np.float32]
@@ -53,7 +53,8 @@ class NetworkInfo:
     Attributes:
         input: the function of `features` that computes its input.
         output: "actions": an output for each of the A actions; "turns": for the T actions of a turn; at other decisions the agent
-            takes the default action; "points": the points that the seat expects of the Shift, which no agent can play.
+            takes the default action; "points": a value network, the points that the seat expects of the Shift, at decisions among
+            several actions.
         output_activation: activation of the last layer. It does not affect the actions chosen.
         masked: whether it was trained to choose only among legal actions. Agents that play it always do.
         players: seats of the rule set, N.
@@ -180,9 +181,9 @@ class Network:
         return values
 
     def points_of(self, situations: Situations) -> Floats:
-        """Returns the points that the seat of each row expects of the Shift, (R,) float32, by a network whose output they are.
+        """Returns the points that the seat of each row expects of the Shift, (R,) float32, by a value network.
 
-        It is a `leaf` of `search.Position.evaluate`.
+        It has learned from decisions among several actions. A `leaf` of `search.Position.evaluate`.
         """
         if self.info.output != "points":
             raise ValueError(f"the network {self.info.name!r} has outputs for {self.info.output}: `value` trains one for points")
@@ -212,7 +213,7 @@ class Network:
 
     def _check_chooses(self) -> None:
         if self.info.output == "points":
-            raise ValueError(f"the network {self.info.name!r} knows points and chooses no actions")
+            raise ValueError(f"the value network {self.info.name!r} chooses no actions")
 
     def actions_of(self, situations: Situations) -> Actions:
         """Returns the action of each row of a batch, or of `Decision.situations`: (R,) u16. See `actions`."""
@@ -264,7 +265,7 @@ def save(
 def load(path: str | os.PathLike[str]) -> Network:
     """Reads a network from a file, or that of the built-in agent: "trained", which is in chefshat-native.
 
-    "trained_points" is the network, in this package, that knows how many points `trained` brings.
+    "trained_points" is the value network of `trained`, in this package.
 
     Raises:
         NetworkFileError: the file is not a network.

@@ -40,13 +40,12 @@ def existing(training: Path) -> Path:
     return training
 
 
-def refuse_to_replace(*files: Path) -> None:
+def refuse_to_replace(*files: Path, can_resume: bool = True) -> None:
     """Raises FileExistsError, saying what to do, if any of the files that a new training would write exists."""
+    resume = "continue that training with --resume, " if can_resume else ""
     for file in files:
         if file.exists():
-            raise FileExistsError(
-                f"{file} exists: continue that training with --resume, replace it with --force, or give another --out"
-            )
+            raise FileExistsError(f"{file} exists: {resume}replace it with --force, or give another --out")
 
 
 def trained_by(before: str, command: str) -> str:

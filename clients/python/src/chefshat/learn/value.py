@@ -1,7 +1,7 @@
-"""The command `value`: a network that says how many points a policy brings, from what the seat that decides may know.
+"""The command `value`: trains a value network, which estimates the expected points of a policy from what a seat may know.
 
-The policy plays all seats. In every Shift one seat of them takes, at a random decision, a random action: what follows is that
-policy's again, and shows situations to which it would not have come. Only those decisions are learned from.
+The policy plays all seats. In each Shift the first seat takes a random action at one of its first decisions, and then plays by the
+policy again, in situations that it would not have reached itself. The network learns from the decisions after that action.
 """
 
 import argparse
@@ -10,6 +10,8 @@ import json
 import sys
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -25,21 +27,22 @@ from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import features, network, runs
 from chefshat.learn.mlp import Mlp, Params, to_layers
 from chefshat.learn.network import Network, NetworkFileError, NetworkInfo
+from chefshat.opponents import selected
 from chefshat.vector import VectorEnv
 
 # Parallel games.
-SIDE_BY_SIDE = 256
-# The random action is one of the first decisions, as many as a Shift rarely has more.
+GAMES = 256
+# The random action is one of the first 20 decisions; few Shifts have more.
 EXPLORED = 20
-# The share of Shifts that measure what was learned from the others.
-MEASURED = 0.1
+# The share of Shifts for validation.
+VALIDATION = 0.1
 MINIBATCH = 1024
 LEARNING_RATE = 1e-3
 
 
 @dataclass(frozen=True)
 class Learned:
-    """How well the points of Shifts that were not learned from are known. A constant, their mean, explains 0.
+    """How well the points of other Shifts are estimated. A constant, their mean, explains 0 of their variance.
 
     Attributes:
         decisions: decisions learned from.
@@ -80,10 +83,11 @@ def run(options: argparse.Namespace) -> int:
     """Runs the command: plays, learns, writes the network and prints how well it knows. Returns the exit code."""
     try:
         if not options.force:
-            runs.refuse_to_replace(options.out)
+            runs.refuse_to_replace(options.out, can_resume=False)
         policy = network.load(options.policy)
-        name = str(options.policy)
-        samples, rules = play(policy, name, options.decisions, options.seed, options.rules, join_options.server_if_any(options))
+        samples, rules = play(
+            policy, options.policy, options.decisions, options.seed, options.rules, join_options.server_if_any(options)
+        )
         params, found = learn(samples, options.width, options.epochs, options.seed, float(max(rules.points)))
         info = NetworkInfo(
             input="table",
@@ -94,7 +98,7 @@ def run(options: argparse.Namespace) -> int:
             faces=rules.faces,
             jokers=rules.jokers,
             rules=MessageToJson(rules, indent=None, sort_keys=True),
-            name=f"value of {policy.info.name or name}"[:64],
+            name=f"value of {policy.info.name or options.policy}"[:64],
             trained_by=runs.trained_by("", options.trained_by),
         )
         network.save(options.out, to_layers(params), info, dtype=np.float16)
@@ -105,65 +109,62 @@ def run(options: argparse.Namespace) -> int:
 
 
 def play(
-    policy: Network, name: str, decisions: int, seed: int, rules: str | pb.RuleSet, address: str | ServerAddress | None
+    policy: Network, file: Path, decisions: int, seed: int, rules: str | pb.RuleSet, address: str | ServerAddress | None
 ) -> tuple[Samples, pb.RuleSet]:
-    """Plays until there are this many decisions to learn from. `name`: the policy for the other seats, see `VectorEnv`."""
+    """Plays until there are this many decisions to learn from. `file`: the policy's, by which the other seats play."""
     if policy.info.output != "actions":
-        raise ValueError(f"{name} has outputs for {policy.info.output}: a value is that of a policy for all actions")
+        raise ValueError(f"{file} has outputs for {policy.info.output}: a value is that of a policy for all actions")
+    opponent = network.TRAINED if str(file) == network.TRAINED else file
     rng = np.random.default_rng(seed)
     inputs: list[npt.NDArray[np.float16]] = []
     cards: list[npt.NDArray[np.uint8]] = []
-    # Of each decision: its Shift, and its number in the Shift.
     shifts_of: list[npt.NDArray[np.int64]] = []
-    numbers_of: list[npt.NDArray[np.int64]] = []
-    options = {"client_seats": [0], "opponents": name, "rules": rules, "skip_forced": True}
-    with VectorEnv(address, SIDE_BY_SIDE, seed=runs.SEED_STEP + seed, **options) as env:  # type: ignore[arg-type]
+    # The Shifts that have ended, and their points.
+    ended_shifts: list[npt.NDArray[np.int64]] = []
+    ended_points: list[npt.NDArray[np.float32]] = []
+    options: Any = {"client_seats": [0], "opponents": opponent, "rules": rules, "skip_forced": True}
+    with VectorEnv(address, GAMES, seed=runs.SEED_STEP + seed, **options) as env:
         if not policy.info.fits(env.players, env.faces, env.hand_size):
-            raise ValueError(f"{name} plays with {policy.info.players} players and {policy.info.faces} faces, not in these games")
+            raise ValueError(f"{file} plays with {policy.info.players} players and {policy.info.faces} faces, not in these games")
         worth = np.array(env.rules.points, np.float32)
-        shift = np.arange(SIDE_BY_SIDE)
-        number = np.zeros(SIDE_BY_SIDE, np.int64)
-        explored = rng.integers(EXPLORED, size=SIDE_BY_SIDE)
-        # By Shift: its points, NaN until it has ended, and the decision after which it counts.
-        points, after, kept = [np.full(SIDE_BY_SIDE, np.nan, np.float32)], [explored], 0
+        # Of each game: its Shift, the number of its next decision there, and that of the random action.
+        shift, number, explored = np.arange(GAMES), np.zeros(GAMES, np.int64), rng.integers(EXPLORED, size=GAMES)
+        begun, kept = GAMES, 0
+        random_actions = env.sample(seed)
         with tqdm(total=decisions, unit=" decisions", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
             while kept < decisions:
-                batch = env.batch
-                games = batch.games
-                inputs.append(features.table_of(batch).astype(np.float16))
-                cards.append(batch.observations.cards_left)
-                shifts_of.append(shift[games])
-                numbers_of.append(number[games])
-                new = int(np.count_nonzero(number[games] > explored[games]))
-                kept += new
-                bar.update(new)
-                chosen = policy.actions_of(batch)
-                actions = np.where(number[games] == explored[games], env.sample(), chosen)
+                batch, games = env.batch, env.batch.games
+                rows = np.flatnonzero(number[games] > explored[games])
+                if len(rows):
+                    inputs.append(features.table_of(selected(batch, rows)).astype(np.float16))
+                    cards.append(batch.observations.cards_left[rows])
+                    shifts_of.append(shift[games[rows]])
+                    kept += len(rows)
+                    bar.update(len(rows))
+                actions = np.where(number[games] == explored[games], random_actions, policy.actions_of(batch))
                 number[games] += 1
                 endings = env.step(actions).endings
                 ended, at = np.unique(endings.games, return_index=True)
-                if len(ended):
-                    begun = sum(map(len, points))
-                    known = np.concatenate(points)
-                    known[shift[ended]] = worth[endings.places_taken[at] - 1]
-                    shift[ended] = begun + np.arange(len(ended))
-                    number[ended] = 0
-                    explored[ended] = rng.integers(EXPLORED, size=len(ended))
-                    points = [known, np.full(len(ended), np.nan, np.float32)]
-                    after.append(explored[ended])
+                ended_shifts.append(shift[ended])
+                ended_points.append(worth[endings.places_taken[at] - 1])
+                shift[ended] = begun + np.arange(len(ended))
+                begun += len(ended)
+                number[ended], explored[ended] = 0, rng.integers(EXPLORED, size=len(ended))
+                random_actions = env.sample()
         rules_used = env.rules
-    all_points, all_after = np.concatenate(points), np.concatenate(after)
-    shifts, numbers = np.concatenate(shifts_of), np.concatenate(numbers_of)
-    counts = (numbers > all_after[shifts]) & ~np.isnan(all_points[shifts])
-    samples = Samples(np.concatenate(inputs)[counts], np.concatenate(cards)[counts], all_points[shifts[counts]], shifts[counts])
+    points = np.full(begun, np.nan, np.float32)
+    points[np.concatenate(ended_shifts)] = np.concatenate(ended_points)
+    shifts = np.concatenate(shifts_of)
+    known = ~np.isnan(points[shifts])
+    samples = Samples(np.concatenate(inputs)[known], np.concatenate(cards)[known], points[shifts[known]], shifts[known])
     return samples, rules_used
 
 
 def learn(samples: Samples, width: int, epochs: int, seed: int, most: float) -> tuple[Params, Learned]:
     """Learns the points by least squares. `most`: the most points of a Shift, for the scale of the outputs."""
-    chance = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     shifts, of = np.unique(samples.shifts, return_inverse=True)
-    measured = (chance.random(len(shifts)) < MEASURED)[of]
+    measured = (rng.random(len(shifts)) < VALIDATION)[of]
     rows = np.flatnonzero(~measured)
     if len(rows) < MINIBATCH or not measured.any():
         raise ValueError(f"{len(samples.points)} decisions are too few to learn from: play more with --decisions")
@@ -175,7 +176,7 @@ def learn(samples: Samples, width: int, epochs: int, seed: int, most: float) -> 
     update = jax.jit(partial(_update, mlp, optimizer))
     with tqdm(total=steps, unit=" updates", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
         for _ in range(epochs):
-            order = chance.permutation(rows)
+            order = rng.permutation(rows)
             for first in range(0, len(rows) - MINIBATCH + 1, MINIBATCH):
                 part = order[first : first + MINIBATCH]
                 targets = samples.points[part] / most
