@@ -121,14 +121,11 @@ def test_both_ways_to_the_games_are_equal(real_address: str, number: int) -> Non
     "options",
     [
         {"games": 0},
-        {"games": 16385, "client_seats": [0]},
         {"client_seats": [1, 0]},
         {"client_seats": [0], "opponents": "nobody"},
         {"client_seats": [0], "opponents": ["greedy", "greedy"]},
         {"max_invalid_attempts": 3},
         {"total_games": 1, "games": 2},
-        {"records": True, "games": 257},
-        {"records": True, "rules": {"target_points": 1001}},
         {"records": True, "invalid": "ask_again"},
         {"rules": {"faces": 40}},
         {"rules": "nothing"},
@@ -143,6 +140,24 @@ def test_refusals_have_the_same_words(real_address: str, options: dict[str, Any]
             VectorEnv(address, **options)
         refusals.append((refused.value.reason, refused.value.message, refused.value.metadata))
     assert refusals[0] == refusals[1]
+
+
+@pytest.mark.server
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"games": 16385, "client_seats": [0]}, "play at most 16384 games times seats"),
+        ({"games": 1025, "history": 512, "client_seats": [0]}, "choose at most 524288 actions"),
+        ({"records": True, "games": 257}, "at most 256 parallel games can be recorded"),
+        ({"records": True, "rules": {"target_points": 1001}}, "ends after at most 1000 points or Shifts"),
+        ({"seed": [bytes(32)] * 16385}, "16385 seeds; give 1 to 16384"),
+    ],
+    ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
+)
+def test_what_a_server_limits_is_free_in_this_process(real_address: str, options: dict[str, Any], words: str) -> None:
+    with pytest.raises(ChefsHatError, match=words):
+        VectorEnv(real_address, **options)
+    VectorEnv(**options).close()
 
 
 def test_draws_are_legal_uniform_and_repeatable() -> None:
