@@ -21,6 +21,7 @@ use numpy::PyArray1;
 use prost::Message as _;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use crate::games::{caught, decode, refused};
@@ -308,11 +309,7 @@ pub(crate) fn play_states<'py>(
             let game = games[number as usize].closing_copy();
             play_on(game, &policies, stream(seed, number).seed())
         };
-        let played: Vec<_> = match &pool {
-            Some(pool) => pool.install(|| part.into_par_iter().map(played).collect()),
-            None => part.map(played).collect(),
-        };
-        played
+        on_pool(pool.as_deref(), part, played)
             .iter()
             .flat_map(|worths| worths.values().copied())
             .collect()
@@ -341,10 +338,7 @@ pub(crate) fn choose_actions<'py>(
             let game = &games[number as usize];
             choose(game, &policy, stream(seed, number).seed()).index()
         };
-        match &pool {
-            Some(pool) => pool.install(|| part.into_par_iter().map(chosen).collect()),
-            None => part.map(chosen).collect(),
-        }
+        on_pool(pool.as_deref(), part, chosen)
     })?;
     Ok(PyArray1::from_vec(py, actions))
 }
@@ -384,6 +378,18 @@ fn in_chunks<T: Send>(
         py.check_signals()?;
     }
     Ok(done)
+}
+
+/// What `of` returns for each number, in order.
+fn on_pool<T: Send>(
+    pool: Option<&ThreadPool>,
+    part: Range<u64>,
+    of: impl Fn(u64) -> T + Sync + Send,
+) -> Vec<T> {
+    match pool {
+        Some(pool) => pool.install(|| part.into_par_iter().map(of).collect()),
+        None => part.map(of).collect(),
+    }
 }
 
 fn shifts<'py>(py: Python<'py>, worths: &[Worth]) -> Shifts<'py> {

@@ -92,8 +92,8 @@ impl RunningGame {
     }
 
     /// Replaces the agents by those of other terms. Seats with the same agent keep it as it is; another
-    /// one begins here, from the game's seed. Rewards of a seat whose player changes begin with 0, and a
-    /// decision that is no longer the client's is without the attempts at it so far.
+    /// one begins here, from the game's seed. Rewards of a seat whose player changes begin with 0. If
+    /// the open decision is no longer the client's, its attempts so far do not count.
     pub(super) fn reseat(&mut self, before: &Terms, here: &Terms) {
         let mut agents = RunningGame::agents(here, self.seed);
         for (seat, (agent, kept)) in agents.iter_mut().zip(&self.agents).enumerate() {
