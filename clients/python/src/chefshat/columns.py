@@ -341,6 +341,11 @@ class Endings(Situations):
         """(R,): whether the episode was cut off without places. An adjudicated Shift has places and terminates."""
         return np.asarray((self.ends != pb.EPISODE_END_FINISHED) & (self.places_taken == 0))
 
+    def first_of_each_game(self) -> "Endings":
+        """Returns the first ending of each game, for one seat of the client: it had no decision in further ones."""
+        first = np.unique(self.games, return_index=True)[1]
+        return self if len(first) == len(self) else self.take(first)
+
     def __init__(self, rows: int, sizes: Sizes, message: pb.EpisodeEndings | None = None) -> None:
         super().__init__(rows, sizes, message)
         self.__dict__["kinds"] = np.zeros(rows, np.uint8)

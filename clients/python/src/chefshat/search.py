@@ -5,7 +5,8 @@ that the seat may not know are dropped before anything is computed, so two games
 results. The computation needs the package `chefshat-native`; `Client.evaluate` estimates a live decision on a server without it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
@@ -19,7 +20,7 @@ from chefshat.errors import ChefsHatError
 from chefshat.estimates import Estimates, Outcomes, checked_prior, mean_and_error, scores
 from chefshat.opponents import selected
 from chefshat.vector import Batch, VectorEnv
-from chefshat.vector_setup import NETWORK_SUFFIX, network_content
+from chefshat.vector_setup import is_network_file, network_content
 
 if TYPE_CHECKING:
     import chefshat_native
@@ -63,13 +64,10 @@ def position(at: At, row: int = 0, *, max_steps: int = MAX_STEPS) -> "Position":
         ChefsHatError: NATIVE_MISSING without `chefshat-native`; STATES_REFUSED if the state has no decision or a history that is
             too short; ANALYSIS_REFUSED if there are too many deals to count.
     """
-    native = _native()
-    try:
+    with _engine() as native:
         if isinstance(at, Decision):
             return Position(native.Position.of_situation(at.situation().SerializeToString(), max_steps))
         return Position(native.Position.of_state(_state(at, row), max_steps))
-    except native.Refused as error:
-        raise ChefsHatError(*error.args) from None
 
 
 def play_on(
@@ -91,12 +89,9 @@ def play_on(
     Raises:
         ChefsHatError: STATES_REFUSED or ANALYSIS_REFUSED says what is wrong with a state or an agent.
     """
-    native = _native()
     agents = [agent] if isinstance(agent, (str, Path)) else list(agent)
-    try:
+    with _engine() as native:
         points, places = native.play_states(list(states), [_policy(one) for one in agents], threads=threads, seed=_seed(seed))
-    except native.Refused as error:
-        raise ChefsHatError(*error.args) from None
     shape = (len(states), -1 if len(states) else 0)
     return points.reshape(shape), places.reshape(shape)
 
@@ -117,11 +112,8 @@ def choose(states: Sequence[bytes], agent: Agent = "greedy", *, seed: int = 0) -
     Raises:
         ChefsHatError: STATES_REFUSED or ANALYSIS_REFUSED says what is wrong with a state or the agent.
     """
-    native = _native()
-    try:
+    with _engine() as native:
         return native.choose_actions(list(states), _policy(agent), seed=_seed(seed))  # type: ignore[no-any-return]
-    except native.Refused as error:
-        raise ChefsHatError(*error.args) from None
 
 
 class Position:
@@ -220,8 +212,7 @@ class Position:
                 raise ValueError(f"a prior needs 1..={MAX_DEALS} rollouts, and considers 1 action or more")
             chosen = self._chosen(actions)
             return self._by_prior(rollouts, chosen, checked_prior(prior, len(chosen)), considered, agent, threads, seed)
-        native = _native()
-        try:
+        with _engine():
             columns = self._native.evaluate(
                 self._chosen(actions).tolist(),
                 _policy(agent),
@@ -231,8 +222,6 @@ class Position:
                 threads=threads,
                 seed=_seed(seed),
             )
-        except native.Refused as error:
-            raise ChefsHatError(*error.args) from None
         return Estimates(**columns)
 
     def outcomes(
@@ -275,13 +264,10 @@ class Position:
         self, actions: NDArray[np.uint16], first: int, deals: int, agent: Agent, threads: int, seed: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Returns points and places, (deals, A) each, in deals from `first` on."""
-        native = _native()
-        try:
+        with _engine():
             found = self._native.outcomes(
                 actions.tolist(), _policy(agent), first=first, deals=deals, threads=threads, seed=_seed(seed)
             )
-        except native.Refused as error:
-            raise ChefsHatError(*error.args) from None
         points, places = (column.reshape(deals, len(actions)).astype(np.float64) for column in found)
         return points, places
 
@@ -309,9 +295,9 @@ class Position:
         self, leaf: Leaf, batch: Batch, worth: NDArray[np.float64], points: NDArray[np.float64], places: NDArray[np.float64]
     ) -> bool:
         """Sets points and places of the games that have come to a leaf, or to the end of the Shift. Returns whether all have."""
-        ended, at = np.unique(batch.endings.games, return_index=True)
-        new = np.isnan(points[ended])
-        ended, reached = ended[new], batch.endings.places_taken[at][new]
+        endings = batch.endings.first_of_each_game()
+        new = np.isnan(points[endings.games])
+        ended, reached = endings.games[new], endings.places_taken[new]
         places[ended], points[ended] = reached, worth[reached - 1]
         rows = np.flatnonzero(np.isnan(points[batch.games]))
         if len(rows):
@@ -367,7 +353,9 @@ class Position:
         return Estimates(chosen, points_of, errors, gains_of, gain_errors, places_of, rollouts_of)
 
 
-def _native() -> ModuleType:
+@contextmanager
+def _engine() -> Iterator[ModuleType]:
+    """Provides the native module, and raises what it refuses as `ChefsHatError`."""
     try:
         import chefshat_native
     except ModuleNotFoundError as error:
@@ -376,13 +364,15 @@ def _native() -> ModuleType:
             "decision with Client.evaluate"
         )
         raise ChefsHatError("NATIVE_MISSING", words) from error
-    return chefshat_native
+    try:
+        yield chefshat_native
+    except chefshat_native.Refused as error:
+        raise ChefsHatError(*error.args) from None
 
 
 def _policy(agent: Agent) -> str | bytes:
     """Returns an agent as the engine takes it."""
-    is_file = isinstance(agent, Path) or agent.endswith(NETWORK_SUFFIX)
-    return network_content(agent) if is_file else str(agent)
+    return network_content(agent) if is_network_file(agent) else str(agent)
 
 
 def _state(at: VectorEnv | Wrapper | bytes, row: int) -> bytes:

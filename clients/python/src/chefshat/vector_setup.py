@@ -143,6 +143,11 @@ def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
     return setup
 
 
+def is_network_file(agent: str | PathLike[str]) -> bool:
+    """Returns whether this names a network file, and not a built-in agent."""
+    return isinstance(agent, PathLike) or agent.endswith(NETWORK_SUFFIX)
+
+
 def network_content(file: str | PathLike[str]) -> bytes:
     """Returns the content of a network file. Raises ValueError if it is too large for one: files of other kinds may be huge."""
     path = Path(file)
@@ -157,10 +162,10 @@ def _put_opponents(setup: pb.VectorSetup, opponents: Opponent | Sequence[Opponen
     for opponent in [opponents] if isinstance(opponents, (str, bytes, PathLike)) else opponents:
         if isinstance(opponent, bytes):
             name, content = "", opponent
-        elif isinstance(opponent, PathLike) or opponent.endswith(NETWORK_SUFFIX):
+        elif is_network_file(opponent):
             name, content = Path(opponent).name, network_content(opponent)
         else:
-            setup.opponents.append(opponent)
+            setup.opponents.append(str(opponent))
             continue
         if content not in numbers:
             numbers[content] = len(numbers)

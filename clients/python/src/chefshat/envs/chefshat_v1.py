@@ -185,7 +185,8 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
         self.agent_selection = agent
         if batch.sizes.has_all_hands:
             hands = batch.all_hands.reshape(-1, len(self._deck)) / self._deck
-            self._state = np.concatenate([features.table_of(batch)[0], np.roll(hands, -seat, axis=0).ravel()])
+            seen = observation if self._form.is_table else features.table_of(batch)[0]
+            self._state = np.concatenate([seen, np.roll(hands, -seat, axis=0).ravel()])
         self._seen[agent] = observation
         self.infos[agent] = {"kind": kind, "invalid_attempts": attempts}
         return reward

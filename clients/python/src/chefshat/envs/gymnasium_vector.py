@@ -147,7 +147,7 @@ class ChefsHatVectorEnv(NotCopied, gymnasium.vector.VectorEnv[Any, Any, Any]):
         truncations = np.zeros(self.num_envs, np.bool_)
         observed, infos = self._observe(batch), self._infos(batch)
         if len(batch.endings):
-            endings = _first_of_each(batch.endings)
+            endings = batch.endings.first_of_each_game()
             rewards[endings.games] = endings.rewards
             terminations[endings.games] = ~endings.truncated
             truncations[endings.games] = endings.truncated
@@ -224,12 +224,6 @@ class ChefsHatVectorEnv(NotCopied, gymnasium.vector.VectorEnv[Any, Any, Any]):
         places[endings.games] = endings.places_taken
         infos["final_obs"], infos["_final_obs"] = last, ended
         infos["final_info"], infos["_final_info"] = {"place": places, "_place": ended}, ended
-
-
-def _first_of_each(endings: Endings) -> Endings:
-    """Returns the first ending of each game: the seat had no decision in further ones."""
-    first = np.unique(endings.games, return_index=True)[1]
-    return endings if len(first) == len(endings) else endings.take(first)
 
 
 def _put(before: NDArray[Any] | None, games: NDArray[np.uint32], rows: NDArray[Any], count: int = 0) -> NDArray[Any]:

@@ -23,7 +23,7 @@ from chefshat.learn import network as network_file
 from chefshat.learn.network import Network, NetworkFileError
 from chefshat.opponents import Policy
 from chefshat.vector import Rules, Seed, VectorEnv
-from chefshat.vector_setup import NETWORK_SUFFIX
+from chefshat.vector_setup import is_network_file
 
 # Parallel games.
 SIDE_BY_SIDE = 256
@@ -190,7 +190,7 @@ def _play(
     address: str | ServerAddress | None,
 ) -> _Played:
     """Plays games with the player on a seat."""
-    if isinstance(player, Path) or (isinstance(player, str) and player.endswith(NETWORK_SUFFIX)):
+    if isinstance(player, (str, Path)) and is_network_file(player):
         player = network_file.load(player)
     network = player if isinstance(player, Network) else None
     with VectorEnv(
@@ -228,7 +228,7 @@ def _play(
                 break
             if isinstance(player, Network):
                 actions: npt.ArrayLike = player.actions_of(batch)
-            elif isinstance(player, str):
+            elif isinstance(player, (str, Path)):
                 actions = search.choose(env.save(batch.games), player, seed=batch.step)
             else:
                 actions = player(batch)

@@ -180,6 +180,10 @@ class Network:
             values = (np.fmax(values, 0) if number else values) @ weight.T + bias
         return values
 
+    def _sums_of(self, situations: Situations) -> Floats:
+        observations, seats, kinds, masks = situations.observations, situations.seats, situations.kinds, situations.mask_bits
+        return self._sums(self.inputs(observations, seats, kinds, masks))
+
     def points_of(self, situations: Situations) -> Floats:
         """Returns the points that the seat of each row expects of the Shift, (R,) float32, by a value network.
 
@@ -187,8 +191,7 @@ class Network:
         """
         if self.info.output != "points":
             raise ValueError(f"the network {self.info.name!r} has outputs for {self.info.output}: `value` trains one for points")
-        observations, seats, kinds, masks = situations.observations, situations.seats, situations.kinds, situations.mask_bits
-        return self._sums(self.inputs(observations, seats, kinds, masks))[:, 0]
+        return self._sums_of(situations)[:, 0]
 
     def logits_of(self, situations: Situations) -> Floats:
         """Returns the outputs of each row before their activation, (R, `info.output_width`) float32; -inf at illegal actions.
@@ -196,9 +199,8 @@ class Network:
         The softmax of a row is the policy that `ppo` trained, of which `actions_of` takes the most likely action.
         """
         self._check_chooses()
-        observations, seats, kinds, masks = situations.observations, situations.seats, situations.kinds, situations.mask_bits
-        sums = self._sums(self.inputs(observations, seats, kinds, masks))
-        return np.where(unpack(masks, sums.shape[1]), sums, np.float32(-np.inf))
+        sums = self._sums_of(situations)
+        return np.where(unpack(situations.mask_bits, sums.shape[1]), sums, np.float32(-np.inf))
 
     def actions(
         self, observations: Observations, seats: features.Bytes, kinds: features.Bytes, mask_bits: features.Bytes

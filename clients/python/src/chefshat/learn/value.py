@@ -143,10 +143,10 @@ def play(
                     bar.update(len(rows))
                 actions = np.where(number[games] == explored[games], random_actions, policy.actions_of(batch))
                 number[games] += 1
-                endings = env.step(actions).endings
-                ended, at = np.unique(endings.games, return_index=True)
+                endings = env.step(actions).endings.first_of_each_game()
+                ended = endings.games
                 ended_shifts.append(shift[ended])
-                ended_points.append(worth[endings.places_taken[at] - 1])
+                ended_points.append(worth[endings.places_taken - 1])
                 shift[ended] = begun + np.arange(len(ended))
                 begun += len(ended)
                 number[ended], explored[ended] = 0, rng.integers(EXPLORED, size=len(ended))
