@@ -1,5 +1,6 @@
 //! Tables of a Swiss round: participants with similar standings meet, from the top, with as few
-//! repeated meetings as possible. Byes go to the lowest of the participants with the fewest byes.
+//! repeated meetings as possible. Byes go to those who have left, then to the lowest of the participants
+//! with the fewest byes.
 
 use std::cmp::Reverse;
 
@@ -18,16 +19,20 @@ const MEMORY: usize = 500;
 pub(super) fn draw(state: &TournamentState, chance: &mut Chance) -> Pairings {
     let seats = state.settings.players;
     let mut order = standings::order(state);
-    let byes = byes(state, &order, order.len() % seats);
+    // Those who have left fill the last table, and are at no others.
+    let stay = order.iter().filter(|&&who| !state.withdrawn[who]).count();
+    let tables = (order.len() / seats).min(stay.div_ceil(seats).max(1));
+    let byes = byes(state, &order, order.len() - tables * seats);
     order.retain(|who| !byes.contains(who));
     let tables = Tables::new(state, order, seats).improved(chance);
     Pairings { tables, byes }
 }
 
-/// Selects byes: participants with the fewest so far, the lowest ranks first.
+/// Selects byes: those who have left, then participants with the fewest so far, the lowest ranks first.
 fn byes(state: &TournamentState, order: &[usize], count: usize) -> Vec<usize> {
     let mut candidates: Vec<(usize, usize)> = order.iter().copied().enumerate().collect();
-    candidates.sort_by_key(|&(rank, who)| (state.sums[who].byes, Reverse(rank)));
+    candidates
+        .sort_by_key(|&(rank, who)| (!state.withdrawn[who], state.sums[who].byes, Reverse(rank)));
     let chosen = candidates.into_iter().take(count);
     let mut byes: Vec<usize> = chosen.map(|(_, who)| who).collect();
     byes.sort_unstable();

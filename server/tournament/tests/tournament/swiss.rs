@@ -1,7 +1,7 @@
 //! Rounds of a Swiss tournament: similar scores meet, few pairs meet twice, byes go to the lowest
 //! without one.
 
-use chefshat_tournament::{Format, Tournament};
+use chefshat_tournament::{Format, Leaving, Tournament};
 
 use super::support::{
     Round, begun, drawn, end, follow, meetings, played_by_number, range, settings,
@@ -164,5 +164,34 @@ fn the_default_number_of_rounds_can_find_a_winner() {
             begun(settings(Format::Swiss), participants).rounds(),
             rounds
         );
+    }
+}
+
+#[test]
+fn those_who_have_left_make_room() {
+    // Participants, those who leave after the first round, how many of them sit out in the second.
+    for (participants, leaving, byes) in [
+        (6, &[1, 4][..], 2),
+        // Without two of them, some would sit out who have stayed.
+        (9, &[0, 2, 8], 1),
+        (8, &[3], 0),
+        (8, &[0, 1, 2, 3], 4),
+    ] {
+        let mut settings = settings(Format::Swiss);
+        settings.rounds = Some(2);
+        let mut tournament = begun(settings, participants);
+        for game in tournament.playing().collect::<Vec<_>>() {
+            let ended = played_by_number(&tournament, game);
+            end(&mut tournament, game, ended);
+        }
+        for who in leaving {
+            let left = tournament.withdraw(*who, Leaving::Itself);
+            tournament.fold(&left.expect("it plays").expect("a change"));
+        }
+        let changes = follow(&mut tournament, 0);
+        let round = drawn(&changes).pop().expect("a second round");
+        assert_eq!(round.byes.len(), byes, "{participants}: {round:?}");
+        let have_left = round.byes.iter().all(|who| leaving.contains(who));
+        assert!(have_left, "{participants}: {round:?}");
     }
 }
