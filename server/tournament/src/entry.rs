@@ -177,10 +177,18 @@ impl Tournament {
     /// Whether another participant than the one at `place` has this name.
     pub fn is_name_taken(&self, name: &str, place: Option<usize>) -> bool {
         let mut others = (self.state.everybody().into_iter()).filter(|&who| Some(who) != place);
-        // Equal names would be indistinguishable in the standings.
-        let name = name.to_lowercase();
-        others.any(|who| self.state.participants[who].name.to_lowercase() == name)
+        // Names that look the same would be indistinguishable in the standings.
+        let name = looks(name);
+        others.any(|who| looks(&self.state.participants[who].name) == name)
     }
+}
+
+/// A name as it looks: without capitals, without what only chooses the form of a symbol, and with one
+/// space for all kinds of them.
+fn looks(name: &str) -> String {
+    let words: Vec<&str> = name.split_whitespace().collect();
+    let letters = words.join(" ").to_lowercase();
+    letters.replace(|letter| matches!(letter, '\u{fe00}'..='\u{fe0f}'), "")
 }
 
 /// Name of fillers, before their number.
