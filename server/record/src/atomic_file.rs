@@ -1,4 +1,5 @@
-//! A file that replaces its target atomically: written beside it, synced, then renamed.
+//! A file that replaces its target atomically: written beside it, synced, then renamed. A link stays
+//! one, and what it leads to is replaced; pipes and devices are written to.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -23,7 +24,32 @@ pub struct WriteError {
 #[derive(Debug)]
 pub struct AtomicFile {
     path: PathBuf,
-    file: BufWriter<NamedTempFile>,
+    file: BufWriter<Target>,
+}
+
+/// Where bytes go.
+#[derive(Debug)]
+enum Target {
+    /// The unfinished file.
+    Part(NamedTempFile),
+    /// A pipe or device, which nothing replaces.
+    Through(File),
+}
+
+impl Write for Target {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Part(file) => file.write(bytes),
+            Self::Through(file) => file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::Part(file) => file.flush(),
+            Self::Through(file) => file.flush(),
+        }
+    }
 }
 
 impl AtomicFile {
@@ -52,25 +78,39 @@ impl AtomicFile {
         path: &Path,
         open: impl Fn(&Path) -> io::Result<File>,
     ) -> Result<Self, WriteError> {
-        let mut prefix = path.file_name().unwrap_or_default().to_owned();
-        prefix.push(".");
-        let file = tempfile::Builder::new()
-            .prefix(&prefix)
-            .suffix(".part")
-            .make_in(folder_of(path), open)
-            .map_err(|source| WriteError {
-                path: path.to_path_buf(),
-                source,
-            })?;
-        Ok(Self {
-            path: path.to_path_buf(),
-            file: BufWriter::new(file),
-        })
+        let path = match path.is_symlink() {
+            true => path.canonicalize().unwrap_or_else(|_| path.to_path_buf()),
+            false => path.to_path_buf(),
+        };
+        let opened = match std::fs::metadata(&path) {
+            Ok(it) if !it.is_file() && !it.is_dir() => {
+                (File::options().write(true).open(&path)).map(Target::Through)
+            }
+            _ => {
+                let mut prefix = path.file_name().unwrap_or_default().to_owned();
+                prefix.push(".");
+                let part = tempfile::Builder::new()
+                    .prefix(&prefix)
+                    .suffix(".part")
+                    .make_in(folder_of(&path), open);
+                part.map(Target::Part)
+            }
+        };
+        match opened {
+            Ok(target) => Ok(Self {
+                path,
+                file: BufWriter::new(target),
+            }),
+            Err(source) => Err(WriteError { path, source }),
+        }
     }
 
     /// The path of the unfinished file, for another program to write to.
     pub fn part(&self) -> &Path {
-        self.file.get_ref().path()
+        match self.file.get_ref() {
+            Target::Part(file) => file.path(),
+            Target::Through(_) => &self.path,
+        }
     }
 
     /// Writes bytes.
@@ -97,6 +137,13 @@ impl AtomicFile {
     /// # Errors
     /// The target exists, or the file system refused.
     pub fn finish_new(self) -> Result<(), WriteError> {
+        if let Target::Through(_) = self.file.get_ref() {
+            let source = io::ErrorKind::AlreadyExists.into();
+            return Err(WriteError {
+                path: self.path.clone(),
+                source,
+            });
+        }
         self.finish_by(|file, path| file.persist_noclobber(path))
     }
 
@@ -105,11 +152,13 @@ impl AtomicFile {
         persist: impl FnOnce(NamedTempFile, &Path) -> Result<File, PersistError>,
     ) -> Result<(), WriteError> {
         let Self { path, file } = self;
-        let finish = || {
-            let file = file.into_inner().map_err(io::IntoInnerError::into_error)?;
-            file.as_file().sync_all()?;
-            persist(file, &path)?;
-            sync_folder_of(&path)
+        let finish = || match file.into_inner().map_err(io::IntoInnerError::into_error)? {
+            Target::Part(file) => {
+                file.as_file().sync_all()?;
+                persist(file, &path)?;
+                sync_folder_of(&path)
+            }
+            Target::Through(mut file) => file.flush(),
         };
         finish().map_err(|source| WriteError {
             path: path.clone(),

@@ -92,6 +92,33 @@ fn an_unfinished_file_leaves_the_target_unchanged() {
     assert!(error.starts_with(&nowhere.display().to_string()), "{error}");
 }
 
+#[cfg(unix)]
+#[test]
+fn links_and_pipes_stay_what_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+    std::fs::write(&file, "before").unwrap();
+    std::os::unix::fs::symlink("file", &link).unwrap();
+    let mut written = AtomicFile::create(&link).unwrap();
+    written.write_all(b"after").unwrap();
+    written.finish().unwrap();
+    assert!(link.is_symlink());
+    assert_eq!(std::fs::read(&file).unwrap(), b"after");
+
+    let pipe = folder.path().join("pipe");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.unwrap().success());
+    let reading = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || std::fs::read(pipe).unwrap()
+    });
+    let mut written = AtomicFile::create(&pipe).unwrap();
+    written.write_all(b"through").unwrap();
+    written.finish().unwrap();
+    assert_eq!(reading.join().unwrap(), b"through");
+    assert_eq!(names(folder.path()), ["file", "link", "pipe"]);
+}
+
 #[test]
 fn writers_of_one_file_do_not_disturb_each_other() {
     let folder = tempfile::tempdir().unwrap();
