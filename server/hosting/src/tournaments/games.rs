@@ -144,7 +144,12 @@ impl TournamentTask {
         if self.retry.is_some_and(|retry| Instant::now() < retry) {
             return Ok(());
         }
-        self.retry = None;
+        // A game that waits for a room has not begun.
+        if self.unit.state.core.is_paused() {
+            self.retry = None;
+            return Ok(());
+        }
+        let has_waited = self.retry.take().is_some();
         let without_room: Vec<usize> = self.without_room.iter().copied().collect();
         let creating = without_room.iter().map(|game| {
             let new = self.new_room(*game);
@@ -168,7 +173,7 @@ impl TournamentTask {
                 // When the server is restarted, the game is assigned a new room.
                 Err(CreateError::ShuttingDown) => self.retry = Some(retry()),
                 Err(error) => {
-                    if self.retry.replace(retry()).is_none() {
+                    if self.retry.replace(retry()).is_none() && !has_waited {
                         warn!(tournament = %self.unit.handle.id(), %error, "games of a tournament wait for rooms");
                     }
                 }
