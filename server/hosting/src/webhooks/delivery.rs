@@ -208,13 +208,21 @@ impl Delivery {
         }
         let mut lines: Vec<Line> = std::mem::take(&mut self.lines).into_values().collect();
         lines.sort_by_key(|line| line.number);
+        let mut lost = 0;
         for event in lines.into_iter().flat_map(|line| line.events) {
             let outcome = match timeout_at(until, self.send(&event)).await {
                 Ok(Attempt::Received) => WebhookOutcome::Delivered,
                 Ok(Attempt::Refused(_)) => WebhookOutcome::Refused,
                 Ok(Attempt::Failed(_)) | Err(_) => WebhookOutcome::Failed,
             };
+            lost += u32::from(outcome == WebhookOutcome::Failed);
             outcomes.metrics.webhook(outcome);
+        }
+        if lost > 0 {
+            warn!(
+                lost,
+                "the receiver has not taken these webhooks before the server stopped; they are lost"
+            );
         }
     }
 
