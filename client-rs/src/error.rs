@@ -80,13 +80,14 @@ impl Error {
     }
 
     pub(crate) fn connect(url: &str, cause: &tonic::transport::Error) -> Self {
-        let message = format!("cannot connect to {url}: {}", with_causes(cause));
+        let mut message = format!("cannot connect to {url}: {}", with_causes(cause));
+        add_scheme_hint(&mut message);
         Self::own(Code::Unavailable, CONNECT_FAILED, message)
     }
 
     pub(crate) fn tls(url: &str, cause: &str) -> Self {
         let message = format!(
-            "no secure connection to {url}: {cause}; for a certificate of a private authority, give the authority's file (--ca or CHEFSHAT_CA)"
+            "no secure connection to {url}: {cause}; for a certificate of a private authority, give the authority's file (--ca or CHEFSHAT_CA); for a server without TLS, give http://"
         );
         Self::own(Code::Unavailable, TLS_FAILED, message)
     }
@@ -127,6 +128,13 @@ impl Error {
     }
 }
 
+/// What answers in TLS is no frame of HTTP/2.
+fn add_scheme_hint(message: &mut String) {
+    if message.contains("frame with invalid size") {
+        *message += "; a server with TLS has an address with https://";
+    }
+}
+
 impl From<Status> for Error {
     fn from(status: Status) -> Self {
         let info = status.get_details_error_info();
@@ -137,6 +145,7 @@ impl From<Status> for Error {
                 message = format!("{message}: {causes}");
             }
         }
+        add_scheme_hint(&mut message);
         if info
             .as_ref()
             .is_some_and(|info| info.reason == "TOKEN_MISSING")
