@@ -2,7 +2,7 @@
 //! deal (`0000.jsonl`, …), and `result.json` what they show.
 
 use std::fmt::Display;
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use chefshat_benchmark::{AgentInfo, BENCHMARK, GameScore, Task, TaskResult, check};
@@ -41,6 +41,8 @@ pub(super) struct Folder {
     path: PathBuf,
     pub(super) task: &'static Task,
     manifest: Manifest,
+    /// Held by the run that adds records.
+    _lock: Option<File>,
 }
 
 impl Folder {
@@ -55,11 +57,16 @@ impl Folder {
             path: path.to_owned(),
             task,
             manifest,
+            _lock: None,
         })
     }
 
     /// Opens the folder, or creates it. One that has games of something else is refused.
+    /// So is one to which another run adds games.
     pub(super) fn create(path: &Path, manifest: Manifest) -> Result<Self, CommandError> {
+        fs::create_dir_all(path)
+            .map_err(|error| format!("{}: {error}; name another with --out", path.display()))?;
+        let lock = locked(path)?;
         let file = path.join(MANIFEST);
         if file.exists()
             && let folder = Self::open(path)?
@@ -77,10 +84,12 @@ impl Folder {
             }
         }
         check_agent(path, &manifest.agent)?;
-        fs::create_dir_all(path)
-            .map_err(|error| format!("{}: {error}; name another with --out", path.display()))?;
         write_json(&file, &manifest)?;
-        Self::open(path)
+        let folder = Self::open(path)?;
+        Ok(Self {
+            _lock: lock,
+            ..folder
+        })
     }
 
     /// The file of a deal's record.
@@ -219,4 +228,21 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CommandError> {
     file.write_all(&serde_json::to_vec_pretty(value)?)?;
     file.write_all(b"\n")?;
     Ok(file.finish()?)
+}
+
+/// Locks a folder, where folders can be opened.
+fn locked(path: &Path) -> Result<Option<File>, CommandError> {
+    if !cfg!(unix) {
+        return Ok(None);
+    }
+    let folder = File::open(path)?;
+    match folder.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(format!(
+            "another run adds games to {}; wait for it, or name another with --out",
+            path.display()
+        )
+        .into()),
+        // Some file systems have no locks.
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(folder)),
+    }
 }

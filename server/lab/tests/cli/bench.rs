@@ -70,6 +70,20 @@ fn an_agent_has_the_same_result_wherever_it_plays() {
     assert!(table.stdout.contains("+0.000"), "{}", table.stdout);
 }
 
+#[cfg(unix)]
+#[test]
+fn one_run_at_a_time_adds_games_to_a_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = fs::File::open(folder.path()).unwrap();
+    other.lock().unwrap();
+    let refused = run("shift", folder.path(), &["--agent", "random"]);
+    refused.assert_failed("another run adds games to");
+    assert!(fs::read_dir(folder.path()).unwrap().next().is_none());
+    drop(other);
+    let played = run("shift", folder.path(), &["--agent", "random"]);
+    assert_eq!(played.json()["deals"], 4);
+}
+
 #[test]
 fn every_task_can_be_hosted() {
     let folder = tempfile::tempdir().unwrap();
