@@ -9,6 +9,7 @@ use serde_json::json;
 
 use super::connect::ServerArg;
 use super::numbers::counted;
+use super::tournament::words::state;
 use super::{CommandError, pages, say};
 
 /// Bytes of a mebibyte.
@@ -112,12 +113,13 @@ impl AdminCommand {
                 let request = v1::AdminServiceCloseTournamentRequest {
                     tournament_id: id.clone(),
                 };
-                service(&server)
-                    .await?
-                    .close_tournament(request)
-                    .await
-                    .map_err(refused)?;
-                say(format_args!("tournament {id} is closed"))?;
+                let answer =
+                    (service(&server).await?.close_tournament(request).await).map_err(refused)?;
+                let tournament = answer.into_inner().tournament.unwrap_or_default();
+                say(format_args!(
+                    "tournament {id} is {}",
+                    state(tournament.state())
+                ))?;
             }
         }
         Ok(ExitCode::SUCCESS)

@@ -271,12 +271,9 @@ pub(super) struct Serve {
 impl Serve {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let settings = self.settings;
-        // Not a clap conflict: clap would treat a variable that is set to false as present.
         let data_dir = match (settings.no_records, settings.data_dir.clone()) {
-            (true, None) => None,
-            (true, Some(_)) => {
-                return Err("--no-records and --data-dir cannot be used together".into());
-            }
+            // No conflict: images and units set the variable of the data directory.
+            (true, _) => None,
             (false, data_dir) if settings.node.database.is_some() => {
                 Some(data_dir::prepare_without_records(data_dir)?)
             }

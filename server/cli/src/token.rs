@@ -152,8 +152,15 @@ impl Create {
 
 impl List {
     fn run(self) -> Result<(), CommandError> {
-        let file = TokenFile::of(&data_dir::name(self.place.data_dir)?);
-        let tokens = file.read()?.unwrap_or_default();
+        let data_dir = data_dir::name(self.place.data_dir)?;
+        if !data_dir.is_dir() {
+            return Err(format!(
+                "there is no folder {}; name the server's with --data-dir",
+                data_dir.display()
+            )
+            .into());
+        }
+        let tokens = TokenFile::of(&data_dir).read()?.unwrap_or_default();
         let now_ms = since_epoch_ms();
         if self.place.json {
             let lines = tokens.iter().map(|token| line_of(token, now_ms));

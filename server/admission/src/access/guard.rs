@@ -161,6 +161,8 @@ impl Followed {
 #[derive(Debug)]
 pub struct Access {
     mode: Mode,
+    /// Whether the mode was chosen, not found by the tokens file.
+    is_mode_chosen: bool,
     anonymous: Role,
     records: Role,
     file: Option<Followed>,
@@ -191,6 +193,7 @@ impl Access {
         let tokens = read.transpose()?.flatten();
         let exists = tokens.is_some();
         let access = Self {
+            is_mode_chosen: settings.mode.is_some(),
             mode: settings.mode.unwrap_or(match exists {
                 true => Mode::Tokens,
                 false => Mode::Open,
@@ -353,7 +356,7 @@ impl Access {
 
     /// Follows the tokens file and the expiry of tokens, until it is dropped.
     pub async fn follow(self: Arc<Self>) {
-        let mut open_noted = self.mode == Mode::Tokens;
+        let mut open_noted = self.is_mode_chosen || self.mode == Mode::Tokens;
         loop {
             tokio::time::sleep(INTERVAL).await;
             self.read_on_thread().await;

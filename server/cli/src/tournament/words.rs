@@ -110,7 +110,7 @@ pub(crate) fn format_name(format: v1::TournamentFormat) -> &'static str {
 }
 
 /// The name of a state.
-pub(super) fn state(state: v1::TournamentState) -> &'static str {
+pub(crate) fn state(state: v1::TournamentState) -> &'static str {
     match state {
         v1::TournamentState::Unspecified => "unknown",
         v1::TournamentState::Open => "open",
