@@ -186,6 +186,7 @@ pub struct Metrics {
     node_lease: Gauge,
     node_reached: Gauge,
     takeovers: Counter,
+    handovers: Counter,
     not_resumed: Counter,
     peer_errors: Counter,
     outboxes: Mutex<Vec<Weak<dyn Queue>>>,
@@ -272,6 +273,11 @@ impl Default for Metrics {
                 all,
                 "takeovers",
                 "Rooms, tournaments and studies that the node took over from others or had to read again",
+            ),
+            handovers: plain(
+                all,
+                "handovers",
+                "Rooms, tournaments and studies that the node handed over to one that was less full",
             ),
             not_resumed: plain(
                 all,
@@ -441,6 +447,11 @@ impl Metrics {
     /// Counts a unit that the node is about to resume.
     pub fn taken_over(&self) {
         self.takeovers.inc();
+    }
+
+    /// Counts a unit that the node has handed over to one that was less full.
+    pub fn handed_over(&self) {
+        self.handovers.inc();
     }
 
     /// Counts a connection to another node that could not be opened.

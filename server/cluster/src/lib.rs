@@ -7,11 +7,13 @@
 //! its writer has the present one. *Liveness* is the lease: a node that does not beat loses what it owns. A lease that is
 //! wrong for any reason costs time, never a decision.
 
+mod balance;
 mod lease;
 mod node;
 mod tables;
 mod writer;
 
+pub use balance::{Load, place, surplus};
 pub use lease::{Lease, LeaseTimes, WrongTimes};
 pub use node::{BeatAnswer, ClaimAnswer, Input, Node, Output, Phase};
 pub use tables::{Created, Row, Tables, Written};

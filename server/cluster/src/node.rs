@@ -10,9 +10,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::{Epoch, Lease, LeaseTimes, NodeId};
 
-/// Most orphans asked for at a time, so that several nodes share those of one that died.
-const ORPHANS_AT_ONCE: usize = 64;
-
 /// What a node is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Phase {
@@ -60,8 +57,8 @@ pub enum Input<K> {
     },
     /// Orphans were found, or somebody said that there are some.
     Orphans(Vec<(K, Epoch)>),
-    /// A claim was answered.
-    Claimed(K, ClaimAnswer),
+    /// The claim of an orphan that was seen at this epoch was answered.
+    Claimed(K, Epoch, ClaimAnswer),
     /// A unit was created here.
     Created {
         /// The unit.
@@ -71,8 +68,10 @@ pub enum Input<K> {
     },
     /// A write was refused at this epoch: another node owns the unit.
     Fenced(K, Epoch),
-    /// A release was answered; `false` if no answer came.
-    Released(K, bool),
+    /// A release at this epoch was answered; `false` if no answer came.
+    Released(K, Epoch, bool),
+    /// A unit is to be handed over to a node that is less full.
+    HandOver(K),
     /// The node is to hand everything over and leave.
     Drain,
 }
@@ -82,8 +81,8 @@ pub enum Input<K> {
 pub enum Output<K> {
     /// Beat, and read in the same transaction what the node owns.
     Beat,
-    /// Look for at most this number of orphans.
-    FindOrphans(usize),
+    /// Look for orphans.
+    FindOrphans,
     /// Claim an orphan that was seen at this epoch.
     Claim(K, Epoch),
     /// Read its journals and run it.
@@ -106,15 +105,15 @@ pub struct Node<K> {
     id: NodeId,
     lease: Lease,
     phase: Phase,
-    /// Most units it takes over; those created here come on top.
-    capacity: usize,
     owned: BTreeMap<K, Epoch>,
     /// Those of `owned` that no other node can take over.
     ephemeral: BTreeSet<K>,
-    /// Claims without an answer, and whether the lease has held since each was sent. Otherwise its answer may be older than a
-    /// takeover by another node, and only the next beats tell who owns the unit.
-    claiming: BTreeMap<K, bool>,
+    /// Claims without an answer: the epochs at which the orphans were seen, and whether the lease has held since. Otherwise the
+    /// answer may be older than a takeover by another node, and only the next beats tell who owns the unit.
+    claiming: BTreeMap<K, (Epoch, bool)>,
     releasing: BTreeSet<K>,
+    /// Those of `owned` that are handed over although the node stays.
+    leaving: BTreeSet<K>,
     suspended: bool,
     /// When it may take over again after it has regained its lease. The database may have been away for all nodes: the first
     /// one to reach it again must not take everything from the others.
@@ -128,16 +127,16 @@ pub struct Node<K> {
 
 impl<K: Ord + Copy> Node<K> {
     /// A node that has just joined: it has no lease until its first beat is committed.
-    pub fn new(id: NodeId, times: LeaseTimes, capacity: usize) -> Self {
+    pub fn new(id: NodeId, times: LeaseTimes) -> Self {
         Self {
             id,
             lease: Lease::new(times),
             phase: Phase::Serving,
-            capacity,
             owned: BTreeMap::new(),
             ephemeral: BTreeSet::new(),
             claiming: BTreeMap::new(),
             releasing: BTreeSet::new(),
+            leaving: BTreeSet::new(),
             suspended: true,
             claims_from_ms: 0,
             beating: false,
@@ -221,7 +220,7 @@ impl<K: Ord + Copy> Node<K> {
             Input::Time => {}
             Input::Beat { sent_ms, answer } => self.beaten(sent_ms, answer, now_ms, &mut outputs),
             Input::Orphans(orphans) => self.claim(orphans, now_ms, &mut outputs),
-            Input::Claimed(id, answer) => self.claimed(id, answer, &mut outputs),
+            Input::Claimed(id, seen, answer) => self.claimed(id, seen, answer, &mut outputs),
             Input::Created { unit, ephemeral } => {
                 self.own(unit, Epoch::FIRST);
                 if ephemeral {
@@ -234,19 +233,32 @@ impl<K: Ord + Copy> Node<K> {
                     outputs.push(Output::Stop(id));
                 }
             }
-            Input::Released(id, true) => self.disown(id),
-            // Whether it was released is in the answer to a later beat.
-            Input::Released(id, false) => {
-                self.changed.insert(id);
-                self.releasing.remove(&id);
+            // An answer that comes late may be about an earlier epoch.
+            Input::Released(id, epoch, is_answered) => {
+                if self.owned.get(&id) == Some(&epoch) {
+                    match is_answered {
+                        true => self.disown(id),
+                        // Whether it was released is in the answer to a later beat.
+                        false => {
+                            self.changed.insert(id);
+                            self.releasing.remove(&id);
+                        }
+                    }
+                }
+            }
+            // What no other node can take over stays.
+            Input::HandOver(id) => {
+                if self.owned.contains_key(&id) && !self.ephemeral.contains(&id) {
+                    self.leaving.insert(id);
+                }
             }
             Input::Drain => {
                 self.phase = Phase::Draining;
                 self.beats_at_ms = now_ms;
             }
         }
+        self.release(&mut outputs);
         if self.phase == Phase::Draining {
-            self.release(&mut outputs);
             // The next beat says whether it may leave.
             if self.owns_nothing() && !self.changed.is_empty() {
                 self.beats_at_ms = now_ms;
@@ -264,7 +276,7 @@ impl<K: Ord + Copy> Node<K> {
     fn suspend_without_lease(&mut self, now_ms: u64, outputs: &mut Vec<Output<K>>) {
         if !self.suspended && !self.lease.holds(now_ms) {
             self.suspended = true;
-            self.claiming.values_mut().for_each(|held| *held = false);
+            (self.claiming.values_mut()).for_each(|(_, held)| *held = false);
             outputs.push(Output::Suspend);
         }
         if self.suspended && now_ms >= self.expires_ms() {
@@ -279,6 +291,7 @@ impl<K: Ord + Copy> Node<K> {
         outputs.extend(claimable.copied().map(Output::Stop));
         self.owned.retain(|id, _| ephemeral.contains(id));
         self.releasing.retain(|id| ephemeral.contains(id));
+        self.leaving.clear();
     }
 
     fn own(&mut self, id: K, epoch: Epoch) {
@@ -295,6 +308,7 @@ impl<K: Ord + Copy> Node<K> {
         self.owned.remove(&id);
         self.ephemeral.remove(&id);
         self.releasing.remove(&id);
+        self.leaving.remove(&id);
     }
 
     fn owns_nothing(&self) -> bool {
@@ -329,7 +343,9 @@ impl<K: Ord + Copy> Node<K> {
                         }
                         outputs.push(Output::Resume);
                     }
-                    self.find_orphans(now_ms, outputs);
+                    if self.may_claim(now_ms) {
+                        outputs.push(Output::FindOrphans);
+                    }
                     let nothing_left = self.owns_nothing() && self.changed.is_empty();
                     if self.phase == Phase::Draining && nothing_left {
                         self.phase = Phase::Left;
@@ -354,18 +370,12 @@ impl<K: Ord + Copy> Node<K> {
             if self.changed.contains(&id) || self.owned.contains_key(&id) {
                 continue;
             }
+            // The answer to the claim says nothing more, and may come when the unit has been handed over.
+            self.claiming.remove(&id);
             self.owned.insert(id, epoch);
             if self.phase == Phase::Serving {
                 outputs.push(Output::Serve(id, epoch));
             }
-        }
-    }
-
-    fn find_orphans(&self, now_ms: u64, outputs: &mut Vec<Output<K>>) {
-        let taken = self.owned.len() + self.claiming.len();
-        let count = self.capacity.saturating_sub(taken).min(ORPHANS_AT_ONCE);
-        if count > 0 && self.may_claim(now_ms) {
-            outputs.push(Output::FindOrphans(count));
         }
     }
 
@@ -374,17 +384,19 @@ impl<K: Ord + Copy> Node<K> {
             return;
         }
         for (id, seen) in orphans {
-            let taken = self.owned.len() + self.claiming.len();
-            let is_new = !self.owned.contains_key(&id) && !self.claiming.contains_key(&id);
-            if taken < self.capacity && is_new {
-                self.claiming.insert(id, true);
+            if !self.owned.contains_key(&id) && !self.claiming.contains_key(&id) {
+                self.claiming.insert(id, (seen, true));
                 outputs.push(Output::Claim(id, seen));
             }
         }
     }
 
-    fn claimed(&mut self, id: K, answer: ClaimAnswer, outputs: &mut Vec<Output<K>>) {
-        let held = self.claiming.remove(&id) == Some(true);
+    fn claimed(&mut self, id: K, seen: Epoch, answer: ClaimAnswer, outputs: &mut Vec<Output<K>>) {
+        // The answer to an earlier claim may come late: the unit may have been handed over and claimed again meanwhile.
+        let Some(&(_, held)) = self.claiming.get(&id).filter(|claim| claim.0 == seen) else {
+            return;
+        };
+        self.claiming.remove(&id);
         let ClaimAnswer::Won(epoch) = answer else {
             return;
         };
@@ -401,9 +413,14 @@ impl<K: Ord + Copy> Node<K> {
         }
     }
 
+    /// Releases what leaves the node, again if no answer came: whatever runs of it has been stopped.
     fn release(&mut self, outputs: &mut Vec<Output<K>>) {
-        for (&id, &epoch) in &self.owned {
-            if self.releasing.insert(id) {
+        let leaving: Vec<K> = match self.phase {
+            Phase::Draining => self.owned.keys().copied().collect(),
+            Phase::Serving | Phase::Left => self.leaving.iter().copied().collect(),
+        };
+        for id in leaving {
+            if let Some(&epoch) = self.owned.get(&id).filter(|_| self.releasing.insert(id)) {
                 outputs.push(Output::Release(id, epoch));
             }
         }

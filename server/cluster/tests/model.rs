@@ -45,6 +45,13 @@ const DRAIN: Bounds = Bounds {
     ..TAKEOVER
 };
 
+/// A node hands the unit over and stays, twice, and an answer gets lost.
+const HANDOVER: Bounds = Bounds {
+    until: 3,
+    handovers: 2,
+    ..TAKEOVER
+};
+
 /// A game ends while others may take it over.
 const END: Bounds = Bounds {
     until: 5,
@@ -119,6 +126,7 @@ fn every_order_is_safe_and_recovers() {
         ("decisions", DECISIONS),
         ("slow beats", SLOW_BEATS),
         ("drain", DRAIN),
+        ("handover", HANDOVER),
         ("end", END),
         ("tournament", TOURNAMENT),
         ("tournament's end", TOURNAMENT_END),

@@ -7,7 +7,7 @@
 use std::time::Duration;
 
 use chefshat_cluster::LeaseTimes;
-pub use chefshat_cluster::{Epoch, NodeId};
+pub use chefshat_cluster::{Epoch, Load, NodeId};
 use futures::future::BoxFuture;
 use futures::{FutureExt as _, TryFutureExt as _};
 
@@ -30,6 +30,15 @@ pub struct NodeInfo {
     pub capacity: u64,
 }
 
+/// What a node says about itself with each heartbeat.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Heartbeat {
+    /// Whether it has been reached since it joined.
+    pub reached: bool,
+    /// Rooms that wait or play there.
+    pub rooms: u64,
+}
+
 /// A node that has a lease.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LivingNode {
@@ -39,6 +48,8 @@ pub struct LivingNode {
     pub info: NodeInfo,
     /// Whether it has been reached since it joined.
     pub reached: bool,
+    /// How full it is; `None` if it takes no rooms, or is of an earlier version, which does not say.
+    pub load: Option<Load>,
 }
 
 /// A node of the cluster.
@@ -136,10 +147,9 @@ pub trait ClusterStore: Store {
     /// was removed because it was away for long, it becomes a new node.
     fn join(&self, info: NodeInfo) -> BoxFuture<'_, Result<NodeId, StoreError>>;
 
-    /// Renews the lease of this node, even if it has expired, says whether it has been reached since
-    /// it joined, and returns what it owns at the same moment. `None`: the node is not known (any
-    /// more).
-    fn beat(&self, reached: bool) -> BoxFuture<'_, Result<Option<Beat>, StoreError>>;
+    /// Renews the lease of this node, even if it has expired, notes what it says, and returns what it
+    /// owns at the same moment. `None`: the node is not known (any more).
+    fn beat(&self, heartbeat: Heartbeat) -> BoxFuture<'_, Result<Option<Beat>, StoreError>>;
 
     /// At most `count` units that nobody owns or whose owner's lease has expired, with their
     /// epochs, in an order of this node's own, so that several nodes share them; only such that this
@@ -177,8 +187,14 @@ pub trait ClusterStore: Store {
     fn load(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<Option<Unit>, StoreError>>;
 
     /// Gives up a unit that this node owns at this epoch, so that others may claim it at once, and
-    /// names one that is to. The last append to each of its journals must have been answered.
-    fn release(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<(), StoreError>>;
+    /// names one that is to: `next` if it takes rooms, otherwise any, an emptier one more often. The
+    /// last append to each of its journals must have been answered.
+    fn release(
+        &self,
+        unit: Id,
+        epoch: Epoch,
+        next: Option<NodeId>,
+    ) -> BoxFuture<'_, Result<(), StoreError>>;
 
     /// Removes this node if it owns nothing. Returns whether it is removed.
     fn leave(&self) -> BoxFuture<'_, Result<bool, StoreError>>;

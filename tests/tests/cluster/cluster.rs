@@ -102,6 +102,11 @@ impl Pairs {
 impl Cluster {
     /// Starts this many nodes.
     pub(crate) async fn start(count: usize, leases: Leases) -> Self {
+        Self::start_for(count, leases, None).await
+    }
+
+    /// The same with this limit of rooms for each.
+    pub(crate) async fn start_for(count: usize, leases: Leases, max_rooms: Option<usize>) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let postgres = tokio::task::block_in_place(match leases {
             Leases::Short | Leases::Steady => Postgres::start,
@@ -135,6 +140,9 @@ impl Cluster {
                 .with("--peer-cert", certificate.certificate.display())
                 .with("--peer-key", certificate.key.display())
                 .with("--peer-ca", certificate.authority.display());
+            if let Some(max_rooms) = max_rooms {
+                launch = launch.with("--max-rooms", max_rooms);
+            }
             launch = match leases {
                 Leases::Short => launch.with("--lease", 1_000),
                 Leases::Steady => launch.with("--lease", 4_000),
@@ -272,6 +280,30 @@ impl Cluster {
         self.select(&format!(
             "SELECT {column} FROM nodes WHERE peer_endpoint = '{endpoint}' ORDER BY beat_ms DESC LIMIT 1"
         ))
+    }
+
+    /// How many rooms that are not over each node owns.
+    pub(crate) fn rooms_of_nodes(&self) -> Vec<usize> {
+        let nodes = 0..self.nodes.len();
+        nodes.map(|node| self.games_of(node).len()).collect()
+    }
+
+    /// Waits until the nodes own numbers of rooms that differ by less than a fifth.
+    pub(crate) async fn balanced(&self) {
+        let balanced = async {
+            loop {
+                let rooms = self.rooms_of_nodes();
+                let (least, most) = (rooms.iter().min(), rooms.iter().max());
+                if least
+                    .zip(most)
+                    .is_some_and(|(least, most)| (most - least) * 5 < *most)
+                {
+                    return;
+                }
+                tokio::time::sleep(LOOK_AGAIN).await;
+            }
+        };
+        patiently("nodes that are equally full", balanced).await;
     }
 
     /// The node that owns a room or tournament.

@@ -1,6 +1,7 @@
 //! Several server processes as the nodes of a cluster, on a real PostgreSQL server and behind a real
 //! proxy, while machines and networks fail.
 
+mod balance;
 mod certificates;
 mod cluster;
 mod cup;

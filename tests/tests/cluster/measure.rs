@@ -22,6 +22,8 @@ const ROOMS: usize = 48;
 const TIMES: usize = 4;
 /// Rooms during an upgrade.
 const UPGRADED_ROOMS: usize = 200;
+/// Rooms of the nodes that another one joins.
+const JOINED_ROOMS: usize = 300;
 /// Rooms whose throughput is measured.
 const FAST_ROOMS: usize = 64;
 /// How long before and during a window of measurement.
@@ -160,6 +162,39 @@ async fn games_of_a_drained_node() {
         cluster.restart(node).await;
     }
     show("all drains: longest time without a decision", "s", all);
+    missed(&cluster, rooms).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[ignore = "measures"]
+async fn a_node_joins_full_ones() {
+    let mut cluster = Cluster::start(NODES + 1, Leases::Default).await;
+    cluster.stop(NODES).await;
+    let pace = Duration::from_secs(1);
+    let rooms = BusyRooms::start(&cluster.url(), rooms(JOINED_ROOMS, 2, 5_000, pace));
+    all_play(&rooms).await;
+    let before = rooms.ledger.games();
+    eprintln!("rooms of the nodes: {:?}", cluster.rooms_of_nodes());
+    cluster.restart(NODES).await;
+    let joined = Instant::now();
+    cluster.balanced().await;
+    let seconds = joined.elapsed().as_secs_f64();
+    eprintln!(
+        "within a fifth after {seconds:.2} s: {:?}",
+        cluster.rooms_of_nodes()
+    );
+    rooms.all_go_on().await;
+    let moved = cluster.games_of(NODES);
+    let (moved, stayed): (Vec<_>, Vec<_>) = before.iter().partition(|game| moved.contains(game));
+    for (what, games) in [("moved", moved), ("stayed", stayed)] {
+        let pauses = games.iter();
+        let pauses = pauses.filter_map(|game| longest_pause(&rooms.ledger, game, joined));
+        show(
+            &format!("longest time without a decision of games that {what}"),
+            "s",
+            pauses.collect(),
+        );
+    }
     missed(&cluster, rooms).await;
 }
 

@@ -51,6 +51,8 @@ pub(crate) struct Bounds {
     pub(crate) lost: u8,
     pub(crate) crashes: u8,
     pub(crate) drains: u8,
+    /// How often a node hands the unit over although it stays.
+    pub(crate) handovers: u8,
     pub(crate) ends: u8,
     /// How often a room is created. With any, the unit is a tournament, whose own journal gets no row when it is taken over.
     pub(crate) creations: u8,
@@ -67,6 +69,7 @@ impl Bounds {
         lost: 0,
         crashes: 0,
         drains: 0,
+        handovers: 0,
         ends: 0,
         creations: 0,
         slow_beats: false,
@@ -158,6 +161,7 @@ pub(crate) struct World {
     lost: u8,
     crashes: u8,
     drains: u8,
+    handovers: u8,
     ends: u8,
     creations: u8,
 }
@@ -177,6 +181,7 @@ pub(crate) enum Transition {
     AnswerLost(usize, Request, Answer),
     Crash(usize),
     Drain(usize),
+    HandOver(usize),
 }
 
 impl Cluster {
@@ -207,7 +212,7 @@ impl Cluster {
         let it = world.servers[server].as_mut().expect("it lives");
         match output {
             Output::Beat => self.send(world, server, Request::Beat(world.now)),
-            Output::FindOrphans(_) => self.send(world, server, Request::FindOrphans),
+            Output::FindOrphans => self.send(world, server, Request::FindOrphans),
             Output::Claim(_, seen) => self.send(world, server, Request::Claim(seen)),
             // The journals are read at once: any other writer conflicts at the position or has another epoch.
             Output::Serve(_, epoch) if it.creates => it.serves_next = Some(epoch),
@@ -445,15 +450,16 @@ impl Cluster {
                 },
             },
             (Request::FindOrphans, Some(Answer::Orphans(orphans))) => Input::Orphans(orphans),
-            (Request::Claim(_), answer) => Input::Claimed(
+            (Request::Claim(seen), answer) => Input::Claimed(
                 UNIT,
+                seen,
                 match answer {
                     Some(Answer::Claimed(Some(epoch))) => ClaimAnswer::Won(epoch),
                     Some(_) => ClaimAnswer::Lost,
                     None => ClaimAnswer::None,
                 },
             ),
-            (Request::Release(_), answer) => Input::Released(UNIT, answer.is_some()),
+            (Request::Release(epoch), answer) => Input::Released(UNIT, epoch, answer.is_some()),
             _ => return,
         };
         self.put_in(world, server, input);
@@ -555,7 +561,7 @@ impl Model for Cluster {
         let mut tables = Tables::new(times);
         let servers = (0..2).map(|_| {
             Some(Server {
-                node: Node::new(tables.join(0), times, 1),
+                node: Node::new(tables.join(0), times),
                 running: BTreeMap::new(),
                 releases: None,
                 creates: false,
@@ -583,6 +589,7 @@ impl Model for Cluster {
             lost: 0,
             crashes: 0,
             drains: 0,
+            handovers: 0,
             ends: 0,
             creations: 0,
         }]
@@ -621,6 +628,9 @@ impl Model for Cluster {
             if world.drains < bounds.drains && it.node.phase() == Phase::Serving {
                 actions.push(Transition::Drain(server));
             }
+            if world.handovers < bounds.handovers && world.serves(server) {
+                actions.push(Transition::HandOver(server));
+            }
         }
         for &(server, request, awaited) in &world.requests {
             actions.push(Transition::Arrive(server, request, awaited));
@@ -656,6 +666,10 @@ impl Cluster {
             Transition::Drain(server) => {
                 next.drains += 1;
                 self.put_in(next, server, Input::Drain);
+            }
+            Transition::HandOver(server) => {
+                next.handovers += 1;
+                self.put_in(next, server, Input::HandOver(UNIT));
             }
             Transition::Crash(server) => {
                 next.crashes += 1;

@@ -59,7 +59,7 @@ pub(super) fn all(bounds: &Bounds) -> Vec<Property<Cluster>> {
         }),
         Property::always("it recovers", recovers),
     ];
-    let reached: [(bool, Property<Cluster>); 5] = [
+    let reached: [(bool, Property<Cluster>); 6] = [
         (
             bounds.until > 3,
             Property::sometimes("another node takes over", |_, world: &World| {
@@ -79,6 +79,16 @@ pub(super) fn all(bounds: &Bounds) -> Vec<Property<Cluster>> {
                 |_, world: &World| {
                     let left = world.servers[0].as_ref().is_some_and(|it| it.left);
                     left && world.serves(1) && world.now < 3
+                },
+            ),
+        ),
+        (
+            bounds.handovers > 1,
+            Property::sometimes(
+                "a unit that was handed over comes back before a lease ends",
+                |_, world: &World| {
+                    let epoch = world.tables.epoch(UNIT);
+                    world.serves(0) && world.now < 3 && epoch.is_some_and(|epoch| epoch.0 == 3)
                 },
             ),
         ),

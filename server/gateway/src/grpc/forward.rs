@@ -1,7 +1,8 @@
 //! The layer that sends a call to the node that has its room or tournament. A call is first tried
 //! here; if its handler finds what it is about at another node (`status::elsewhere`), the same
 //! request goes to that node, and its answer comes back as it arrives. So no method knows anything
-//! of forwarding. Spectators share streams (`fanout`). A single server does not have this layer.
+//! of forwarding. What is new is created by the node that it is for (`Lookup::check_placed_here`).
+//! Spectators share streams (`fanout`). A single server does not have this layer.
 //!
 //! The other node decides about access and charges the caller, so the headers that it needs for
 //! that pass with the request. It never passes the request on.
@@ -37,7 +38,7 @@ use chefshat_admission::access::{Call, MAX_STUDY_MESSAGE_BYTES, SECRET_HEADER};
 use chefshat_admission::limits::{CallLimits, Key};
 use chefshat_base::proxies::FORWARDED_FOR;
 use chefshat_base::tasks::{LongTask, named};
-use chefshat_hosting::cluster::{Directory, Peer};
+use chefshat_hosting::cluster::{Directory, Elsewhere, Peer};
 use chefshat_wire::encoded::peer::ShareRequest;
 use chefshat_wire::encoded::peer::peer_service_client::PeerServiceClient;
 
@@ -96,6 +97,13 @@ impl Gateway {
     /// Who has which rooms and tournaments.
     pub(super) fn directory(&self) -> &Arc<dyn Directory> {
         &self.layer.directory
+    }
+
+    /// The node that was named does not have it, or cannot be reached.
+    pub(super) fn forget(&self, elsewhere: &Elsewhere) {
+        if let Some(found_by) = &elsewhere.found_by {
+            self.directory().forget(found_by);
+        }
     }
 
     /// A request to another node, for the client of this one.
@@ -239,10 +247,10 @@ impl Gateway {
             };
             match answered {
                 Ok(answer) if !is_not_owner(answer.headers()) => return Ok(returned(answer)),
-                Ok(_) => self.directory().forget(&elsewhere.found_by),
+                Ok(_) => self.forget(elsewhere),
                 Err(error) => {
                     debug!(peer = %elsewhere.peer.node, %error, "a call could not be forwarded");
-                    self.directory().forget(&elsewhere.found_by);
+                    self.forget(elsewhere);
                     // Whether it was executed is unknown.
                     break;
                 }

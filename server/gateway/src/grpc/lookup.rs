@@ -10,6 +10,7 @@ use tonic::Status;
 use tracing::warn;
 
 use super::access::check;
+use super::forward::Gateway;
 use super::status::{
     elsewhere, owner_unreachable, read_failed, room_gone, room_unknown, tournament_unknown,
 };
@@ -113,15 +114,45 @@ impl Lookup {
         request: Option<RequestKey>,
         caller: Key,
     ) -> Result<(), Status> {
-        let Some(id) = request.map(|request| request.created_id()) else {
+        let Some(request) = request.filter(|request| !self.has_created(*request)) else {
             return Ok(());
         };
-        if self.rooms.get(id).is_some() || self.tournaments.get(id).is_some() {
-            return Ok(());
-        }
-        let found_by = FoundBy::Id(id);
+        let found_by = FoundBy::Id(request.created_id());
         let checked = self.check_not_elsewhere(&found_by, caller, || false);
         checked.await.map(drop)
+    }
+
+    /// Sends a request for a room or tournament to the node that has created it before or, if it is new,
+    /// is to create it. `gateway`: `None` if another node has sent it here.
+    pub(super) async fn check_created_here(
+        &self,
+        request: Option<RequestKey>,
+        caller: Key,
+        gateway: Option<&Gateway>,
+    ) -> Result<(), Status> {
+        self.check_not_created_elsewhere(request, caller).await?;
+        match request.is_some_and(|request| self.has_created(request)) {
+            true => Ok(()),
+            false => self.check_placed_here(gateway).await,
+        }
+    }
+
+    fn has_created(&self, request: RequestKey) -> bool {
+        let id = request.created_id();
+        self.rooms.get(id).is_some() || self.tournaments.get(id).is_some()
+    }
+
+    /// Sends a request for something new to the node that is to create it. `gateway`: `None` if another
+    /// node has sent it here.
+    pub(super) async fn check_placed_here(&self, gateway: Option<&Gateway>) -> Result<(), Status> {
+        let peer = match gateway {
+            Some(_) => self.rooms.place().await,
+            None => None,
+        };
+        peer.map_or(Ok(()), |peer| {
+            let found_by = None;
+            Err(elsewhere(Elsewhere { peer, found_by }))
+        })
     }
 
     /// Checks that what is not in memory is not at another node. Returns whether this node owns it:
@@ -146,7 +177,7 @@ impl Lookup {
             Location::Here | Location::Unknown => Err(owner_unreachable()),
             Location::Node(peer) => Err(elsewhere(Elsewhere {
                 peer,
-                found_by: found_by.clone(),
+                found_by: Some(found_by.clone()),
             })),
         }
     }

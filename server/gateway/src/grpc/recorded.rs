@@ -175,7 +175,7 @@ impl Recorded {
         lines.map_err(|status| match is_refusal(&status) {
             true => status,
             false => {
-                gateway.directory().forget(&elsewhere.found_by);
+                gateway.forget(elsewhere);
                 owner_unreachable()
             }
         })

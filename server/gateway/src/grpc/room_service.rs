@@ -216,7 +216,7 @@ impl RoomService for RoomCalls {
         let new = new_room(reading, request.into_inner(), key).await?;
         let request = new.request;
         self.lookup()
-            .check_not_created_elsewhere(request, key)
+            .check_created_here(request, key, gateway.as_ref())
             .await?;
         let physical = new.physical;
         let built_in = new.fills.iter().all(|fill| fill.is_built_in());

@@ -130,17 +130,22 @@ impl StudyService for StudyCalls {
     ) -> Result<Response<v1::CreateStudyResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
+        let gateway: Option<Gateway> = request.extensions().get().cloned();
         let request = request.into_inner();
         let settings = request.settings.unwrap_or_default();
         // Levels are a map: their order differs between encodings of the same settings.
         let content = content_of(&settings);
         let request_key =
             request_id(&request.request_id, &caller)?.map(|id| RequestKey::new(id, &content));
-        self.calls.charge(key, COST_OF_TOURNAMENT);
-        if let Some(request) = request_key {
+        let known = match request_key {
             // Another node may have created it for the same request.
-            self.here(Studies::created_id(request), key).await?;
+            Some(request) => self.here(Studies::created_id(request), key).await?,
+            None => None,
+        };
+        if known.is_none() {
+            self.lookup.check_placed_here(gateway.as_ref()).await?;
         }
+        self.calls.charge(key, COST_OF_TOURNAMENT);
         let created = self.studies.create(settings, request_key, key).await;
         if let (Err(CreateProblem::Store(StoreError::Taken(_))), Some(request)) =
             (&created, request_key)

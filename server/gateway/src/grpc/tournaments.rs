@@ -226,6 +226,7 @@ impl TournamentService for TournamentCalls {
     ) -> Result<Response<v1::CreateTournamentResponse>, Status> {
         let caller = Caller::of(request.extensions());
         let key = charged(request.extensions());
+        let gateway: Option<Gateway> = request.extensions().get().cloned();
         let request = request.into_inner();
         let settings = request.settings.unwrap_or_default();
         let request_key = request_id(&request.request_id, &caller)?
@@ -250,7 +251,9 @@ impl TournamentService for TournamentCalls {
         plan.policy
             .set_default_absence_times(ABSENCE_TIME_IN_TOURNAMENTS);
         let lookup = self.recorded.lookup();
-        lookup.check_not_created_elsewhere(request_key, key).await?;
+        lookup
+            .check_created_here(request_key, key, gateway.as_ref())
+            .await?;
         self.calls.charge(key, COST_OF_TOURNAMENT);
         let created = self.tournaments.create(&name, plan, request_key, key).await;
         if matches!(&created, Err(CreateProblem::Store(StoreError::Taken(_)))) {

@@ -9,6 +9,7 @@ use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 
 use chefshat_admission::limits::Key;
+use chefshat_cluster::Load;
 use chefshat_room::ids::{Id, normal_code};
 use chefshat_store::cluster::Kind;
 use chefshat_store::{ResumableGame, StoreError};
@@ -37,14 +38,14 @@ pub enum Location {
     Unknown,
 }
 
-/// What a request is about is at another node.
+/// What a request is about is at another node, or is created there.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("another node has it")]
 pub struct Elsewhere {
     /// The node.
     pub peer: Peer,
-    /// How it was found.
-    pub found_by: FoundBy,
+    /// How it was found; `None` for what is new.
+    pub found_by: Option<FoundBy>,
 }
 
 /// How a room or tournament is found.
@@ -80,6 +81,11 @@ pub trait Directory: Send + Sync + 'static {
     /// The names of the nodes that have not been reached since they joined.
     fn unreached(&self) -> BoxFuture<'_, BTreeSet<Arc<str>>> {
         ready(BTreeSet::new()).boxed()
+    }
+
+    /// The node that something new is for, if this node, which is this full, is not.
+    fn place(&self, _own: Load) -> BoxFuture<'_, Option<Peer>> {
+        ready(None).boxed()
     }
 
     /// The location of a room or tournament that is not in memory, for this caller.

@@ -13,6 +13,7 @@ use tracing::{debug, warn};
 use super::directory::{Directory, FoundBy, Location, Peer};
 use super::lease::NodeLease;
 use chefshat_admission::limits::{FairSemaphore, Key, Shares};
+use chefshat_cluster::Load;
 use chefshat_room::ids::Id;
 use chefshat_store::cluster::{self, ClusterStore, LivingNode, NodeId};
 use chefshat_store::{ResumableGame, StoreError};
@@ -50,6 +51,8 @@ struct Alive {
     nodes: BTreeMap<NodeId, Peer>,
     /// The names of those that have not been reached.
     unreached: BTreeSet<Arc<str>>,
+    /// How full those are that take rooms.
+    loads: BTreeMap<NodeId, Load>,
 }
 
 impl StoreDirectory {
@@ -112,11 +115,18 @@ impl StoreDirectory {
         }
         let alive = self.store.alive().await.map(|alive| {
             let mut read = Alive::default();
-            for LivingNode { id, info, reached } in alive {
+            for living in alive {
+                let LivingNode {
+                    id,
+                    info,
+                    reached,
+                    load,
+                } = living;
                 let node: Arc<str> = format!("{} #{}", info.name, id.0).into();
                 if !reached {
                     read.unreached.insert(Arc::clone(&node));
                 }
+                read.loads.extend(load.map(|load| (id, load)));
                 let endpoint = info.peer_endpoint.into();
                 read.nodes.insert(id, Peer { node, endpoint });
             }
@@ -178,6 +188,26 @@ impl Directory for StoreDirectory {
             let own = self.lease.node().and_then(|node| nodes.remove(&node));
             let name = own.map_or_else(|| Arc::from(""), |own| own.node);
             (name, nodes.into_values().collect())
+        }
+        .boxed()
+    }
+
+    fn place(&self, own: Load) -> BoxFuture<'_, Option<Peer>> {
+        async move {
+            let mut alive = self.living().await;
+            let own_node = self.lease.node()?;
+            alive.loads.remove(&own_node);
+            let others: Vec<_> = alive.loads.into_iter().collect();
+            let node = chefshat_cluster::place(own, &others)?;
+            // Until it is read again, the node has one more.
+            if let Some(Nodes {
+                alive: Ok(known), ..
+            }) = &mut *self.nodes.lock().await
+                && let Some(load) = known.loads.get_mut(&node)
+            {
+                load.rooms += 1;
+            }
+            alive.nodes.remove(&node)
         }
         .boxed()
     }

@@ -12,7 +12,7 @@ use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_cluster::{BeatAnswer, ClaimAnswer, Input, Node, Output, Phase};
+use chefshat_cluster::{BeatAnswer, ClaimAnswer, Input, Node, Output, Phase, surplus};
 use futures::FutureExt as _;
 use futures::future::pending;
 use tokio::sync::{Semaphore, watch};
@@ -27,7 +27,7 @@ use crate::cluster::{NodeLease, UnitEvent};
 use chefshat_base::tasks::{LongTask, named, short};
 use chefshat_room::ids::Id;
 use chefshat_store::StoreError;
-use chefshat_store::cluster::{ClusterStore, Epoch, NodeId, NodeInfo};
+use chefshat_store::cluster::{ClusterStore, Epoch, Heartbeat, Load, NodeId, NodeInfo};
 use keyed_queue::KeyedQueue;
 use units::{Resumed, Units};
 
@@ -38,6 +38,14 @@ const ANSWER_TIME: Duration = Duration::from_secs(4);
 const FIND_INTERVAL: Duration = Duration::from_millis(500);
 /// Time between two removals of what is over.
 const TIDY_INTERVAL: Duration = Duration::from_secs(30);
+/// Time between two comparisons of how full the nodes are.
+const BALANCE_INTERVAL: Duration = Duration::from_secs(5);
+/// Most units that are handed over after one comparison, so that most rooms always go on.
+const MOVED_AT_ONCE: usize = 64;
+/// How long a full node leaves orphans to others: longer than any needs to find and claim them.
+const LEFT_TO_OTHERS: Duration = Duration::from_secs(3);
+/// How long a unit that was handed over is left to its next owner, and to others.
+const LEFT_TO_NEXT: Duration = Duration::from_secs(10);
 /// Most orphans that are looked for at a time, so that several nodes share them.
 const ORPHANS_AT_ONCE: usize = 64;
 /// Units that are handed over at a time: each is away only from its own last commit on.
@@ -75,17 +83,17 @@ impl ClusterNode {
         lease.joined(id);
         let reached = lease.reached();
         let units = Units::new(Arc::clone(&store), hosted, grace);
-        let capacity = usize::try_from(info.capacity).unwrap_or(usize::MAX);
         let task = Task {
-            node: Node::new(id, store.lease(), capacity),
-            capacity,
+            node: Node::new(id, store.lease()),
+            orphans: BTreeMap::new(),
             info,
             store,
             lease,
             units: Arc::new(units),
             began: Instant::now(),
             running: BTreeMap::new(),
-            not_resumable: BTreeMap::new(),
+            left_alone: BTreeMap::new(),
+            next_owners: BTreeMap::new(),
             nothing_to_run: BTreeMap::new(),
             queue: KeyedQueue::default(),
             answers: JoinSet::new(),
@@ -138,10 +146,12 @@ enum Event {
     Answer(Input<Id>),
     /// Orphans were found.
     Found(Vec<(Id, Epoch)>),
-    /// Claims were answered.
-    Claimed(Vec<(Id, ClaimAnswer)>),
-    /// A unit was released because this node cannot resume it.
-    GivenUp(Id),
+    /// Claims of orphans, with the epochs at which they were seen, were answered.
+    Claimed(Vec<(Id, Epoch, ClaimAnswer)>),
+    /// This node is too full: these units are for others.
+    TooFull(Vec<(Id, NodeId)>),
+    /// A unit was released at this epoch because this node cannot resume it.
+    GivenUp(Id, Epoch),
     /// A unit has nothing to run at this epoch.
     NothingToRun(Id, Epoch),
     /// A beat was answered, and the node was asked to hand over what it owns.
@@ -154,7 +164,8 @@ enum Event {
 
 struct Task {
     node: Node<Id>,
-    capacity: usize,
+    /// Orphans that were found, and when first.
+    orphans: BTreeMap<Id, Instant>,
     info: NodeInfo,
     store: Arc<dyn ClusterStore>,
     units: Arc<Units>,
@@ -162,8 +173,11 @@ struct Task {
     began: Instant,
     /// The epochs at which units are resumed here.
     running: BTreeMap<Id, Epoch>,
-    /// Units that this node could not resume, and when it has tried. It leaves them to others.
-    not_resumable: BTreeMap<Id, Instant>,
+    /// Units that this node leaves to others, and until when: it could not resume them, or has handed
+    /// them over.
+    left_alone: BTreeMap<Id, Instant>,
+    /// The next owners of units that are handed over because this node is too full.
+    next_owners: BTreeMap<Id, NodeId>,
     /// Units that are this node's, at these epochs, and have nothing to run: ephemeral rooms that have
     /// stopped.
     nothing_to_run: BTreeMap<Id, Epoch>,
@@ -186,6 +200,8 @@ impl Task {
         finding.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut tidying = interval(TIDY_INTERVAL);
         tidying.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut balancing = interval(BALANCE_INTERVAL);
+        balancing.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let store = Arc::clone(&self.store);
         self.put_in(Input::Time);
         loop {
@@ -197,7 +213,8 @@ impl Task {
                     Ok(Event::Answer(input)) => self.answered(input),
                     Ok(Event::Found(orphans)) => self.found(orphans),
                     Ok(Event::Claimed(claims)) => self.claimed(claims),
-                    Ok(Event::GivenUp(unit)) => self.given_up(unit),
+                    Ok(Event::TooFull(units)) => self.hand_over(units),
+                    Ok(Event::GivenUp(unit, epoch)) => self.given_up(unit, epoch),
                     Ok(Event::NothingToRun(unit, epoch)) => {
                         self.nothing_to_run.insert(unit, epoch);
                     }
@@ -220,9 +237,10 @@ impl Task {
                     }
                 }
                 () = sleep_until(alarm), if wakes_at.is_some() => self.put_in(Input::Time),
-                orphan = store.handed_over() => self.found(vec![orphan]),
-                _ = finding.tick() => self.find_orphans(ORPHANS_AT_ONCE),
+                orphan = store.handed_over() => self.take_over(vec![orphan]),
+                _ = finding.tick() => self.find_orphans(),
                 _ = tidying.tick() => self.tidy(),
+                _ = balancing.tick() => self.balance(),
                 Ok(()) = self.reached.changed() => self.put_in(Input::Time),
                 () = drain.cancelled(), if !is_draining => self.put_in(Input::Drain),
             }
@@ -271,6 +289,12 @@ impl Task {
     /// Takes the answer of the database to something.
     fn answered(&mut self, input: Input<Id>) {
         let is_beat = matches!(input, Input::Beat { .. });
+        if let Input::Released(unit, _, true) = input
+            && self.next_owners.remove(&unit).is_some()
+        {
+            self.units.metrics().handed_over();
+            (self.left_alone).insert(unit, Instant::now() + LEFT_TO_NEXT);
+        }
         self.put_in(input);
         if is_beat && self.node.phase() == Phase::Serving {
             self.resume_missing();
@@ -300,15 +324,19 @@ impl Task {
         match output {
             Output::Beat => {
                 self.queue.forget_ended();
-                let (sent_ms, is_reached) = (self.now_ms(), *self.reached.borrow());
+                let sent_ms = self.now_ms();
+                let heartbeat = Heartbeat {
+                    reached: *self.reached.borrow(),
+                    rooms: self.units.fullness().rooms,
+                };
                 // A beat without an answer must not take up the time of the next one, which the
                 // lease may still wait for.
                 let within = Duration::from_millis(store.lease().beat_every_ms());
-                let beating = async move { beat(&*store, within, sent_ms, is_reached).await };
+                let beating = async move { beat(&*store, within, sent_ms, heartbeat).await };
                 let answer = BeatAnswer::None;
                 self.spawn(beating, Event::Answer(Input::Beat { sent_ms, answer }));
             }
-            Output::FindOrphans(count) => self.find_orphans(count),
+            Output::FindOrphans => self.find_orphans(),
             Output::Claim(unit, seen) => self.claim(vec![(unit, seen)]),
             Output::Serve(unit, epoch) => {
                 self.units.want(unit, epoch);
@@ -320,7 +348,7 @@ impl Task {
                         Resumed::Runs => Event::Nothing,
                         Resumed::Nothing => Event::NothingToRun(unit, epoch),
                         Resumed::Impossible => match units.give_up(unit, epoch).await {
-                            true => Event::GivenUp(unit),
+                            true => Event::GivenUp(unit, epoch),
                             false => Event::Nothing,
                         },
                     }
@@ -333,14 +361,15 @@ impl Task {
             Output::Resume => info!("the node has a lease"),
             Output::Release(unit, epoch) => {
                 self.units.unwant(unit);
+                let next = self.next_owners.get(&unit).copied();
                 let (units, releases) = (Arc::clone(&self.units), Arc::clone(&self.releases));
                 let releasing = async move {
                     units.until_ephemeral_over(unit).await;
                     let _permit = releases.acquire().await.expect("it is never closed");
-                    let is_released = units.release(unit, epoch).await;
-                    Event::Answer(Input::Released(unit, is_released))
+                    let is_released = units.release(unit, epoch, next).await;
+                    Event::Answer(Input::Released(unit, epoch, is_released))
                 };
-                let not_released = Event::Answer(Input::Released(unit, false));
+                let not_released = Event::Answer(Input::Released(unit, epoch, false));
                 self.queue(unit, releasing, not_released);
             }
             Output::Leave => {
@@ -358,48 +387,117 @@ impl Task {
     /// Claims units together.
     fn claim(&mut self, orphans: Vec<(Id, Epoch)>) {
         let store = Arc::clone(&self.store);
-        let units: Vec<Id> = orphans.iter().map(|(unit, _)| *unit).collect();
-        let unanswered = units.iter().map(|unit| (*unit, ClaimAnswer::None));
-        let unanswered = Event::Claimed(unanswered.collect());
+        let claims = orphans
+            .iter()
+            .map(|(unit, seen)| (*unit, *seen, ClaimAnswer::None));
+        let mut claims: Vec<_> = claims.collect();
+        let unanswered = Event::Claimed(claims.clone());
         let claiming = async move {
             let claimed = answer("claim", ANSWER_TIME, store.claim_all(orphans)).await;
-            let answers = match claimed {
-                Some(claimed) => (claimed.into_iter())
-                    .map(|epoch| epoch.map_or(ClaimAnswer::Lost, ClaimAnswer::Won))
-                    .collect(),
-                None => vec![ClaimAnswer::None; units.len()],
-            };
-            Event::Claimed(units.into_iter().zip(answers).collect())
+            for ((.., answer), epoch) in claims.iter_mut().zip(claimed.into_iter().flatten()) {
+                *answer = epoch.map_or(ClaimAnswer::Lost, ClaimAnswer::Won);
+            }
+            Event::Claimed(claims)
         };
         self.spawn(claiming, unanswered);
     }
 
-    fn claimed(&mut self, claims: Vec<(Id, ClaimAnswer)>) {
-        let is_any_won = (claims.iter()).any(|(_, it)| matches!(it, ClaimAnswer::Won(_)));
-        for (unit, answer) in claims {
-            self.put_in(Input::Claimed(unit, answer));
+    fn claimed(&mut self, claims: Vec<(Id, Epoch, ClaimAnswer)>) {
+        let is_any_won = (claims.iter()).any(|(.., it)| matches!(it, ClaimAnswer::Won(_)));
+        for (unit, seen, answer) in claims {
+            self.put_in(Input::Claimed(unit, seen, answer));
         }
         if is_any_won {
             // There may be more than are looked for at a time.
-            self.find_orphans(ORPHANS_AT_ONCE);
+            self.find_orphans();
         }
     }
 
+    /// Takes orphans over. A full node first leaves them to others, and takes those that stay without
+    /// an owner: games that are acknowledged come before its limit.
     fn found(&mut self, mut orphans: Vec<(Id, Epoch)>) {
+        orphans.retain(|(unit, _)| !self.left_alone.contains_key(unit));
+        let now = Instant::now();
+        let earlier = std::mem::take(&mut self.orphans);
+        let found = orphans.iter().map(|(unit, _)| *unit);
+        self.orphans = found
+            .map(|unit| (unit, earlier.get(&unit).copied().unwrap_or(now)))
+            .collect();
+        let Load { rooms, capacity } = self.units.fullness();
+        if rooms >= capacity {
+            orphans.retain(|(unit, _)| now - self.orphans[unit] >= LEFT_TO_OTHERS);
+            if !orphans.is_empty() {
+                let units = orphans.len();
+                warn!(
+                    units,
+                    rooms,
+                    capacity,
+                    "nobody else takes these units over; this node does, though it is full"
+                );
+            }
+        }
+        self.take_over(orphans);
+    }
+
+    fn take_over(&mut self, mut orphans: Vec<(Id, Epoch)>) {
         if !*self.reached.borrow() {
             return;
         }
-        orphans.retain(|(unit, _)| !self.not_resumable.contains_key(unit));
+        orphans.retain(|(unit, _)| !self.left_alone.contains_key(unit));
         self.put_in(Input::Orphans(orphans));
     }
 
-    fn given_up(&mut self, unit: Id) {
+    /// Compares how full the nodes are.
+    fn balance(&mut self) {
+        let owned: BTreeMap<Id, Epoch> = self.node.owned().collect();
+        self.next_owners.retain(|unit, _| owned.contains_key(unit));
+        let may_move = *self.reached.borrow() && self.node.may_claim(self.now_ms());
+        if !may_move || !self.next_owners.is_empty() {
+            return;
+        }
+        let (store, units, own) = (
+            Arc::clone(&self.store),
+            Arc::clone(&self.units),
+            self.node.id(),
+        );
+        let comparing = async move {
+            let alive = answer("compare nodes", ANSWER_TIME, store.alive()).await;
+            let others = alive.into_iter().flatten().filter(|node| node.id != own);
+            let others: Vec<_> = others
+                .filter_map(|node| Some((node.id, node.load?)))
+                .collect();
+            let moves = surplus(units.fullness(), &others);
+            match moves.is_empty() {
+                true => Event::Nothing,
+                false => Event::TooFull(units.to_hand_over(moves).await),
+            }
+        };
+        self.spawn(comparing, Event::Nothing);
+    }
+
+    /// Hands units over to nodes that are less full.
+    fn hand_over(&mut self, mut units: Vec<(Id, NodeId)>) {
+        if self.node.phase() != Phase::Serving {
+            return;
+        }
+        units.truncate(MOVED_AT_ONCE);
+        info!(
+            units = units.len(),
+            "other nodes are less full; units are handed over to them"
+        );
+        for (unit, next) in units {
+            self.next_owners.insert(unit, next);
+            self.put_in(Input::HandOver(unit));
+        }
+    }
+
+    fn given_up(&mut self, unit: Id, epoch: Epoch) {
         let minutes = LEFT_ALONE.as_secs() / 60;
         self.units.metrics().not_resumed();
         error!(%unit, minutes, "nothing of it can be resumed here; for some time it is left to other nodes");
-        self.not_resumable.insert(unit, Instant::now());
+        self.left_alone.insert(unit, Instant::now() + LEFT_ALONE);
         self.running.remove(&unit);
-        self.put_in(Input::Released(unit, true));
+        self.put_in(Input::Released(unit, epoch, true));
     }
 
     fn tidy(&mut self) {
@@ -415,7 +513,7 @@ impl Task {
         self.spawn(tidying, Event::Nothing);
     }
 
-    fn find_orphans(&mut self, count: usize) {
+    fn find_orphans(&mut self) {
         if !*self.reached.borrow() || !self.node.may_claim(self.now_ms()) {
             return;
         }
@@ -423,10 +521,10 @@ impl Task {
         let Ok(search) = Arc::clone(&self.search).try_acquire_owned() else {
             return;
         };
-        // Those that it could not resume are found as well.
-        self.not_resumable
-            .retain(|_, tried| tried.elapsed() < LEFT_ALONE);
-        let count = count + self.not_resumable.len();
+        // Those that it leaves to others are found as well.
+        let now = Instant::now();
+        self.left_alone.retain(|_, until| now < *until);
+        let count = ORPHANS_AT_ONCE + self.left_alone.len();
         let store = Arc::clone(&self.store);
         let finding = async move {
             let orphans = answer("look for orphans", ANSWER_TIME, store.orphans(count)).await;
@@ -501,14 +599,19 @@ impl Task {
             }
         };
         self.lease.joined(id);
-        self.node = Node::new(id, self.store.lease(), self.capacity);
+        self.node = Node::new(id, self.store.lease());
         self.put_in(Input::Time);
     }
 }
 
 /// Beats, and reads what the node owns.
-async fn beat(store: &dyn ClusterStore, within: Duration, sent_ms: u64, is_reached: bool) -> Event {
-    let (answer, drain) = match answer("beat", within, store.beat(is_reached)).await {
+async fn beat(
+    store: &dyn ClusterStore,
+    within: Duration,
+    sent_ms: u64,
+    heartbeat: Heartbeat,
+) -> Event {
+    let (answer, drain) = match answer("beat", within, store.beat(heartbeat)).await {
         Some(Some(beat)) => (BeatAnswer::Renewed(beat.owned), beat.drain),
         Some(None) => (BeatAnswer::Unknown, false),
         None => (BeatAnswer::None, false),

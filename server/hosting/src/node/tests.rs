@@ -29,6 +29,8 @@ use chefshat_wire::convert;
 
 /// Longest time that anything takes, on the paused clock.
 const SOON: Duration = Duration::from_secs(60);
+/// Most rooms of a node.
+const MAX_ROOMS: usize = 1_000;
 
 /// A server without sockets.
 struct TestNode {
@@ -44,7 +46,12 @@ struct TestNode {
 impl TestNode {
     /// Starts a node that others reach.
     async fn start(database: &Arc<Database>) -> Self {
-        let mut started = Self::start_unreached(database).await;
+        Self::start_for(database, MAX_ROOMS).await
+    }
+
+    /// The same for this many rooms.
+    async fn start_for(database: &Arc<Database>, max_rooms: usize) -> Self {
+        let mut started = Self::start_unreached_for(database, max_rooms).await;
         let lease = Arc::clone(&started.lease);
         let reaching = tokio::spawn(async move {
             loop {
@@ -59,12 +66,19 @@ impl TestNode {
     }
 
     async fn start_unreached(database: &Arc<Database>) -> Self {
+        Self::start_unreached_for(database, MAX_ROOMS).await
+    }
+
+    async fn start_unreached_for(database: &Arc<Database>, max_rooms: usize) -> Self {
         let store = FakeStore::new(database);
         let tracker = TaskTracker::new();
         let lease = Arc::new(NodeLease::new());
         let stored: Arc<dyn Store> = Arc::clone(&store) as Arc<dyn Store>;
         let shared: Arc<dyn ClusterStore> = Arc::clone(&store) as Arc<dyn ClusterStore>;
-        let config = ServerConfig::default();
+        let config = ServerConfig {
+            max_rooms,
+            ..ServerConfig::default()
+        };
         let directory = StoreDirectory::new(Arc::clone(&shared), Arc::clone(&lease), config.shares);
         let directory = Arc::new(directory);
         let rooms = Rooms::of_node(
@@ -78,7 +92,7 @@ impl TestNode {
         let tournaments = Tournaments::new(Arc::clone(&rooms), tracker.clone());
         let studies = Studies::new(Arc::clone(&rooms), tracker);
         let info = NodeInfo {
-            capacity: 1_000,
+            capacity: max_rooms as u64,
             ..NodeInfo::default()
         };
         let id = store
@@ -229,6 +243,76 @@ async fn a_node_takes_nothing_until_it_is_reached() {
     second.create_room().await;
     assert!(*second.node.serves().borrow());
     assert!(second.shows("chefshat_node_reached 1"));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_node_that_joins_gets_its_share_of_the_rooms() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let mut rooms = Vec::new();
+    for number in 0..30 {
+        let room = first.create_room().await;
+        let name = format!("player {number}");
+        soon(join(&room, &name)).await.expect("it runs");
+        rooms.push((room.id(), name));
+    }
+    let ephemeral = first.create(Durability::Ephemeral).await.id();
+    assert_eq!(first.rooms.place().await, None, "it is alone");
+
+    let second = TestNode::start(&database).await;
+    // What is new is created by the emptier one.
+    let placed = async {
+        while first.rooms.place().await.is_none() {
+            sleep(Duration::from_millis(10)).await;
+        }
+    };
+    soon(placed).await;
+    assert_eq!(second.rooms.place().await, None);
+
+    let balanced = async {
+        while second.rooms.open_count() < 15 || first.rooms.open_count() > 16 {
+            sleep(Duration::from_millis(10)).await;
+        }
+    };
+    soon(balanced).await;
+    assert!(first.shows("chefshat_handovers_total 15"));
+    // Nothing is handed over any more, and nothing was lost.
+    sleep(SOON).await;
+    assert_eq!(second.rooms.open_count(), 15);
+    for (id, name) in rooms {
+        let node = match database.owner(id) == Some(first.store.node()) {
+            true => &first,
+            false => &second,
+        };
+        assert_eq!(names(&node.has(id).await).await, [name]);
+    }
+    assert!(first.rooms.get(ephemeral).is_some(), "it would be lost");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_full_node_takes_over_what_nobody_else_does() {
+    let database = Database::new();
+    let first = TestNode::start(&database).await;
+    let (full, free) = (
+        TestNode::start_for(&database, 2).await,
+        TestNode::start(&database).await,
+    );
+    let new = || NewRoom {
+        charged: Key::Proxies,
+        ..NewRoom::for_tests()
+    };
+    for _ in 0..2 {
+        full.rooms.create(new()).await.expect("a room");
+    }
+    let refused = full.rooms.create(new()).await;
+    assert!(matches!(refused, Err(CreateError::TooMany(2))));
+    let room = first.create_room().await.id();
+    drop(first);
+    free.has(room).await;
+    assert_eq!(full.rooms.open_count(), 2, "another one has space");
+    drop(free);
+    full.has(room).await;
+    assert_eq!(full.rooms.open_count(), 3);
 }
 
 #[tokio::test(start_paused = true)]

@@ -11,7 +11,7 @@ use crate::tournaments::Tournaments;
 use chefshat_base::metrics::Metrics;
 use chefshat_room::ids::Id;
 use chefshat_store::StoreError;
-use chefshat_store::cluster::{ClusterStore, Epoch};
+use chefshat_store::cluster::{ClusterStore, Epoch, Load, NodeId};
 use chefshat_store::units::UnitKind;
 use tokio::sync::Semaphore;
 use tokio::time::{Duration, sleep, timeout};
@@ -71,6 +71,34 @@ impl Units {
             wanted: Mutex::default(),
             loads: Semaphore::new(LOADS_AT_ONCE),
         }
+    }
+
+    /// How full the node is.
+    pub(super) fn fullness(&self) -> Load {
+        self.rooms.load()
+    }
+
+    /// Units to hand over, each with its next owner, so that these nodes get about these numbers of
+    /// rooms: rooms that nobody plays in first, tournaments and studies last.
+    pub(super) async fn to_hand_over(&self, moves: Vec<(NodeId, u64)>) -> Vec<(Id, NodeId)> {
+        let mut units = Vec::new();
+        for (unit, rooms) in self.rooms.durable_units() {
+            let waits = match rooms.as_slice() {
+                [room] if room.id() == unit => Some(room.has_started().await == Ok(false)),
+                _ => None,
+            };
+            units.push((waits, rooms.len() as u64, unit));
+        }
+        units.sort_by_key(|(waits, rooms, _)| (waits.is_none(), waits.map(|it| !it), *rooms));
+        let mut units = units.into_iter().peekable();
+        let mut chosen = Vec::new();
+        for (node, mut wanted) in moves {
+            while let Some((_, rooms, unit)) = units.next_if(|(_, rooms, _)| *rooms <= wanted) {
+                wanted -= rooms;
+                chosen.push((unit, node));
+            }
+        }
+        chosen
     }
 
     /// Counts what the node does.
@@ -172,7 +200,7 @@ impl Units {
     /// database knows.
     pub(super) async fn give_up(&self, unit: Id, epoch: Epoch) -> bool {
         while self.wanted().get(&unit) == Some(&epoch) {
-            if self.release(unit, epoch).await {
+            if self.release(unit, epoch, None).await {
                 self.unwant(unit);
                 return true;
             }
@@ -181,13 +209,13 @@ impl Units {
         false
     }
 
-    /// Ends everything of a unit after its next commits, and gives it up. Returns whether the
-    /// database knows.
-    pub(super) async fn release(&self, unit: Id, epoch: Epoch) -> bool {
+    /// Ends everything of a unit after its next commits, and gives it up, to this node if one is named.
+    /// Returns whether the database knows.
+    pub(super) async fn release(&self, unit: Id, epoch: Epoch, next: Option<NodeId>) -> bool {
         self.tournaments.stop_one(unit).await;
         self.studies.stop_one(unit).await;
         self.rooms.suspend_unit(unit).await;
-        match self.store.release(unit, epoch).await {
+        match self.store.release(unit, epoch, next).await {
             Ok(()) => true,
             Err(error) => {
                 warn!(%unit, %error, "a room or tournament cannot be released");

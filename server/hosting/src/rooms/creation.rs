@@ -10,7 +10,7 @@ use chefshat_engine::{RULES_VERSION, RuleSet, Seat, SeedPlan};
 
 use super::table::{CreateError, Entry};
 use super::{CODES_TRIED, Rooms};
-use crate::cluster::UnitEvent;
+use crate::cluster::{Peer, UnitEvent};
 use crate::room::{Handle, TaskContext, spawn_room};
 use chefshat_admission::limits::{Key, Payer, Permit, Refused};
 use chefshat_base::SERVER_VERSION;
@@ -181,11 +181,16 @@ impl Rooms {
             .map_err(|error| StoreError::Failed(format!("creating a room failed: {error}")))?
     }
 
+    /// The node that something new is for, if it is not this one, which is full or much fuller.
+    pub async fn place(&self) -> Option<Peer> {
+        self.directory.place(self.load()).await
+    }
+
     /// The refusal of one more room of a caller.
     fn too_many_of(&self, key: Key) -> Refused {
         Refused {
             reason: "TOO_MANY_ROOMS",
-            what: "too many rooms that wait or play; close one, or try later",
+            what: "too many rooms of one client wait or play; close one, or try later",
             limit: self.places.share_of(key) as u64,
             retry_after: RETRY_ROOMS,
         }

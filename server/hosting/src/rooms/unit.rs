@@ -1,8 +1,10 @@
 //! The rooms of a unit, which change hands together in a cluster: a room without a tournament, or
 //! those of a tournament.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::future::Future;
 
+use chefshat_cluster::Load;
 use chefshat_proto::v1::RoomState;
 
 use super::{Rooms, Table};
@@ -15,6 +17,31 @@ impl Rooms {
         let table = self.lock();
         table.get(unit).is_some_and(|entry| entry.is_open())
             || table.in_creation.contains_key(&unit)
+    }
+
+    /// How full this server is.
+    pub fn load(&self) -> Load {
+        Load {
+            rooms: self.open_count() as u64,
+            capacity: self.max_rooms as u64,
+        }
+    }
+
+    /// The rooms that wait or play, by their units; those of units of which nothing is lost with this
+    /// server.
+    pub(crate) fn durable_units(&self) -> BTreeMap<Id, Vec<Handle>> {
+        let table = self.lock();
+        let mut units = BTreeMap::<Id, Vec<Handle>>::new();
+        let mut lost = BTreeSet::new();
+        for entry in table.by_number.values().filter(|entry| entry.is_open()) {
+            let unit = entry.header.unit();
+            match entry.durable {
+                true => units.entry(unit).or_default().push(entry.handle.clone()),
+                false => drop(lost.insert(unit)),
+            }
+        }
+        units.retain(|unit, _| !lost.contains(unit));
+        units
     }
 
     /// Stops all rooms of a unit at once, which publish nothing more, unless their games are over.

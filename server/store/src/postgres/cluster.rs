@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use chefshat_cluster::LeaseTimes;
+use chefshat_cluster::{LeaseTimes, Load};
 use chefshat_engine::RULES_VERSION;
 use futures::FutureExt as _;
 use futures::future::{BoxFuture, pending};
@@ -17,8 +17,8 @@ use super::owned::rooms;
 use super::values::{ROOM, integer, kind_of, millis, text};
 use super::{PostgresStore, lock};
 use crate::cluster::{
-    Beat, ClusterStore, Epoch, Kind, LivingNode, Location, NodeId, NodeInfo, NodeStatus, Unit,
-    WithoutNode,
+    Beat, ClusterStore, Epoch, Heartbeat, Kind, LivingNode, Location, NodeId, NodeInfo, NodeStatus,
+    Unit, WithoutNode,
 };
 use crate::form::FORM;
 use crate::units::UnitKind;
@@ -158,18 +158,19 @@ impl ClusterStore for PostgresStore {
         .boxed()
     }
 
-    fn beat(&self, reached: bool) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
+    fn beat(&self, heartbeat: Heartbeat) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
         async move {
             let node = self.node()?;
             let beat = self.beats.read(move |connection| {
                 async move {
                     let mut transaction = connection.begin().await?;
                     let drain: Option<bool> = sqlx::query_scalar(
-                        "UPDATE nodes SET beat_ms = greatest(beat_ms, clock_ms()), reached = $2
+                        "UPDATE nodes SET beat_ms = greatest(beat_ms, clock_ms()), reached = $2, rooms = $3
                          WHERE node = $1 RETURNING drain",
                     )
                     .bind(node)
-                    .bind(reached)
+                    .bind(heartbeat.reached)
+                    .bind(integer(heartbeat.rooms))
                     .fetch_optional(&mut *transaction)
                     .await?;
                     let Some(drain) = drain else {
@@ -320,13 +321,19 @@ impl ClusterStore for PostgresStore {
         .boxed()
     }
 
-    fn release(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn release(
+        &self,
+        unit: Id,
+        epoch: Epoch,
+        next: Option<NodeId>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
-            let (node, expire_after) = (self.node()?, self.expire_after());
+            let expire_after = self.expire_after();
             let unit = (unit, integer(epoch.0));
+            let nodes = (self.node()?, next.map(|node| integer(node.0)));
             let released = self
                 .control
-                .read(move |connection| release(connection, unit, node, expire_after).boxed());
+                .read(move |connection| release(connection, unit, nodes, expire_after).boxed());
             released.await
         }
         .boxed()
@@ -392,7 +399,7 @@ impl ClusterStore for PostgresStore {
             let expire_after = self.expire_after();
             let nodes = self.reader.read(move |connection| {
                 sqlx::query(
-                    "SELECT node, name, peer_endpoint, client_endpoint, build, capacity, reached
+                    "SELECT node, name, peer_endpoint, client_endpoint, build, capacity, reached, drain, rooms
                      FROM nodes WHERE beat_ms + $1 > clock_ms()",
                 )
                 .bind(expire_after)
@@ -403,7 +410,18 @@ impl ClusterStore for PostgresStore {
             let alive = nodes.iter().map(|row| {
                 let (id, info) = node_of(row);
                 let reached = row.get("reached");
-                LivingNode { id, info, reached }
+                let takes_rooms = reached && !row.get::<bool, _>("drain") && info.capacity > 0;
+                let rooms: Option<i64> = row.get("rooms");
+                let load = rooms.filter(|_| takes_rooms).map(|rooms| Load {
+                    rooms: rooms.cast_unsigned(),
+                    capacity: info.capacity,
+                });
+                LivingNode {
+                    id,
+                    info,
+                    reached,
+                    load,
+                }
             });
             Ok(alive.collect())
         }

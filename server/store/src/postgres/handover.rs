@@ -26,11 +26,12 @@ const RENEW_AFTER: Duration = Duration::from_secs(60);
 const WAITING: usize = 1_024;
 
 /// Gives up a unit that a node owns at an epoch, removes its ephemeral rooms, and tells one of the
-/// other nodes. Leases expire after this number of milliseconds.
+/// other nodes: `next` if it takes rooms, otherwise one at random, by the space that each has. Leases
+/// expire after this number of milliseconds.
 pub(super) async fn release(
     connection: &mut PgConnection,
     (unit, epoch): (Id, i64),
-    node: i64,
+    (node, next): (i64, Option<i64>),
     expire_after: i64,
 ) -> sqlx::Result<()> {
     sqlx::query(
@@ -43,7 +44,7 @@ pub(super) async fn release(
          ), next AS (
              SELECT node FROM nodes
              WHERE node <> $3 AND NOT drain AND reached AND capacity > 0 AND beat_ms + $4 > clock_ms()
-             ORDER BY random() LIMIT 1
+             ORDER BY node = coalesce($6, 0) DESC, -ln(1 - random()) / greatest(capacity - coalesce(rooms, 0), 1) LIMIT 1
          )
          SELECT pg_notify($5, concat_ws(' ', next.node, encode($1, 'hex'), $2)) FROM next
          WHERE EXISTS (SELECT FROM released WHERE NOT over)",
@@ -53,6 +54,7 @@ pub(super) async fn release(
     .bind(node)
     .bind(expire_after)
     .bind(CHANNEL)
+    .bind(next)
     .execute(connection)
     .await
     .map(drop)

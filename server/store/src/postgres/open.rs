@@ -15,10 +15,11 @@ use crate::StoreError;
 
 /// The migrations, oldest first. They never change: sqlx refuses a database in which one ran with
 /// another text.
-const MIGRATIONS: [(i64, &str, &str); 3] = [
+const MIGRATIONS: [(i64, &str, &str); 4] = [
     (1, "games", include_str!("migrations/0001_games.sql")),
     (2, "studies", include_str!("migrations/0002_studies.sql")),
     (3, "reached", include_str!("migrations/0003_reached.sql")),
+    (4, "rooms", include_str!("migrations/0004_rooms.sql")),
 ];
 /// Key of the advisory lock that is held while the schema is created or upgraded: "chefshat" in ASCII.
 const SCHEMA_LOCK: i64 = 0x6368_6566_7368_6174;

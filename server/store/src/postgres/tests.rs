@@ -23,10 +23,16 @@ use chefshat_tournament::Change as TournamentChange;
 use sqlx::postgres::PgConnection;
 
 use super::*;
-use crate::cluster::{ClusterStore, Epoch, Kind, NodeId, NodeInfo};
+use crate::cluster::{ClusterStore, Epoch, Heartbeat, Kind, NodeId, NodeInfo};
 use crate::testing::TypedUnits as _;
 use crate::tournaments::{TournamentEntry, TournamentHeader};
 use crate::units::UnitKind;
+
+/// What a node without rooms says.
+const REACHED: Heartbeat = Heartbeat {
+    reached: true,
+    rooms: 0,
+};
 
 /// A node that has just joined, whose writes wait for a lock as long as a test wants.
 pub(crate) async fn node(database: &Database) -> PostgresStore {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
-use chefshat_cluster::{Created, LeaseTimes, Tables, Written};
+use chefshat_cluster::{Created, LeaseTimes, Load, Tables, Written};
 use chefshat_proto::v1;
 use chefshat_room::ids::Id;
 use chefshat_room::journal::{Change, Entry, GameHeader};
@@ -16,7 +16,8 @@ use tokio::sync::{Mutex as AsyncMutex, broadcast, watch};
 use tokio::time::{Instant, sleep};
 
 use crate::cluster::{
-    Beat, ClusterStore, Epoch, Kind, LivingNode, Location, NodeId, NodeInfo, NodeStatus, Unit,
+    Beat, ClusterStore, Epoch, Heartbeat, Kind, LivingNode, Location, NodeId, NodeInfo, NodeStatus,
+    Unit,
 };
 use crate::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
 use crate::{Journal, Listed, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame};
@@ -28,6 +29,14 @@ enum Row {
     Unit(Vec<u8>),
 }
 
+/// A unit that a node has released.
+#[derive(Clone, Copy)]
+struct Released {
+    by: NodeId,
+    unit: (Id, Epoch),
+    next: Option<NodeId>,
+}
+
 /// What all nodes share.
 pub struct Database {
     began: Instant,
@@ -35,10 +44,11 @@ pub struct Database {
     games: Mutex<BTreeMap<Id, Arc<GameHeader>>>,
     /// The headers of tournaments.
     tournaments: Mutex<BTreeMap<Id, Vec<u8>>>,
-    nodes: Mutex<BTreeMap<NodeId, NodeInfo>>,
+    /// With what each has said last.
+    nodes: Mutex<BTreeMap<NodeId, (NodeInfo, Heartbeat)>>,
     drain: Mutex<Option<NodeId>>,
-    /// Units that nodes have released, for all others: in a test, each of them is the next owner.
-    released: broadcast::Sender<(NodeId, Id, Epoch)>,
+    /// Units that nodes have released, for the next owner if one is named, otherwise for all others.
+    released: broadcast::Sender<Released>,
     finished: Arc<MemoryStore>,
 }
 
@@ -162,7 +172,7 @@ pub struct FakeStore {
     pub panics_at: watch::Sender<&'static str>,
     /// The join codes of new rooms that are refused, until as many have been tried.
     pub codes_taken: Mutex<(usize, Vec<String>)>,
-    released: AsyncMutex<broadcast::Receiver<(NodeId, Id, Epoch)>>,
+    released: AsyncMutex<broadcast::Receiver<Released>>,
 }
 
 impl FakeStore {
@@ -459,13 +469,13 @@ impl ClusterStore for FakeStore {
             let node = self.database.tables().join(self.database.now_ms());
             *self.node.lock().expect("no test panics here") = node;
             let mut nodes = self.database.nodes.lock().expect("no test panics here");
-            nodes.insert(node, info);
+            nodes.insert(node, (info, Heartbeat::default()));
             Ok(node)
         }
         .boxed()
     }
 
-    fn beat(&self, _: bool) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
+    fn beat(&self, heartbeat: Heartbeat) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
         async move {
             self.may_panic("beat");
             self.reached().await;
@@ -486,6 +496,8 @@ impl ClusterStore for FakeStore {
             if !tables.beat(node, self.database.now_ms()) {
                 return Ok(None);
             }
+            let mut nodes = self.database.nodes.lock().expect("no test panics here");
+            nodes.entry(node).and_modify(|(_, said)| *said = heartbeat);
             let drain = *self.database.drain.lock().expect("no test panics here");
             Ok(Some(Beat {
                 owned: tables.owned_by(node),
@@ -511,10 +523,10 @@ impl ClusterStore for FakeStore {
         async move {
             let mut released = self.released.lock().await;
             loop {
-                let (node, unit, epoch) =
+                let Released { by, unit, next } =
                     (released.recv().await).expect("a test releases few units");
-                if node != self.node() {
-                    return (unit, epoch);
+                if by != self.node() && next.is_none_or(|next| next == self.node()) {
+                    return unit;
                 }
             }
         }
@@ -605,13 +617,22 @@ impl ClusterStore for FakeStore {
         .boxed()
     }
 
-    fn release(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn release(
+        &self,
+        unit: Id,
+        epoch: Epoch,
+        next: Option<NodeId>,
+    ) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
             self.may_panic("release");
             self.reached().await;
             self.database.tables().release(unit, epoch);
             // Nobody may listen.
-            let _ = (self.database.released).send((self.node(), unit, epoch));
+            let _ = (self.database.released).send(Released {
+                by: self.node(),
+                unit: (unit, epoch),
+                next,
+            });
             Ok(())
         }
         .boxed()
@@ -687,7 +708,27 @@ impl ClusterStore for FakeStore {
     }
 
     fn alive(&self) -> BoxFuture<'_, Result<Vec<LivingNode>, StoreError>> {
-        async { Ok(Vec::new()) }.boxed()
+        async move {
+            self.reached().await;
+            let tables = self.database.tables();
+            let now_ms = self.database.now_ms();
+            let nodes = self.database.nodes.lock().expect("no test panics here");
+            let living = nodes.iter().filter(|(id, _)| {
+                (tables.last_beat(**id))
+                    .is_some_and(|beat| !LeaseTimes::DEFAULT.expired(beat, now_ms))
+            });
+            let living = living.map(|(id, (info, said))| LivingNode {
+                id: *id,
+                info: info.clone(),
+                reached: said.reached,
+                load: said.reached.then_some(Load {
+                    rooms: said.rooms,
+                    capacity: info.capacity,
+                }),
+            });
+            Ok(living.collect())
+        }
+        .boxed()
     }
 
     fn nodes(&self) -> BoxFuture<'_, Result<Vec<NodeStatus>, StoreError>> {

@@ -254,8 +254,8 @@ impl RemoteSeats {
                 return Err(NotPassedOn::NodeGone(parked));
             }
             let id = match elsewhere.found_by {
-                FoundBy::Id(id) => Some(id),
-                FoundBy::Code(_) | FoundBy::Game(_) => None,
+                Some(FoundBy::Id(id)) => Some(id),
+                Some(FoundBy::Code(_) | FoundBy::Game(_)) | None => None,
             };
             let seat = RemoteSeat {
                 id,

@@ -1,5 +1,7 @@
 //! Units that are handed over, claimed together, or left to another version of the program.
 
+use chefshat_cluster::Load;
+
 use super::fencing::Pair;
 use super::*;
 
@@ -64,12 +66,12 @@ async fn the_last_word_of_an_owner_costs_no_other_claim() {
 #[tokio::test]
 async fn a_released_unit_is_offered_to_another_node() {
     let pair = Pair::new().await;
-    create(&pair.first, 1..=2).await;
+    create(&pair.first, 1..=8).await;
     let info = NodeInfo {
         capacity: 1,
         ..NodeInfo::default()
     };
-    pair.second.join(info).await.expect("it joins");
+    let next = pair.second.join(info.clone()).await.expect("it joins");
     // It listens from the first time on.
     assert_eq!(pair.second.handed_over().now_or_never(), None);
     let mut observer = connected(&pair.database).await;
@@ -87,11 +89,56 @@ async fn a_released_unit_is_offered_to_another_node() {
     assert!(is_listening);
     // Until it has been reached, nothing is offered to it.
     for (room, reached) in [(1, false), (2, true)] {
-        pair.second.beat(reached).await.expect("it answers");
-        let released = pair.first.release(Id([room; 16]), FIRST);
+        pair.second
+            .beat(Heartbeat { reached, ..REACHED })
+            .await
+            .expect("it answers");
+        let released = pair.first.release(Id([room; 16]), FIRST, None);
         released.await.expect("released");
     }
     assert_eq!(pair.second.handed_over().await, (Id([2; 16]), FIRST));
+
+    // A node that is named has it, whichever other ones there are.
+    let other = node(&pair.database).await;
+    other.join(info).await.expect("it joins");
+    other.beat(REACHED).await.expect("it answers");
+    for room in 3..=8 {
+        let released = pair.first.release(Id([room; 16]), FIRST, Some(next));
+        released.await.expect("released");
+        let unit = (Id([room; 16]), FIRST);
+        assert_eq!(pair.second.handed_over().await, unit);
+    }
+    other.close().await;
+    pair.close().await;
+}
+
+#[tokio::test]
+async fn nodes_say_how_full_they_are() {
+    let pair = Pair::new().await;
+    let info = NodeInfo {
+        capacity: 9,
+        ..NodeInfo::default()
+    };
+    let node = pair.second.join(info).await.expect("it joins");
+    let load = async || {
+        let alive = pair.first.alive().await.expect("readable");
+        let living = alive.iter().find(|it| it.id == node);
+        living.expect("it has a lease").load
+    };
+    for (reached, rooms) in [(true, 3), (true, 4), (false, 4)] {
+        let beat = pair.second.beat(Heartbeat { reached, rooms });
+        beat.await.expect("it answers");
+        let said = Load { rooms, capacity: 9 };
+        assert_eq!(load().await, reached.then_some(said));
+    }
+    pair.second.beat(REACHED).await.expect("it answers");
+    assert_eq!(load().await.map(|load| load.rooms), Some(0));
+    pair.first.request_drain(node).await.expect("it answers");
+    assert_eq!(load().await, None, "it takes nothing");
+    // A node of an earlier version.
+    pair.database
+        .run("UPDATE nodes SET drain = false, rooms = NULL");
+    assert_eq!(load().await, None, "it says nothing");
     pair.close().await;
 }
 

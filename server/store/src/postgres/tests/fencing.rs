@@ -39,7 +39,7 @@ impl Pair {
     /// Lets the lease of the first node expire.
     pub(super) async fn stall(&self) {
         advance(&self.database, 8_000);
-        let beat = self.second.beat(true).await.expect("it answers");
+        let beat = self.second.beat(REACHED).await.expect("it answers");
         assert!(beat.is_some(), "the second node is known");
     }
 
@@ -243,7 +243,10 @@ async fn of_many_claims_one_wins() {
     created.await.expect("created");
     let room = Id([1; 16]);
     let third = node(&pair.database).await;
-    pair.first.release(room, FIRST).await.expect("released");
+    pair.first
+        .release(room, FIRST, None)
+        .await
+        .expect("released");
     let stores = [&pair.first, &pair.second, &third];
     let claims = (stores.iter().cycle().take(9)).map(|store| store.claim(room, FIRST));
     let claims = futures::future::join_all(claims).await;
@@ -263,7 +266,7 @@ async fn nodes_that_look_for_a_few_orphans_find_different_ones() {
     for room in 1..=40 {
         let created = pair.first.create(durable(room), vec![entry(1)]);
         created.await.expect("created");
-        let released = pair.first.release(Id([room; 16]), FIRST);
+        let released = pair.first.release(Id([room; 16]), FIRST, None);
         released.await.expect("released");
     }
     let first = pair.first.orphans(10).await.expect("it answers");
@@ -384,10 +387,14 @@ async fn no_two_processes_are_the_same_node_even_after_a_backup_was_put_back() {
     let after = node(&database).await;
     let created = after.create(durable(1), vec![entry(1)]);
     let mut journal = created.await.expect("created");
-    assert_eq!(before.beat(true).await, Ok(None), "it is no node any more");
+    assert_eq!(
+        before.beat(REACHED).await,
+        Ok(None),
+        "it is no node any more"
+    );
     assert_eq!(before.claim(Id([1; 16]), FIRST).await, Ok(None));
     assert_eq!(before.leave().await, Ok(false));
-    let beat = after.beat(true).await.expect("it answers");
+    let beat = after.beat(REACHED).await.expect("it answers");
     assert_eq!(beat.expect("it is known").owned, [(Id([1; 16]), FIRST)]);
     append(&mut journal, 2).await.expect("committed");
     drop(journal);
@@ -426,7 +433,7 @@ async fn a_node_is_listed_drained_and_leaves() {
     assert_eq!(pair.first.leave().await, Ok(false), "it owns a room");
     assert_eq!(pair.second.request_drain(node).await, Ok(true));
     assert_eq!(pair.second.request_drain(NodeId(99)).await, Ok(false));
-    let beat = pair.first.beat(true).await.expect("it answers");
+    let beat = pair.first.beat(REACHED).await.expect("it answers");
     let beat = beat.expect("it is known");
     assert!(beat.drain);
     assert_eq!(beat.owned, [(Id([1; 16]), FIRST)]);
@@ -447,10 +454,10 @@ async fn a_node_is_listed_drained_and_leaves() {
         "it has just joined"
     );
     assert!(nodes.iter().all(|it| it.reached == (it.id == node)));
-    let released = pair.first.release(Id([1; 16]), FIRST);
+    let released = pair.first.release(Id([1; 16]), FIRST, None);
     released.await.expect("released");
     assert_eq!(pair.first.leave().await, Ok(true));
-    assert_eq!(pair.first.beat(true).await, Ok(None));
+    assert_eq!(pair.first.beat(REACHED).await, Ok(None));
     let refused = pair.first.create(durable(2), vec![entry(1)]).await;
     assert_eq!(refused.err(), Some(StoreError::Fenced(Id([2; 16]))));
     let claimed = pair.first.claim(Id([1; 16]), FIRST).await;
@@ -559,7 +566,7 @@ async fn stopped(retry_for: Duration) -> (Server, PostgresStore, Box<dyn Journal
     let mut journal = created.expect("created");
     append(&mut journal, 2).await.expect("committed");
     server.stop();
-    assert!(store.beat(true).await.is_err(), "nobody answers");
+    assert!(store.beat(REACHED).await.is_err(), "nobody answers");
     (server, store, journal)
 }
 

@@ -132,7 +132,7 @@ impl Worlds {
             Operation::Beat(node) => {
                 let server = &self.servers[node];
                 let known = self.tables.beat(server.id, self.now_ms);
-                let beat = server.store.beat(true).await.expect("it answers");
+                let beat = server.store.beat(REACHED).await.expect("it answers");
                 assert_eq!(beat.is_some(), known);
                 if let Some(beat) = beat {
                     let mut owned = beat.owned;
@@ -226,7 +226,7 @@ impl Worlds {
                     return;
                 };
                 self.tables.release(id(unit), epoch);
-                let released = server.store.release(id(unit), epoch).await;
+                let released = server.store.release(id(unit), epoch, None).await;
                 released.expect("released");
             }
         }

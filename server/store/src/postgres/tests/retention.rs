@@ -32,7 +32,7 @@ async fn a_tournament_needs_its_games_at_every_node_until_it_is_over() {
 
     // Also when the rooms have been removed.
     advance(&database, 600_001);
-    first.beat(true).await.expect("it answers");
+    first.beat(REACHED).await.expect("it answers");
     second.tidy().await.expect("it answers");
     assert_eq!(second.locate(Id([2; 16])).await, Ok(None));
     assert_eq!(prunable(&second).await, [2]);

@@ -110,7 +110,7 @@ async fn connections_that_hang_do_not_keep_their_places() {
     let beats: Vec<_> = (0..BEATERS)
         .map(|_| {
             let store = Arc::clone(&store);
-            tokio::spawn(async move { store.beat(true).await })
+            tokio::spawn(async move { store.beat(REACHED).await })
         })
         .collect();
     let all = "SELECT count(*) = $1 FROM pg_stat_activity
@@ -124,7 +124,7 @@ async fn connections_that_hang_do_not_keep_their_places() {
     run(&mut holder, "ROLLBACK").await;
     // The node gives up waiting.
     beats.iter().for_each(JoinHandle::abort);
-    let beating = async { while store.beat(true).await.is_err() {} };
+    let beating = async { while store.beat(REACHED).await.is_err() {} };
     let beats = tokio::time::timeout(Duration::from_secs(60), beating).await;
     assert_eq!(beats, Ok(()), "the database can be reached");
     store.close().await;
