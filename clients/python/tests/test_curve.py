@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chefshat.experiments.stats import interquartile_mean
 from chefshat.learn import __main__ as command
-from chefshat.learn.curve import figure, read
+from chefshat.learn.curve import figure, interquartile_mean, read
 
 
 def a_look(decisions: int, points: float) -> dict[str, object]:

@@ -1,23 +1,21 @@
-"""The experiments: intervals, tables, plots and files with made-up figures, and the complete command on the real server."""
+"""The experiments: intervals, tables and files with made-up figures, and the complete command on the real server."""
 
 import json
 import re
 import struct
 import subprocess
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 import pytest
-from matplotlib.legend import Legend
 
-from chefshat.experiments import Estimate, Figure, Level, Line, Panel, Points, Result, Table, paper, results, stats
+from chefshat.experiments import Estimate, Result, Table, paper, results, stats
 from chefshat.experiments.__main__ import main, parse
+from chefshat.learn.figures import Figure, Level, Line, Panel, Points
 
 # These need the extra `learn`.
-from chefshat.experiments import command, mechanics, page, plots, rules, tables  # isort: skip
+from chefshat.experiments import command, mechanics, page, rules, tables  # isort: skip
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "experiments.md"
 
@@ -170,42 +168,6 @@ def test_other_files_are_refused(tmp_path: Path, spoil: Callable[[dict[str, obje
         results.from_json(plain)
     (tmp_path / "mechanics.json").write_text(json.dumps(plain))
     assert main(["report", str(tmp_path)]) == 1
-
-
-def test_a_plot_is_deterministic(tmp_path: Path) -> None:
-    (figure,) = a_result().figures
-    picture = plots.png(figure)
-    width, height = png_size(picture)
-    assert width > 2 * height > 400
-    assert picture == plots.png(figure)
-    other = replace(figure, panels=figure.panels[:1])
-    assert png_size(plots.png(other))[0] < width
-
-
-def test_legends_do_not_cover_lines() -> None:
-    (figure,) = a_result().figures
-    names = [[text.get_text() for text in legend.get_texts()] for legend in legends_beside_panels(figure)]
-    assert names == [["learner", "paper"], ["ours"]]
-    # If each name has one line style and each style one name, all panels share a legend.
-    panels = [figure.panels[0], replace(figure.panels[0], levels=())]
-    (legend,) = legends_beside_panels(replace(figure, panels=panels))
-    assert [text.get_text() for text in legend.get_texts()] == ["learner", "paper"]
-
-
-def legends_beside_panels(figure: Figure) -> list[Legend]:
-    """Returns the legends of a figure. None touches a panel or leaves the picture."""
-    with mpl.rc_context(plots.STYLE):
-        canvas = plots.drawn(figure)
-        canvas.canvas.draw()
-    found = [*canvas.legends, *(legend for axes in canvas.axes if (legend := axes.get_legend()))]
-    for legend in found:
-        place = legend.get_window_extent()
-        assert not any(place.overlaps(axes.get_window_extent()) for axes in canvas.axes)
-        assert canvas.bbox.containsx(place.x0)
-        assert canvas.bbox.containsx(place.x1)
-        assert canvas.bbox.containsy(place.y0)
-        assert canvas.bbox.containsy(place.y1)
-    return found
 
 
 def test_a_page_is_filled_only_between_the_marks() -> None:

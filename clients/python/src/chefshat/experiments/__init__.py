@@ -2,10 +2,10 @@
 
 An experiment is a module of this package with one function, `run(config: Config, progress: Progress) -> Result`, which prints
 nothing. Shared modules: `results` (a result and its file), `stats` (intervals), `paper` (the figures the paper reports), `tables`
-(text and Markdown), `plots` (figures as PNG), `progress`, `page` (the results in docs/experiments.md) and `command` (the command,
-whose options `__main__` parses).
+(text and Markdown), `progress`, `page` (the results in docs/experiments.md) and `command` (the command, whose options `__main__`
+parses). `chefshat.learn.plots` draws figures as PNG.
 """
 
-from chefshat.experiments.results import Config, Estimate, Figure, Level, Line, Panel, Points, Result, Table
+from chefshat.experiments.results import Config, Estimate, Result, Table
 
-__all__ = ["Config", "Estimate", "Figure", "Level", "Line", "Panel", "Points", "Result", "Table"]
+__all__ = ["Config", "Estimate", "Result", "Table"]

@@ -20,10 +20,11 @@ import chefshat
 from chefshat import join_options
 from chefshat.address import ServerAddress
 from chefshat.errors import ChefsHatError, failed
-from chefshat.experiments import page, plots, results, tables
+from chefshat.experiments import page, results, tables
 from chefshat.experiments.progress import Progress
 from chefshat.experiments.results import Config, Result
 from chefshat.files import write_atomically
+from chefshat.learn import plots
 from chefshat.local_server import LocalServer
 
 EXPERIMENTS = ("mechanics", "rules", "winning")

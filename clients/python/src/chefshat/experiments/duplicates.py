@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from chefshat.experiments import plots
-from chefshat.experiments.results import Figure, Line, Panel
+from chefshat.learn import plots
+from chefshat.learn.figures import Figure, Line, Panel
 
 EXAMPLE = """\
 example:

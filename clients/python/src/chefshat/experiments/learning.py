@@ -17,10 +17,11 @@ from google.protobuf.json_format import MessageToDict
 
 from chefshat.experiments import paper, stats
 from chefshat.experiments.progress import Progress
-from chefshat.experiments.results import Config, Estimate, Line
+from chefshat.experiments.results import Config, Estimate
 from chefshat.learn import deep_q, deep_q_training
 from chefshat.learn.deep_q import Agents, DeepQConfig
 from chefshat.learn.deep_q_training import Played
+from chefshat.learn.figures import Line
 from chefshat.learn.mlp import Params
 from chefshat.transitions import RewardFunction
 from chefshat.vector import VectorEnv

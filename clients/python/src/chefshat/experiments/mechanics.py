@@ -19,7 +19,8 @@ from chefshat import pb
 from chefshat.address import ServerAddress
 from chefshat.experiments import paper, stats
 from chefshat.experiments.progress import Progress
-from chefshat.experiments.results import Cell, Config, Estimate, Figure, Level, Panel, Points, Result, Table
+from chefshat.experiments.results import Cell, Config, Estimate, Result, Table
+from chefshat.learn.figures import Figure, Level, Panel, Points
 from chefshat.vector import VectorEnv, sample_legal
 
 PRESETS = ("paper", "original2020")

@@ -6,7 +6,8 @@ The text between the marks is generated from results files. The text outside is 
 from collections.abc import Iterable
 
 from chefshat.experiments import tables
-from chefshat.experiments.results import Figure, Result
+from chefshat.experiments.results import Result
+from chefshat.learn.figures import Figure
 
 # The folder of plots, next to the page.
 PICTURES = "images"

@@ -1,7 +1,7 @@
 """The config and the result of an experiment: settings, tables and figures as data, and the results file.
 
 Everything that is printed, drawn or put into a page comes from a `Result`, so that a file can be shown again without running
-anything. Formatting is in `tables` and `plots`.
+anything. Formatting is in `tables` and `chefshat.learn.plots`.
 """
 
 import dataclasses
@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 
 from chefshat.address import ServerAddress
 from chefshat.files import write_atomically
+from chefshat.learn.figures import Figure, Level, Line, Panel, Points
 
 FORMAT = "chefshat-experiment-1"
 # Significant digits of the numbers in figures: more are invisible.
@@ -86,77 +87,6 @@ class Table:
         wrong = [row for row in self.rows if len(row) != len(self.columns)]
         if wrong:
             raise ValueError(f"table {self.name} has {len(self.columns)} columns, but a row is {wrong[0]}")
-
-
-@dataclass(frozen=True)
-class Line:
-    """A line of a figure, with a band if `low` and `high` are given. All have the same length."""
-
-    label: str
-    x: Sequence[float]
-    y: Sequence[float]
-    low: Sequence[float] = ()
-    high: Sequence[float] = ()
-
-
-@dataclass(frozen=True)
-class Points:
-    """A point for each category of a panel, with an error bar from low to high if given; NaN omits a category."""
-
-    label: str
-    y: Sequence[float]
-    low: Sequence[float] = ()
-    high: Sequence[float] = ()
-
-
-@dataclass(frozen=True)
-class Level:
-    """A horizontal dashed line, for a figure of the paper."""
-
-    label: str
-    y: float
-
-
-@dataclass(frozen=True)
-class Panel:
-    """One pair of axes: lines over numbers, or points over categories.
-
-    Attributes:
-        title: one line.
-        x_label: name and unit of x; may be empty over categories.
-        y_label: name and unit of y.
-        lines: lines, in the order of the palette.
-        points: points over `categories`.
-        levels: horizontal lines.
-        categories: names along x, for `points`.
-        y_range: minimum and maximum of y; None: automatic.
-    """
-
-    title: str
-    x_label: str
-    y_label: str
-    lines: Sequence[Line] = ()
-    points: Sequence[Points] = ()
-    levels: Sequence[Level] = ()
-    categories: Sequence[str] = ()
-    y_range: tuple[float, float] | None = None
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A picture of one or more panels.
-
-    Attributes:
-        name: short name in lower case, unique within the result; part of the picture's file name.
-        title: one line.
-        panels: at least one.
-        columns: panels in a row.
-    """
-
-    name: str
-    title: str
-    panels: Sequence[Panel]
-    columns: int = 2
 
 
 @dataclass(frozen=True)

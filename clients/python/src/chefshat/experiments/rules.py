@@ -28,10 +28,11 @@ import chefshat
 from chefshat.experiments import baselines, learning, paper
 from chefshat.experiments.learning import Counts, Learned
 from chefshat.experiments.progress import Progress
-from chefshat.experiments.results import Cell, Config, Estimate, Figure, Level, Panel, Result, Table
+from chefshat.experiments.results import Cell, Config, Estimate, Result, Table
 from chefshat.learn import checkpoint, network
 from chefshat.learn.checkpoint import Training
 from chefshat.learn.deep_q import DeepQConfig
+from chefshat.learn.figures import Figure, Level, Panel
 from chefshat.learn.mlp import Params
 from chefshat.learn.network import NetworkFileError
 

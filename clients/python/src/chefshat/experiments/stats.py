@@ -7,7 +7,8 @@ from math import sqrt
 import numpy as np
 import numpy.typing as npt
 
-from chefshat.experiments.results import Estimate, Line
+from chefshat.experiments.results import Estimate
+from chefshat.learn.figures import Line
 
 # Half the width of a 95% interval of the normal distribution, in standard deviations.
 Z_95 = 1.959963984540054
@@ -54,28 +55,6 @@ def spread(values: Sequence[float], *, percent: bool = False, digits: int = 1) -
 def clustered(values: Sequence[float], *, percent: bool = False, digits: int = 1) -> Estimate:
     """Returns the mean over games with its standard error. Games are independent; the Shifts of a game need not be."""
     return dataclasses.replace(spread(values, percent=percent, digits=digits), low=None, high=None)
-
-
-def interquartile_mean(values: npt.NDArray[np.float64]) -> tuple[float, float, float]:
-    """Returns the mean of the middle half of the runs, with its 95% interval by bootstrap: Agarwal et al., 2021.
-
-    "Deep reinforcement learning at the edge of the statistical precipice". Of R runs the R//4 best and the R//4 worst are left out.
-    The interval has the 2.5th and the 97.5th percentile over 2,000 resamples of the runs, drawn with a fixed seed.
-
-    Args:
-        values: (R,) one number for each run, R at least 2.
-    """
-    runs = len(values)
-    if runs < 2:
-        raise ValueError("an interquartile mean needs two runs or more")
-    resamples = np.random.default_rng(1).integers(runs, size=(2000, runs))
-    left_out = runs // 4
-
-    def middle(rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        return np.asarray(np.sort(rows, axis=-1)[..., left_out : runs - left_out].mean(axis=-1))
-
-    low, high = np.percentile(middle(values[resamples]), [2.5, 97.5])
-    return float(middle(values)), float(low), float(high)
 
 
 def standard_error(values: npt.ArrayLike) -> float | None:

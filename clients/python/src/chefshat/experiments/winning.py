@@ -26,8 +26,9 @@ import numpy.typing as npt
 from chefshat.experiments import baselines, learning, paper, rules, stats
 from chefshat.experiments.learning import Counts, Learned
 from chefshat.experiments.progress import Progress
-from chefshat.experiments.results import Cell, Config, Estimate, Figure, Level, Line, Panel, Result, Table
+from chefshat.experiments.results import Cell, Config, Estimate, Result, Table
 from chefshat.learn.deep_q import DeepQConfig
+from chefshat.learn.figures import Figure, Level, Line, Panel
 from chefshat.transitions import RewardFunction, Transitions
 
 WRONG_LIMIT = 10

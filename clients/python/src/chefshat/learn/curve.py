@@ -7,13 +7,17 @@ import argparse
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from chefshat.experiments import plots
-from chefshat.experiments.results import Figure, Level, Line, Panel
-from chefshat.experiments.stats import Z_95, interquartile_mean
+from chefshat.learn import plots
+from chefshat.learn.figures import Figure, Level, Line, Panel
+
+# Half the width of a 95% interval of the normal distribution, in standard deviations.
+Z_95 = NormalDist().inv_cdf(0.975)
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,28 @@ def _line(group: Sequence[Run], number: int, label: str) -> Line:
     else:
         middle, low, high = np.transpose([interquartile_mean(column) for column in points.T])
     return Line(label, decisions.mean(axis=0).tolist(), middle.tolist(), low.tolist(), high.tolist())
+
+
+def interquartile_mean(values: npt.NDArray[np.float64]) -> tuple[float, float, float]:
+    """Returns the mean of the middle half of the runs, with its 95% interval by bootstrap: Agarwal et al., 2021.
+
+    "Deep reinforcement learning at the edge of the statistical precipice". Of R runs the R//4 best and the R//4 worst are left out.
+    The interval has the 2.5th and the 97.5th percentile over 2,000 resamples of the runs, drawn with a fixed seed.
+
+    Args:
+        values: (R,) one number for each run, R at least 2.
+    """
+    runs = len(values)
+    if runs < 2:
+        raise ValueError("an interquartile mean needs two runs or more")
+    resamples = np.random.default_rng(1).integers(runs, size=(2000, runs))
+    left_out = runs // 4
+
+    def middle(rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        return np.asarray(np.sort(rows, axis=-1)[..., left_out : runs - left_out].mean(axis=-1))
+
+    low, high = np.percentile(middle(values[resamples]), [2.5, 97.5])
+    return float(middle(values)), float(low), float(high)
 
 
 def run(options: argparse.Namespace) -> int:

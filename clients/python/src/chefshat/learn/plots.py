@@ -14,8 +14,8 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.transforms import ScaledTranslation
 
 from chefshat.errors import failed
-from chefshat.experiments.results import Figure, Panel
 from chefshat.files import check_readable, write_atomically
+from chefshat.learn.figures import Figure, Panel
 
 Read = TypeVar("Read")
 

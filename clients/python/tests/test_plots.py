@@ -1,0 +1,63 @@
+"""Figures as pictures."""
+
+import struct
+from dataclasses import replace
+
+import matplotlib as mpl
+from matplotlib.legend import Legend
+
+from chefshat.learn import plots
+from chefshat.learn.figures import Figure, Level, Line, Panel, Points
+
+
+def a_figure() -> Figure:
+    lines = [Line("learner", [1, 2], [0.123456789, 2.0], [0.0, 1.0], [1.0, 3.0])]
+    points = [Points("ours", [1.0, float("nan")], [0.5, float("nan")], [1.5, float("nan")])]
+    panels = [
+        Panel("Over time", "Shift", "reward", lines=lines, levels=[Level("paper", 0.5)], y_range=(-1, 3)),
+        Panel("By condition", "", "laps", points=points, categories=["all", "none"]),
+    ]
+    return Figure("curves", "All of it", panels)
+
+
+def png_size(picture: bytes) -> tuple[int, int]:
+    assert picture[:8] == b"\x89PNG\r\n\x1a\n"
+    assert picture[12:16] == b"IHDR"
+    width, height = struct.unpack(">II", picture[16:24])
+    return width, height
+
+
+def test_a_plot_is_deterministic() -> None:
+    figure = a_figure()
+    picture = plots.png(figure)
+    width, height = png_size(picture)
+    assert width > 2 * height > 400
+    assert picture == plots.png(figure)
+    other = replace(figure, panels=figure.panels[:1])
+    assert png_size(plots.png(other))[0] < width
+
+
+def test_legends_do_not_cover_lines() -> None:
+    figure = a_figure()
+    names = [[text.get_text() for text in legend.get_texts()] for legend in legends_beside_panels(figure)]
+    assert names == [["learner", "paper"], ["ours"]]
+    # If each name has one line style and each style one name, all panels share a legend.
+    panels = [figure.panels[0], replace(figure.panels[0], levels=())]
+    (legend,) = legends_beside_panels(replace(figure, panels=panels))
+    assert [text.get_text() for text in legend.get_texts()] == ["learner", "paper"]
+
+
+def legends_beside_panels(figure: Figure) -> list[Legend]:
+    """Returns the legends of a figure. None touches a panel or leaves the picture."""
+    with mpl.rc_context(plots.STYLE):
+        canvas = plots.drawn(figure)
+        canvas.canvas.draw()
+    found = [*canvas.legends, *(legend for axes in canvas.axes if (legend := axes.get_legend()))]
+    for legend in found:
+        place = legend.get_window_extent()
+        assert not any(place.overlaps(axes.get_window_extent()) for axes in canvas.axes)
+        assert canvas.bbox.containsx(place.x0)
+        assert canvas.bbox.containsx(place.x1)
+        assert canvas.bbox.containsy(place.y0)
+        assert canvas.bbox.containsy(place.y1)
+    return found
