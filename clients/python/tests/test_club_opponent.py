@@ -76,12 +76,12 @@ def test_a_training_against_a_player_resumes(
     assert others[-1]["evaluations"][2]["opponents"] == ["club_players:Largest", "greedy", "random"]
 
     resume = ["ppo", "--out", str(out), "--resume", "--decisions", "128"]
-    assert command.main([*resume, "--club-arguments", "{}"]) == 1
-    assert "club arguments" in capsys.readouterr().err
+    assert command.main([*resume, "--opponent-arguments", "{}"]) == 1
+    assert "opponent arguments" in capsys.readouterr().err
     assert command.main([*resume, *arguments]) == 0
     for wrong in ("[]", "{"):
         with pytest.raises(SystemExit):
-            command.main([*resume, "--club-arguments", wrong])
+            command.main([*resume, "--opponent-arguments", wrong])
     other = str(tmp_path / "other.safetensors")
     assert command.main(["ppo", "--out", other, "--decisions", "64", *games[:5], "club:club_players:NoSuchPlayer"]) == 1
     assert "NoSuchPlayer" in capsys.readouterr().err

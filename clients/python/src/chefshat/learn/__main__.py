@@ -50,12 +50,23 @@ def _ppo(command: argparse.ArgumentParser) -> None:
         nargs="+",
         default=["greedy"],
         metavar="NAME",
-        help="who plays the other seats of these: built-in agents, network files or players of the Players Club "
-        "(club:module.path:Class), one or one for each seat; for instance past.safetensors trained greedy",
+        help="who plays the other seats of these: built-in agents, network files or opponents of plug-ins (with chefshat-paper "
+        "club:module.path:Class), one or one for each seat; for instance past.safetensors trained greedy",
     )
-    plan.add_argument("--club-python", default="", metavar="PYTHON", help="the Python with these players (default: this one)")
     plan.add_argument(
-        "--club-arguments", type=json_object, default="{}", metavar="JSON", help="arguments of their constructors, as an object"
+        "--opponent-python",
+        "--club-python",
+        default="",
+        metavar="PYTHON",
+        help="the Python of opponents of plug-ins (default: this one)",
+    )
+    plan.add_argument(
+        "--opponent-arguments",
+        "--club-arguments",
+        type=json_object,
+        default="{}",
+        metavar="JSON",
+        help="their arguments, as an object",
     )
     plan.add_argument("--steps", type=count, default=128, help="decisions in each game between two updates")
     plan.add_argument("--epochs", type=count, default=2, help="passes over them in an update")

@@ -23,8 +23,6 @@ from chefshat.learn.training_file import network_info, opened
 from chefshat.vector_setup import NETWORK_SUFFIX
 
 FORMAT = "chefshat-ppo-training-2"
-# Before the class of a player of the Players Club.
-CLUB = "club:"
 # With weights as (out, in), and with older names in the plan.
 OLD_FORMAT = "chefshat-ppo-training-1"
 
@@ -34,10 +32,10 @@ class Opponent:
     """An opponent of a training.
 
     Attributes:
-        name: a built-in agent, the path of a network file, or `CLUB` and "module.path:Class", a player of the Players Club.
+        name: a built-in agent, the path of a network file, or "KIND:NAME", an opponent of a plug-in; see `plugins`.
         sha256: the SHA-256 of the file in hexadecimal; empty: not known yet, or not a file.
-        python: the Python of a player of the Players Club; empty: this program's.
-        arguments: the arguments of that player's constructor, a JSON object; empty: none.
+        python: the Python of an opponent of a plug-in; empty: this program's.
+        arguments: the arguments of that opponent, a JSON object; empty: none.
     """
 
     name: str

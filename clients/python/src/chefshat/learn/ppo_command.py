@@ -21,16 +21,15 @@ from tqdm import tqdm
 
 from chefshat import join_options, pb
 from chefshat.errors import ChefsHatError, failed
-from chefshat.learn import network, ppo_checkpoint, runs
+from chefshat.learn import network, plugins, ppo_checkpoint, runs
 from chefshat.learn.evaluation import Evaluation, evaluate
 from chefshat.learn.network import Network
+from chefshat.learn.plugins import PluginOpponent
 from chefshat.learn.ppo import Hyperparameters
-from chefshat.learn.ppo_checkpoint import CLUB, Opponent, Plan, Progress, Training
+from chefshat.learn.ppo_checkpoint import Opponent, Plan, Progress, Training
 from chefshat.learn.ppo_training import Trainer
 from chefshat.learn.scalars import Scalars
 from chefshat.learn.training_file import TrainingFileError
-from chefshat.players_club import AgentError
-from chefshat.players_club.opponent import ClubOpponent
 
 LOG = logging.getLogger("chefshat.learn")
 OPPONENTS = ("greedy", "random")
@@ -51,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
             LOG.info(json.dumps(_setup(trainer.training)))
             with Scalars(options.tensorboard) as scalars:
                 evaluations = _train(trainer, options, state, scalars)
-    except (AgentError, ChefsHatError, TrainingFileError, OSError, ValueError) as error:
+    except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)
     if options.json:
         print(json.dumps({"event": "trained", "file": str(out), **_summary(trainer.training, evaluations)}))
@@ -96,9 +95,9 @@ def _start(options: argparse.Namespace) -> Training:
 
 
 def _opponent(name: str, options: argparse.Namespace) -> Opponent:
-    if not name.startswith(CLUB):
+    if plugins.find(name) is None:
         return Opponent(name)
-    return Opponent(name, python=options.club_python, arguments=options.club_arguments)
+    return Opponent(name, python=options.opponent_python, arguments=options.opponent_arguments)
 
 
 def _policy(file: Path, rules: pb.RuleSet) -> Network:
@@ -115,8 +114,8 @@ def _resume(state: Path, options: argparse.Namespace) -> Training:
     training = ppo_checkpoint.load(runs.existing(state))
     plan, hyper = training.plan, training.plan.hyper
     opponents = [opponent.name for opponent in plan.opponents]
-    club = next((opponent for opponent in plan.opponents if opponent.name.startswith(CLUB)), Opponent(""))
-    fixed: dict[str, object] = {"opponents": opponents, "club_python": club.python, "club_arguments": club.arguments}
+    added = next((opponent for opponent in plan.opponents if opponent.arguments), Opponent(""))
+    fixed: dict[str, object] = {"opponents": opponents, "opponent_python": added.python, "opponent_arguments": added.arguments}
     fixed |= {"seed": training.seed, "width": hyper.policy_widths[0], "value_width": hyper.value_widths[0]}
     runs.refuse_contradictions(options.given, {**dataclasses.asdict(plan), **dataclasses.asdict(hyper), **fixed})
     if "rules" in options.given:
@@ -160,7 +159,7 @@ def _evaluate(trainer: Trainer, options: argparse.Namespace, losses: dict[str, f
     training = trainer.training
     current = training.network(options.name)
     plan = training.plan.checked()
-    tables: list[tuple[str | ClubOpponent, ...]] = [(name,) for name in OPPONENTS]
+    tables: list[tuple[str | PluginOpponent, ...]] = [(name,) for name in OPPONENTS]
     if plan.opponent_games:
         tables.append(tuple(trainer.opponents))
     evaluations = [

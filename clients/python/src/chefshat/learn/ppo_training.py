@@ -7,7 +7,6 @@ in `self_play`, learning in `ppo`, files are in `ppo_checkpoint`, the command is
 import dataclasses
 import itertools
 import json
-import sys
 import time
 from collections.abc import Sequence
 from typing import Any, Self
@@ -18,13 +17,13 @@ import numpy as np
 import numpy.typing as npt
 
 from chefshat.address import ServerAddress
-from chefshat.learn import ppo
+from chefshat.learn import plugins, ppo
 from chefshat.learn.all_hands import other_hands
+from chefshat.learn.plugins import PluginOpponent
 from chefshat.learn.ppo import Params, Samples
-from chefshat.learn.ppo_checkpoint import CLUB, Opponent, Plan, Progress, Training
+from chefshat.learn.ppo_checkpoint import Opponent, Plan, Progress, Training
 from chefshat.learn.runs import SEED_STEP
 from chefshat.learn.self_play import Collector, Floats, advantages
-from chefshat.players_club.opponent import ClubOpponent
 from chefshat.vector import VectorEnv
 
 
@@ -37,8 +36,7 @@ class Trainer:
         Raises:
             ChefsHatError: they are refused, or the server does not answer.
             ValueError: a network file among the opponents has changed since the training began.
-            OSError: such a file cannot be read.
-            AgentError: a player of the Players Club could not be created.
+            OSError: such a file cannot be read, or an opponent of a plug-in could not be created.
         """
         plan = training.plan.checked()
         runs = training.progress.runs + 1
@@ -47,8 +45,8 @@ class Trainer:
         first_seed = training.seed + SEED_STEP * runs
         self._envs: list[VectorEnv] = []
         self._collectors: list[Collector] = []
-        #: Who plays against the policy in games that are not self-play: names, and players of the Players Club.
-        self.opponents: list[str | ClubOpponent] = []
+        #: Who plays against the policy in games that are not self-play: names, and opponents of plug-ins.
+        self.opponents: list[str | PluginOpponent] = []
         try:
             for opponent in plan.opponents if plan.opponent_games else ():
                 self.opponents.append(seated(opponent))
@@ -72,11 +70,11 @@ class Trainer:
         self.close()
 
     def close(self) -> None:
-        """Ends the games, and the players of the Players Club."""
+        """Ends the games, and the opponents of plug-ins."""
         for env in self._envs:
             env.close()
         for opponent in self.opponents:
-            if isinstance(opponent, ClubOpponent):
+            if not isinstance(opponent, str):
                 opponent.close()
 
     def update(self, done: float) -> dict[str, float]:
@@ -110,16 +108,16 @@ class Trainer:
         return found
 
 
-def seated(opponent: Opponent) -> str | ClubOpponent:
-    """Returns an opponent as a `VectorEnv` takes it. Starts a player of the Players Club, which the caller closes.
+def seated(opponent: Opponent) -> str | PluginOpponent:
+    """Returns an opponent as a `VectorEnv` takes it. Creates one of a plug-in, which the caller closes.
 
     Raises:
-        AgentError: it could not be created.
+        OSError: it could not be created.
     """
-    if not opponent.name.startswith(CLUB):
+    plugin = plugins.find(opponent.name)
+    if plugin is None:
         return opponent.name
-    arguments = json.loads(opponent.arguments or "{}")
-    return ClubOpponent(opponent.name.removeprefix(CLUB), arguments=arguments, python=opponent.python or sys.executable)
+    return plugins.create(plugin, opponent.name, json.loads(opponent.arguments or "{}"), opponent.python)
 
 
 def play(collector: Collector, params: Params, key: jax.Array, plan: Plan) -> Samples:

@@ -16,7 +16,7 @@ from chefshat.errors import exit_code
 from chefshat.join_options import JoinOptions
 from chefshat.players_club.agent import ATTEMPTS, RulesDoNotFit, check_rules
 from chefshat.players_club.players import Players
-from chefshat.players_club.process import AgentError, AgentSpec
+from chefshat.players_club.process import AgentSpec
 
 EXAMPLE = """examples:
   python -m chefshat.players_club --server 127.0.0.1:50051 --code BCDF2345 \\
@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             codes = [play(client, players, way, as_json=options.json) for way in options.ways]
             return max(*codes, int(players.given_up))
 
-    return exit_code(play_all, AgentError, RulesDoNotFit, as_json=options.json)
+    return exit_code(play_all, RulesDoNotFit, as_json=options.json)
 
 
 def play(client: Client, players: Players, way: JoinOptions, *, as_json: bool) -> int:

@@ -34,7 +34,7 @@ MAX_TAIL = 2000
 FAREWELL_S = 5.0
 
 
-class AgentError(Exception):
+class AgentError(ChildProcessError):
     """A call of an agent failed. The message says how."""
 
 
