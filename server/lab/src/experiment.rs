@@ -35,7 +35,7 @@ const LARGE: u64 = 100_000;
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example:\n  chefshat experiment mechanics --large\n\nThe paper's experiments with learning agents: \
-                  python -m chefshat.experiments --help"
+                  python -m chefshat_paper.experiments --help"
 )]
 pub(super) struct ExperimentCommand {
     #[command(subcommand)]

@@ -56,7 +56,7 @@ impl Places {
     /// The Python packages in the source tree, relative to its root: the SDK, then those built on
     /// it.
     pub(crate) fn python_packages(&self) -> Vec<&'static str> {
-        let all = [CLIENTS, "clients/robot", DEPLOYMENT];
+        let all = [CLIENTS, "clients/paper", "clients/robot", DEPLOYMENT];
         all.into_iter()
             .filter(|package| self.root.join(package).join("pyproject.toml").exists())
             .collect()

@@ -24,7 +24,7 @@ use crate::wheels;
 pub(crate) enum Part {
     /// Engine, server, Rust SDK and system tests, with the agent in C++.
     Rust,
-    /// The packages in clients/python and clients/robot.
+    /// The packages in clients/python, clients/paper and clients/robot.
     Python,
     /// The agent in clients/node.
     Node,
@@ -49,12 +49,13 @@ const ALL: [Part; 5] = [
 /// The parts that a change of a file can break. The server and the protocol are in all of them.
 fn broken_by(file: &str) -> &'static [Part] {
     use Part::{Deployment, Node, Python, Rust, Web};
-    let folders: [(&str, &'static [Part]); 8] = [
+    let folders: [(&str, &'static [Part]); 9] = [
         ("clients/web/", &[Web, Deployment]),
         // The system tests start agents of each language.
         ("clients/node/", &[Rust, Node, Deployment]),
         ("clients/cpp/", &[Rust]),
         ("clients/python/", &[Rust, Python, Deployment]),
+        ("clients/paper/", &[Python]),
         ("clients/robot/", &[Python]),
         ("docs/", &[Rust, Python, Deployment]),
         ("docker/", &[Rust, Deployment]),

@@ -11,8 +11,6 @@ EXAMPLES = """examples:
   python -m chefshat.learn ppo --out exploiter.safetensors --games 0 --opponent-games 256 --opponents trained --minutes 30
   python -m chefshat.learn curve seed-*.jsonl --out curve.png
   python -m chefshat.learn value strong.safetensors --out points.safetensors
-  python -m chefshat.learn deep-q --out deep_q.safetensors --shifts 1000 --mask
-  python -m chefshat.learn tune --out tuned.json --trials 50 --shifts 250
   python -m chefshat.learn evaluate strong.safetensors --opponents greedy --games 2000
   python -m chefshat.learn play strong.safetensors --address 127.0.0.1:50051 --code CODE --name Strong
 
@@ -129,42 +127,6 @@ def _curve(command: argparse.ArgumentParser) -> None:
     command.add_argument("--out", type=Path, required=True, metavar="PNG", help="the picture to write")
 
 
-def _deep_q(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--out", type=Path, required=True, metavar="FILE", help="the network to write")
-    command.add_argument("--shifts", type=count, default=250, help="Shifts to play")
-    _deep_q_games(command)
-    command.add_argument("--name", default="deep-q", help="name of the agent, written into the network")
-    add_rules(command)
-    command.add_argument("--parameters", type=Path, metavar="FILE", help="hyper-parameters found by `tune` (default: the paper's)")
-    command.add_argument(
-        "--resume",
-        action="store_true",
-        help="resume from the checkpoint, with its settings; --shifts counts from the first start",
-    )
-    add_force(command)
-    command.add_argument("--save-every", type=count, default=50, metavar="SHIFTS", help="Shifts between two writes of both files")
-    command.add_argument("--checkpoint", type=Path, metavar="FILE", help="the checkpoint (default: OUT as .training)")
-
-
-def _tune(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--out", type=Path, required=True, metavar="FILE", help="the results to write, as JSON")
-    command.add_argument("--trials", type=count, default=20, help="sets of hyper-parameters to try")
-    command.add_argument("--agents", type=count, default=3, help="agents trained in parallel with each set")
-    command.add_argument("--shifts", type=count, default=100, help="Shifts that each agent plays; the second half counts")
-    _deep_q_games(command)
-
-
-def _deep_q_games(command: argparse.ArgumentParser) -> None:
-    add_games(command)
-    command.add_argument(
-        "--opponents", default="random", metavar="NAME", help="the built-in agent or network file of the three other seats"
-    )
-    command.add_argument("--rewards", default="paper", metavar="SCHEME", help="the reward scheme of turns")
-    command.add_argument(
-        "--mask", action=Given, nargs=0, const=True, default=False, help="choose and learn only among legal actions"
-    )
-
-
 def _play(command: argparse.ArgumentParser) -> None:
     command.add_argument("file", type=Path, help="the network, or trained: that of the built-in agent")
     join_options.add_server_options(command, required=True)
@@ -182,13 +144,11 @@ PROGRAM = Program(
         "ppo": ("ppo_command", "trains an agent by self-play with proximal policy optimisation", _ppo),
         "value": ("value", "trains a value network: the expected points of a policy", _value),
         "evaluate": ("evaluation", "plays a trained network on one seat against built-in agents", _evaluate),
-        "deep-q": ("deep_q_command", "trains a Deep Q agent, the 2020 paper's, against built-in agents", _deep_q),
-        "tune": ("tune", "searches hyper-parameters of the Deep Q agent", _tune),
         "curve": ("curve", "draws the learning curve of a training, from its log", _curve),
         "play": ("play", "plays a game in a room, or a whole tournament, with a trained network", _play),
     },
     extra="chefshat[learn]",
-    packages=("flax", "jax", "jaxlib", "optax", "optuna", "safetensors", "tensorboardX", "tqdm"),
+    packages=("flax", "jax", "jaxlib", "optax", "safetensors", "tensorboardX", "tqdm"),
 )
 main, parse = PROGRAM.main, PROGRAM.parse
 

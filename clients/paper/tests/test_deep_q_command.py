@@ -1,0 +1,137 @@
+"""The command `deep-q` and its files: Ctrl-C saves the training, and a resumed training keeps its settings."""
+
+import dataclasses
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chefshat import pb
+from chefshat.learn import network, runs
+from waiting import LIMIT_S, wait_until
+
+from chefshat_paper.learn import checkpoint, deep_q
+from chefshat_paper.learn.__main__ import main, parse
+from chefshat_paper.learn.deep_q import DeepQConfig
+
+SMALL = {"hidden": [8], "batch_size": 4, "memory_size": 32}
+
+
+class Place:
+    """A folder with hyper-parameters of a small agent, and the command that trains it there."""
+
+    def __init__(self, folder: Path, address: str) -> None:
+        self.out = folder / "agent.safetensors"
+        self.state = folder / "agent.training"
+        self.address = address
+        self.parameters = folder / "small.json"
+        self.parameters.write_text(json.dumps({"parameters": SMALL}))
+
+    def arguments(self, shifts: int, *more: str) -> list[str]:
+        files = ["--out", str(self.out), "--parameters", str(self.parameters)]
+        return ["deep-q", *files, "--shifts", str(shifts), "--address", self.address, *more]
+
+
+@pytest.fixture
+def place(tmp_path: Path, real_address: str) -> Place:
+    return Place(tmp_path, real_address)
+
+
+@pytest.mark.slow
+@pytest.mark.server
+def test_a_training_resumes_after_ctrl_c(
+    place: Place, processes: list["subprocess.Popen[str]"], capsys: pytest.CaptureFixture[str]
+) -> None:
+    # Far more Shifts than are played before Ctrl-C.
+    command = [sys.executable, "-m", "chefshat_paper.learn", *place.arguments(1_000_000, "--save-every", "1", "--seed", "5")]
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    processes.append(running)
+    # The network is written last, so both files exist during the training.
+    wait_until(place.out.exists, "the network is written", running)
+    during = checkpoint.load(place.state)
+    running.send_signal(signal.SIGINT)
+    _, message = running.communicate(timeout=LIMIT_S)
+    assert running.returncode == 130, message
+    assert "of 1,000,000 Shifts" in message
+    assert "resume by the same command with --resume" in message
+    assert "Traceback" not in message
+
+    stopped = checkpoint.load(place.state)
+    assert stopped.shifts >= during.shifts >= 1
+    assert int(stopped.agents.updates[0]) > 0
+    (expected,) = stopped.networks("deep-q")
+    for saved, layer in zip(network.load(place.out).layers, expected.layers, strict=True):
+        np.testing.assert_array_equal(saved.weight, layer.weight)
+
+    assert main(place.arguments(stopped.shifts + 2, "--resume", "--json")) == 0
+    assert json.loads(capsys.readouterr().out)["event"] == "trained"
+    after = checkpoint.load(place.state)
+    assert (after.shifts, after.seed) == (stopped.shifts + 2, 5)
+    assert int(after.agents.updates[0]) > int(stopped.agents.updates[0])
+    assert int(after.agents.remembered[0]) > int(stopped.agents.remembered[0])
+    assert after.rules.target_shifts == after.shifts
+    first, second = after.trained_by.split("; ")
+    assert ("--seed 5" in first, "--resume" in second) == (True, True)
+    assert network.load(place.out).info.trained_by == after.trained_by
+
+
+@pytest.fixture(scope="module")
+def full_rules(real_address: str) -> pb.RuleSet:
+    rules = runs.full_rules("paper", real_address)
+    rules.ClearField("target_points")
+    rules.target_shifts = 3
+    return rules
+
+
+@pytest.mark.server
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["--mask"], "mask False, not True"),
+        (["--opponents", "greedy"], "opponents random, not greedy"),
+        (["--rewards", "validity"], "rewards paper, not validity"),
+        (["--seed", "2"], "seed 7, not 2"),
+        (["--rules", "rulebook"], "rules points [5, 3, 1, 0], not [3, 2, 1, 0]"),
+        (["--shifts", "3"], "has played 3 Shifts already: give more than that with --shifts"),
+    ],
+)
+def test_contradicting_options_are_refused(
+    place: Place, full_rules: pb.RuleSet, given: Sequence[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    begin(place, full_rules)
+    before = place.state.read_bytes()
+    assert main(place.arguments(5, "--resume", *given)) == 1
+    found = capsys.readouterr().err
+    assert message in found
+    assert place.state.read_bytes() == before
+    assert not place.out.exists()
+
+
+@pytest.mark.server
+def test_contradicting_parameters_are_refused(place: Place, full_rules: pb.RuleSet, capsys: pytest.CaptureFixture[str]) -> None:
+    begin(place, full_rules)
+    place.parameters.write_text(json.dumps({"parameters": {**SMALL, "batch_size": 8}}))
+    assert main(place.arguments(5, "--resume")) == 1
+    assert "batch size 4, not 8" in capsys.readouterr().err
+
+
+def test_resuming_needs_a_checkpoint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(Place(tmp_path, "127.0.0.1:1").arguments(5, "--resume")) == 1
+    assert "leave out --resume" in capsys.readouterr().err
+
+
+def begin(place: Place, rules: pb.RuleSet) -> None:
+    """Writes a checkpoint after 3 Shifts."""
+    config = dataclasses.replace(DeepQConfig(), hidden=(8,), batch_size=4, memory_size=32)
+    agents = deep_q.start(config, [7])
+    checkpoint.save(place.state, checkpoint.Training(config, agents, rules, "a command", "random", "paper", 7, 3))
+
+
+def test_given_options_are_distinguished_from_defaults() -> None:
+    options = parse(["deep-q", "--out", "o", "--shifts", "250", "--mask"])
+    assert options.given == {"out": Path("o"), "shifts": 250, "mask": True}
+    assert (options.mask, options.opponents, parse(["deep-q", "--out", "o"]).mask) == (True, "random", False)

@@ -1,0 +1,39 @@
+"""What the training commands share."""
+
+import os
+import signal
+
+import pytest
+
+from chefshat.learn import runs
+from chefshat.learn.__main__ import parse
+
+
+def test_given_options_are_distinguished_from_defaults() -> None:
+    options = parse(["ppo", "--out", "o", "--minutes", "1", "--games", "256", "--all-hands"])
+    assert (options.given["games"], options.given["all_hands"]) == (256, True)
+    assert "steps" not in options.given
+
+
+def test_a_limited_number_of_commands_is_stored() -> None:
+    assert runs.trained_by("", "first") == "first"
+    assert runs.trained_by("first", "second") == "first; second"
+    commands = ""
+    for number in range(1_000):
+        commands = runs.trained_by(commands, f"command {number:04}")
+    assert len(commands) <= runs.MAX_TRAINED_BY
+    assert commands.startswith("command 0000; command 0001; ")
+    assert commands.endswith("; command 0998; command 0999")
+    assert commands.count("[...]") == 1
+    assert len(runs.trained_by("", "x" * 100_000)) <= runs.MAX_TRAINED_BY
+
+
+def test_the_first_ctrl_c_requests_a_stop_and_the_second_interrupts() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with runs.Interrupts() as interrupts:
+        assert not interrupts.asked
+        os.kill(os.getpid(), signal.SIGINT)
+        assert interrupts.asked
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is before
