@@ -1,5 +1,6 @@
 """What importing the package loads: names on first use, and no gRPC before a server is used."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -84,6 +85,12 @@ except ImportError as error:
     stepped, refused = run(WITHOUT_GRPC + program).splitlines()
     assert stepped == "2"
     assert "pip install grpcio" in refused
+
+
+def test_packages_built_on_this_one_are_not_imported() -> None:
+    importing = re.compile(r"^\s*(import|from) chefshat_(paper|robot)\b", re.MULTILINE)
+    files = Path(chefshat.__file__).parent.rglob("*.py")
+    assert [path for path in files if importing.search(path.read_text(encoding="utf-8"))] == []
 
 
 def test_what_needs_a_server_says_what_to_install() -> None:

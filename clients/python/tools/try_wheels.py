@@ -91,6 +91,8 @@ def commands() -> None:
     for command in ("chefshat", "chefshat-agent", "chefshat-experiments", "chefshat-learn", "chefshat-players-club"):
         with attempt(f"{command} --help"):
             subprocess.run([command, "--help"], check=True, stdout=subprocess.DEVNULL)
+    with attempt("chefshat_paper.learn --help"):
+        subprocess.run([sys.executable, "-I", "-m", "chefshat_paper.learn", "--help"], check=True, stdout=subprocess.DEVNULL)
 
 
 def main() -> None:

@@ -24,6 +24,7 @@ fn documents() -> Vec<PathBuf> {
         "clients/python/server/README.md",
         "clients/node/README.md",
         "clients/cpp/README.md",
+        "clients/paper/README.md",
         "clients/robot/README.md",
         "clients/web/README.md",
         "docker/archive/README.md",

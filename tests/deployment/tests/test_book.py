@@ -1,7 +1,7 @@
 """Every command in the book is run as it is written, but for names, ports and printed values, or has a reason here why it is not.
 
 That all commands have options that exist is checked where they are parsed: `server/lab/src/documents.rs`,
-`clients/python/tests/test_book.py`, `clients/robot/tests/test_book.py`, `tests/xtask/src/main.rs`.
+`clients/python/tests/test_book.py`, those of `clients/paper` and `clients/robot`, `tests/xtask/src/main.rs`.
 """
 
 import os
@@ -56,7 +56,7 @@ NOT_RUN = {
     r"chefshat-robot wizard ": "needs NAOqi; clients/robot/tests has a peer that speaks its protocol",
     r"chefshat-robot affect ": "needs a network of Lab Streaming Layer; clients/robot/tests",
     r"python -m chefshat\.lsl ": "needs a network of Lab Streaming Layer; clients/python/tests",
-    r"python (-m chefshat(\.learn|_paper\.(learn|experiments))|benchmarks/) ?": "minutes to hours; clients/python/tests has short ones",
+    r"python (-m chefshat(\.learn|_paper\.(learn|experiments))|benchmarks/) ?": "minutes to hours; tests of both have short ones",
     r"(RAY_ADDRESS=auto )?python clients/python/samples/cluster/": "needs Ray, with older dependencies: see CONTRIBUTING.md",
     r"~/club/bin/|python -m chefshat_paper\.players_club ": "needs ChefsHatGym 2; clients/paper/tests has such players",
     r"for seed in |done$|chefshat compare (trained|exploiter|seed|deep_q)": "half an hour or more, or networks learned for hours",

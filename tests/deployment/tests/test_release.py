@@ -196,7 +196,7 @@ def test_the_debian_package_has_a_service(system: System) -> None:
 
 def test_the_wheels_work_without_a_network(python_system: System, tmp_path: Path) -> None:
     wheels = sorted(DIST.glob("*.whl"))
-    assert len(wheels) == 6
+    assert len(wheels) == 7
     house = tmp_path / "house"
     sdk = next(wheel for wheel in wheels if wheel.name.startswith("chefshat-"))
     run(
@@ -209,7 +209,8 @@ def test_the_wheels_work_without_a_network(python_system: System, tmp_path: Path
     assert "action_mask" in output, output
     assert "place" in output, output
     activated = ". .venv/bin/activate; export PATH; "
-    python_system.type(f"{activated} pip install ./chefshat_robot-*.whl; chefshat-robot --help; python -I try_wheels.py", **offline)
+    others = "./chefshat_paper-*.whl ./chefshat_robot-*.whl"
+    python_system.type(f"{activated} pip install {others}; chefshat-robot --help; python -I try_wheels.py", **offline)
 
 
 def test_the_image_plays(tmp_path: Path) -> None:

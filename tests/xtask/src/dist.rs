@@ -539,6 +539,16 @@ fn the_versions_agree() {
         ),
         ("clients/python/pyproject.toml", exact.clone(), 2),
         (
+            "clients/paper/pyproject.toml",
+            format!("\nversion = {quoted}"),
+            1,
+        ),
+        (
+            "clients/paper/pyproject.toml",
+            format!("\"chefshat{exact}"),
+            1,
+        ),
+        (
             "clients/robot/pyproject.toml",
             format!("\nversion = {quoted}"),
             1,

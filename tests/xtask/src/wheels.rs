@@ -32,7 +32,7 @@ const MODULE: &str = "clients/python/native";
 /// The programs, built by it as well.
 const SERVER: &str = "clients/python/server";
 /// The packages in Python alone.
-const PURE: [&str; 2] = ["clients/python", "clients/robot"];
+const PURE: [&str; 3] = ["clients/python", "clients/paper", "clients/robot"];
 
 /// Builds the page and all wheels for these processors with one of Cargo's profiles; then optionally
 /// tries them.
