@@ -99,7 +99,7 @@ def through_gymnasium(seed: int) -> Play:
 
     import chefshat.envs  # noqa: F401 - Registers it.
 
-    env = gymnasium.make("chefshat/ChefsHat-v1")
+    env = gymnasium.make("chefshat.envs:chefshat/ChefsHat-v1")
     chance = random.Random(seed)
     info = env.reset(seed=seed)[1]
 

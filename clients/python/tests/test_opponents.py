@@ -151,14 +151,17 @@ def test_a_function_plays_in_the_environments_above() -> None:
     pytest.importorskip("chefshat_native")
     gymnasium = pytest.importorskip("gymnasium")
     one: Any
-    for one in (chefshat.make(opponents=first), gymnasium.make("chefshat/ChefsHat-v1", opponents=[first, "random", last])):
+    for one in (
+        chefshat.make(opponents=first),
+        gymnasium.make("chefshat.envs:chefshat/ChefsHat-v1", opponents=[first, "random", last]),
+    ):
         one.reset(seed=1)
         over = False
         while not over:
             _, _, over, _, info = one.step(int(one.unwrapped.action_masks().argmax()))
         assert 1 <= info["place"] <= 4
         one.close()
-    many: Any = gymnasium.make_vec("chefshat/ChefsHat-v1", num_envs=3, opponents=last)
+    many: Any = gymnasium.make_vec("chefshat.envs:chefshat/ChefsHat-v1", num_envs=3, opponents=last)
     many.reset(seed=1)
     for _ in range(30):
         _, _, _, _, infos = many.step(many.unwrapped.action_masks().argmax(axis=1))

@@ -133,7 +133,7 @@ def test_a_wrapper_of_one_game(name: str) -> None:
 def test_a_wrapper_of_many_games(name: str) -> None:
     def make(mode: str) -> Any:
         return gymnasium.make_vec(
-            "chefshat/ChefsHat-v1", num_envs=GAMES, observation=OBSERVATIONS.get(name, "table"), autoreset_mode=mode
+            "chefshat.envs:chefshat/ChefsHat-v1", num_envs=GAMES, observation=OBSERVATIONS.get(name, "table"), autoreset_mode=mode
         )
 
     if name in IMPOSSIBLE:
@@ -161,7 +161,7 @@ def test_games_that_pause_are_those_that_do_not() -> None:
     options: Any = {"num_envs": GAMES, "observation": "columns", "rewards": "winning"}
     episodes: dict[str, list[list[Any]]] = {}
     for mode in ("same_step", "next_step"):
-        env: Any = gymnasium.make_vec("chefshat/ChefsHat-v1", autoreset_mode=mode, **options)
+        env: Any = gymnasium.make_vec("chefshat.envs:chefshat/ChefsHat-v1", autoreset_mode=mode, **options)
         observed, infos = env.reset(seed=4)
         found: list[list[Any]] = [[] for _ in range(GAMES)]
         pausing = np.zeros(GAMES, bool)

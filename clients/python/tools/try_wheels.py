@@ -29,14 +29,14 @@ def in_this_process() -> None:
     import gymnasium
 
     with attempt("first step of an environment, without a server"):
-        env = gymnasium.make("chefshat/ChefsHat-v1", opponents="greedy")
+        env = gymnasium.make("chefshat.envs:chefshat/ChefsHat-v1", opponents="greedy")
         _, info = env.reset(seed=1)
         env.step(env.action_space.sample(info["action_mask"]))
         env.close()
     import chefshat
 
     with attempt("an episode of 64 games at once"):
-        envs = gymnasium.make_vec("chefshat/ChefsHat-v1", num_envs=64)
+        envs = gymnasium.make_vec("chefshat.envs:chefshat/ChefsHat-v1", num_envs=64)
         _, infos = envs.reset(seed=1)
         ended = False
         while not ended:

@@ -158,7 +158,11 @@ class Games:
 
     def __init__(self, options: Options, *, seed: int) -> None:
         self.envs = gymnasium.make_vec(
-            "chefshat/ChefsHat-v1", num_envs=options.games, observation="table", rewards="winning", opponents=options.opponents
+            "chefshat.envs:chefshat/ChefsHat-v1",
+            num_envs=options.games,
+            observation="table",
+            rewards="winning",
+            opponents=options.opponents,
         )
         self.seen, infos = self.envs.reset(seed=seed)
         self.masks = infos["action_mask"] == 1

@@ -10,8 +10,9 @@ PettingZoo, `replay` learns from recorded games. `search` looks ahead from what 
 Names are imported on first use, so that `import chefshat` is fast, and environments in this process do not load gRPC.
 """
 
-# Not from `typing`, whose import takes as long as all the rest: `chefshat.pth` imports this package whenever Python starts.
-TYPE_CHECKING = False
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 if TYPE_CHECKING:
     from chefshat import aio, errors, pb, replay, search, vector
     from chefshat.address import ServerAddress
@@ -86,8 +87,6 @@ def __getattr__(name: str) -> object:
     """Imports a name on first use (PEP 562)."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module
-
     home = _HOMES.get(name)
     value: object = import_module(f"{__name__}.{home or name}")
     if home is not None:
