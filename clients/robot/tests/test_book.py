@@ -63,7 +63,7 @@ def test_the_sample_of_a_robots_program_works() -> None:
 def test_every_command_and_every_driver_is_described() -> None:
     for name in cli.COMMANDS:
         assert f"chefshat-robot {name}" in TEXT
-    for name in drivers.DRIVERS:
+    for name in drivers.names():
         assert f"| `{name}` |" in TEXT
 
 

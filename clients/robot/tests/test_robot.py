@@ -202,7 +202,7 @@ def test_wrong_arguments_are_explained(arguments: list[str], message: str, capsy
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ("unknown", "no driver 'unknown': give one of simulated"),
+        ("unknown", "no driver 'unknown': give one of furhat, jsonlines, "),
         ("simulated:colour=red", "driver simulated has no option 'colour'"),
         ("simulated:speed=fast", "option speed of driver simulated: 'fast' is not a number"),
         ("simulated:png=perhaps", "option png of driver simulated: 'perhaps' is not true or false"),
@@ -253,13 +253,27 @@ def test_a_missing_package_of_a_driver_is_named_with_its_extra(driver: str, pack
 def test_drivers_are_listed_with_their_options(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["robot", "--list-drivers"]) == 0
     out = capsys.readouterr().out
-    for name in drivers.DRIVERS:
+    for name in drivers.names():
         assert name in out
     assert "speed=FLOAT  (default: 1.0)" in out
 
 
 def test_an_own_class_is_a_driver() -> None:
     assert isinstance(drivers.create("tests.robots.ScriptedRobot"), ScriptedRobot)
+
+
+def test_an_installed_package_adds_a_driver(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    metadata = tmp_path / "theatre-1.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Name: theatre\nVersion: 1\n")
+    (metadata / "entry_points.txt").write_text(
+        f"[{drivers.GROUP}]\nstage = tests.robots:ScriptedRobot\nempty = tests.robots:Absent\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert {"stage", "simulated"} <= set(drivers.names())
+    assert isinstance(drivers.create("stage"), ScriptedRobot)
+    with pytest.raises(drivers.RobotError, match=r"driver empty: .*Absent"):
+        drivers.create("empty")
 
 
 def test_both_languages_have_all_texts_with_the_same_values() -> None:

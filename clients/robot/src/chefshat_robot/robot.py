@@ -236,7 +236,7 @@ def attendant(as_json: bool) -> Callable[[Notice], None]:
 
 def print_drivers() -> int:
     """Prints every driver with its options. Returns 0."""
-    for name in drivers.DRIVERS:
+    for name in drivers.names():
         print(f"{name:12} {drivers.summary(name)}")
         for option, (kind, default) in drivers.options_of(drivers.find(name)).items():
             print(f"{'':12}   {option}={kind.__name__.upper()}  (default: {default})")

@@ -7,15 +7,16 @@
     jsonlines:host=192.168.1.7,port=7700
     my_package.my_module.MyDriver:port=1234
 
-The last is a class of your own: a subclass of `Driver`, whose constructor takes the options.
+The last is a class of your own: a subclass of `Driver`, whose constructor takes the options. A package gives its driver a name by
+an entry point of the group `chefshat_robot.drivers`, as this one does.
 """
 
 from __future__ import annotations
 
-import importlib
 import inspect
 import os
 import sys
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -40,7 +41,6 @@ from chefshat_robot.drivers.driver import (
 )
 
 __all__ = [
-    "DRIVERS",
     "Act",
     "Affect",
     "Button",
@@ -60,20 +60,18 @@ __all__ = [
     "Say",
     "create",
     "find",
+    "names",
     "options_of",
     "summary",
 ]
 
-#: The drivers of this package: name and class.
-DRIVERS = {
-    "simulated": "chefshat_robot.drivers.simulated.SimulatedDriver",
-    "jsonlines": "chefshat_robot.drivers.jsonlines.JsonLinesDriver",
-    "ros2": "chefshat_robot.drivers.ros2.Ros2Driver",
-    "rosbridge": "chefshat_robot.drivers.rosbridge.RosbridgeDriver",
-    "yarp": "chefshat_robot.drivers.yarp.YarpDriver",
-    "naoqi": "chefshat_robot.drivers.naoqi.NaoqiDriver",
-    "furhat": "chefshat_robot.drivers.furhat.FurhatDriver",
-}
+#: The entry points by which packages, this one among them, add drivers: a name and a class.
+GROUP = "chefshat_robot.drivers"
+
+
+def names() -> list[str]:
+    """Returns the names of all installed drivers, sorted."""
+    return sorted(entry_points(group=GROUP).names)
 
 
 def create(spec: str) -> Driver:
@@ -101,18 +99,22 @@ def summary(name: str) -> str:
 
 def find(name: str) -> type[Driver]:
     """Imports the class of a driver, by its name or dotted path. Raises RobotError if there is none."""
-    path = DRIVERS.get(name, name)
-    module, _, class_name = path.rpartition(".")
-    if not module:
-        raise RobotError(f"no driver {name!r}: give one of {', '.join(DRIVERS)}, or a class of your own as package.module.Class")
-    if os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())
+    plugin = next(iter(entry_points(group=GROUP, name=name)), None)
+    if plugin is None:
+        module, _, class_name = name.rpartition(".")
+        if not module:
+            raise RobotError(
+                f"no driver {name!r}: give one of {', '.join(names())}, or a class of your own as package.module.Class"
+            )
+        if os.getcwd() not in sys.path:
+            sys.path.insert(0, os.getcwd())
+        plugin = EntryPoint(name, f"{module}:{class_name}", GROUP)
     try:
-        found = getattr(importlib.import_module(module), class_name)
+        found = plugin.load()
     except (ImportError, AttributeError) as error:
         raise RobotError(f"driver {name}: {error}") from error
     if not (isinstance(found, type) and issubclass(found, Driver)):
-        raise RobotError(f"driver {name}: {class_name} is not a subclass of chefshat_robot.drivers.Driver")
+        raise RobotError(f"driver {name}: {plugin.attr} is not a subclass of chefshat_robot.drivers.Driver")
     return found
 
 
