@@ -133,7 +133,8 @@ def test_observation_forms(anywhere: str | None) -> None:
         seen = env.batch
         sizes = env.sizes
         classic = features.classic(seen.observations, seen.mask_bits, faces=sizes.faces, hand_size=sizes.hand_size)
-        for observation, wanted in [("classic", classic[0]), (hands, seen.observations.hands[0])]:
+        forms: list[tuple[Any, Any]] = [("classic", classic[0]), (hands, seen.observations.hands[0])]
+        for observation, wanted in forms:
             one = chefshat.make(address=anywhere, observation=observation, seat=int(seen.seats[0]), seed=3)
             assert one.reset()[0].tolist() == wanted.tolist()
             one.close()
@@ -276,6 +277,11 @@ def test_all_seats_are_rewarded_when_they_decide_next(toy: FakeVector) -> None:
     env.close()
 
 
+def untyped(function: Any, *arguments: Any, **options: Any) -> Any:
+    """Calls a function with what its types do not allow."""
+    return function(*arguments, **options)
+
+
 @pytest.mark.parametrize("kind", ["gymnasium", "gymnasium_vector", "pettingzoo", "vector"])
 def test_make_creates_every_kind(toy: FakeVector, kind: Any) -> None:
     env = chefshat.make(kind, address=toy.address, rewards="points", seed=8)
@@ -288,16 +294,16 @@ def test_make_creates_every_kind(toy: FakeVector, kind: Any) -> None:
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda address: chefshat.make("gym", address=address), "'gymnasium_vector'"),
+        (lambda address: untyped(chefshat.make, "gym", address=address), "'gymnasium_vector'"),
         (lambda address: ChefsHatEnv(address, observation="picture"), "'table', 'columns', 'classic'"),
         (lambda address: ChefsHatEnv(address, observation=lambda seen: np.zeros(3)), "one row for each"),
         (lambda address: ChefsHatEnv(address, observation=lambda seen: seen.masks), "booleans"),
-        (lambda address: ChefsHatEnv(address, games=2), "VectorEnv"),
+        (lambda address: untyped(ChefsHatEnv, address, games=2), "VectorEnv"),
         (lambda address: ChefsHatEnv(address, render_mode="rgb_array"), '"ansi"'),
         (lambda address: ChefsHatVectorEnv(address, render_mode="ansi"), "render_mode"),
         (lambda address: ChefsHatVectorEnv(address, 2, total_games=2), "total_games"),
         (lambda address: ChefsHatVectorEnv(address, 2).reset(options={"reset_mask": [1, 0]}), "booleans"),
-        (lambda address: chefshat_v1.env(address, client_seats=[1]), "all seats"),
+        (lambda address: untyped(chefshat_v1.env, address, client_seats=[1]), "all seats"),
         (lambda address: chefshat_v1.env(address, render_mode="rgb_array"), '"human"'),
     ],
 )
@@ -413,7 +419,7 @@ def test_the_state_has_all_hands(anywhere: str | None) -> None:
 
 @pytest.mark.parametrize("kind", ["gymnasium", "pettingzoo"])
 def test_a_new_game_where_it_is_asked_for(anywhere: str | None, kind: str) -> None:
-    env: Any = chefshat.make(kind, address=anywhere)
+    env = untyped(chefshat.make, kind, address=anywhere)
     shifts = env.unwrapped.vector
 
     def play() -> None:

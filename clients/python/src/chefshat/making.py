@@ -1,15 +1,20 @@
 """`make`: creates any of the environments in `vector` and `envs`."""
 
-# ruff: noqa: ANN401 - The options are those of the environment.
+from __future__ import annotations
+
 import importlib
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack, overload
 
 from chefshat.vector import VectorEnv
 
 if TYPE_CHECKING:
     from pettingzoo import AECEnv
 
+    from chefshat.address import ServerAddress
     from chefshat.envs import ChefsHatEnv, ChefsHatVectorEnv
+    from chefshat.envs.options import AllSeatsOptions, ColumnsOptions, ManyGamesOptions, OneSeatOptions
+
+    Address: TypeAlias = str | ServerAddress | None
 
 # The kinds that need the extra `envs`, by module and name.
 _KINDS = {
@@ -20,15 +25,15 @@ _KINDS = {
 
 
 @overload
-def make(kind: Literal["gymnasium"] = ..., **options: Any) -> "ChefsHatEnv": ...
+def make(kind: Literal["gymnasium"] = ..., *, address: Address = ..., **options: Unpack[OneSeatOptions]) -> ChefsHatEnv: ...
 @overload
-def make(kind: Literal["gymnasium_vector"], **options: Any) -> "ChefsHatVectorEnv": ...
+def make(
+    kind: Literal["gymnasium_vector"], *, address: Address = ..., **options: Unpack[ManyGamesOptions]
+) -> ChefsHatVectorEnv: ...
 @overload
-def make(kind: Literal["vector"], **options: Any) -> VectorEnv: ...
+def make(kind: Literal["vector"], *, address: Address = ..., **options: Unpack[ColumnsOptions]) -> VectorEnv: ...
 @overload
-def make(kind: Literal["pettingzoo"], **options: Any) -> "AECEnv[str, Any, Any]": ...
-@overload
-def make(kind: str, **options: Any) -> Any: ...
+def make(kind: Literal["pettingzoo"], *, address: Address = ..., **options: Unpack[AllSeatsOptions]) -> AECEnv[str, Any, Any]: ...
 def make(kind: str = "gymnasium", **options: Any) -> Any:
     """Creates an environment.
 
@@ -39,6 +44,7 @@ def make(kind: str = "gymnasium", **options: Any) -> Any:
         kind: "gymnasium": `envs.ChefsHatEnv`, one seat against built-in agents; "gymnasium_vector": `envs.ChefsHatVectorEnv`, the
             same many times; "vector": `VectorEnv`, columns of any seats of many games; "pettingzoo": `envs.chefshat_v1`, all seats.
         options: arguments of that environment, for example `address`, `token`, `ca`, `opponents`, `rewards`, `observation`, `seed`.
+            Their types are in `envs.options`.
 
     Raises:
         ImportError: the kind needs the extra `envs`.

@@ -24,12 +24,13 @@ from chefshat.errors import ChefsHatError
 from chefshat.masks import sample_legal
 from chefshat.opponents import Policies, Policy, PolicyGames, split
 from chefshat.transitions import Memory, RewardFunction, Transitions
-from chefshat.vector_setup import Rules, Seed, VectorOptions, put_seed, vector_setup
+from chefshat.vector_setup import GameOptions, Rules, Seed, VectorOptions, put_seed, vector_setup
 
 __all__ = [
     "Batch",
     "Beginnings",
     "Endings",
+    "GameOptions",
     "GameRecord",
     "Observations",
     "Policy",
@@ -102,7 +103,7 @@ class VectorEnv:
             transitions: whether batches have `transitions`. They take some 200 bytes for each seat of each game.
             reward_function: computes rewards from the columns of the transitions, instead of the server's.
             threads: how many of this process step the games; 0: one for each core. They do not change what is played.
-            options: see `VectorOptions`.
+            options: see `VectorOptions` and `GameOptions`.
         """
         if threads < 0:
             raise ValueError(f"threads is a number of threads, or 0 for one for each core, not {threads}")

@@ -38,23 +38,19 @@ class Seeded(Protocol):
         """The games' seeds."""
 
 
-class VectorOptions(TypedDict, total=False):
-    """The options of a `VectorEnv`, all optional.
+class GameOptions(TypedDict, total=False):
+    """The options of games in every kind of environment, all optional.
 
     Attributes:
-        client_seats: the seats played by the client; default: all.
         opponents: who plays the other seats: one for each, in the order of the seats, or one for all; default: "random". The name
             of a built-in agent; a network file (a path, a name that ends with .safetensors, or the content as bytes), which plays
             as fast as "trained"; or a function from a batch to the action of each row, see `Policy`. Functions decide within the
             same step: each is asked for all rows of its seats that wait, until only the client's are left. Its seats count for the
             server's limits as the client's. OPPONENT_FAILED says what it did wrong.
-        rewards: "validity", "paper", "paper_intended", "winning" or "points"; default: all rewards are 0.
         episode: "shift" (default) or "game".
         decisions: "all" (default), or "turns": only the first T actions.
         other_decisions: with "turns": the built-in agent that takes the other decisions; default: the default action is taken.
         skip_forced: whether decisions with one legal action are taken without asking.
-        invalid: effect of an illegal action: "error" (default): `step` raises ILLEGAL_ACTION and takes none of the actions;
-            "ask_again" counts it, rewards it and asks again.
         max_invalid_attempts: with "ask_again": invalid attempts after which the default action is taken; 0 (default): unlimited.
         total_games: total number of games; 0 (default): unlimited.
         seed: a base seed, the games' seeds, or None (default) for random ones. See `Seed`.
@@ -70,14 +66,11 @@ class VectorOptions(TypedDict, total=False):
             analysis.
     """
 
-    client_seats: Sequence[int] | None
     opponents: "Opponent | Policy | Sequence[Opponent | Policy]"
-    rewards: str | None
     episode: str
     decisions: str
     other_decisions: str | None
     skip_forced: bool
-    invalid: str
     max_invalid_attempts: int
     total_games: int
     seed: Seed
@@ -89,6 +82,21 @@ class VectorOptions(TypedDict, total=False):
     records: bool
     history: int
     all_hands: bool
+
+
+class VectorOptions(GameOptions, total=False):
+    """The options of a `VectorEnv`: those of `GameOptions`, and further ones, all optional.
+
+    Attributes:
+        client_seats: the seats played by the client; default: all.
+        rewards: "validity", "paper", "paper_intended", "winning" or "points"; default: all rewards are 0.
+        invalid: effect of an illegal action: "error" (default): `step` raises ILLEGAL_ACTION and takes none of the actions;
+            "ask_again" counts it, rewards it and asks again.
+    """
+
+    client_seats: Sequence[int] | None
+    rewards: str | None
+    invalid: str
 
 
 def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:

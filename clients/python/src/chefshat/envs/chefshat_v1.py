@@ -4,7 +4,7 @@ One seat against built-in agents is in `gymnasium_env`. Seats decide in turn, so
 """
 
 import copy
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 import numpy as np
 from gymnasium import spaces
@@ -23,6 +23,7 @@ from chefshat.envs.copying import NotCopied
 from chefshat.envs.gymnasium_env import check_open, take, wait_for_a_row
 from chefshat.envs.illegal import with_limit
 from chefshat.envs.observing import Form, ObservationFunction, mask_space
+from chefshat.envs.options import AllSeatsOptions, EnvOptions
 from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
 from chefshat.envs.single import RowReader
 from chefshat.learn import features
@@ -31,7 +32,7 @@ from chefshat.vector import Batch, VectorEnv
 __all__ = ["env", "raw_env"]
 
 
-def env(address: str | ServerAddress | None = None, **options: Any) -> "AECEnv[str, Any, Any]":  # noqa: ANN401 - Those of `raw_env`.
+def env(address: str | ServerAddress | None = None, **options: Unpack[AllSeatsOptions]) -> "AECEnv[str, Any, Any]":
     """Creates the environment with PettingZoo's checks of the order of calls and of actions. Arguments: see `raw_env`."""
     checked: AECEnv[str, Any, Any] = wrappers.AssertOutOfBoundsWrapper(raw_env(address, **options))
     return wrappers.OrderEnforcingWrapper(checked)
@@ -67,7 +68,7 @@ class raw_env(NotCopied, AECEnv[str, Any, Any]):  # type: ignore[misc]  # Pettin
         invalid: str = "ask_again",
         invalid_penalty: float = 0.0,
         render_mode: str | None = None,
-        **options: Any,  # noqa: ANN401 - Those of `VectorEnv`.
+        **options: Unpack[EnvOptions],
     ) -> None:
         """Starts a game. For the arguments see `ChefsHatEnv`; this environment has all seats."""
         super().__init__()

@@ -3,7 +3,7 @@
 Many games at once are in `gymnasium_vector`, all seats of a game in `chefshat_v1`.
 """
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 import gymnasium
 import numpy as np
@@ -15,6 +15,7 @@ from chefshat.columns import Endings
 from chefshat.envs.copying import NotCopied
 from chefshat.envs.illegal import penalties, with_limit
 from chefshat.envs.observing import Form, ObservationFunction
+from chefshat.envs.options import EnvOptions
 from chefshat.envs.rendering import RENDER_MODES, as_text, check_render_mode
 from chefshat.envs.single import RowReader
 from chefshat.errors import ChefsHatError
@@ -81,7 +82,7 @@ class ChefsHatEnv(NotCopied, gymnasium.Env[Any, Any]):
         invalid: str = "ask_again",
         invalid_penalty: float = 0.0,
         render_mode: str | None = None,
-        **options: Any,  # noqa: ANN401 - Those of `VectorEnv`.
+        **options: Unpack[EnvOptions],
     ) -> None:
         """Starts a game.
 

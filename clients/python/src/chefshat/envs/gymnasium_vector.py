@@ -1,7 +1,7 @@
 """One seat of many games at once as a `gymnasium.vector.VectorEnv`, stepped together. One game is in `gymnasium_env`."""
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Unpack
 
 import gymnasium
 import numpy as np
@@ -16,6 +16,7 @@ from chefshat.envs.copying import NotCopied
 from chefshat.envs.gymnasium_env import check_open
 from chefshat.envs.illegal import penalties, with_limit
 from chefshat.envs.observing import Form, ObservationFunction, Observed
+from chefshat.envs.options import EnvOptions
 from chefshat.vector import Batch, VectorEnv
 
 
@@ -54,7 +55,7 @@ class ChefsHatVectorEnv(NotCopied, gymnasium.vector.VectorEnv[Any, Any, Any]):
         invalid_penalty: float = 0.0,
         render_mode: str | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
-        **options: Any,  # noqa: ANN401 - Those of `VectorEnv`.
+        **options: Unpack[EnvOptions],
     ) -> None:
         """Starts the games.
 

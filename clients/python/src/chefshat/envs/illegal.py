@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chefshat.columns import Situations
+from chefshat.envs.options import EnvOptions
 from chefshat.masks import is_legal
 
 #: Default number of illegal actions at one decision after which the default action is taken.
 MAX_INVALID_ATTEMPTS = 10
 
 
-def with_limit(invalid: str, options: dict[str, Any]) -> dict[str, Any]:
+def with_limit(invalid: str, options: EnvOptions) -> dict[str, Any]:
     """Returns the options of a `VectorEnv` with `invalid`, and with the limit unless they have another; 0 is none."""
     limit = {"max_invalid_attempts": MAX_INVALID_ATTEMPTS} if invalid == "ask_again" else {}
     return {"invalid": invalid, **limit, **options}

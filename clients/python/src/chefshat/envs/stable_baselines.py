@@ -4,7 +4,7 @@ One game needs no adapter: `ChefsHatEnv` is a `gymnasium.Env` with `action_masks
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium
 import numpy as np
@@ -18,6 +18,7 @@ except ImportError as error:
 
 from chefshat.envs.copying import NotCopied
 from chefshat.envs.gymnasium_vector import ChefsHatVectorEnv
+from chefshat.envs.options import OneSeatOptions
 
 
 class ChefsHatVecEnv(NotCopied, VecEnv):  # type: ignore[misc]  # It may not be installed.
@@ -27,7 +28,7 @@ class ChefsHatVecEnv(NotCopied, VecEnv):  # type: ignore[misc]  # It may not be 
     totals that the algorithms log.
     """
 
-    def __init__(self, num_envs: int, **options: Any) -> None:  # noqa: ANN401 - Those of `ChefsHatVectorEnv`.
+    def __init__(self, num_envs: int, **options: Unpack[OneSeatOptions]) -> None:
         """Starts the games. `options` are the arguments of `ChefsHatVectorEnv`."""
         self.games = ChefsHatVectorEnv(num_envs=num_envs, **options)
         self._actions = np.zeros(num_envs, np.int64)
