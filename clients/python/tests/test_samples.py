@@ -24,6 +24,7 @@ PAGES = [
         ROOT / "README.md",
         ROOT / "docs" / "index.md",
         ROOT / "docs" / "agents-python.md",
+        ROOT / "docs" / "environments.md",
         ROOT / "docs" / "learning.md",
     )
     if path.is_file()
@@ -46,7 +47,7 @@ def run_python(*arguments: str, folder: Path = PACKAGE) -> str:
 
 
 def test_there_are_samples() -> None:
-    assert len(PAGES) == 5
+    assert len(PAGES) == 6
     assert len(PRINTED) >= 15
     assert len(SAMPLES) >= 4
 
