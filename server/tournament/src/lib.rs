@@ -180,10 +180,17 @@ impl Tournament {
         self.state.over
     }
 
-    /// Total number of games. Before the tournament begins: the number if it began now.
+    /// Total number of games. Before the tournament begins: the number if it began now. In a Swiss
+    /// tournament it shrinks when a round needs fewer tables, because participants have left.
     pub fn games_expected(&self) -> usize {
-        let joined = self.joined().max(MIN_PARTICIPANTS);
-        self.state.settings.games_for(joined)
+        let state = &self.state;
+        let settings = &state.settings;
+        if settings.format == Format::Swiss && state.drawn > 0 {
+            let tables = state.field.len() / settings.players;
+            let rounds = (state.rounds - state.drawn) as usize;
+            return state.games.len() + rounds * tables * settings.games_of_pairing() as usize;
+        }
+        settings.games_for(self.joined().max(MIN_PARTICIPANTS))
     }
 
     /// Whether information about this deal may be published: all games with this deal are over.

@@ -180,6 +180,7 @@ fn those_who_have_left_make_room() {
         let mut settings = settings(Format::Swiss);
         settings.rounds = Some(2);
         let mut tournament = begun(settings, participants);
+        follow(&mut tournament, 0);
         for game in tournament.playing().collect::<Vec<_>>() {
             let ended = played_by_number(&tournament, game);
             end(&mut tournament, game, ended);
@@ -193,5 +194,6 @@ fn those_who_have_left_make_room() {
         assert_eq!(round.byes.len(), byes, "{participants}: {round:?}");
         let have_left = round.byes.iter().all(|who| leaving.contains(who));
         assert!(have_left, "{participants}: {round:?}");
+        assert_eq!(tournament.games().len(), tournament.games_expected());
     }
 }
