@@ -47,8 +47,12 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
           <th scope="col" class={css.name} data-part="standings-name">
             {words.name}
           </th>
-          {knockout && <th scope="col">{words.round}</th>}
-          <th scope="col" class={css.minor}>
+          {knockout && (
+            <th scope="col" data-part="standings-detail">
+              {words.round}
+            </th>
+          )}
+          <th scope="col" class={css.minor} data-part="standings-detail">
             {words.games}
           </th>
           <th scope="col" title={words.scoreHint}>
@@ -78,8 +82,14 @@ export function Standings({ tournament, standings, mine, large = false }: Standi
             <th scope="row" class={css.name} data-part="standings-name">
               <Who tournament={tournament} standing={standing} large={large} />
             </th>
-            {knockout && <td class="number">{standing.lastRound || "–"}</td>}
-            <td class={`number ${css.minor}`}>{standing.games}</td>
+            {knockout && (
+              <td class="number" data-part="standings-detail">
+                {standing.lastRound || "–"}
+              </td>
+            )}
+            <td class={`number ${css.minor}`} data-part="standings-detail">
+              {standing.games}
+            </td>
             <td class="number">
               <b>{standing.games > 0 ? decimal(meanScore(standing), 2) : "–"}</b>
             </td>

@@ -1,9 +1,10 @@
 // The wall view of a tournament: name, standings and current tables, as large as the screen allows;
-// before the start, the participants and the way in. What does not fit is shown in turns.
+// before the start, the participants and the way in. What does not fit is shown in turns; a large screen
+// has the standings of up to 64 at once.
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
-import { TournamentFormat, TournamentState } from "../gen/chefshat/v1/tournament_pb";
+import { TournamentFormat, type TournamentStanding, TournamentState } from "../gen/chefshat/v1/tournament_pb";
 import { t } from "../i18n";
 import { QrCode } from "../lobby/Invite";
 import { Drawing } from "../parts/Drawing";
@@ -22,6 +23,11 @@ import { inShort, playWords, TournamentStateChip } from "./words";
 
 /** Most lines of the standings at a time. */
 const LINES = 12;
+/** Most names at a time on a large screen, which has several columns, and the most lines of one. */
+const MOST_NAMES = 64;
+const COLUMN_LINES = 22;
+/** Screens on which names in columns can be read from afar. */
+const LARGE_SCREEN = "(min-width: 1600px) and (min-height: 900px)";
 /** Most tables at a time. */
 const TABLES = 12;
 /** Most tables per round for a readable bracket: with more, the tables are shown side by side. */
@@ -88,16 +94,28 @@ function codeFor(tournamentId: string): string | undefined {
 function Played({ live }: { live: LiveTournament }) {
   const { tournament, standings } = live;
   const words = t().tournaments;
-  const lines = useParts(standings, LINES);
+  const largeScreen = useMatches(LARGE_SCREEN);
+  const lines = useParts(standings, largeScreen ? MOST_NAMES : LINES);
+  const columns = inColumns(lines.shown);
   return (
     <>
-      <section class={css.part}>
+      <section class={`${css.part} ${columns.length > 1 ? css.wide : ""}`}>
         <h2>
           {standingsTitle(tournament)}
           {lines.several && <span class="soft number"> {words.wall.more(lines.from, lines.to)}</span>}
         </h2>
         <Fitted>
-          <Standings tournament={tournament} standings={lines.shown} large />
+          {columns.length > 1 ? (
+            <div class={css.columns} data-part="wall-columns">
+              {columns.map((column, index) => (
+                <div key={index} style={{ "--share": column.length / (columns[0]?.length ?? 1) }}>
+                  <Standings tournament={tournament} standings={column} large />
+                </div>
+              ))}
+            </div>
+          ) : (
+            <Standings tournament={tournament} standings={lines.shown} large />
+          )}
         </Fitted>
       </section>
       <Tables live={live} />
@@ -146,6 +164,25 @@ function Fitted({ children }: { children: ComponentChildren }) {
       {children}
     </div>
   );
+}
+
+/** Columns of about equal length, none longer than can be read; one for a screen that has no more lines. */
+function inColumns(shown: readonly TournamentStanding[]): TournamentStanding[][] {
+  const length = Math.ceil(shown.length / Math.max(1, Math.ceil(shown.length / COLUMN_LINES)));
+  const columns = Math.ceil(shown.length / Math.max(1, length));
+  return Array.from({ length: columns }, (_, index) => shown.slice(index * length, (index + 1) * length));
+}
+
+/** Whether the screen matches a media query, also after it has changed. */
+function useMatches(query: string): boolean {
+  const [matches, setMatches] = useState(() => matchMedia(query).matches);
+  useEffect(() => {
+    const media = matchMedia(query);
+    const changed = () => setMatches(media.matches);
+    media.addEventListener("change", changed);
+    return () => media.removeEventListener("change", changed);
+  }, [query]);
+  return matches;
 }
 
 /** Splits a list into parts of about equal length, none longer than `most`. */
