@@ -61,7 +61,7 @@ export function Lobby() {
       <RoomSection title={words.rooms.waiting} shown={waiting} own={own}>
         {words.rooms.noneWaiting}
       </RoomSection>
-      <RoomSection title={words.rooms.playing} shown={playing} own={own}>
+      <RoomSection title={words.rooms.playing} shown={playing} own={own} half>
         {words.rooms.nonePlaying}
       </RoomSection>
       <TournamentStrip />
@@ -70,18 +70,22 @@ export function Lobby() {
   );
 }
 
-/** A list of rooms with its title; `children` if it is empty. Those with own seats are listed above. */
+/**
+ * A list of rooms with its title; `children` if it is empty. Those with own seats are listed above. On a
+ * large screen another section may stand beside it.
+ */
 function RoomSection(props: {
   title: string;
   shown: Shown<Room>;
   own?: readonly Room[];
+  half?: boolean;
   children?: ComponentChildren;
 }) {
-  const { title, shown, own = [], children } = props;
+  const { title, shown, own = [], half = false, children } = props;
   const { list } = shown;
   if (list === null) return null;
   return (
-    <section class={css.section} data-part="lobby-section">
+    <section class={`${css.section} ${half ? css.half : ""}`} data-part="lobby-section">
       <h2>
         {title} {list.items.length > 0 && <span class="soft number">{countWords(list.items.length, list.more)}</span>}
       </h2>
