@@ -5,6 +5,7 @@ import { render } from "preact";
 import "@fontsource-variable/atkinson-hyperlegible-next/wght.css";
 import "./theme.css";
 import { startToken } from "./api/token";
+import { startUpdates } from "./api/update";
 import { App } from "./app";
 import { startLanguage } from "./i18n";
 import { startTheme } from "./theme";
@@ -13,6 +14,7 @@ const root = document.getElementById("app");
 if (root) {
   startToken();
   startTheme();
+  startUpdates();
   await startLanguage();
   root.replaceChildren();
   render(<App />, root);

@@ -6,6 +6,7 @@
 import { Code, type Interceptor } from "@connectrpc/connect";
 import { type Signal, signal } from "@preact/signals";
 import { type Fault, faultOf, isPassing, PAGE_BROKEN } from "./faults";
+import { lookForUpdate } from "./update";
 
 /**
  * The state of a stream: connecting, open, lost and about to reconnect, ended for good, or failed
@@ -99,6 +100,7 @@ export function follow<Message>(
           if (stopped) return;
           heardAtMs = Date.now();
           failures = 0;
+          if (link.peek() === "lost") void lookForUpdate();
           link.value = "open";
           if (!handle(message)) return end("ended");
         }

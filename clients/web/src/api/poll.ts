@@ -3,6 +3,7 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { type Fault, faultOf } from "./faults";
+import { lookForUpdate } from "./update";
 
 /** The last response and the last error. */
 export interface Polled<T> {
@@ -35,6 +36,7 @@ export function usePolled<T>(ask: (signal: AbortSignal) => Promise<T>, everyMs: 
       try {
         const value = await ask(stop.signal);
         if (stop.signal.aborted) return;
+        if (slowdown > 1) void lookForUpdate();
         slowdown = 1;
         setPolled({ value, fault: null });
       } catch (error) {

@@ -2,6 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
+import { outdated } from "../api/update";
 import { hidden } from "../hiding";
 import { t } from "../i18n";
 import { isWall, type Route } from "../router";
@@ -10,6 +11,7 @@ import { Drawing } from "./Drawing";
 import css from "./Layout.module.css";
 import { Settings } from "./Settings";
 import { useTab } from "./tab";
+import { UpdateNotice } from "./Update";
 
 interface LayoutProps {
   here: Route;
@@ -60,7 +62,8 @@ export function Layout({ here, children }: LayoutProps) {
           type="button"
           class={css.headerSettings}
           data-part="header-settings"
-          aria-label={words.settings.title}
+          data-outdated={outdated.value ? "" : undefined}
+          aria-label={outdated.value ? `${words.settings.title}. ${words.outdated.text}` : words.settings.title}
           onClick={() => setOpen(true)}
         >
           <GearSign />
@@ -69,6 +72,7 @@ export function Layout({ here, children }: LayoutProps) {
       <main id="content" ref={content} tabIndex={-1} class={css.content} data-part="content">
         {children}
       </main>
+      <UpdateNotice />
       <Announcer />
       {open && <Settings onClose={() => setOpen(false)} />}
     </div>

@@ -16,6 +16,7 @@ import { ConfirmButton } from "./ConfirmButton";
 import { Dialog } from "./Dialog";
 import { CheckField, SelectField, TextField } from "./Field";
 import css from "./Layout.module.css";
+import { UpdateSetting } from "./Update";
 
 /** The dialog of settings. */
 export function Settings({ onClose }: { onClose: () => void }) {
@@ -24,6 +25,7 @@ export function Settings({ onClose }: { onClose: () => void }) {
   return (
     <Dialog title={words.title} onClose={onClose}>
       <div class={css.settings}>
+        <UpdateSetting />
         <SelectField
           label={words.language}
           value={language.value}

@@ -48,6 +48,31 @@ test("a play that is pressed while the network is gone arrives when it is back",
   await tap.stop();
 });
 
+test("a server that has been updated says so, never over a decision, and a new page has the same one", async () => {
+  const { code } = await newRoom(server, { seats: ["person", ...OPPONENTS], faces: 5 });
+  const { page } = await person(browser);
+  await sitDown(page, server, code, "Rosa");
+  const decision = await nextDecision(page);
+  const lobby = await page.context().newPage();
+  await lobby.goto(server.url);
+  await lobby.locator('[data-part~="quick"]').waitFor();
+  const next = (await (await fetch(server.url)).text()).replace(/index-[^"]+\.js/, "index-next.js");
+  await page.context().route(`${server.url}/`, (route) => route.fulfill({ body: next, contentType: "text/html" }));
+  await server.restart();
+
+  const settings = page.locator('[data-part~="header-settings"][data-outdated]');
+  await settings.waitFor();
+  expect(await page.locator('[data-part~="update"]').isVisible()).toBe(false);
+  await settings.click();
+  await Promise.all([page.waitForEvent("load"), page.getByRole("button", { name: "Load the new version" }).click()]);
+  expect(await nextDecision(page)).toBe(decision);
+
+  const notice = lobby.locator('[data-part~="update"]');
+  await notice.getByText("The server has been updated").waitFor();
+  await notice.getByRole("button", { name: "Close" }).click();
+  await notice.waitFor({ state: "detached" });
+});
+
 test("a person plays a complete game with the keyboard alone, and hears all that happens in its order", async () => {
   const names = ["Rosa", "greedy", "random", "trained"];
   const { roomId, code } = await newRoom(server, { seats: ["person", ...names.slice(1)], faces: 9, shifts: 2 });

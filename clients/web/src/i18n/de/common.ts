@@ -109,6 +109,10 @@ export const common: Texts["common"] = {
   more: "Mehr",
   showMore: "Mehr anzeigen",
   pageNotLoaded: "Diese Seite konnte nicht geladen werden. Prüfe deine Verbindung und lade sie neu.",
+  outdated: {
+    text: "Der Server wurde aktualisiert, und diese Seite ist noch die alte Version. Deine Plätze und Spiele bleiben, wenn du die neue lädst.",
+    load: "Neue Version laden",
+  },
   pageBroken: {
     title: "Auf dieser Seite ist ein Fehler aufgetreten",
     text: "Ein Fehler der Seite selbst, nicht deiner Verbindung. Dein Platz und alles am Tisch bleiben erhalten.",

@@ -101,6 +101,10 @@ export const common = {
   more: "More",
   showMore: "Show more",
   pageNotLoaded: "This page could not be loaded. Check your connection and reload.",
+  outdated: {
+    text: "The server has been updated, and this page is the old version. Your seats and games stay as they are when you load the new one.",
+    load: "Load the new version",
+  },
   pageBroken: {
     title: "This page has met an error",
     text: "An error of the page itself, not of your connection. Your seat and everything at the table are kept.",

@@ -109,6 +109,10 @@ export const common: Texts["common"] = {
   more: "Más",
   showMore: "Mostrar más",
   pageNotLoaded: "No se ha podido cargar esta página. Comprueba tu conexión y vuelve a cargarla.",
+  outdated: {
+    text: "El servidor se ha actualizado y esta página es la versión anterior. Tus sitios y partidas se conservan al cargar la nueva.",
+    load: "Cargar la nueva versión",
+  },
   pageBroken: {
     title: "Se ha producido un error en esta página",
     text: "Es un error de la propia página, no de tu conexión. Tu sitio y todo lo que hay en la mesa se conservan.",

@@ -106,6 +106,10 @@ export const common: Texts["common"] = {
   more: "Altri",
   showMore: "Mostra altro",
   pageNotLoaded: "Non è stato possibile caricare questa pagina. Controlla la connessione e ricarica.",
+  outdated: {
+    text: "Il server è stato aggiornato e questa pagina è la versione precedente. I tuoi posti e le tue partite restano quando carichi quella nuova.",
+    load: "Carica la nuova versione",
+  },
   pageBroken: {
     title: "In questa pagina si è verificato un errore",
     text: "È un errore della pagina stessa, non della connessione. Il tuo posto e tutto ciò che è sul tavolo restano.",

@@ -1,0 +1,37 @@
+// Whether the server has another version of the page than the one that is open. Looked for where the
+// server may have been replaced: after a lost connection is back, and when the page is seen again.
+// Nothing is reloaded here: parts/Update.tsx offers it.
+
+import { signal } from "@preact/signals";
+
+/** Whether the page is of another version than the server's. */
+export const outdated = signal(false);
+
+/** The script of a document, in a build of the page: its name has a hash of all code. */
+const SCRIPT = /<script type="module"[^>]* src="(\/assets\/[^"]+)"/;
+
+let looking = false;
+
+/** Requests the server's document, and compares its script with that of the open page. */
+export async function lookForUpdate(): Promise<void> {
+  const own = document.querySelector('script[type="module"]')?.getAttribute("src");
+  if (!own || looking || outdated.peek()) return;
+  looking = true;
+  try {
+    const answer = await fetch("/", { cache: "no-store" });
+    // What answers in between, such as a hotspot's sign-in page, has no such script.
+    const [, script] = SCRIPT.exec(answer.ok ? await answer.text() : "") ?? [];
+    outdated.value = script !== undefined && script !== own;
+  } catch {
+    // The connection is lost again: the next time it is back.
+  } finally {
+    looking = false;
+  }
+}
+
+/** Looks when the page is seen again, which may be days later. */
+export function startUpdates(): void {
+  document.addEventListener("visibilitychange", () => {
+    if (!document.hidden) void lookForUpdate();
+  });
+}
