@@ -60,7 +60,7 @@ test("only the first gift of an exchange is a moment", () => {
 
 test("gifts travel until they have arrived, also when the next ones come meanwhile", async () => {
   vi.useFakeTimers({ toFake: ["setTimeout", "clearTimeout"] });
-  const show = (table: TableState) => act(() => render(<Travel table={table} />, root));
+  const show = (table: TableState) => act(() => render(<Travel table={table} own={0} dealt={false} />, root));
   const underWay = () => root.querySelectorAll('[data-part~="under-way"]').length;
   const later = (ms: number) => act(() => void vi.advanceTimersByTime(ms));
   let table = played(start(), deal);

@@ -31,6 +31,8 @@ interface HandProps {
   /** A card was refused for a reason to be shown. */
   onRefused: (reason: string) => void;
   label: string;
+  /** Whether the cards are being dealt. */
+  dealt?: boolean;
   /** Whether cards have keys: those that are not the number on the card are shown. */
   keys?: boolean;
   /** Shown in place of cards if there are none. */
@@ -116,7 +118,7 @@ export function Hand(props: HandProps) {
   let index = -1;
   return (
     <div
-      class={`${css.hand} ${units <= ONE_ROW_UNITS ? css.short : ""}`}
+      class={`${css.hand} ${units <= ONE_ROW_UNITS ? css.short : ""} ${props.dealt ? css.dealt : ""}`}
       role="toolbar"
       aria-label={props.label}
       aria-describedby="hand-help"
@@ -143,6 +145,7 @@ export function Hand(props: HandProps) {
                 <button
                   key={inStack}
                   type="button"
+                  style={{ "--nth": at }}
                   class={`${css.card} ${picked.has(at) ? css.picked : ""}`}
                   data-part="hand-card"
                   aria-pressed={picked.has(at)}

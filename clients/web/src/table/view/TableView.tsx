@@ -17,6 +17,7 @@ import type { OpenDecision } from "../model/live";
 import { awaitsHand, type TableState } from "../model/state";
 import { distinctName, headingWords, violationWords } from "../words";
 import { ActionBar } from "./ActionBar";
+import { useDealt } from "./arrivals";
 import { Board } from "./Board";
 import { useDeciding } from "./deciding";
 import { Hand } from "./Hand";
@@ -106,6 +107,7 @@ export function TableView(props: TableViewProps) {
   });
   const { hand, moves } = deciding;
   const [helped, setHelped] = useState(false);
+  const dealt = useDealt(table);
   // A study that hides what is possible hides its explanation too.
   const help = props.replayed || hidden.value.includes("lookup") ? undefined : () => setHelped(true);
   useShortcuts((key) => {
@@ -219,6 +221,7 @@ export function TableView(props: TableViewProps) {
               received={mine.received}
               refusal={deciding.refusal}
               label={handLabel}
+              dealt={dealt}
               keys={props.onAnswer !== undefined && isOn("keys")}
               onToggle={deciding.toggle}
               onPlay={deciding.play}
@@ -246,7 +249,7 @@ export function TableView(props: TableViewProps) {
         <Seats table={table} own={own} next={next} kind={kind} lower />
       )}
       {props.children}
-      <Travel table={table} />
+      <Travel table={table} own={own} dealt={dealt} />
       {helped && (
         <Help
           table={table}

@@ -1,21 +1,32 @@
-// The cards of the exchange, which travel from the one who gives them to the one who gets them.
-// Decorative: the history says what was given.
+// Cards on their way over the table: those that are dealt from the pizza, and those of the exchange
+// from the one who gives them to the one who gets them. Decorative: the history says what was given.
 
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import { Card } from "../../parts/Card";
+import type { Card as CardValue } from "../model/cards";
 import type { LogEntry, TableState } from "../model/state";
 import { useArrivals } from "./arrivals";
 import { showsMoments } from "./Moment";
 import css from "./Travel.module.css";
 
-/** How long cards are under way, milliseconds; as in the style sheet. */
+/** How long the cards of the exchange are under way, milliseconds; as in the style sheet. */
 const UNDER_WAY_MS = 1600;
+/** The backs that are dealt to a seat, for all its cards. */
+const DEALT = [undefined, undefined, undefined];
 
 interface Gift extends Extract<LogEntry, { kind: "gave" }> {
   readonly sequence: number;
 }
 
-export function Travel({ table }: { table: TableState }) {
+interface TravelProps {
+  table: TableState;
+  /** The reader's seat, whose hand shows how it is dealt. */
+  own: number | undefined;
+  /** Whether the cards are being dealt. */
+  dealt: boolean;
+}
+
+export function Travel({ table, own, dealt }: TravelProps) {
   const [gifts, setGifts] = useState<readonly Gift[]>([]);
   useArrivals(table, (since, caughtUp) => {
     if (caughtUp || !showsMoments()) return;
@@ -27,36 +38,73 @@ export function Travel({ table }: { table: TableState }) {
   const arrived = (sequence: number) => setGifts((before) => before.filter((gift) => gift.sequence !== sequence));
   return (
     <>
-      {gifts.map((gift) => (
-        <UnderWay key={gift.sequence} gift={gift} onArrived={() => arrived(gift.sequence)} />
+      {dealt &&
+        showsMoments() &&
+        table.seats.map(
+          ({ seat }) =>
+            seat !== own && (
+              <UnderWay key={`${table.shift}-${seat}`} from={BOARD} to={seatPart(seat)} cards={DEALT} nth={seat} />
+            ),
+        )}
+      {gifts.map(({ sequence, giver, receiver, cards, count }) => (
+        <UnderWay
+          key={sequence}
+          from={seatPart(giver)}
+          to={seatPart(receiver)}
+          cards={cards.length > 0 ? cards : Array.from({ length: count }, () => undefined)}
+          onArrived={() => arrived(sequence)}
+        />
       ))}
     </>
   );
 }
 
-function UnderWay({ gift, onArrived }: { gift: Gift; onArrived: () => void }) {
-  const cards = useRef<HTMLDivElement>(null);
+const BOARD = '[data-part~="board"]';
+
+function seatPart(seat: number): string {
+  return `[data-part~="seat"][data-seat="${seat}"]`;
+}
+
+interface UnderWayProps {
+  /** Selectors of the parts of the table between whose middles the cards travel. */
+  from: string;
+  to: string;
+  /** Undefined for backs. */
+  cards: readonly (CardValue | undefined)[];
+  /** Of cards that are dealt: whose turn it is. */
+  nth?: number;
+  onArrived?: () => void;
+}
+
+function UnderWay({ from, to, cards, nth, onArrived }: UnderWayProps) {
+  const box = useRef<HTMLDivElement>(null);
   useEffect(() => {
+    if (!onArrived) return;
     const timer = setTimeout(onArrived, UNDER_WAY_MS);
     return () => clearTimeout(timer);
   }, []);
   useLayoutEffect(() => {
-    const { current } = cards;
-    const table = current?.closest('[data-part~="table"]');
-    const [from, to] = [gift.giver, gift.receiver].map((seat) => {
-      const box = table?.querySelector(`[data-part~="seat"][data-seat="${seat}"]`)?.getBoundingClientRect();
-      return box && ([box.left + box.width / 2, box.top + box.height / 2] as const);
-    });
+    const { current } = box;
     if (!current) return;
-    current.hidden = !from || !to;
-    if (!from || !to) return;
-    for (const [name, [x, y]] of [["from", from] as const, ["to", to] as const])
-      current.style.setProperty(`--${name}`, `${x.toFixed(0)}px ${y.toFixed(0)}px`);
+    const table = current.closest('[data-part~="table"]');
+    const [begin, end] = [from, to].map((part) => table?.querySelector(part)?.getBoundingClientRect());
+    current.hidden = !begin || !end;
+    for (const [name, at] of [["from", begin] as const, ["to", end] as const])
+      if (at)
+        current.style.setProperty(
+          `--${name}`,
+          `${(at.left + at.width / 2).toFixed(0)}px ${(at.top + at.height / 2).toFixed(0)}px`,
+        );
   }, []);
-  const shown = gift.cards.length > 0 ? gift.cards : Array.from({ length: gift.count }, () => undefined);
   return (
-    <div ref={cards} class={css.underWay} data-part="under-way" aria-hidden="true">
-      {shown.map((card, index) => (
+    <div
+      ref={box}
+      class={`${css.underWay} ${nth === undefined ? "" : css.dealt}`}
+      style={nth === undefined ? undefined : { "--nth": nth }}
+      data-part="under-way"
+      aria-hidden="true"
+    >
+      {cards.map((card, index) => (
         <Card key={index} card={card} />
       ))}
     </div>
