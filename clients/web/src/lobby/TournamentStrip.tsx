@@ -22,7 +22,7 @@ export function TournamentStrip() {
   const { value: found } = usePolled(listCurrent, EVERY_MS, "tournaments");
   if (!found) return null;
   return (
-    <section class={`${lobbyCss.section} ${lobbyCss.half}`} data-part="lobby-section">
+    <section class={`${lobbyCss.section} ${lobbyCss.beside}`} data-part="lobby-section">
       <h2>{words.title}</h2>
       {found.length === 0 && <p class="soft">{words.none}</p>}
       <ul class={css.tournamentStrip}>
