@@ -27,7 +27,12 @@ const tone = (hertz: number, at: number, length: number, loud: number, wave: Osc
   return { hertz, at, length, loud, wave };
 };
 
+/** When a card that is laid meets the board, in seconds; as in view/Board.module.css. */
+const LAID_S = 0.33;
+
 const SOUNDS = {
+  /** Cards slide over the table, one after the other. */
+  dealt: [0, 1, 2, 3, 4, 5].map((nth) => tone(150 + 12 * nth, nth * 0.09, 0.07, 0.2, "triangle")),
   /** A card is played. */
   play: [tone(190, 0, 0.09, 0.5, "triangle"), tone(95, 0.01, 0.12, 0.5)],
   pass: [tone(240, 0, 0.06, 0.16, "triangle")],
@@ -60,11 +65,14 @@ export function play(sound: Sound): void {
   if (!soundOn.peek() || typeof AudioContext === "undefined" || !navigator.userActivation?.hasBeenActive) return;
   context ??= new AudioContext();
   const audio = context;
+  const moves = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const begin = audio.currentTime + (sound === "play" && moves ? LAID_S : 0);
   if (audio.state === "suspended") void audio.resume();
   for (const { hertz, at, length, loud, wave } of SOUNDS[sound]) {
-    const start = audio.currentTime + at;
+    const start = begin + at;
     const oscillator = new OscillatorNode(audio, { type: wave, frequency: hertz });
     const gain = new GainNode(audio, { gain: 0 });
+    gain.gain.setValueAtTime(0, start);
     gain.gain.linearRampToValueAtTime(loud * 0.5, start + 0.008);
     gain.gain.exponentialRampToValueAtTime(0.0001, start + length);
     oscillator.connect(gain).connect(audio.destination);
@@ -80,6 +88,7 @@ export function soundOf({ entry }: LogLine): Sound | undefined {
       return "play";
     case "passed":
       return "pass";
+    case "dealt":
     case "declared":
     case "pizzaDone":
     case "violated":
