@@ -102,12 +102,12 @@ export function useCopying(text: string): { copied: boolean; copy: (() => void) 
   return { copied: text !== "" && copied === text, copy: clipboard && copy };
 }
 
-/** A text as a QR code: black on white in both themes, as scanners need it. */
+/** A text as a QR code: black on white, as scanners need it; in the dark theme on a grey that does not dazzle. */
 export function QrCode({ text, label }: { text: string; label: string }) {
   const { path, size } = useMemo(() => qrPath(text), [text]);
   return (
     <svg class={css.qr} viewBox={`0 0 ${size} ${size}`} role="img" aria-label={label} shape-rendering="crispEdges">
-      <rect width={size} height={size} fill="#ffffff" />
+      <rect width={size} height={size} fill="light-dark(#ffffff, #d2ccc2)" />
       <path d={path} fill="#000000" />
     </svg>
   );
