@@ -54,7 +54,7 @@ test("after a failure it is looked for again, and once found no longer", async (
   expect(ask).toHaveBeenCalledTimes(2);
 });
 
-test("a stream that is lost and back, and a page that is seen again, look for it", async () => {
+test("a stream that is lost and back, a page that is seen again, and time look for it", async () => {
   ask.mockImplementation(async () => documentOf("/assets/index-old.js"));
   const streams = [["a"], ["b", "end"]];
   const following = follow(
@@ -67,13 +67,13 @@ test("a stream that is lost and back, and a page that is seen again, look for it
   expect(ask).not.toHaveBeenCalled();
   await expect.poll(() => following.link.value).toBe("ended");
   expect(ask).toHaveBeenCalledTimes(1);
+  vi.useFakeTimers();
   startUpdates();
-  await expect
-    .poll(() => {
-      document.dispatchEvent(new Event("visibilitychange"));
-      return ask.mock.calls.length;
-    })
-    .toBe(2);
+  document.dispatchEvent(new Event("visibilitychange"));
+  expect(ask).toHaveBeenCalledTimes(2);
+  await vi.advanceTimersByTimeAsync(300_000);
+  expect(ask).toHaveBeenCalledTimes(3);
+  vi.useRealTimers();
 });
 
 test("the offer reloads, is closed once, and stays in the settings", async () => {
@@ -81,7 +81,7 @@ test("the offer reloads, is closed once, and stays in the settings", async () =>
   await act(() =>
     render(
       <>
-        <UpdateNotice />
+        <UpdateNotice unattended={false} />
         <UpdateSetting />
       </>,
       root,
@@ -98,4 +98,15 @@ test("the offer reloads, is closed once, and stays in the settings", async () =>
   expect(reload).toHaveBeenCalledTimes(1);
   await act(() => buttons()[1]?.click());
   expect(buttons().map((button) => button.textContent)).toEqual(["Load the new version"]);
+});
+
+test("a wall loads itself, and says nothing", async () => {
+  const reload = vi.spyOn(location, "reload").mockImplementation(() => {});
+  await act(() => render(<UpdateNotice unattended />, root));
+  expect(reload).not.toHaveBeenCalled();
+  await act(() => {
+    outdated.value = true;
+  });
+  expect(reload).toHaveBeenCalledTimes(1);
+  expect(root.textContent).toBe("");
 });

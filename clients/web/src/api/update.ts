@@ -1,5 +1,5 @@
 // Whether the server has another version of the page than the one that is open. Looked for where the
-// server may have been replaced: after a lost connection is back, and when the page is seen again.
+// server may have been replaced: after a lost connection is back, when the page is seen again, and now and then.
 // Nothing is reloaded here: parts/Update.tsx offers it.
 
 import { signal } from "@preact/signals";
@@ -9,6 +9,9 @@ export const outdated = signal(false);
 
 /** The script of a document, in a build of the page: its name has a hash of all code. */
 const SCRIPT = /<script type="module"[^>]* src="(\/assets\/[^"]+)"/;
+
+/** How often it is looked for while the page is seen, milliseconds. */
+const EVERY_MS = 300_000;
 
 let looking = false;
 
@@ -29,9 +32,14 @@ export async function lookForUpdate(): Promise<void> {
   }
 }
 
-/** Looks when the page is seen again, which may be days later. */
+/**
+ * Looks when the page is seen again, which may be days later, and now and then while it is seen: a quick
+ * restart may pass between two calls.
+ */
 export function startUpdates(): void {
-  document.addEventListener("visibilitychange", () => {
+  const look = () => {
     if (!document.hidden) void lookForUpdate();
-  });
+  };
+  document.addEventListener("visibilitychange", look);
+  setInterval(look, EVERY_MS);
 }

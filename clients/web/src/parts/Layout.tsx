@@ -72,7 +72,7 @@ export function Layout({ here, children }: LayoutProps) {
       <main id="content" ref={content} tabIndex={-1} class={css.content} data-part="content">
         {children}
       </main>
-      <UpdateNotice />
+      <UpdateNotice unattended={isWall(here)} />
       <Announcer />
       {open && <Settings onClose={() => setOpen(false)} />}
     </div>

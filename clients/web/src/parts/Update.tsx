@@ -8,14 +8,16 @@ import { announce } from "./Announcer";
 import { Button } from "./Button";
 import css from "./Update.module.css";
 
-/** The offer on the page, until it is closed. */
-export function UpdateNotice() {
+/** The offer on the page, until it is closed. Where nobody can press a button, as on a wall, the page loads itself. */
+export function UpdateNotice({ unattended }: { unattended: boolean }) {
   const [closed, setClosed] = useState(false);
   const shown = outdated.value && !closed;
   useEffect(() => {
-    if (shown) announce(t().common.outdated.text);
-  }, [shown]);
-  if (!shown) return null;
+    if (!shown) return;
+    if (unattended) location.reload();
+    else announce(t().common.outdated.text);
+  }, [shown, unattended]);
+  if (!shown || unattended) return null;
   return (
     <aside class={css.notice} data-part="update">
       <Offer />
