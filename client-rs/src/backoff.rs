@@ -3,10 +3,7 @@
 use std::time::Duration;
 
 use rand::{Rng, RngExt as _};
-use tokio::time::{Instant, sleep};
-use tonic::Status;
-
-use crate::error::{Error, may_retry};
+use tokio::time::Instant;
 
 /// Default delay before the first reconnection attempt.
 pub const FIRST_DELAY: Duration = Duration::from_millis(100);
@@ -76,22 +73,6 @@ impl Outage {
             return Err(lasted);
         }
         Ok(delay)
-    }
-
-    /// Waits before the next attempt to restore a lost stream.
-    ///
-    /// # Errors
-    /// `status`, if there is to be no further attempt.
-    pub(crate) async fn wait(&mut self, backoff: &Backoff, status: Status) -> Result<(), Error> {
-        let retry = may_retry(status.code())
-            .then(|| self.failed(backoff, Instant::now()).ok())
-            .flatten();
-        let Some(delay) = retry else {
-            return Err(status.into());
-        };
-        tracing::info!(?delay, "connection lost: {status}");
-        sleep(delay).await;
-        Ok(())
     }
 }
 

@@ -245,6 +245,14 @@ impl PlayError {
             Self::ConnectionLost { .. } => Some("CONNECTION_LOST"),
         }
     }
+
+    /// The message, for people: the server's if it refused the seat.
+    pub fn message(&self) -> String {
+        match self {
+            Self::Refused(error) => error.message().to_owned(),
+            error => error.to_string(),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The modules: agents ([`Agent`]), connections and calls ([`Client`]), results of games
-//! ([`Outcome`], [`PlayError`]), watching ([`Spectator`]), seats of those who decide slowly
-//! ([`SeatFollower`]), physical tables ([`TableFollower`]). The
+//! ([`Outcome`], [`PlayError`]), watching ([`Spectator`]), tickets of those who decide slowly
+//! ([`TicketFollower`]), physical tables ([`TableFollower`]). The
 //! messages of the protocol are re-exported as [`v1`]. The crate contains no rules of the game: the
 //! server sends the legal actions.
 #![doc = ""]
@@ -15,15 +15,16 @@ mod error;
 mod mask;
 mod options;
 mod outcome;
-mod participant;
 mod random;
 mod repeat;
 mod run;
 mod seat;
-mod seat_follower;
 mod session;
 mod spectate;
+mod stream;
 mod table;
+mod ticket_follower;
+mod tickets;
 mod tournaments;
 mod vector;
 
@@ -38,8 +39,8 @@ pub use mask::{count_in, is_legal, legal_actions, legal_count, nth_in, nth_legal
 pub use options::{ENTROPY_BYTES, Entropy, PlayOptions};
 pub use outcome::{Ending, Outcome};
 pub use random::RandomAgent;
-pub use seat_follower::SeatFollower;
 pub use spectate::{Spectator, Watched};
 pub use table::TableFollower;
+pub use ticket_follower::{Followed, SeatFollower, TicketFollower};
 pub use tournaments::TournamentFollower;
 pub use vector::VectorGames;

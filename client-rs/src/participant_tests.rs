@@ -31,15 +31,14 @@ impl Cup {
             entropy: Entropy::Fixed(vec![7]),
             ..PlayOptions::default()
         };
-        let participant = Participant::new("cup".to_owned(), make, &options);
-        let session = Session::of_participant(participant, &options);
+        let session = Session::of_participant("cup".to_owned(), make, &options);
         Self { session, logs }
     }
 
     /// One that has entered.
     fn entered() -> Self {
         let mut cup = Self::new();
-        assert_eq!(cup.attach(), ["cup from 0"]);
+        assert_eq!(cup.attach(), ["cup from 1"]);
         assert!(cup.receive(vec![(0, entered())]).is_empty());
         cup
     }
@@ -128,7 +127,7 @@ fn played(cup: Cup) -> Result<Vec<String>, String> {
 fn a_seat_that_is_attached_twice_is_played_under_its_newest_handle() {
     let mut cup = Cup::entered();
     cup.receive(vec![(FIRST_HANDLE, seated(0, "a", 0, 1))]);
-    assert_eq!(cup.attach(), ["ticket of a from 1", "cup from 0"]);
+    assert_eq!(cup.attach(), ["ticket of a from 1", "cup from 1"]);
     // The server attaches it with the participant, before it gets to what the client asked for.
     let sent = cup.receive(vec![
         (1, entered()),
@@ -191,7 +190,7 @@ fn a_new_stream_continues_with_the_same_agents() {
     let attached = cup.attach();
     assert_eq!(
         attached,
-        ["ticket of a from 3", "ticket of b from 1", "cup from 0"]
+        ["ticket of a from 3", "ticket of b from 1", "cup from 1"]
     );
     let sent = cup.receive(vec![
         (0, seated(1, "a", 0, 4)),
@@ -252,7 +251,7 @@ fn a_game_that_ended_on_a_lost_connection_is_not_played_again() {
     ]);
     cup.session.disconnected();
     cup.new_lines();
-    assert_eq!(cup.attach(), ["cup from 0"]);
+    assert_eq!(cup.attach(), ["cup from 1"]);
     let sent = cup.receive(vec![
         (0, entered()),
         (FIRST_HANDLE, seated(0, "a", 0, 1)),

@@ -1,125 +1,119 @@
-//! Carries messages between a session and the server: opens the stream, reopens it when it breaks,
-//! and finally gives up. `session` interprets the messages.
+//! Carries messages between tickets and the server, on one `Play` stream at a time. `session`
+//! interprets those of agents' seats, `ticket_follower` passes on those of others.
 
 use std::time::Duration;
 
 use tokio::sync::mpsc;
-use tokio::time::{Instant, sleep, timeout};
+use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
-use tonic::{Status, Streaming};
 
-use crate::backoff::{Backoff, Outage};
+use crate::Agent;
+use crate::backoff::Backoff;
 use crate::connection::{Connection, MAX_RESPONSE_BYTES};
-use crate::error::{PlayError, may_retry};
 use crate::session::Session;
+use crate::stream::{Broken, Reconnecting};
 use crate::v1::{self, play_service_client::PlayServiceClient};
-use crate::{Agent, Error};
 
 /// Maximum number of requests waiting for the transport.
 const REQUEST_QUEUE: usize = 64;
-/// Time limit for the server to accept a stream.
-const OPEN_TIMEOUT: Duration = Duration::from_secs(10);
 /// Time limit for the server to end a half-closed stream.
 const LEAVE_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// A stream that ended before the games of its seats.
-struct Lost {
-    status: Status,
-    /// How long the stream was open.
-    held: Duration,
+/// The `Play` stream of a process, across lost connections.
+#[derive(Debug)]
+pub(crate) struct PlayStream {
+    service: PlayServiceClient<Connection>,
+    responses: Reconnecting<v1::PlayResponse>,
+    /// To the current stream.
+    requests: Option<mpsc::Sender<v1::PlayRequest>>,
+}
+
+impl PlayStream {
+    pub(crate) fn new(connection: Connection, backoff: Backoff) -> Self {
+        Self {
+            service: PlayServiceClient::new(connection)
+                .max_decoding_message_size(MAX_RESPONSE_BYTES),
+            responses: Reconnecting::new(backoff),
+            requests: None,
+        }
+    }
+
+    pub(crate) fn set_backoff(&mut self, backoff: Backoff) {
+        self.responses.set_backoff(backoff);
+    }
+
+    /// The next response. A new stream begins with the requests of `attach`. Cancel safe.
+    pub(crate) async fn next(
+        &mut self,
+        mut attach: impl FnMut() -> Vec<v1::PlayRequest>,
+    ) -> Result<v1::PlayResponse, Broken> {
+        let response = self.responses.next(|| {
+            let attach = attach();
+            // All attachments must fit: nothing is read from the queue before the stream is open.
+            let (requests, queue) = mpsc::channel(REQUEST_QUEUE.max(attach.len()));
+            for request in attach {
+                requests
+                    .try_send(request)
+                    .expect("the queue has room for all attachments");
+            }
+            self.requests = Some(requests);
+            let mut service = self.service.clone();
+            async move { service.play(ReceiverStream::new(queue)).await }
+        });
+        let response = match response.await {
+            Ok(Some(response)) => return Ok(response),
+            Ok(None) => Err(self.responses.ended()),
+            Err(broken) => Err(broken),
+        };
+        self.requests = None;
+        response
+    }
+
+    /// Sends requests on the current stream, if there is one. If the transport accepts no more, the
+    /// next response has the reason.
+    pub(crate) async fn send(&self, all: Vec<v1::PlayRequest>) {
+        if let Some(requests) = &self.requests {
+            for request in all {
+                let _ = requests.send(request).await;
+            }
+        }
+    }
+
+    /// Ends the outage: there was progress.
+    pub(crate) fn progress(&mut self) {
+        self.responses.progress();
+    }
+
+    /// Ends the stream cleanly, but does not depend on it: everything has been sent.
+    pub(crate) async fn leave(self) {
+        drop(self.requests);
+        let _ended = timeout(LEAVE_TIMEOUT, self.responses.drain()).await;
+    }
 }
 
 /// Plays until every seat of the session is settled.
 pub(crate) async fn run<A: Agent>(
-    channel: Connection,
+    connection: Connection,
     session: &mut Session<'_, A>,
     backoff: &Backoff,
 ) {
-    let mut client = PlayServiceClient::new(channel).max_decoding_message_size(MAX_RESPONSE_BYTES);
-    let mut outage = Outage::default();
+    let mut stream = PlayStream::new(connection, backoff.clone());
     while !session.is_over() {
-        let Err(lost) = converse(&mut client, session).await else {
-            return;
-        };
-        session.disconnected();
-        if !may_retry(lost.status.code()) {
-            session.give_up(&PlayError::Refused(lost.status.into()));
-            return;
-        }
-        if session.take_progress() || lost.held >= backoff.max {
-            outage.over();
-        }
-        match outage.failed(backoff, Instant::now()) {
-            Ok(delay) => {
-                tracing::warn!(
-                    "connection lost, trying again in {:.1} s: {}",
-                    delay.as_secs_f32(),
-                    lost.status
-                );
-                sleep(delay).await;
+        match stream.next(|| session.attach()).await {
+            Ok(response) => {
+                let requests = session.receive(response);
+                if session.take_progress() {
+                    stream.progress();
+                }
+                stream.send(requests).await;
             }
-            Err(outage) => {
-                let last = Error::from(lost.status);
-                session.give_up(&PlayError::ConnectionLost { outage, last });
+            Err(broken) => {
+                session.disconnected();
+                if let Err(error) = broken.of_seats() {
+                    session.give_up(&error);
+                }
             }
         }
     }
-}
-
-/// Runs one stream, until the session is over or the stream breaks.
-async fn converse<A: Agent>(
-    client: &mut PlayServiceClient<Connection>,
-    session: &mut Session<'_, A>,
-) -> Result<(), Lost> {
-    let attach = session.attach();
-    // All attachments must fit: nothing is read from the queue before the stream is open.
-    let (requests, queue) = mpsc::channel(REQUEST_QUEUE.max(attach.len()));
-    for request in attach {
-        requests
-            .try_send(request)
-            .expect("the queue has room for all attachments");
-    }
-    let mut responses = open(client, queue).await.map_err(|status| Lost {
-        status,
-        held: Duration::ZERO,
-    })?;
-    let opened = Instant::now();
-    let lost = |status| Lost {
-        status,
-        held: opened.elapsed(),
-    };
-    while !session.is_over() {
-        let response = match responses.message().await {
-            Ok(Some(response)) => response,
-            Ok(None) => return Err(lost(Status::unavailable("the server ended the stream"))),
-            Err(status) => return Err(lost(status)),
-        };
-        for request in session.receive(response) {
-            if requests.send(request).await.is_err() {
-                // The transport accepts no more requests; the response stream has the reason.
-                break;
-            }
-        }
-    }
-    drop(requests);
-    // Ends the stream cleanly, but does not depend on it: everything has been sent.
-    let _ended = timeout(LEAVE_TIMEOUT, drain(responses)).await;
-    Ok(())
-}
-
-async fn open(
-    client: &mut PlayServiceClient<Connection>,
-    queue: mpsc::Receiver<v1::PlayRequest>,
-) -> Result<Streaming<v1::PlayResponse>, Status> {
-    let call = client.play(ReceiverStream::new(queue));
-    match timeout(OPEN_TIMEOUT, call).await {
-        Ok(opened) => opened.map(tonic::Response::into_inner),
-        Err(_elapsed) => Err(Status::unavailable(
-            "the server did not accept the stream in time",
-        )),
-    }
-}
-
-async fn drain(mut responses: Streaming<v1::PlayResponse>) {
-    while let Ok(Some(_)) = responses.message().await {}
+    stream.leave().await;
 }

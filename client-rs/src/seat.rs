@@ -1,10 +1,11 @@
-//! The protocol for one seat: updates go in, commands come out. No stream, no clock and no other
-//! seats (see `session`), so every sequence of events can be tested as data.
+//! What an agent does on one seat: updates go in, commands come out. No ticket (see `tickets`), no
+//! stream, no clock and no other seats (see `session`).
 
 use prost::Message as _;
 
-use crate::v1::{self, game_event, seat_command::Command};
-use crate::{Agent, Ending, Outcome, PlayError, PlayOptions};
+use crate::tickets::command;
+use crate::v1::{self, game_event, seat_command::Command, seat_update::Update};
+use crate::{Agent, Ending, Outcome, PlayError};
 
 /// Larger annotations are not sent: the server drops them above 4 KiB, and a message of 64 KiB
 /// would end the stream.
@@ -21,17 +22,14 @@ enum Owed {
     SameAnswer,
 }
 
-/// One seat, from its ticket to its outcome, across any number of connections.
+/// One seat, from its first attachment to its outcome, across any number of connections.
 #[derive(Debug)]
 pub(crate) struct SeatSession<A> {
     agent: A,
-    ticket: String,
     entropy: Vec<u8>,
     room_id: String,
     game_id: String,
     seat: u32,
-    /// Number of the next event.
-    next_event: u64,
     /// Events below this number happened before the seat was last attached.
     live_from: u64,
     open: Option<v1::DecisionRequest>,
@@ -46,19 +44,16 @@ pub(crate) struct SeatSession<A> {
     awaits: bool,
     answers: u64,
     ending: Option<Ending>,
-    outcome: Option<Result<Outcome, PlayError>>,
 }
 
 impl<A: Agent> SeatSession<A> {
-    pub(crate) fn new(ticket: String, agent: A, entropy: Vec<u8>) -> Self {
+    pub(crate) fn new(agent: A, entropy: Vec<u8>) -> Self {
         Self {
             agent,
-            ticket,
             entropy,
             room_id: String::new(),
             game_id: String::new(),
             seat: 0,
-            next_event: 1,
             live_from: 1,
             open: None,
             answered: None,
@@ -68,31 +63,15 @@ impl<A: Agent> SeatSession<A> {
             awaits: false,
             answers: 0,
             ending: None,
-            outcome: None,
         }
     }
 
-    /// Attaches on a new connection. An unacknowledged answer is stored: the server requests its
+    /// Prepares for a new connection. An unacknowledged answer is stored: the server requests its
     /// decision again if the answer never arrived.
-    pub(crate) fn attach(&mut self, request_id: u32, options: &PlayOptions) -> v1::SeatCommand {
+    pub(crate) fn reconnect(&mut self) {
         self.open = None;
         self.owed = Owed::Nothing;
         self.substituted = false;
-        attach(
-            &self.ticket,
-            request_id,
-            self.next_event,
-            &self.entropy,
-            options,
-        )
-    }
-
-    pub(crate) fn is_settled(&self) -> bool {
-        self.outcome.is_some()
-    }
-
-    pub(crate) fn take_outcome(&mut self) -> Option<Result<Outcome, PlayError>> {
-        self.outcome.take()
     }
 
     /// The game it was last attached to; empty before the first attachment.
@@ -112,43 +91,36 @@ impl<A: Agent> SeatSession<A> {
         self.game_id = attached.game_id;
     }
 
-    /// Passes new events to the agent. Returns whether there were any.
-    pub(crate) fn events(&mut self, batch: v1::EventBatch) -> bool {
-        let mut any = false;
-        for event in batch.events {
-            if event.sequence < self.next_event {
-                continue;
+    /// Handles an update. Returns whether it closed or changed the open decision.
+    pub(crate) fn update(&mut self, update: Update) -> bool {
+        match update {
+            Update::Events(batch) => {
+                for event in batch.events {
+                    self.agent.on_event(&event);
+                    self.follow(event);
+                }
             }
-            if event.sequence > self.next_event {
-                tracing::warn!(
-                    seat = self.seat,
-                    expected = self.next_event,
-                    got = event.sequence,
-                    "events are missing"
-                );
+            Update::Awaited(awaited) => self.awaited(&awaited),
+            // Whether a substitute plays for the seat, where no event says so.
+            Update::Substitution(substitution) => self.substituted = substitution.active,
+            Update::Decision(request) => self.decision(request),
+            Update::Result(result) => return self.result(&result),
+            Update::Refused(refused) => {
+                let (seat, reason) = (self.seat, refused.reason);
+                tracing::warn!(seat, reason, "{}", refused.message);
             }
-            self.next_event = event.sequence.saturating_add(1);
-            any = true;
-            self.agent.on_event(&event);
-            self.follow(event);
+            Update::Snapshot(_)
+            | Update::Attached(_)
+            | Update::Detached(_)
+            | Update::Entered(_) => {}
         }
-        any
-    }
-
-    /// Goes on after a snapshot, which stands for the events before.
-    pub(crate) fn snapshot(&mut self, snapshot: &v1::Snapshot) {
-        self.next_event = self.next_event.max(snapshot.next_sequence);
+        false
     }
 
     /// Passes on whom the game waits for.
-    pub(crate) fn awaited(&mut self, awaited: &v1::Awaited) {
+    fn awaited(&mut self, awaited: &v1::Awaited) {
         self.awaits = awaited.seat.is_some();
         self.agent.on_awaited(awaited);
-    }
-
-    /// Whether a substitute plays for the seat, where no event says so.
-    pub(crate) fn substitution(&mut self, substitution: v1::Substitution) {
-        self.substituted = substitution.active;
     }
 
     /// Updates the state after an event. Attaching ends earlier substitutions.
@@ -166,7 +138,7 @@ impl<A: Agent> SeatSession<A> {
         }
     }
 
-    pub(crate) fn decision(&mut self, request: v1::DecisionRequest) {
+    fn decision(&mut self, request: v1::DecisionRequest) {
         let answered = self.answered.as_ref().map(|answer| answer.decision_id);
         self.owed = if answered == Some(request.decision_id) {
             Owed::SameAnswer
@@ -178,7 +150,7 @@ impl<A: Agent> SeatSession<A> {
     }
 
     /// Processes the result of an answer. Returns whether it closed or changed the open decision.
-    pub(crate) fn result(&mut self, result: &v1::AnswerResult) -> bool {
+    fn result(&mut self, result: &v1::AnswerResult) -> bool {
         self.agent.on_result(result);
         let answered = self.answered.as_ref();
         let ours = answered
@@ -199,40 +171,19 @@ impl<A: Agent> SeatSession<A> {
         true
     }
 
-    pub(crate) fn refused(&mut self, refused: v1::Refused) {
-        self.settle(Err(PlayError::Refused(crate::Error::refused(refused))));
-    }
-
-    pub(crate) fn detached(&mut self, reason: v1::DetachReason) {
-        match (reason, self.ending.is_some()) {
-            (_, true) => self.finish(),
-            (v1::DetachReason::GameOver, false) => self.settle(Err(PlayError::EndingUnknown)),
-            (v1::DetachReason::Superseded, false) => self.settle(Err(PlayError::Superseded)),
-            _ => self.settle(Err(PlayError::Detached)),
-        }
-    }
-
-    /// Settles the seat if the result of its game is known.
-    pub(crate) fn finish(&mut self) {
-        if let Some(ending) = self.ending.take() {
-            let outcome = Outcome {
-                room_id: std::mem::take(&mut self.room_id),
-                game_id: std::mem::take(&mut self.game_id),
-                seat: self.seat,
-                ending,
-                entropy: std::mem::take(&mut self.entropy),
-                answers: self.answers,
-            };
-            self.agent.on_game_over(&outcome);
-            self.settle(Ok(outcome));
-        }
-    }
-
-    /// Settles the seat.
-    pub(crate) fn settle(&mut self, outcome: Result<Outcome, PlayError>) {
-        self.outcome = Some(outcome);
-        self.open = None;
-        self.owed = Owed::Nothing;
+    /// The outcome of a seat that is settled.
+    pub(crate) fn outcome(mut self, end: Result<(), PlayError>) -> Result<Outcome, PlayError> {
+        end?;
+        let outcome = Outcome {
+            room_id: self.room_id,
+            game_id: self.game_id,
+            seat: self.seat,
+            ending: self.ending.ok_or(PlayError::EndingUnknown)?,
+            entropy: self.entropy,
+            answers: self.answers,
+        };
+        self.agent.on_game_over(&outcome);
+        Ok(outcome)
     }
 
     /// Whether `speak` would add commands.
@@ -242,9 +193,6 @@ impl<A: Agent> SeatSession<A> {
 
     /// Adds the commands to send now; calls the agent if necessary.
     pub(crate) fn speak(&mut self, handle: u32, out: &mut Vec<v1::SeatCommand>) {
-        if self.is_settled() {
-            return;
-        }
         // Who leaves decisions open leaves them to the substitute.
         if std::mem::take(&mut self.substituted) && !self.left_open {
             out.push(command(handle, Command::Resume(v1::ResumeSeat {})));
@@ -277,34 +225,5 @@ impl<A: Agent> SeatSession<A> {
         if let Some(answer) = &self.answered {
             out.push(command(handle, Command::Answer(answer.clone())));
         }
-    }
-}
-
-/// The command that attaches a seat, or a participant of a tournament.
-pub(crate) fn attach(
-    ticket: &str,
-    request_id: u32,
-    from_sequence: u64,
-    entropy: &[u8],
-    options: &PlayOptions,
-) -> v1::SeatCommand {
-    command(
-        0,
-        Command::Attach(v1::Attach {
-            ticket: ticket.to_owned(),
-            request_id,
-            from_sequence,
-            snapshot: false,
-            delivery: options.delivery.into(),
-            no_mask: options.no_mask,
-            entropy: entropy.to_vec(),
-        }),
-    )
-}
-
-fn command(handle: u32, command: Command) -> v1::SeatCommand {
-    v1::SeatCommand {
-        handle,
-        command: Some(command),
     }
 }

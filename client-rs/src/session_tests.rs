@@ -6,9 +6,13 @@ use std::sync::{Arc, Mutex};
 #[path = "participant_tests.rs"]
 mod participant;
 
+use prost::Message as _;
+
 use super::*;
+use crate::tickets::{FIRST_SEAT, MAX_COMMANDS, MAX_REQUEST_BYTES};
 use crate::v1::game_event::Kind;
 use crate::v1::seat_command::Command;
+use crate::v1::seat_update::Update;
 use crate::{ActionId, Ending, Entropy};
 
 /// In place of an action: none is chosen.

@@ -3,12 +3,11 @@
 use std::collections::VecDeque;
 
 use futures::Stream;
-use tokio::time::Instant;
-use tonic::{Status, Streaming};
 
-use crate::backoff::{Backoff, Outage};
+use crate::backoff::Backoff;
 use crate::connection::{Connection, MAX_RESPONSE_BYTES};
 use crate::error::Error;
+use crate::stream::{Broken, Reconnecting};
 use crate::v1::{self, spectator_service_client::SpectatorServiceClient};
 
 /// What a spectator learns.
@@ -18,8 +17,8 @@ pub enum Watched {
     Event(Box<v1::GameEvent>),
     /// The state of the game, in place of events that the room of a long game no longer has.
     Snapshot(Box<v1::Snapshot>),
-    /// Whom the game waits for, after the events so far; nobody when a new connection begins, until
-    /// the server says it.
+    /// Whom the game waits for, after the events so far; nobody once the connection is lost, until
+    /// the server says it again.
     Awaited(v1::Awaited),
 }
 
@@ -31,9 +30,7 @@ pub struct Spectator {
     next_event: u64,
     /// The first event that the latest connection has asked for.
     asked_from: u64,
-    backoff: Backoff,
-    outage: Outage,
-    stream: Option<(Streaming<v1::SpectatorServiceWatchResponse>, Instant)>,
+    stream: Reconnecting<v1::SpectatorServiceWatchResponse>,
     ready: VecDeque<Watched>,
     /// The last [`Watched::Awaited`] had a seat.
     awaits: bool,
@@ -49,9 +46,7 @@ impl Spectator {
             room_id,
             next_event: from_sequence,
             asked_from: from_sequence,
-            backoff: Backoff::default(),
-            outage: Outage::default(),
-            stream: None,
+            stream: Reconnecting::new(Backoff::default()),
             ready: VecDeque::new(),
             awaits: false,
             room: None,
@@ -62,7 +57,7 @@ impl Spectator {
     /// Replaces the default backoff.
     #[must_use]
     pub fn with_backoff(mut self, backoff: Backoff) -> Self {
-        self.backoff = backoff;
+        self.stream.set_backoff(backoff);
         self
     }
 
@@ -115,7 +110,7 @@ impl Spectator {
             match self.receive().await {
                 Ok(Some(response)) => self.take(response),
                 Ok(None) => self.ended = true,
-                Err(status) => self.lost(status).await?,
+                Err(broken) => self.lost(broken)?,
             }
         }
     }
@@ -128,26 +123,18 @@ impl Spectator {
         })
     }
 
-    async fn receive(&mut self) -> Result<Option<v1::SpectatorServiceWatchResponse>, Status> {
-        if self.stream.is_none() {
+    async fn receive(&mut self) -> Result<Option<v1::SpectatorServiceWatchResponse>, Broken> {
+        let response = self.stream.next(|| {
             self.asked_from = self.next_event;
             let request = v1::SpectatorServiceWatchRequest {
                 room_id: self.room_id.clone(),
                 from_sequence: self.next_event,
                 snapshot: false,
             };
-            let stream = self.client.watch(request).await?.into_inner();
-            self.stream = Some((stream, Instant::now()));
-            if self.awaits {
-                self.awaits = false;
-                let nobody = v1::Awaited::default();
-                self.ready.push_back(Watched::Awaited(nobody));
-            }
-        }
-        match &mut self.stream {
-            Some((stream, _)) => stream.message().await,
-            None => Ok(None),
-        }
+            let mut client = self.client.clone();
+            async move { client.watch(request).await }
+        });
+        response.await
     }
 
     fn take(&mut self, response: v1::SpectatorServiceWatchResponse) {
@@ -156,12 +143,13 @@ impl Spectator {
         }
         if let Some(snapshot) = response.snapshot {
             self.next_event = self.next_event.max(snapshot.next_sequence);
+            self.stream.progress();
             self.ready.push_back(Watched::Snapshot(Box::new(snapshot)));
         }
         for event in response.events {
             if event.sequence >= self.next_event {
                 self.next_event = event.sequence.saturating_add(1);
-                self.outage.over();
+                self.stream.progress();
                 self.ready.push_back(Watched::Event(Box::new(event)));
             }
         }
@@ -171,12 +159,11 @@ impl Spectator {
         }
     }
 
-    async fn lost(&mut self, status: Status) -> Result<(), Error> {
-        let opened = self.stream.take().map(|(_, opened)| opened);
-        if opened.is_some_and(|opened| opened.elapsed() >= self.backoff.max) {
-            self.outage.over();
+    fn lost(&mut self, broken: Broken) -> Result<(), Error> {
+        if std::mem::take(&mut self.awaits) {
+            let nobody = v1::Awaited::default();
+            self.ready.push_back(Watched::Awaited(nobody));
         }
-        let waited = self.outage.wait(&self.backoff, status).await;
-        waited.inspect_err(|_| self.ended = true)
+        broken.or_again().inspect_err(|_| self.ended = true)
     }
 }

@@ -2,13 +2,13 @@
 
 use futures::Stream;
 use rand::TryRng as _;
-use tonic::{Status, Streaming};
 
-use crate::backoff::{Backoff, Outage};
+use crate::backoff::Backoff;
 use crate::client::Client;
 use crate::connection::{Connection, MAX_RESPONSE_BYTES};
 use crate::error::Error;
 use crate::repeat::repeated;
+use crate::stream::{Broken, Reconnecting};
 use crate::v1::{self, table_service_client::TableServiceClient};
 
 impl Client {
@@ -53,9 +53,7 @@ impl Client {
         TableFollower {
             service: service(self),
             table_ticket: table_ticket.into(),
-            backoff: Backoff::default(),
-            outage: Outage::default(),
-            stream: None,
+            stream: Reconnecting::new(Backoff::default()),
             over: false,
         }
     }
@@ -66,9 +64,7 @@ impl Client {
 pub struct TableFollower {
     service: TableServiceClient<Connection>,
     table_ticket: String,
-    backoff: Backoff,
-    outage: Outage,
-    stream: Option<Streaming<v1::TableServiceWatchResponse>>,
+    stream: Reconnecting<v1::TableServiceWatchResponse>,
     over: bool,
 }
 
@@ -76,7 +72,7 @@ impl TableFollower {
     /// Replaces the default backoff.
     #[must_use]
     pub fn with_backoff(mut self, backoff: Backoff) -> Self {
-        self.backoff = backoff;
+        self.stream.set_backoff(backoff);
         self
     }
 
@@ -89,15 +85,14 @@ impl TableFollower {
     pub async fn next(&mut self) -> Result<Option<v1::TableState>, Error> {
         while !self.over {
             match self.receive().await {
+                // A response without a state is a heartbeat.
                 Ok(response) => {
-                    self.outage.over();
-                    // A response without a state is a heartbeat.
                     if let Some(state) = response.state {
                         self.over = state.stage() == v1::TableStage::Over;
                         return Ok(Some(state));
                     }
                 }
-                Err(status) => self.lost(status).await?,
+                Err(broken) => broken.or_again().inspect_err(|_| self.over = true)?,
             }
         }
         Ok(None)
@@ -111,24 +106,13 @@ impl TableFollower {
         })
     }
 
-    async fn receive(&mut self) -> Result<v1::TableServiceWatchResponse, Status> {
-        let stream = match &mut self.stream {
-            Some(stream) => stream,
-            none => {
-                let request = v1::TableServiceWatchRequest {
-                    table_ticket: self.table_ticket.clone(),
-                };
-                none.insert(self.service.watch(request).await?.into_inner())
-            }
-        };
-        let response = stream.message().await?;
-        response.ok_or_else(|| Status::unavailable("the server ended the stream"))
-    }
-
-    async fn lost(&mut self, status: Status) -> Result<(), Error> {
-        self.stream = None;
-        let waited = self.outage.wait(&self.backoff, status).await;
-        waited.inspect_err(|_| self.over = true)
+    async fn receive(&mut self) -> Result<v1::TableServiceWatchResponse, Broken> {
+        let response = self.stream.next(|| {
+            let (mut service, table_ticket) = (self.service.clone(), self.table_ticket.clone());
+            let request = v1::TableServiceWatchRequest { table_ticket };
+            async move { service.watch(request).await }
+        });
+        response.await?.ok_or_else(|| self.stream.ended())
     }
 }
 

@@ -4,14 +4,13 @@
 mod by_hand;
 
 use futures::Stream;
-use tonic::{Status, Streaming};
 
-use crate::backoff::{Backoff, Outage};
+use crate::backoff::Backoff;
 use crate::connection::{Connection, MAX_RESPONSE_BYTES};
 use crate::error::{Error, PlayError};
-use crate::participant::Participant;
 use crate::repeat::{identify, repeated};
 use crate::session::Session;
+use crate::stream::{Broken, Reconnecting};
 use crate::v1::tournament_service_client::TournamentServiceClient;
 use crate::{Agent, Client, Outcome, PlayOptions, run, v1};
 
@@ -222,9 +221,7 @@ impl Client {
         TournamentFollower {
             service: service(self),
             tournament_id: tournament_id.into(),
-            backoff: Backoff::default(),
-            outage: Outage::default(),
-            stream: None,
+            stream: Reconnecting::new(Backoff::default()),
             over: false,
         }
     }
@@ -262,8 +259,7 @@ impl Client {
         make: impl FnMut(&v1::Attached) -> A + Send,
         options: &PlayOptions,
     ) -> Result<Vec<Outcome>, PlayError> {
-        let participant = Participant::new(ticket.into(), make, options);
-        let mut session = Session::of_participant(participant, options);
+        let mut session = Session::of_participant(ticket.into(), make, options);
         run::run(self.channel(), &mut session, &options.backoff).await;
         session.into_played()
     }
@@ -274,9 +270,7 @@ impl Client {
 pub struct TournamentFollower {
     service: TournamentServiceClient<Connection>,
     tournament_id: String,
-    backoff: Backoff,
-    outage: Outage,
-    stream: Option<Streaming<v1::FollowTournamentResponse>>,
+    stream: Reconnecting<v1::FollowTournamentResponse>,
     over: bool,
 }
 
@@ -284,7 +278,7 @@ impl TournamentFollower {
     /// Replaces the default backoff.
     #[must_use]
     pub fn with_backoff(mut self, backoff: Backoff) -> Self {
-        self.backoff = backoff;
+        self.stream.set_backoff(backoff);
         self
     }
 
@@ -297,15 +291,14 @@ impl TournamentFollower {
     pub async fn next(&mut self) -> Result<Option<v1::FollowTournamentResponse>, Error> {
         while !self.over {
             match self.receive().await {
+                // A report without a tournament is a heartbeat.
                 Ok(report) => {
-                    self.outage.over();
-                    // A report without a tournament is a heartbeat.
                     if let Some(tournament) = &report.tournament {
                         self.over = is_over(tournament);
                         return Ok(Some(report));
                     }
                 }
-                Err(status) => self.lost(status).await?,
+                Err(broken) => broken.or_again().inspect_err(|_| self.over = true)?,
             }
         }
         Ok(None)
@@ -321,24 +314,13 @@ impl TournamentFollower {
         })
     }
 
-    async fn receive(&mut self) -> Result<v1::FollowTournamentResponse, Status> {
-        let stream = match &mut self.stream {
-            Some(stream) => stream,
-            none => {
-                let request = v1::FollowTournamentRequest {
-                    tournament_id: self.tournament_id.clone(),
-                };
-                none.insert((self.service.follow_tournament(request).await?).into_inner())
-            }
-        };
-        let report = stream.message().await?;
-        report.ok_or_else(|| Status::unavailable("the server ended the stream"))
-    }
-
-    async fn lost(&mut self, status: Status) -> Result<(), Error> {
-        self.stream = None;
-        let waited = self.outage.wait(&self.backoff, status).await;
-        waited.inspect_err(|_| self.over = true)
+    async fn receive(&mut self) -> Result<v1::FollowTournamentResponse, Broken> {
+        let report = self.stream.next(|| {
+            let (mut service, tournament_id) = (self.service.clone(), self.tournament_id.clone());
+            let request = v1::FollowTournamentRequest { tournament_id };
+            async move { service.follow_tournament(request).await }
+        });
+        report.await?.ok_or_else(|| self.stream.ended())
     }
 }
 

@@ -8,7 +8,8 @@ use std::sync::{Arc, Mutex};
 
 use chefshat_client::Client;
 use chefshat_client::v1::{
-    self, play_service_server, seat_command::Command, seat_update::Update, spectator_service_server,
+    self, play_service_server, seat_command::Command, seat_update::Update,
+    spectator_service_server, table_service_server,
 };
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::{ReceiverStream, TcpListenerStream};
@@ -89,6 +90,8 @@ type Scripted = Pin<Box<dyn Future<Output = ()> + Send>>;
 type PlayScript = Box<dyn FnOnce(Line) -> Scripted + Send>;
 /// The updates of a seat that is followed, message by message; the stream breaks with the last.
 pub(crate) type SeatScript = Vec<Result<Vec<Update>, Status>>;
+/// The same of all seats of a ticket, with their handles.
+pub(crate) type TicketScript = Vec<Result<Vec<(u32, Update)>, Status>>;
 /// The responses of a spectator's stream, in order; it ends after the last.
 pub(crate) type WatchScript = Vec<Result<v1::SpectatorServiceWatchResponse, Status>>;
 
@@ -99,7 +102,6 @@ pub(crate) struct Fake {
     plays: Arc<Mutex<VecDeque<PlayScript>>>,
     watches: Arc<Mutex<VecDeque<WatchScript>>>,
     watched_from: Arc<Mutex<Vec<u64>>>,
-    seats: Arc<Mutex<VecDeque<SeatScript>>>,
     attached: Arc<Mutex<Vec<v1::Attach>>>,
 }
 
@@ -118,12 +120,35 @@ impl Fake {
         self.watches.lock().unwrap().push_back(script);
     }
 
-    /// Follows this script on the next stream of a seat that is followed.
+    /// Follows this script on the next stream of a seat that is followed: handle 0.
     pub(crate) fn follow(&self, script: SeatScript) {
-        self.seats.lock().unwrap().push_back(script);
+        let script = script.into_iter().map(|message| {
+            let updates = message?.into_iter().map(|update| (0, update));
+            Ok(updates.collect())
+        });
+        self.follow_all(script.collect());
     }
 
-    /// The attachments of seats that are followed, one for each stream.
+    /// Follows this script on the next stream of a ticket that is followed.
+    pub(crate) fn follow_all(&self, script: TicketScript) {
+        let attached = Arc::clone(&self.attached);
+        self.play(async move |mut line: Line| {
+            for command in line.heard().await {
+                match command.command {
+                    Some(Command::Attach(attach)) => attached.lock().unwrap().push(attach),
+                    other => panic!("not an attachment: {other:?}"),
+                }
+            }
+            for message in script {
+                match message {
+                    Ok(updates) => line.says(updates).await,
+                    Err(status) => return line.fails(status).await,
+                }
+            }
+        });
+    }
+
+    /// The attachments of tickets that are followed, in order.
     pub(crate) fn attached(&self) -> Vec<v1::Attach> {
         self.attached.lock().unwrap().clone()
     }
@@ -135,9 +160,7 @@ impl Fake {
 
     /// Whether all scripts have been followed.
     pub(crate) fn is_done(&self) -> bool {
-        self.plays.lock().unwrap().is_empty()
-            && self.watches.lock().unwrap().is_empty()
-            && self.seats.lock().unwrap().is_empty()
+        self.plays.lock().unwrap().is_empty() && self.watches.lock().unwrap().is_empty()
     }
 
     /// Serves on a free port and connects to it.
@@ -152,10 +175,12 @@ impl Fake {
     pub(crate) async fn serve(self, listener: std::net::TcpListener) {
         let listener = tokio::net::TcpListener::from_std(listener).unwrap();
         let play = play_service_server::PlayServiceServer::new(self.clone());
-        let spectators = spectator_service_server::SpectatorServiceServer::new(self);
+        let spectators = spectator_service_server::SpectatorServiceServer::new(self.clone());
+        let tables = table_service_server::TableServiceServer::new(self);
         let server = tonic::transport::Server::builder()
             .add_service(play)
-            .add_service(spectators);
+            .add_service(spectators)
+            .add_service(tables);
         let served = server.serve_with_incoming(TcpListenerStream::new(listener));
         served.await.unwrap();
     }
@@ -175,8 +200,7 @@ pub(crate) async fn connect(address: SocketAddr) -> Client {
 #[tonic::async_trait]
 impl play_service_server::PlayService for Fake {
     type PlayStream = ReceiverStream<Result<v1::PlayResponse, Status>>;
-    type WatchStream =
-        tokio_stream::Iter<std::vec::IntoIter<Result<v1::PlayServiceWatchResponse, Status>>>;
+    type WatchStream = tokio_stream::Empty<Result<v1::PlayServiceWatchResponse, Status>>;
 
     async fn play(
         &self,
@@ -195,23 +219,9 @@ impl play_service_server::PlayService for Fake {
 
     async fn watch(
         &self,
-        request: Request<v1::PlayServiceWatchRequest>,
+        _request: Request<v1::PlayServiceWatchRequest>,
     ) -> Result<Response<Self::WatchStream>, Status> {
-        let mut seats = request.into_inner().seats;
-        self.attached.lock().unwrap().append(&mut seats);
-        let script = self.seats.lock().unwrap().pop_front();
-        let script = script.ok_or_else(|| Status::failed_precondition("no script is left"))?;
-        let messages = script.into_iter().map(|message| {
-            let updates = message?.into_iter().map(|update| v1::SeatUpdate {
-                handle: 0,
-                update: Some(update),
-            });
-            Ok(v1::PlayServiceWatchResponse {
-                updates: updates.collect(),
-            })
-        });
-        let messages: Vec<_> = messages.collect();
-        Ok(Response::new(tokio_stream::iter(messages)))
+        Err(Status::unimplemented("not in this play"))
     }
 
     async fn act(
@@ -236,6 +246,28 @@ impl spectator_service_server::SpectatorService for Fake {
         let script = self.watches.lock().unwrap().pop_front();
         let script = script.ok_or_else(|| Status::failed_precondition("no script is left"))?;
         Ok(Response::new(tokio_stream::iter(script)))
+    }
+}
+
+/// A table whose state is sent on every stream, which then ends.
+#[tonic::async_trait]
+impl table_service_server::TableService for Fake {
+    type WatchStream = tokio_stream::Once<Result<v1::TableServiceWatchResponse, Status>>;
+
+    async fn report(
+        &self,
+        _request: Request<v1::ReportRequest>,
+    ) -> Result<Response<v1::ReportResponse>, Status> {
+        Err(Status::unimplemented("not in this play"))
+    }
+
+    async fn watch(
+        &self,
+        _request: Request<v1::TableServiceWatchRequest>,
+    ) -> Result<Response<Self::WatchStream>, Status> {
+        let state = Some(v1::TableState::default());
+        let response = v1::TableServiceWatchResponse { state };
+        Ok(Response::new(tokio_stream::once(Ok(response))))
     }
 }
 

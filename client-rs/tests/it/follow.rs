@@ -1,12 +1,14 @@
 //! A seat that is followed, whose stream breaks.
 
-use std::time::Duration;
-
-use chefshat_client::v1::{self, game_event::Kind, seat_update::Update};
-use chefshat_client::{Backoff, PlayError, SeatFollower};
+use chefshat_client::v1::{self, game_event::Kind, seat_command::Command, seat_update::Update};
+use chefshat_client::{Followed, PlayError, SeatFollower, TicketFollower};
 use tonic::Status;
 
-use crate::fake::{Fake, event};
+use crate::fake::{Fake, Line, event};
+use crate::play::quick;
+
+/// Request id of the ticket that is followed.
+const TICKET: u32 = u32::MAX;
 
 fn events(numbers: impl IntoIterator<Item = u64>) -> Update {
     let events = numbers.into_iter().map(event).collect();
@@ -30,7 +32,11 @@ fn decision(decision_id: u64) -> Update {
 }
 
 fn attached() -> Update {
-    Update::Attached(v1::Attached::default())
+    Update::Attached(v1::Attached {
+        request_id: TICKET,
+        game_id: "game".to_owned(),
+        ..v1::Attached::default()
+    })
 }
 
 fn detached(reason: v1::DetachReason) -> Update {
@@ -39,13 +45,8 @@ fn detached(reason: v1::DetachReason) -> Update {
 }
 
 async fn follower(fake: &Fake) -> SeatFollower {
-    let backoff = Backoff {
-        first: Duration::from_millis(1),
-        max: Duration::from_millis(10),
-        ..Backoff::default()
-    };
     let client = fake.start().await;
-    client.follow_seat("ticket").with_backoff(backoff)
+    client.follow_seat("ticket").with_backoff(quick().backoff)
 }
 
 #[tokio::test]
@@ -120,6 +121,7 @@ async fn events_that_a_snapshot_stands_for_are_not_asked_for_again() {
 #[tokio::test]
 async fn a_seat_that_is_lost_says_why_after_what_came_before() {
     let refused = Update::Refused(v1::Refused {
+        request_id: TICKET,
         reason: "TICKET_UNKNOWN".to_owned(),
         ..v1::Refused::default()
     });
@@ -153,4 +155,157 @@ async fn a_stream_that_breaks_after_the_end_of_the_game_is_not_opened_again() {
     assert_eq!(seat.next().await.unwrap(), Some(ending(1)));
     assert_eq!(seat.next().await.unwrap(), None);
     assert_eq!(fake.attached().len(), 1);
+}
+
+/// First handle of the seats that the server attaches.
+const GAMES: u32 = 1 << 31;
+
+fn entered() -> Update {
+    Update::Entered(v1::Entered {
+        request_id: TICKET,
+        ..v1::Entered::default()
+    })
+}
+
+/// The seat of a game, attached by the server (request id 0) or because it was asked for.
+fn seated(request_id: u32, game: &str) -> Update {
+    Update::Attached(v1::Attached {
+        request_id,
+        game_id: game.to_owned(),
+        ticket: format!("ticket of {game}"),
+        ..v1::Attached::default()
+    })
+}
+
+fn refused(request_id: u32) -> Update {
+    Update::Refused(v1::Refused {
+        request_id,
+        message: "no such seat".to_owned(),
+        ..v1::Refused::default()
+    })
+}
+
+async fn ticket_follower(fake: &Fake) -> TicketFollower {
+    let client = fake.start().await;
+    client.follow_ticket("cup").with_backoff(quick().backoff)
+}
+
+/// What a follower learns up to the end, in short.
+async fn learnt(follower: &mut TicketFollower) -> Vec<String> {
+    let mut lines = Vec::new();
+    loop {
+        lines.push(match follower.next().await {
+            Ok(Some(Followed::Entered(_))) => "entered".to_owned(),
+            Ok(Some(Followed::Update(game, update))) => match *update {
+                Update::Attached(_) => format!("{game} attached"),
+                Update::Events(batch) => {
+                    let numbers = batch.events.iter().map(|event| event.sequence);
+                    format!("{game} {:?}", numbers.collect::<Vec<_>>())
+                }
+                Update::Decision(request) => {
+                    let answer = v1::Answer::default();
+                    follower.send(&game, Command::Answer(answer)).await;
+                    format!("{game} decides {}", request.decision_id)
+                }
+                other => panic!("{other:?}"),
+            },
+            Ok(Some(Followed::Gone(game, why))) => format!("{game} gone: {}", why.message()),
+            Ok(Some(Followed::Lost(why))) => format!("lost: {}", why.message()),
+            Ok(None) => return lines,
+            Err(error) => {
+                lines.push(format!("failed: {}", error.message()));
+                return lines;
+            }
+        });
+    }
+}
+
+#[tokio::test]
+async fn the_games_of_a_participant_are_followed_across_lost_streams() {
+    let fake = Fake::default();
+    fake.follow_all(vec![
+        Ok(vec![
+            (0, entered()),
+            (GAMES, seated(0, "a")),
+            (GAMES, events([1, 2])),
+            (GAMES + 1, seated(0, "b")),
+            (GAMES + 1, ending(1)),
+            (GAMES + 2, seated(0, "c")),
+        ]),
+        Err(Status::unavailable("no more")),
+    ]);
+    fake.play(async |mut line: Line| {
+        let commands = line.heard().await.into_iter();
+        let asked = commands.map(|command| match command.command {
+            Some(Command::Attach(it)) => format!("{} from {}", it.ticket, it.from_sequence),
+            other => panic!("not an attachment: {other:?}"),
+        });
+        let asked: Vec<_> = asked.collect();
+        // The result of b is known.
+        assert_eq!(
+            asked,
+            ["ticket of a from 3", "ticket of c from 1", "cup from 1"]
+        );
+        line.says(vec![
+            (2, entered()),
+            (GAMES, seated(0, "a")),
+            // Refused late: the server has just attached it with its participant.
+            (0, refused(1)),
+            (1, refused(3)),
+            // The server has not counted the end of b, since the connection was lost.
+            (GAMES + 1, seated(0, "b")),
+            (GAMES + 1, ending(1)),
+            (GAMES, events([2, 3])),
+        ])
+        .await;
+        let left = line.heard().await;
+        assert_eq!(left.len(), 1);
+        assert_eq!(left[0].handle, GAMES + 1);
+        assert!(matches!(left[0].command, Some(Command::Detach(_))));
+        line.says(vec![(GAMES, decision(7))]).await;
+        let answered = line.heard().await;
+        assert_eq!(answered[0].handle, GAMES);
+        assert!(matches!(answered[0].command, Some(Command::Answer(_))));
+        line.says(vec![
+            (2, detached(v1::DetachReason::TournamentOver)),
+            (GAMES, ending(4)),
+            (GAMES, detached(v1::DetachReason::GameOver)),
+        ])
+        .await;
+    });
+    let mut follower = ticket_follower(&fake).await;
+    assert_eq!(
+        learnt(&mut follower).await,
+        [
+            "entered",
+            "a attached",
+            "a [1, 2]",
+            "b attached",
+            "b [1]",
+            "c attached",
+            "lost: no more",
+            "entered",
+            "a attached",
+            "c gone: no such seat",
+            "a [3]",
+            "a decides 7",
+            "a [4]",
+        ]
+    );
+    assert!(fake.is_done());
+}
+
+#[tokio::test]
+async fn a_place_that_is_taken_over_ends_everything() {
+    let fake = Fake::default();
+    fake.follow_all(vec![Ok(vec![
+        (0, entered()),
+        (GAMES, seated(0, "a")),
+        (0, detached(v1::DetachReason::Superseded)),
+    ])]);
+    let mut follower = ticket_follower(&fake).await;
+    let lines = learnt(&mut follower).await;
+    let superseded = "failed: a newer connection has taken the seat";
+    assert_eq!(lines, ["entered", "a attached", superseded]);
+    assert!(learnt(&mut follower).await.is_empty());
 }

@@ -131,3 +131,30 @@ async fn a_refusal_ends_the_watching() {
     assert_eq!(spectator.next().await.unwrap(), None);
     assert!(!fake.is_done());
 }
+
+/// A state comes with every connection, and is no sign that the connection holds.
+#[tokio::test]
+async fn a_table_whose_streams_all_break_is_given_up() {
+    let client = Fake::default().start().await;
+    let backoff = Backoff {
+        first: Duration::from_millis(1),
+        max: Duration::from_secs(60),
+        give_up_after: Duration::from_millis(300),
+        ..Backoff::default()
+    };
+    let mut table = client.follow_table("ticket").with_backoff(backoff);
+    let mut states = 0;
+    let error = loop {
+        match table.next().await {
+            Ok(state) => {
+                assert_eq!(state, Some(v1::TableState::default()));
+                states += 1;
+                assert!(states < 100, "never given up");
+            }
+            Err(error) => break error,
+        }
+    };
+    assert_eq!(error.message(), "the server ended the stream");
+    assert!(states > 1, "not followed across lost streams");
+    assert_eq!(table.next().await.unwrap(), None);
+}
