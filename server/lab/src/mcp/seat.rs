@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use chefshat_client::{Client, Error, PlayError, legal_count, nth_legal, v1};
+use chefshat_client::{Client, Error, legal_count, nth_legal, v1};
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout};
@@ -57,7 +57,7 @@ impl Seat {
                         continue;
                     }
                     Ok(None) => None,
-                    Err(error) => Some(in_words(&error)),
+                    Err(error) => Some(error.message()),
                 };
                 updates.send_modify(|live| {
                     live.open = None;
@@ -273,12 +273,4 @@ fn forced(live: &Live) -> Option<(u64, u32)> {
 
 fn elapsed_ms(began: Instant) -> u64 {
     u64::try_from(began.elapsed().as_millis()).unwrap_or(u64::MAX)
-}
-
-/// Why a seat was lost, without the tail of an error that only its code has.
-fn in_words(error: &PlayError) -> String {
-    match error {
-        PlayError::Refused(error) => error.message().to_owned(),
-        error => error.to_string(),
-    }
 }

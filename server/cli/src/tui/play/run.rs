@@ -4,14 +4,14 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
+use chefshat_client::Client;
 use chefshat_client::v1::{self, seat_command::Command};
-use chefshat_client::{Client, ENTROPY_BYTES};
 use chefshat_record::convert::PERSON_TIME_KEY;
 use tokio::sync::mpsc;
 
 use super::app::{App, Do, EXPRESSIONS};
 use super::follow::follow;
-use super::link::{Connection, Order};
+use super::link::{Order, link};
 use super::part::{Part, PartInput};
 use super::view;
 use crate::CommandError;
@@ -48,15 +48,13 @@ pub(super) async fn play(taken: Taken, times: bool) -> Result<Part, CommandError
     let client = client.with_secrets([&ticket])?;
     let (sender, mut heard) = mpsc::channel(HEARD);
     let (orders, for_server) = mpsc::channel(ORDERS);
-    let entropy = random_entropy();
-    let own_ticket = ticket.clone();
-    let connection = Connection::new(client.clone(), ticket, entropy);
-    let mut serving = tokio::spawn(connection.serve(for_server, sender.clone()));
+    let linking = link(client.clone(), ticket.clone(), for_server, sender.clone());
+    let mut linking = tokio::spawn(linking);
 
     let theme = Theme::of_environment();
     let mut part = Part::new(game);
     let mut following = None;
-    let mut served = false;
+    let mut ended = false;
     let mut screen = Screen::open(TICK)?;
     while !part.left {
         let now_ms = screen.now_ms();
@@ -67,8 +65,8 @@ pub(super) async fn play(taken: Taken, times: bool) -> Result<Part, CommandError
                 Wake::Tick => PartInput::Tick,
             },
             Some(what) = heard.recv() => what,
-            end = &mut serving, if !served => {
-                served = true;
+            end = &mut linking, if !ended => {
+                ended = true;
                 // It reports why it ended unless it panicked; then the terminal has been restored.
                 end.map_err(|error| format!("the connection failed: {error}; resume with --ticket"))?;
                 continue;
@@ -86,7 +84,7 @@ pub(super) async fn play(taken: Taken, times: bool) -> Result<Part, CommandError
             decision_id,
         } = what
         {
-            let ticket = of_game.unwrap_or_else(|| own_ticket.clone());
+            let ticket = of_game.unwrap_or_else(|| ticket.clone());
             tokio::spawn(ask_hint(
                 client.clone(),
                 ticket,
@@ -108,8 +106,8 @@ pub(super) async fn play(taken: Taken, times: bool) -> Result<Part, CommandError
     if let Some(following) = following {
         following.abort();
     }
-    if !served {
-        serving.await?;
+    if !ended {
+        linking.await?;
     }
     Ok(part)
 }
@@ -126,10 +124,6 @@ async fn ask_hint(
     let hint = hint.map_err(|error| error.message().to_owned());
     // The receiver may be gone.
     let _ = heard.send(PartInput::Hint(game, decision_id, hint)).await;
-}
-
-fn random_entropy() -> Vec<u8> {
-    chefshat_room::ids::random_bytes::<ENTROPY_BYTES>().to_vec()
 }
 
 /// The command for the stream of the seat. The time a decision was on screen is sent only with `times`.
