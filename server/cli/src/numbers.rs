@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+pub use chefshat_record::words::ordinal;
+
 /// A number with grouped thousands: `1,234,567`.
 pub fn grouped(number: u64) -> String {
     let digits = number.to_string();
@@ -44,18 +46,6 @@ pub fn seat_number(seat: u32) -> u32 {
     seat.saturating_add(1)
 }
 
-/// A place: `1st`, `2nd`, … `11th`, … `21st`.
-pub fn ordinal(place: u32) -> String {
-    let ending = match (place % 100, place % 10) {
-        (11..=13, _) => "th",
-        (_, 1) => "st",
-        (_, 2) => "nd",
-        (_, 3) => "rd",
-        _ => "th",
-    };
-    format!("{place}{ending}")
-}
-
 #[cfg(test)]
 mod tests {
     use crate::numbers::*;
@@ -84,32 +74,6 @@ mod tests {
             "99999999999d",
         ] {
             assert!(duration(wrong).is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
-    fn ordinals_have_english_suffixes() {
-        let table = [
-            (1, "1st"),
-            (2, "2nd"),
-            (3, "3rd"),
-            (4, "4th"),
-            (10, "10th"),
-            (11, "11th"),
-            (12, "12th"),
-            (13, "13th"),
-            (20, "20th"),
-            (21, "21st"),
-            (22, "22nd"),
-            (23, "23rd"),
-            (24, "24th"),
-            (101, "101st"),
-            (111, "111th"),
-            (112, "112th"),
-            (123, "123rd"),
-        ];
-        for (place, words) in table {
-            assert_eq!(ordinal(place), words);
         }
     }
 }

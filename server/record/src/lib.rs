@@ -21,3 +21,4 @@ mod stated;
 pub mod summary;
 #[cfg(feature = "testing")]
 pub mod testing;
+pub mod words;

@@ -8,6 +8,7 @@ use chefshat_proto::v1::{self, game_event::Kind};
 
 use super::card::Card;
 use chefshat_record::convert::{cards_from_numbers, seat_from_number};
+use chefshat_record::words;
 
 /// The most log entries.
 const LOG_LENGTH: usize = 9;
@@ -119,6 +120,8 @@ pub enum LogEntry {
         seat: Seat,
         /// The label.
         label: String,
+        /// What it says, if it has words.
+        words: Option<String>,
     },
 }
 
@@ -255,10 +258,14 @@ impl Chronicle {
                 shift: ended.shift,
                 winner: self.seat(*ended.order.first()?)?,
             }),
-            Kind::ExpressionShown(shown) => Some(LogEntry::Expressed {
-                seat: self.seat(shown.seat)?,
-                label: shown.expression.as_ref()?.label.clone(),
-            }),
+            Kind::ExpressionShown(shown) => {
+                let expression = shown.expression.as_ref()?;
+                Some(LogEntry::Expressed {
+                    seat: self.seat(shown.seat)?,
+                    label: expression.label.clone(),
+                    words: words::from_data_url(&expression.media),
+                })
+            }
             _ => None,
         }
     }
@@ -332,16 +339,10 @@ fn participant_kind(kind: v1::ParticipantKind, built_in: &str) -> ParticipantKin
     }
 }
 
-/// Why the participant did not decide, as text.
+/// Why the participant did not decide, as text. A picture has no line about its substitute.
 fn cause(source: v1::DecisionSource) -> Option<&'static str> {
     match source {
-        v1::DecisionSource::Timeout => Some("out of time"),
-        v1::DecisionSource::Invalid => Some("invalid answers"),
-        v1::DecisionSource::Disconnected => Some("disconnected"),
         v1::DecisionSource::Substitute => Some("substitute"),
-        v1::DecisionSource::Unspecified
-        | v1::DecisionSource::Agent
-        | v1::DecisionSource::Recorded
-        | v1::DecisionSource::Table => None,
+        source => words::reason(source),
     }
 }

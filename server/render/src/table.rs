@@ -6,6 +6,7 @@ mod words;
 use std::collections::BTreeSet;
 
 use chefshat_engine::{Role, Seat};
+use chefshat_record::words::ordinal;
 use serde::Serialize;
 
 use super::chronicle::{ParticipantKind, Presence};
@@ -207,9 +208,9 @@ fn panel(
         place: match shown.place {
             0 => String::new(),
             place if matches!(scene.now, Now::GameOver(_)) => {
-                format!("{} in the game", words::ordinal(place))
+                format!("{} in the game", ordinal(place.into()))
             }
-            place => format!("{} to finish", words::ordinal(place)),
+            place => format!("{} to finish", ordinal(place.into())),
         },
         cards,
         counts,
@@ -270,7 +271,7 @@ fn role_badge(painter: &Painter, role: Role) -> RoleBadge {
 
 fn chip(painter: &Painter, scene: &Scene, shown: &SeatScene) -> Option<Chip> {
     let (class, text) = if shown.place > 0 {
-        ("placed", words::ordinal(shown.place))
+        ("placed", ordinal(shown.place.into()))
     } else if shown.deciding {
         ("deciding", words::to_decide(&scene.now).to_owned())
     } else if shown.passed {

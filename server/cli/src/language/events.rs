@@ -51,7 +51,7 @@ pub fn advance(view: &mut GameView, me: Option<u32>, event: &v1::GameEvent) -> E
 /// An event in words, from the state before it.
 fn in_words(view: &GameView, me: Option<u32>, kind: &Kind) -> String {
     let name = |seat| name(view, me, seat);
-    let because = |source| story::reason(source).map_or_else(String::new, |it| format!(" ({it})"));
+    let because = |source| words::reason(source).map_or_else(String::new, |it| format!(" ({it})"));
     match kind {
         Kind::GameStarted(start) => {
             let seats = start.seats.iter().map(|it| name(it.seat));

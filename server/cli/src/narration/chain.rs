@@ -3,9 +3,10 @@
 
 use chefshat_client::v1;
 
-use super::story::{cards, reason};
+use super::story::cards;
 use super::text::{BOLD, DIM, GOLD, PLAIN, Piece, WIDTH, clean, columns, seat_style};
 use super::view::GameView;
+use super::words::reason;
 use crate::numbers::ordinal;
 
 /// Columns for the pizza's number.

@@ -13,10 +13,10 @@ pub mod story;
 mod tests;
 mod text;
 pub mod view;
-pub mod words;
 
 use chefshat_client::v1::{self, game_event::Kind};
 use chefshat_engine::{Opening, RuleSet};
+pub use chefshat_record::words;
 
 use crate::kind::kind_name;
 use crate::numbers::counted;

@@ -190,7 +190,7 @@ fn shift_ended(end: &v1::ShiftEnded) -> Vec<Line> {
 
 /// Why the server decided for the seat, in brackets.
 fn because(source: v1::DecisionSource) -> String {
-    reason(source).map_or_else(String::new, |why| format!(" ({why})"))
+    words::reason(source).map_or_else(String::new, |why| format!(" ({why})"))
 }
 
 /// The receiver and the number of cards, or the cards themselves if the viewer may see them.
@@ -220,20 +220,6 @@ pub fn cards(play: &v1::Play) -> String {
         (quantity, 0) => format!("{quantity}×{}", play.face),
         (quantity, 1) => format!("{quantity}×{}+J", play.face),
         (quantity, jokers) => format!("{quantity}×{}+{jokers}J", play.face),
-    }
-}
-
-/// Why the server decided for the seat, in a word; `None` if the seat decided.
-pub fn reason(source: v1::DecisionSource) -> Option<&'static str> {
-    match source {
-        v1::DecisionSource::Timeout => Some("too late"),
-        v1::DecisionSource::Invalid => Some("invalid"),
-        v1::DecisionSource::Disconnected => Some("absent"),
-        v1::DecisionSource::Agent
-        | v1::DecisionSource::Substitute
-        | v1::DecisionSource::Recorded
-        | v1::DecisionSource::Table
-        | v1::DecisionSource::Unspecified => None,
     }
 }
 

@@ -1,6 +1,7 @@
 //! The text of the table picture: title, open decision, log.
 
 use chefshat_engine::{PlayRequirement, Seat, SpecialAction, Viewer};
+use chefshat_record::words::ordinal;
 use serde::Serialize;
 
 use super::super::card::Card;
@@ -115,17 +116,6 @@ pub(super) fn held(hand: &Hand) -> String {
     }
 }
 
-/// A place as an ordinal.
-pub(super) fn ordinal(place: u8) -> String {
-    let ending = match place {
-        1 => "st",
-        2 => "nd",
-        3 => "rd",
-        _ => "th",
-    };
-    format!("{place}{ending}")
-}
-
 /// The chip of the seat that decides.
 pub(super) fn to_decide(now: &Now) -> &'static str {
     match now {
@@ -173,8 +163,7 @@ pub(super) fn log_entry(
         }
         LogEntry::Passed { seat, cause } => (Some(*seat), format!("passes{}", because(cause))),
         LogEntry::Finished { seat, place } => {
-            let place = ordinal(u8::try_from(*place).unwrap_or(u8::MAX));
-            (Some(*seat), format!("finishes {place}"))
+            (Some(*seat), format!("finishes {}", ordinal(*place)))
         }
         LogEntry::PizzaDone { pizza, next } => {
             let next = short_name(painter, scene, *next, (16.0, false), IN_A_LINE);
@@ -199,7 +188,13 @@ pub(super) fn log_entry(
             let winner = short_name(painter, scene, *winner, (16.0, false), IN_A_LINE);
             (None, format!("Shift {shift} over, {winner} first"))
         }
-        LogEntry::Expressed { seat, label } => (Some(*seat), format!("shows {label}")),
+        LogEntry::Expressed { seat, label, words } => {
+            let text = match words {
+                Some(words) => format!("says “{words}”"),
+                None => format!("shows {label}"),
+            };
+            (Some(*seat), text)
+        }
     }
 }
 
@@ -296,7 +291,7 @@ fn turn_line(play: &PlayRequirement) -> &'static str {
 /// The lines of the result, best first.
 fn rows(painter: &Painter, scene: &Scene) -> Vec<Row> {
     let row = |place: u8, seat: Seat, points: String| Row {
-        place: ordinal(place),
+        place: ordinal(place.into()),
         seat: seat.index(),
         name: painter.fit(&name(scene, seat), 18.0, false, COLUMN - 158.0),
         points,

@@ -4,7 +4,8 @@ use std::io::Cursor;
 use std::path::Path;
 
 use chefshat_engine::{BySeat, Game, Seat, Seed, Viewer};
-use chefshat_proto::v1;
+use chefshat_proto::v1::{self, game_event::Kind};
+use chefshat_record::words;
 use chefshat_render::{Film, GifWriter, Painter, Palette, Perspective, Scene, When, figure_at};
 use resvg::tiny_skia::Pixmap;
 
@@ -62,6 +63,47 @@ fn a_letter_that_the_font_lacks_is_drawn_as_its_base_letter() {
         let named = chronicle(&rules, &[name, "Pepper"], viewer);
         let svg = painter.table(&Scene::of(&game, &named, viewer, &known));
         assert!(svg.contains(&format!(">{expected}<")), "{name}: {svg}");
+    }
+}
+
+#[test]
+fn what_a_participant_says_and_what_the_server_decides_are_in_the_words_of_other_texts() {
+    let rules = rules(2, 4);
+    let viewer = Viewer::Spectator;
+    let mut log = chronicle(&rules, &["Ana", "Pepper"], viewer);
+    let shown = |expression| {
+        Kind::ExpressionShown(Box::new(v1::ExpressionShown {
+            seat: 1,
+            expression: Some(expression),
+        }))
+    };
+    log.note(&shown(words::said("a < b, or not?")));
+    log.note(&shown(v1::Expression {
+        label: "joy".into(),
+        ..v1::Expression::default()
+    }));
+    for source in [
+        v1::DecisionSource::Timeout,
+        v1::DecisionSource::Substitute,
+        v1::DecisionSource::Agent,
+    ] {
+        log.note(&Kind::Pass(v1::Pass {
+            seat: 1,
+            source: source.into(),
+            ..v1::Pass::default()
+        }));
+    }
+    let game = Game::new(rules, Seed([3; 32]), |_| {});
+    let scene = Scene::of(&game, &log, viewer, &BySeat::filled(2, true));
+    let svg = Painter::new().table(&scene);
+    for text in [
+        "says “a &lt; b, or not?”",
+        "shows joy",
+        "passes (too late)",
+        "passes (substitute)",
+        "passes<",
+    ] {
+        assert!(svg.contains(text), "{text}: {svg}");
     }
 }
 

@@ -1,0 +1,121 @@
+//! Words of a game that texts, pictures and language models share: why the server decided, places,
+//! and what a participant says. Sentences are elsewhere: their length and their signs differ.
+
+use chefshat_proto::v1;
+use percent_encoding::{NON_ALPHANUMERIC, percent_decode_str, utf8_percent_encode};
+
+/// Label of an expression with words.
+pub const SAY: &str = "say";
+/// What precedes the words.
+const PREFIX: &str = "data:,";
+/// Maximum bytes of `media` in the protocol.
+const MAX_MEDIA: usize = 256;
+
+/// Why the server decided for the seat, in a word; `None` if the seat, or a substitute whose
+/// beginning has an event of its own, decided.
+pub fn reason(source: v1::DecisionSource) -> Option<&'static str> {
+    match source {
+        v1::DecisionSource::Timeout => Some("too late"),
+        v1::DecisionSource::Invalid => Some("invalid"),
+        v1::DecisionSource::Disconnected => Some("absent"),
+        v1::DecisionSource::Agent
+        | v1::DecisionSource::Substitute
+        | v1::DecisionSource::Recorded
+        | v1::DecisionSource::Table
+        | v1::DecisionSource::Unspecified => None,
+    }
+}
+
+/// A place: `1st`, `2nd`, … `11th`, … `21st`.
+pub fn ordinal(place: u32) -> String {
+    let ending = match (place % 100, place % 10) {
+        (11..=13, _) => "th",
+        (_, 1) => "st",
+        (_, 2) => "nd",
+        (_, 3) => "rd",
+        _ => "th",
+    };
+    format!("{place}{ending}")
+}
+
+/// Whether words can be said whole.
+pub fn fits(words: &str) -> bool {
+    encoded(words).len() <= MAX_MEDIA
+}
+
+fn encoded(words: &str) -> String {
+    format!("{PREFIX}{}", utf8_percent_encode(words, NON_ALPHANUMERIC))
+}
+
+/// An expression that says these words: with the label "say" and a data URL (RFC 2397). The page and
+/// the robots send and read the same.
+pub fn said(words: &str) -> v1::Expression {
+    v1::Expression {
+        label: SAY.to_owned(),
+        media: to_data_url(words),
+        source: v1::ExpressionSource::SelfReport.into(),
+        ..v1::Expression::default()
+    }
+}
+
+/// The words in `media`; `None` if it refers to something else.
+pub fn from_data_url(media: &str) -> Option<String> {
+    let words = percent_decode_str(media.strip_prefix(PREFIX)?);
+    Some(words.decode_utf8_lossy().into_owned())
+}
+
+/// `media` with these words. Words that do not fit are cut off, and end with an ellipsis.
+pub fn to_data_url(words: &str) -> String {
+    let mut media = encoded(words);
+    let mut cut = words.to_owned();
+    while media.len() > MAX_MEDIA {
+        cut.pop();
+        media = encoded(&format!("{}…", cut.trim_end()));
+    }
+    media
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ordinals_have_english_suffixes() {
+        let table = [
+            (1, "1st"),
+            (2, "2nd"),
+            (3, "3rd"),
+            (4, "4th"),
+            (10, "10th"),
+            (11, "11th"),
+            (12, "12th"),
+            (13, "13th"),
+            (20, "20th"),
+            (21, "21st"),
+            (22, "22nd"),
+            (23, "23rd"),
+            (24, "24th"),
+            (101, "101st"),
+            (111, "111th"),
+            (112, "112th"),
+            (123, "123rd"),
+        ];
+        for (place, words) in table {
+            assert_eq!(ordinal(place), words);
+        }
+    }
+
+    #[test]
+    fn words_arrive_as_they_were_sent() {
+        for words in ["", "Good luck", "100 % più: forte?", "\"quoted\"\n"] {
+            assert_eq!(from_data_url(&to_data_url(words)).as_deref(), Some(words));
+        }
+        assert_eq!(to_data_url("a b"), "data:,a%20b");
+        let long = to_data_url(&"è ".repeat(99));
+        assert!(
+            long.len() <= MAX_MEDIA && long.ends_with("%E2%80%A6"),
+            "{long}"
+        );
+        assert_eq!(from_data_url("https://example.org/a.wav"), None);
+    }
+}
