@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use chefshat_client::Client;
 use chefshat_proto::v1;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, Id, TournamentId, UnitId};
 use chefshat_server::cluster::{Directory, FoundBy, Location, Peer};
 use chefshat_server::config::ServerConfig;
 use chefshat_server::limits::Key;
@@ -29,11 +29,11 @@ use crate::link::{Link, listen};
 /// Where rooms and tournaments are, for all nodes.
 #[derive(Debug, Default)]
 struct Places {
-    by_id: HashMap<Id, usize>,
+    by_id: HashMap<UnitId, usize>,
     by_code: HashMap<String, usize>,
-    by_game: HashMap<Id, usize>,
+    by_game: HashMap<GameId, usize>,
     /// What a node wrongly remembers: an owner, and how often it must be forgotten.
-    stale: HashMap<(usize, Id), (usize, u32)>,
+    stale: HashMap<(usize, UnitId), (usize, u32)>,
 }
 
 /// The directory of one node.
@@ -65,7 +65,7 @@ impl Directory for View {
         ready((own.node, others)).boxed()
     }
 
-    fn is_over(&self, _tournament: Id) -> BoxFuture<'_, bool> {
+    fn is_over(&self, _tournament: TournamentId) -> BoxFuture<'_, bool> {
         ready(false).boxed()
     }
 

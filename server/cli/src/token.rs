@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{Id, Room, RoomId, Tournament, TournamentId};
 use chefshat_server::access::{
     AccessToken, NewToken, Role, Scope, StoredToken, TokenFile, TokenId,
 };
@@ -57,11 +57,11 @@ struct Create {
     #[arg(long, value_name = "TIME", value_parser = duration)]
     expires: Option<Duration>,
     /// Make it valid for one room only.
-    #[arg(long, value_name = "ROOM-ID", value_parser = id)]
-    room: Option<Id>,
+    #[arg(long, value_name = "ROOM-ID", value_parser = id::<Room>)]
+    room: Option<RoomId>,
     /// Make it valid for one tournament and its rooms only.
-    #[arg(long, value_name = "TOURNAMENT-ID", value_parser = id, conflicts_with = "room")]
-    tournament: Option<Id>,
+    #[arg(long, value_name = "TOURNAMENT-ID", value_parser = id::<Tournament>, conflicts_with = "room")]
+    tournament: Option<TournamentId>,
     /// Print a link for a browser instead: this address of a page, with the token. Anyone who has
     /// the link has the token.
     #[arg(long, value_name = "URL", value_parser = page)]
@@ -248,7 +248,7 @@ fn label(text: &str) -> Result<String, String> {
     Ok(text.to_owned())
 }
 
-fn id(text: &str) -> Result<Id, String> {
+fn id<T>(text: &str) -> Result<Id<T>, String> {
     Id::parse(text).ok_or_else(|| "use the 32 hexadecimal digits of its id".to_owned())
 }
 

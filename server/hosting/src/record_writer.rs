@@ -11,7 +11,7 @@ use tracing::{error, info};
 use chefshat_admission::limits::{Background, Key};
 use chefshat_base::tasks::short;
 use chefshat_record::atomic_file;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 use chefshat_store::{Store, StoredGame};
 
 /// Lines of a record after which the disk may have become nearly full.
@@ -62,7 +62,7 @@ impl RecordWriter {
     /// Queues the record of a finished game, charged to its creator, and marks it as written in the
     /// store. The file waits while the disk is nearly full. A record that fails, or still waits
     /// when the server stops, is tried again at its next start.
-    pub fn write_record(&self, game: Id, charged: Key) {
+    pub fn write_record(&self, game: GameId, charged: Key) {
         if let Some(data_dir) = self.data_dir.clone() {
             let writer = self.clone();
             self.tracker
@@ -70,7 +70,7 @@ impl RecordWriter {
         }
     }
 
-    async fn write(self, game: Id, charged: Key, data_dir: PathBuf) {
+    async fn write(self, game: GameId, charged: Key, data_dir: PathBuf) {
         // Before it is read: a long record takes much memory. The database has it already, so its
         // file takes nothing of what is kept for running games.
         let _slice = loop {

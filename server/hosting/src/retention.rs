@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_record::{atomic_file, jsonl};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 use tracing::{error, info, warn};
 
 use crate::config::KeepGames;
@@ -109,7 +109,7 @@ impl Retention {
             let found = store.prunable(keep, after, GAMES_PER_COMMIT).await?;
             let Some((last, _)) = found.last() else { break };
             after = *last;
-            let games: Vec<Id> = found.into_iter().map(|(_, game)| game).collect();
+            let games: Vec<GameId> = found.into_iter().map(|(_, game)| game).collect();
             pruned.games += self.delete(games).await?;
             tokio::time::sleep(PAUSE).await;
         }
@@ -129,13 +129,13 @@ impl Retention {
     }
 
     /// Deletes those of these games that nothing needs, and their files. Returns how many it did.
-    pub(crate) async fn delete(&self, games: Vec<Id>) -> Result<u64, StoreError> {
+    pub(crate) async fn delete(&self, games: Vec<GameId>) -> Result<u64, StoreError> {
         if games.is_empty() {
             return Ok(0);
         }
         let data_dir = self.rooms.record_writer().data_dir();
         if let Some(data_dir) = data_dir {
-            let ids: Vec<String> = games.iter().map(Id::to_string).collect();
+            let ids: Vec<String> = games.iter().map(GameId::to_string).collect();
             // A disk that is full must not prevent what frees space.
             if let Err(error) = std::fs::write(data_dir.join(PRUNING), ids.join("\n")) {
                 warn!(%error, "a crash from here on may leave files of deleted games behind");
@@ -157,11 +157,11 @@ impl Retention {
     }
 
     /// The games whose deletion an earlier run began and may not have completed.
-    fn left_over(&self) -> Vec<Id> {
+    fn left_over(&self) -> Vec<GameId> {
         let data_dir = self.rooms.record_writer().data_dir();
         let read = data_dir.and_then(|it| std::fs::read_to_string(it.join(PRUNING)).ok());
         let ids = read.unwrap_or_default();
-        ids.lines().filter_map(Id::parse).collect()
+        ids.lines().filter_map(GameId::parse).collect()
     }
 
     /// Deletes games on a schedule, until the future is dropped.
@@ -207,7 +207,7 @@ mod tests {
         let store: Arc<dyn Store> = Arc::new(MemoryStore::default());
         let created = store.create_tournament(Arc::new(cup(7)), Vec::new()).await;
         created.expect("committed");
-        for (game, tournament) in [(1, Some(Id([7; 16]))), (2, None), (3, None)] {
+        for (game, tournament) in [(1, Some(cup(7).id)), (2, None), (3, None)] {
             let header = Arc::new(GameHeader {
                 tournament: tournament.map(|tournament| TournamentGame {
                     tournament,
@@ -227,7 +227,7 @@ mod tests {
             ..ServerConfig::default()
         };
         let rooms = Rooms::new(&config, Arc::clone(&store), TaskTracker::new()).expect("threads");
-        let id = |game: u8| Id([game; 16]).to_string();
+        let id = |game: u8| GameId::from_bytes([game; 16]).to_string();
         let files = |game: u8| {
             [
                 jsonl::path_of(folder.path(), &id(game)),
@@ -240,7 +240,12 @@ mod tests {
         }
         let left = |game: u8| files(game).iter().filter(|path| path.exists()).count();
         let retention = Retention::new(rooms);
-        let deleted = retention.delete(vec![Id([1; 16]), Id([2; 16])]).await;
+        let deleted = retention
+            .delete(vec![
+                GameId::from_bytes([1; 16]),
+                GameId::from_bytes([2; 16]),
+            ])
+            .await;
         assert_eq!(deleted, Ok(1));
         assert_eq!([1, 2, 3, 4].map(left), [2, 0, 2, 2]);
 

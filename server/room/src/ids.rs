@@ -1,7 +1,10 @@
-//! Identifiers and secrets: room and game ids, join codes, tickets, owner tokens. Secrets come from
+//! Identifiers and secrets: typed ids, join codes, tickets, owner tokens. Secrets come from
 //! the operating system's generator, are stored as hashes and compared in constant time.
 
+use std::cmp::Ordering;
 use std::fmt;
+use std::hash::{Hash, Hasher};
+use std::marker::PhantomData;
 
 use rand::TryRng as _;
 use sha2::{Digest as _, Sha256};
@@ -24,31 +27,149 @@ pub fn random_bytes<const N: usize>() -> [u8; N] {
     bytes
 }
 
-/// Identifies a room or a game: 16 bytes, written as 32 hexadecimal digits.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Id(pub [u8; 16]);
+/// A kind of id: a room.
+#[derive(Debug)]
+pub enum Room {}
+/// A kind of id: a game.
+#[derive(Debug)]
+pub enum Game {}
+/// A kind of id: a series of games with the same deals.
+#[derive(Debug)]
+pub enum Series {}
+/// A kind of id: a tournament.
+#[derive(Debug)]
+pub enum Tournament {}
+/// A kind of id: a study.
+#[derive(Debug)]
+pub enum Study {}
+/// A kind of id: a room, tournament or study, where it is not known or does not matter which.
+#[derive(Debug)]
+pub enum Unit {}
 
-impl Id {
+/// Rooms, tournaments and studies, which have owners and tokens.
+pub trait IsUnit {}
+
+impl IsUnit for Room {}
+impl IsUnit for Tournament {}
+impl IsUnit for Study {}
+
+/// Identifies a `T`: 16 bytes, written as 32 hexadecimal digits. An id of one kind is not taken for
+/// one of another:
+///
+/// ```compile_fail,E0308
+/// use chefshat_room::ids::{GameId, RoomId};
+///
+/// fn close(room: RoomId) {}
+/// close(GameId::random());
+/// ```
+///
+/// Only the id of a room, tournament or study becomes that of a unit. There is no way back: what
+/// finds the unit has its own id.
+///
+/// ```
+/// use chefshat_room::ids::{RoomId, UnitId};
+///
+/// fn stop(unit: UnitId) {}
+/// stop(RoomId::random().unit());
+/// ```
+pub struct Id<T> {
+    bytes: [u8; 16],
+    kind: PhantomData<fn() -> T>,
+}
+
+/// The id of a room.
+pub type RoomId = Id<Room>;
+/// The id of a game.
+pub type GameId = Id<Game>;
+/// The id of a series of games with the same deals.
+pub type SeriesId = Id<Series>;
+/// The id of a tournament.
+pub type TournamentId = Id<Tournament>;
+/// The id of a study.
+pub type StudyId = Id<Study>;
+/// The id of a room, tournament or study.
+pub type UnitId = Id<Unit>;
+
+impl<T> Id<T> {
+    /// The id of these bytes.
+    pub const fn from_bytes(bytes: [u8; 16]) -> Self {
+        let kind = PhantomData;
+        Self { bytes, kind }
+    }
+
     /// A new random id.
     pub fn random() -> Self {
-        Self(random_bytes())
+        Self::from_bytes(random_bytes())
     }
 
     /// Reads 32 hexadecimal digits.
     pub fn parse(text: &str) -> Option<Self> {
         let mut bytes = [0; 16];
         hex::decode_to_slice(text, &mut bytes).ok()?;
-        Some(Self(bytes))
+        Some(Self::from_bytes(bytes))
+    }
+
+    /// The bytes to store.
+    pub const fn bytes(&self) -> &[u8; 16] {
+        &self.bytes
     }
 }
 
-impl fmt::Display for Id {
+impl<T: IsUnit> Id<T> {
+    /// Forgets the kind of a unit.
+    pub const fn unit(self) -> UnitId {
+        Id::from_bytes(self.bytes)
+    }
+}
+
+impl<T: IsUnit> From<Id<T>> for UnitId {
+    fn from(id: Id<T>) -> Self {
+        id.unit()
+    }
+}
+
+// Derived, these would ask the same of `T`.
+impl<T> Clone for Id<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Id<T> {}
+
+impl<T> PartialEq for Id<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.bytes == other.bytes
+    }
+}
+
+impl<T> Eq for Id<T> {}
+
+impl<T> PartialOrd for Id<T> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl<T> Ord for Id<T> {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.bytes.cmp(&other.bytes)
+    }
+}
+
+impl<T> Hash for Id<T> {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.bytes.hash(state);
+    }
+}
+
+impl<T> fmt::Display for Id<T> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(&hex::encode(self.0))
+        formatter.write_str(&hex::encode(self.bytes))
     }
 }
 
-impl fmt::Debug for Id {
+impl<T> fmt::Debug for Id<T> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(self, formatter)
     }
@@ -88,17 +209,25 @@ impl SecretHash {
 /// A secret that belongs to a room, tournament or study, such as a ticket or an owner token: its id
 /// and 256 random bits, written as 96 hexadecimal digits, so that no command line mistakes it for an
 /// option.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub struct Token {
+pub struct Token<T> {
     /// What it belongs to.
-    pub subject: Id,
+    pub subject: Id<T>,
     /// The secret.
     pub secret: [u8; 32],
 }
 
-impl Token {
+/// A token of a room.
+pub type RoomToken = Token<Room>;
+/// A token of a tournament.
+pub type TournamentToken = Token<Tournament>;
+/// A token of a study.
+pub type StudyToken = Token<Study>;
+/// A token of a room, tournament or study.
+pub type UnitToken = Token<Unit>;
+
+impl<T> Token<T> {
     /// A new token.
-    pub fn random(subject: Id) -> Self {
+    pub fn random(subject: Id<T>) -> Self {
         Self {
             subject,
             secret: random_bytes(),
@@ -107,20 +236,43 @@ impl Token {
 
     /// The ticket for a request with an id chosen by the client: the same for every repetition.
     /// Only the server knows `key`.
-    pub fn of_request(subject: Id, key: &SecretHash, request_id: &[u8; 32]) -> Self {
-        let parts = [key.bytes().as_slice(), &subject.0, request_id];
+    pub fn of_request(subject: Id<T>, key: &SecretHash, request_id: &[u8; 32]) -> Self {
+        let parts = [key.bytes().as_slice(), subject.bytes(), request_id];
         Self {
             subject,
             secret: digest(b"chefshat.v1 ticket", &parts),
         }
     }
 
+    /// Parses a token; `None` if the text is not one. Its kind is what its bearer says it is.
+    pub fn parse(word: &str) -> Option<Self> {
+        let mut bytes = [0; 48];
+        hex::decode_to_slice(word, &mut bytes).ok()?;
+        let (subject, secret) = bytes.split_at(16);
+        Some(Self {
+            subject: Id::from_bytes(subject.try_into().ok()?),
+            secret: secret.try_into().ok()?,
+        })
+    }
+
+    /// The token as text, for the client.
+    pub fn to_text(&self) -> String {
+        hex::encode([self.subject.bytes().as_slice(), &self.secret].concat())
+    }
+
+    /// The hash to store.
+    pub fn hash(&self) -> SecretHash {
+        SecretHash::of(&self.secret)
+    }
+}
+
+impl RoomToken {
     /// The owner token of a tournament's room, the same whenever it is computed. Only the server
     /// and the tournament's owner know `key`, the hash of the tournament's owner token.
-    pub fn of_tournament_room(room: Id, key: &SecretHash) -> Self {
+    pub fn of_tournament_room(room: RoomId, key: &SecretHash) -> Self {
         Self {
             subject: room,
-            secret: digest(b"chefshat.v1 tournament room", &[key.bytes(), &room.0]),
+            secret: digest(b"chefshat.v1 tournament room", &[key.bytes(), room.bytes()]),
         }
     }
 
@@ -131,30 +283,25 @@ impl Token {
             secret: digest(b"chefshat.v1 table", &[&owner.secret]),
         }
     }
+}
 
-    /// Parses a token; `None` if the text is not one.
-    pub fn parse(word: &str) -> Option<Self> {
-        let mut bytes = [0; 48];
-        hex::decode_to_slice(word, &mut bytes).ok()?;
-        let (subject, secret) = bytes.split_at(16);
-        Some(Self {
-            subject: Id(subject.try_into().ok()?),
-            secret: secret.try_into().ok()?,
-        })
-    }
-
-    /// The token as text, for the client.
-    pub fn to_text(&self) -> String {
-        hex::encode([self.subject.0.as_slice(), &self.secret].concat())
-    }
-
-    /// The hash to store.
-    pub fn hash(&self) -> SecretHash {
-        SecretHash::of(&self.secret)
+impl<T> Clone for Token<T> {
+    fn clone(&self) -> Self {
+        *self
     }
 }
 
-impl fmt::Debug for Token {
+impl<T> Copy for Token<T> {}
+
+impl<T> PartialEq for Token<T> {
+    fn eq(&self, other: &Self) -> bool {
+        (self.subject, self.secret) == (other.subject, other.secret)
+    }
+}
+
+impl<T> Eq for Token<T> {}
+
+impl<T> fmt::Debug for Token<T> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "Token({}, secret withheld)", self.subject)
     }
@@ -182,14 +329,14 @@ impl RequestKey {
     }
 
     /// The id of the created object, which depends only on the request's id.
-    pub fn created_id(&self) -> Id {
+    pub fn created_id<T>(&self) -> Id<T> {
         let hash = digest(b"chefshat.v1 created", &[&self.id]);
-        Id(std::array::from_fn(|index| hash[index]))
+        Id::from_bytes(std::array::from_fn(|index| hash[index]))
     }
 
     /// The owner token of the created object. It depends on the content too, so a request with
     /// other content gets another token.
-    pub fn owner(&self) -> Token {
+    pub fn owner<T>(&self) -> Token<T> {
         Token {
             subject: self.created_id(),
             secret: digest(b"chefshat.v1 owner", &[&self.id, &self.content]),
@@ -239,12 +386,12 @@ mod tests {
 
     #[test]
     fn tokens_and_ids_are_parsed_back() {
-        let id = Id::random();
-        assert_eq!(Id::parse(&id.to_string()), Some(id));
-        assert_eq!(Id::parse("12"), None);
+        let id = RoomId::random();
+        assert_eq!(RoomId::parse(&id.to_string()), Some(id));
+        assert_eq!(RoomId::parse("12"), None);
         let token = Token::random(id);
         assert_eq!(Token::parse(&token.to_text()), Some(token));
-        assert_eq!(Token::parse(&token.to_text()[1..]), None);
+        assert_eq!(RoomToken::parse(&token.to_text()[1..]), None);
         assert!(token.hash().matches(&token.secret));
         assert!(!token.hash().matches(&Token::random(id).secret));
         assert!(!format!("{token:?}").contains(&token.to_text()));
@@ -252,7 +399,7 @@ mod tests {
 
     #[test]
     fn a_repeated_request_gets_the_same_secrets() {
-        let (room, key) = (Id::random(), SecretHash::of(b"key"));
+        let (room, key) = (RoomId::random(), SecretHash::of(b"key"));
         let ticket = Token::of_request(room, &key, &[1; 32]);
         assert_eq!(ticket, Token::of_request(room, &key, &[1; 32]));
         assert_ne!(ticket, Token::of_request(room, &key, &[2; 32]));
@@ -264,16 +411,17 @@ mod tests {
         assert_eq!(hosted, Token::of_tournament_room(room, &key));
         assert_ne!(hosted, Token::of_tournament_room(Id::random(), &key));
         let request = RequestKey::new([1; 32], b"content");
-        let table = Token::of_table(&request.owner());
-        assert_eq!(table, Token::of_table(&request.owner()));
-        assert!(table.subject == request.created_id() && table != request.owner());
+        let owner = RequestKey::owner::<Room>;
+        let table = Token::of_table(&owner(&request));
+        assert_eq!(table, Token::of_table(&owner(&request)));
+        assert!(table.subject == request.created_id() && table != owner(&request));
         assert_eq!(
-            request.owner(),
-            RequestKey::new([1; 32], b"content").owner()
+            owner(&request),
+            owner(&RequestKey::new([1; 32], b"content"))
         );
         let other = RequestKey::new([1; 32], b"other content");
-        assert_eq!(request.created_id(), other.created_id());
-        assert_ne!(request.owner(), other.owner());
+        assert_eq!(request.created_id::<Room>(), other.created_id());
+        assert_ne!(owner(&request), owner(&other));
     }
 
     #[test]

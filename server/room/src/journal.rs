@@ -11,7 +11,7 @@ pub use chefshat_engine::TakenOver;
 use chefshat_engine::{ActionId, RuleSet, Script, Seat};
 pub use chefshat_referee::Report;
 
-use crate::ids::{Id, SecretHash};
+use crate::ids::{GameId, RoomId, SecretHash, SeriesId, StudyId, TournamentId, UnitId};
 use crate::policy::Policy;
 pub use chefshat_agents::ParticipantKind;
 
@@ -42,7 +42,7 @@ impl Fill {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RecordedSeat {
     /// The recorded game.
-    pub game: Id,
+    pub game: GameId,
     /// The seat in it.
     pub seat: Seat,
 }
@@ -60,7 +60,7 @@ pub struct GameStart {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Branch {
     /// The recorded game.
-    pub game: Id,
+    pub game: GameId,
     /// Whether later Shifts are dealt as in the recorded game.
     pub same_deals: bool,
     /// The decisions taken over, in order. Not empty, because the first Shift's seed comes with
@@ -72,17 +72,17 @@ pub struct Branch {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TournamentGame {
     /// The tournament.
-    pub tournament: Id,
+    pub tournament: TournamentId,
     /// The series of games with the same deals. Until all of them have ended, nothing that could
     /// reveal the deals is published.
-    pub series: Option<Id>,
+    pub series: Option<SeriesId>,
 }
 
 /// The study a game belongs to. Nothing of it reaches the game's participants.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StudyGame {
     /// The study.
-    pub study: Id,
+    pub study: StudyId,
     /// Name of the study for researchers.
     pub name: String,
     /// Id of the condition.
@@ -141,9 +141,9 @@ pub enum SeatLabels {
 #[derive(Debug, Clone)]
 pub struct GameHeader {
     /// The room.
-    pub room_id: Id,
+    pub room_id: RoomId,
     /// The game.
-    pub game_id: Id,
+    pub game_id: GameId,
     /// Display name.
     pub name: String,
     /// The rules.
@@ -208,15 +208,15 @@ impl GameHeader {
     }
 
     /// The series of games with the same deals.
-    pub fn series(&self) -> Option<Id> {
+    pub fn series(&self) -> Option<SeriesId> {
         self.tournament.and_then(|game| game.series)
     }
 
     /// What changes hands together in a cluster: its tournament or study, or the room alone.
-    pub fn unit(&self) -> Id {
-        let study = self.study.as_ref().map(|game| game.study);
-        let tournament = self.tournament.map(|game| game.tournament);
-        tournament.or(study).unwrap_or(self.room_id)
+    pub fn unit(&self) -> UnitId {
+        let study = self.study.as_ref().map(|game| game.study.unit());
+        let tournament = self.tournament.map(|game| game.tournament.unit());
+        tournament.or(study).unwrap_or(self.room_id.unit())
     }
 
     /// Whether the cards are real.

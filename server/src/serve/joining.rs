@@ -105,7 +105,7 @@ mod tests {
     use std::sync::Mutex;
 
     use chefshat_admission::limits::Key;
-    use chefshat_room::ids::Id;
+    use chefshat_room::ids::TournamentId;
     use futures::FutureExt as _;
     use futures::future::{BoxFuture, ready};
 
@@ -132,7 +132,7 @@ mod tests {
             ready(self.unreached.iter().map(|node| Arc::from(*node)).collect()).boxed()
         }
 
-        fn is_over(&self, _: Id) -> BoxFuture<'_, bool> {
+        fn is_over(&self, _: TournamentId) -> BoxFuture<'_, bool> {
             unreachable!("nobody asks")
         }
 

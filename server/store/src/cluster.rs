@@ -11,9 +11,9 @@ pub use chefshat_cluster::{Epoch, Load, NodeId};
 use futures::future::BoxFuture;
 use futures::{FutureExt as _, TryFutureExt as _};
 
-use super::units::{StoredUnit, UnitKind};
+use super::units::{StoredUnit, UnitKey};
 use super::{ResumableGame, Store, StoreError};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, RoomId, UnitId};
 
 /// What a node says about itself when it joins.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -90,31 +90,27 @@ pub struct WithoutNode {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Beat {
     /// The units that the node owns, with their epochs.
-    pub owned: Vec<(Id, Epoch)>,
+    pub owned: Vec<(UnitId, Epoch)>,
     /// Whether somebody has asked the node to hand over what it owns.
     pub drain: bool,
 }
 
 /// What an id belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum Subject {
     /// A room.
-    Room,
-    /// A tournament.
-    Tournament,
-    /// A study, which is never over.
-    Study,
+    Room(RoomId),
+    /// A tournament, or a study, which is never over.
+    Unit(UnitKey),
 }
 
 /// Where a room or tournament is.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Location {
     /// The room or tournament.
-    pub id: Id,
-    /// Which of both it is.
-    pub kind: Kind,
+    pub subject: Subject,
     /// The unit it belongs to.
-    pub unit: Id,
+    pub unit: UnitId,
     /// Who owns the unit, or owned it last; `None` if nobody does at present.
     pub node: Option<NodeId>,
     /// The epoch of the unit.
@@ -126,9 +122,9 @@ pub struct Location {
 
 /// A unit as its owner resumes it.
 #[derive(Default)]
-pub struct Unit {
+pub struct LoadedUnit {
     /// The tournament or study, if the unit is one.
-    pub stored: Option<(UnitKind, StoredUnit)>,
+    pub stored: Option<(UnitKey, StoredUnit)>,
     /// Its durable rooms that are not over, and those that are but have not been removed yet,
     /// oldest first. A game that cannot be read is logged and left unchanged. The last entry of a
     /// game that has been claimed says that the server was restarted.
@@ -154,11 +150,11 @@ pub trait ClusterStore: Store {
     /// At most `count` units that nobody owns or whose owner's lease has expired, with their
     /// epochs, in an order of this node's own, so that several nodes share them; only such that this
     /// version of the program can resume.
-    fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(Id, Epoch)>, StoreError>>;
+    fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(UnitId, Epoch)>, StoreError>>;
 
     /// Waits until another node releases a unit and names this one as its next owner; returns the
     /// unit and its epoch. Some are missed: they are found as orphans.
-    fn handed_over(&self) -> BoxFuture<'_, (Id, Epoch)>;
+    fn handed_over(&self) -> BoxFuture<'_, (UnitId, Epoch)>;
 
     /// Removes what has been over for long, and the ephemeral rooms of nodes whose leases have
     /// expired.
@@ -170,11 +166,11 @@ pub trait ClusterStore: Store {
     /// not an orphan any more, or not at this epoch, or that this version cannot resume.
     fn claim_all(
         &self,
-        orphans: Vec<(Id, Epoch)>,
+        orphans: Vec<(UnitId, Epoch)>,
     ) -> BoxFuture<'_, Result<Vec<Option<Epoch>>, StoreError>>;
 
     /// Takes one orphan over. See [`ClusterStore::claim_all`].
-    fn claim(&self, unit: Id, seen: Epoch) -> BoxFuture<'_, Result<Option<Epoch>, StoreError>> {
+    fn claim(&self, unit: UnitId, seen: Epoch) -> BoxFuture<'_, Result<Option<Epoch>, StoreError>> {
         let claimed = self.claim_all(vec![(unit, seen)]);
         claimed
             .map_ok(|mut claimed| claimed.pop().flatten())
@@ -184,14 +180,18 @@ pub trait ClusterStore: Store {
     /// Reads a unit that this node owns at this epoch, with journals that write at this epoch;
     /// `None` if it does not (any more). From here on, what is written for its tournament is
     /// written at this epoch, so what ran before at another one must have ended.
-    fn load(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<Option<Unit>, StoreError>>;
+    fn load(
+        &self,
+        unit: UnitId,
+        epoch: Epoch,
+    ) -> BoxFuture<'_, Result<Option<LoadedUnit>, StoreError>>;
 
     /// Gives up a unit that this node owns at this epoch, so that others may claim it at once, and
     /// names one that is to: `next` if it takes rooms, otherwise any, an emptier one more often. The
     /// last append to each of its journals must have been answered.
     fn release(
         &self,
-        unit: Id,
+        unit: UnitId,
         epoch: Epoch,
         next: Option<NodeId>,
     ) -> BoxFuture<'_, Result<(), StoreError>>;
@@ -200,7 +200,7 @@ pub trait ClusterStore: Store {
     fn leave(&self) -> BoxFuture<'_, Result<bool, StoreError>>;
 
     /// Where a room or tournament is; `None` if there is none with this id.
-    fn locate(&self, id: Id) -> BoxFuture<'_, Result<Option<Location>, StoreError>>;
+    fn locate(&self, id: UnitId) -> BoxFuture<'_, Result<Option<Location>, StoreError>>;
 
     /// Where the room or tournament with this join code, in its normal form, is.
     fn locate_code<'a>(
@@ -209,10 +209,10 @@ pub trait ClusterStore: Store {
     ) -> BoxFuture<'a, Result<Option<Location>, StoreError>>;
 
     /// Where the room of a game is that is not over.
-    fn locate_game(&self, game: Id) -> BoxFuture<'_, Result<Option<Location>, StoreError>>;
+    fn locate_game(&self, game: GameId) -> BoxFuture<'_, Result<Option<Location>, StoreError>>;
 
     /// The room of a durable game that is over, to show its end, if it has not been removed yet.
-    fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>>;
+    fn ended_room(&self, room: RoomId) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>>;
 
     /// The nodes that have a lease.
     fn alive(&self) -> BoxFuture<'_, Result<Vec<LivingNode>, StoreError>>;

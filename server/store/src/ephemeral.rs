@@ -17,7 +17,7 @@ use tracing::{error, warn};
 use super::decode_pool::MAX_CONCURRENT_RECORDS;
 use super::form;
 use super::{Journal, StoreError};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 use chefshat_room::journal::{Entry, GameHeader};
 
 /// Bytes of a block of the file. As many encoded entries of a game stay in memory.
@@ -26,25 +26,25 @@ pub(super) const BLOCK: usize = 64 * 1024;
 /// The ids of games that are stored when they end, of records that are being imported, and of games
 /// that are being created. Nothing else can take them meanwhile.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Reservations(Arc<Mutex<BTreeSet<Id>>>);
+pub(super) struct Reservations(Arc<Mutex<BTreeSet<GameId>>>);
 
 /// A reserved id, free again when this is dropped.
 #[derive(Debug)]
 pub(super) struct Reserved {
     all: Reservations,
-    game: Id,
+    game: GameId,
 }
 
 impl Reservations {
     /// Reserves the id of a game, unless it is reserved.
-    pub(super) fn take(&self, game: Id) -> Option<Reserved> {
+    pub(super) fn take(&self, game: GameId) -> Option<Reserved> {
         self.lock().insert(game).then(|| Reserved {
             all: self.clone(),
             game,
         })
     }
 
-    fn lock(&self) -> MutexGuard<'_, BTreeSet<Id>> {
+    fn lock(&self) -> MutexGuard<'_, BTreeSet<GameId>> {
         (self.0.lock()).expect("no code that holds this lock can panic")
     }
 }

@@ -1,6 +1,6 @@
 //! Why a store failed.
 
-use chefshat_room::ids::Id;
+use chefshat_room::ids::UnitId;
 
 /// Why a store failed, with advice.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -10,12 +10,12 @@ pub enum StoreError {
     Failed(String),
     /// The id of a game or tournament is taken. Nothing was changed, and the store has not failed.
     #[error("the id {0} is taken")]
-    Taken(Id),
+    Taken(String),
     /// A game or study cannot be read. The store has not failed.
     #[error("{0}")]
     Unreadable(String),
     /// Another node of the cluster owns the unit of this room or tournament. Nothing was changed,
     /// and the store has not failed; the room or tournament must stop and publish nothing more.
     #[error("another node has taken {0} over")]
-    Fenced(Id),
+    Fenced(UnitId),
 }

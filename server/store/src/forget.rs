@@ -15,14 +15,14 @@ use prost::Message as _;
 use super::form::{self, Unreadable};
 use super::tournaments::TournamentEntry;
 use super::{ForgetError, Forgotten, StoredGame};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 use chefshat_room::journal::{Change, Entry, Fill, GameHeader, StudyGame};
 
 /// The rows of a game that may contain the name.
 #[derive(Debug)]
 pub(super) struct GameRows {
     pub(super) number: i64,
-    pub(super) id: Id,
+    pub(super) id: GameId,
     pub(super) is_running: bool,
     pub(super) is_filed: bool,
     pub(super) header: Option<Vec<u8>>,
@@ -130,14 +130,14 @@ impl Rewrite {
 }
 
 impl Forgotten {
-    pub(super) fn add(&mut self, game: Id, is_filed: bool, redactions: Redactions) {
+    pub(super) fn add(&mut self, game: GameId, is_filed: bool, redactions: Redactions) {
         self.games.push(game);
         self.filed.extend(is_filed.then_some(game));
         self.redactions += redactions;
     }
 }
 
-fn unreadable(game: Id, problem: Unreadable) -> ForgetError {
+fn unreadable(game: GameId, problem: Unreadable) -> ForgetError {
     ForgetError::Unreadable {
         what: format!("game {game}"),
         problem: problem.to_string(),

@@ -39,10 +39,10 @@ pub use sqlite::{
 };
 
 use chefshat_base::metrics::StoreMetrics;
-use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::ids::{GameId, Id, SecretHash, StudyId};
 use chefshat_room::journal::{Entry, GameHeader, TournamentGame};
 use chefshat_wire::convert;
-use units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
+use units::{StoredKind, StoredTraces, StoredUnit, UnitKey, UnitKind, UnitWrite};
 
 /// A finished game in the store.
 #[derive(Debug, Clone)]
@@ -113,7 +113,7 @@ pub struct Listed {
 #[error("the summary of game {game} cannot be read: {problem}")]
 pub struct UnreadableGame {
     /// The game.
-    pub game: Id,
+    pub game: GameId,
     /// The reason.
     pub problem: String,
 }
@@ -124,7 +124,9 @@ fn listed(number: i64, game: &[u8], summary: &[u8], header: Option<&[u8]>) -> Li
     let number = u64::try_from(number).unwrap_or_default();
     let summary = v1::RecordSummary::decode(summary).map_err(|error| {
         let unreadable = UnreadableGame {
-            game: game.try_into().map_or(Id([0; 16]), Id),
+            game: game
+                .try_into()
+                .map_or(Id::from_bytes([0; 16]), Id::from_bytes),
             problem: error.to_string(),
         };
         tracing::error!(number, problem = %unreadable, "a game is not listed");
@@ -188,10 +190,10 @@ pub struct DiskUsage {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Forgotten {
     /// Games that contained the name.
-    pub games: Vec<Id>,
+    pub games: Vec<GameId>,
     /// Those of them whose record was written to a file, which must be written again. Until they
     /// are marked as written, the next start of the server does.
-    pub filed: Vec<Id>,
+    pub filed: Vec<GameId>,
     /// Number of tournaments that contained the name.
     pub tournaments: u64,
     /// The changes in the games.
@@ -261,9 +263,10 @@ pub trait Store: Send + Sync + 'static {
     ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>>;
     /// The summary of a finished game, or `None`. Reads little, whatever the length of the game: it
     /// is read before anything else, to find out who may read the rest.
-    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>>;
+    fn summary(&self, game: GameId)
+    -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>>;
     /// A finished game, or `None`.
-    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>>;
+    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>>;
     /// At most `count` finished games of a part of the list that match a filter, in its order, with
     /// their numbers. One whose summary cannot be read is named in its place.
     fn list<'a>(
@@ -275,7 +278,7 @@ pub trait Store: Send + Sync + 'static {
     /// Stores the record of a game played elsewhere. Returns `false` if the id is taken.
     fn import(
         &self,
-        game: Id,
+        game: GameId,
         summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
     ) -> BoxFuture<'_, Result<bool, StoreError>>;
@@ -295,17 +298,17 @@ pub trait Store: Send + Sync + 'static {
         _keep: Keep,
         _after: u64,
         _count: usize,
-    ) -> BoxFuture<'_, Result<Vec<(u64, Id)>, StoreError>> {
+    ) -> BoxFuture<'_, Result<Vec<(u64, GameId)>, StoreError>> {
         ready(Ok(Vec::new())).boxed()
     }
     /// Deletes those of these games that a tournament or study does not need, as `prunable` says,
     /// and gives their space back. Returns those that it no longer has: only their files may be
     /// deleted.
-    fn prune(&self, _games: Vec<Id>) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    fn prune(&self, _games: Vec<GameId>) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
         ready(Ok(Vec::new())).boxed()
     }
     /// Deletes finished games, whatever needs them, and gives their space back.
-    fn delete(&self, _games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn delete(&self, _games: Vec<GameId>) -> BoxFuture<'_, Result<(), StoreError>> {
         ready(Ok(())).boxed()
     }
     /// Replaces the name of a participant in all games and tournaments by a pseudonym, and deletes
@@ -317,24 +320,24 @@ pub trait Store: Send + Sync + 'static {
         ready(Err(failure.into())).boxed()
     }
     /// Finished games whose record is not yet written to a file.
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>>;
+    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>>;
     /// Marks the record of a game as written to a file.
-    fn mark_record_written(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>>;
+    fn mark_record_written(&self, game: GameId) -> BoxFuture<'_, Result<(), StoreError>>;
     /// Writes something for a tournament or study, in one commit. What is added to one that was
     /// deleted has no effect.
-    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>>;
+    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>>;
     /// A tournament or study, or `None`.
-    fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>>;
-    /// The ids of the tournaments or studies that are not over, and of the `newest_over` newest ones
+    fn unit(&self, unit: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>>;
+    /// The tournaments or studies that are not over, and of the `newest_over` newest ones
     /// that are; oldest first.
     fn units(
         &self,
         kind: UnitKind,
         newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<Id>, StoreError>>;
+    ) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>>;
     /// The interface traces of a study, in the order in which they were added. One that cannot be
     /// read is logged and left out.
-    fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>>;
+    fn traces(&self, study: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>>;
     /// Waits until the store fails for good.
     fn failed(&self) -> BoxFuture<'static, StoreError>;
     /// Closes the store; it must not be used afterwards.
@@ -345,6 +348,18 @@ impl std::fmt::Debug for dyn Store {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         formatter.write_str("Store")
     }
+}
+
+/// The ids of the tournaments or studies that [`Store::units`] returns.
+///
+/// # Errors
+/// The store failed.
+pub async fn units_of<K: StoredKind>(
+    store: &(impl Store + ?Sized),
+    newest_over: usize,
+) -> Result<Vec<Id<K>>, StoreError> {
+    let units = store.units(K::KIND, newest_over).await?;
+    Ok(units.into_iter().filter_map(K::id_of).collect())
 }
 
 /// The journal of a running game.

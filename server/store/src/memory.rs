@@ -10,13 +10,13 @@ use futures::future::{BoxFuture, pending, ready};
 
 use super::ephemeral::{Reservations, Reserved};
 use super::forget::forget_stored;
-use super::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
+use super::units::{StoredTraces, StoredUnit, UnitKey, UnitKind, UnitWrite};
 use super::{
     ForgetError, Forgotten, Journal, Keep, Listed, Part, ResumableGame, Store, StoreError,
     StoredGame, matches_filter,
 };
 use chefshat_base::clock::since_epoch_ms;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, StudyId};
 use chefshat_room::journal::{Entry, GameHeader};
 
 /// Most finished games in memory; older ones are dropped.
@@ -31,7 +31,7 @@ pub struct MemoryStore {
     finished: Arc<Mutex<Finished>>,
     /// Those that are not over: what a study needs to be resumed, and of a tournament, which its
     /// server has in memory, that it is there.
-    units: Mutex<BTreeMap<UnitId, UnitInMemory>>,
+    units: Mutex<BTreeMap<UnitKey, UnitInMemory>>,
     /// The ids of running games.
     reserved: Reservations,
     outlives_server: bool,
@@ -51,9 +51,8 @@ impl MemoryStore {
     fn is_needed(&self, game: &StoredGame) -> bool {
         match game {
             StoredGame::Hosted(header, ..) => {
-                let units = lock(&self.units);
-                let needs = |kind: UnitKind| units.contains_key(&kind.id(header.unit()));
-                needs(UnitKind::Study) || needs(UnitKind::Tournament)
+                let unit = UnitKey::of_game(header);
+                unit.is_some_and(|unit| lock(&self.units).contains_key(&unit))
             }
             StoredGame::Imported(_) => false,
         }
@@ -69,17 +68,19 @@ struct UnitInMemory {
 
 /// Writes something for a unit. One that is over is dropped.
 fn write_in(
-    units: &mut BTreeMap<UnitId, UnitInMemory>,
-    unit: UnitId,
+    units: &mut BTreeMap<UnitKey, UnitInMemory>,
+    unit: UnitKey,
     write: UnitWrite,
 ) -> Result<(), StoreError> {
     let known = units.get_mut(&unit);
     match (write, known) {
-        (UnitWrite::Create { .. }, Some(_)) => return Err(StoreError::Taken(unit.id)),
+        (UnitWrite::Create { .. }, Some(_)) => {
+            return Err(StoreError::Taken(unit.id().to_string()));
+        }
         (UnitWrite::Create { header, first, .. }, None) => {
             if !first.as_ref().is_some_and(|row| row.over) {
                 let rows = first.into_iter().map(|row| row.entries).collect();
-                let is_study = unit.kind == UnitKind::Study;
+                let is_study = unit.kind() == UnitKind::Study;
                 let stored = is_study.then(|| StoredUnit::new(header, rows));
                 let traces = Vec::new();
                 units.insert(unit, UnitInMemory { stored, traces });
@@ -110,7 +111,7 @@ fn write_in(
 struct Finished {
     /// By number, oldest first.
     games: BTreeMap<u64, FinishedGame>,
-    numbers: BTreeMap<Id, u64>,
+    numbers: BTreeMap<GameId, u64>,
     last_number: u64,
     /// Journal entries of all of them.
     entries: usize,
@@ -118,7 +119,7 @@ struct Finished {
 
 #[derive(Debug)]
 struct FinishedGame {
-    id: Id,
+    id: GameId,
     /// When it ended; of an imported game, when it was imported.
     ended_at_ms: u64,
     summary: v1::RecordSummary,
@@ -149,7 +150,7 @@ impl Finished {
         }
     }
 
-    fn remove(&mut self, game: Id) {
+    fn remove(&mut self, game: GameId) {
         if let Some(number) = self.numbers.remove(&game)
             && let Some(game) = self.games.remove(&number)
         {
@@ -157,7 +158,7 @@ impl Finished {
         }
     }
 
-    fn get(&self, game: Id) -> Option<&FinishedGame> {
+    fn get(&self, game: GameId) -> Option<&FinishedGame> {
         let number = self.numbers.get(&game)?;
         self.games.get(number)
     }
@@ -177,7 +178,7 @@ impl Store for MemoryStore {
         let reserved = self.reserved.take(game);
         let is_known = lock(&self.finished).get(game).is_some();
         let Some(reserved) = reserved.filter(|_| !is_known) else {
-            return ready(Err(StoreError::Taken(game))).boxed();
+            return ready(Err(StoreError::Taken(game.to_string()))).boxed();
         };
         let journal = MemoryJournal {
             _reserved: reserved,
@@ -195,12 +196,15 @@ impl Store for MemoryStore {
         ready(Ok(Vec::new())).boxed()
     }
 
-    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
+    fn summary(
+        &self,
+        game: GameId,
+    ) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
         let finished = lock(&self.finished);
         ready(Ok(finished.get(game).map(|game| game.summary.clone()))).boxed()
     }
 
-    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
+    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         let finished = lock(&self.finished);
         ready(Ok(finished.get(game).map(|game| game.stored.clone()))).boxed()
     }
@@ -222,7 +226,7 @@ impl Store for MemoryStore {
 
     fn import(
         &self,
-        game: Id,
+        game: GameId,
         mut summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
     ) -> BoxFuture<'_, Result<bool, StoreError>> {
@@ -252,7 +256,7 @@ impl Store for MemoryStore {
         keep: Keep,
         after: u64,
         count: usize,
-    ) -> BoxFuture<'_, Result<Vec<(u64, Id)>, StoreError>> {
+    ) -> BoxFuture<'_, Result<Vec<(u64, GameId)>, StoreError>> {
         let finished = lock(&self.finished);
         let newest = usize::try_from(keep.newest.unwrap_or(1)).unwrap_or(usize::MAX);
         let old = finished.games.len().saturating_sub(newest.max(1));
@@ -269,7 +273,7 @@ impl Store for MemoryStore {
         ready(Ok(found)).boxed()
     }
 
-    fn prune(&self, mut games: Vec<Id>) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    fn prune(&self, mut games: Vec<GameId>) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
         let mut finished = lock(&self.finished);
         games.retain(|game| {
             let is_free = |it: &FinishedGame| !self.is_needed(&it.stored);
@@ -281,7 +285,7 @@ impl Store for MemoryStore {
         ready(Ok(games)).boxed()
     }
 
-    fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn delete(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<(), StoreError>> {
         let mut finished = lock(&self.finished);
         for game in games {
             finished.remove(game);
@@ -300,20 +304,20 @@ impl Store for MemoryStore {
         ready(Ok(forgotten)).boxed()
     }
 
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
         ready(Ok(Vec::new())).boxed()
     }
 
-    fn mark_record_written(&self, _game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn mark_record_written(&self, _game: GameId) -> BoxFuture<'_, Result<(), StoreError>> {
         ready(Ok(())).boxed()
     }
 
-    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
         let written = write_in(&mut lock(&self.units), unit, write);
         ready(written).boxed()
     }
 
-    fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+    fn unit(&self, unit: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
         let units = lock(&self.units);
         let stored = units.get(&unit).and_then(|it| it.stored.clone());
         ready(Ok(stored)).boxed()
@@ -324,16 +328,16 @@ impl Store for MemoryStore {
         &self,
         kind: UnitKind,
         _newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    ) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>> {
         let units = lock(&self.units);
         let stored = units.iter().filter(|(_, it)| it.stored.is_some());
-        let ids = stored.filter(|(unit, _)| unit.kind == kind);
-        ready(Ok(ids.map(|(unit, _)| unit.id).collect())).boxed()
+        let ids = stored.filter(|(unit, _)| unit.kind() == kind);
+        ready(Ok(ids.map(|(unit, _)| *unit).collect())).boxed()
     }
 
-    fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
+    fn traces(&self, study: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
         let units = lock(&self.units);
-        let study = units.get(&UnitKind::Study.id(study));
+        let study = units.get(&UnitKey::Study(study));
         ready(Ok(study.map_or_else(Vec::new, |it| it.traces.clone()))).boxed()
     }
 

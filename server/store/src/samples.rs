@@ -12,7 +12,7 @@ use chefshat_engine::Seat;
 use chefshat_proto::v1::SampleChunk;
 use chefshat_record::convert::FieldProblem;
 use chefshat_record::{private, samples};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 
 /// Most bytes of the samples of one seat: 8 channels, 30 times a second, for more than 15 hours.
 pub(crate) const MAX_SAMPLE_BYTES: u64 = 64 * 1024 * 1024;
@@ -56,7 +56,7 @@ pub enum SampleError {
 pub struct Samples {
     data_dir: Option<PathBuf>,
     /// By game and seat.
-    files: Mutex<HashMap<(Id, usize), SharedFile>>,
+    files: Mutex<HashMap<(GameId, usize), SharedFile>>,
     deleted: Mutex<Deleted>,
 }
 
@@ -64,13 +64,13 @@ pub struct Samples {
 /// again.
 #[derive(Debug, Default)]
 struct Deleted {
-    games: HashSet<Id>,
+    games: HashSet<GameId>,
     /// Oldest first.
-    in_order: VecDeque<Id>,
+    in_order: VecDeque<GameId>,
 }
 
 impl Deleted {
-    fn add(&mut self, game: Id) {
+    fn add(&mut self, game: GameId) {
         if self.games.insert(game) {
             self.in_order.push_back(game);
         }
@@ -116,7 +116,7 @@ impl Samples {
     /// They are refused, or the file system failed.
     pub async fn add(
         self: Arc<Self>,
-        game: Id,
+        game: GameId,
         seat: Seat,
         chunk: SampleChunk,
         now: Duration,
@@ -131,7 +131,7 @@ impl Samples {
         adding.await.map_err(io::Error::other)?
     }
 
-    fn append(&self, game: Id, seat: usize, chunk: SampleChunk) -> Result<u32, SampleError> {
+    fn append(&self, game: GameId, seat: usize, chunk: SampleChunk) -> Result<u32, SampleError> {
         let data_dir = self.data_dir.as_deref().ok_or(SampleError::Off)?;
         let file = {
             let mut files = self.files.lock().unwrap_or_else(PoisonError::into_inner);
@@ -161,7 +161,7 @@ impl Samples {
     }
 
     /// The files of a game's samples, one for each seat that has some.
-    pub fn files(&self, game: Id) -> Vec<PathBuf> {
+    pub fn files(&self, game: GameId) -> Vec<PathBuf> {
         let Some(data_dir) = &self.data_dir else {
             return Vec::new();
         };
@@ -171,7 +171,7 @@ impl Samples {
     }
 
     /// Takes no more samples of these games. What is just being written is written when it returns.
-    pub async fn refuse(self: &Arc<Self>, games: Vec<Id>) -> io::Result<()> {
+    pub async fn refuse(self: &Arc<Self>, games: Vec<GameId>) -> io::Result<()> {
         if self.data_dir.is_none() {
             return Ok(());
         }
@@ -180,7 +180,7 @@ impl Samples {
         refusing.await.map_err(io::Error::other)
     }
 
-    fn refuse_now(&self, games: &[Id]) {
+    fn refuse_now(&self, games: &[GameId]) {
         let mut deleted = self.deleted.lock().unwrap_or_else(PoisonError::into_inner);
         games.iter().for_each(|game| deleted.add(*game));
         drop(deleted);
@@ -204,7 +204,7 @@ impl Samples {
     ///
     /// # Errors
     /// The file system failed.
-    pub async fn delete(self: &Arc<Self>, games: Vec<Id>) -> io::Result<()> {
+    pub async fn delete(self: &Arc<Self>, games: Vec<GameId>) -> io::Result<()> {
         let Some(data_dir) = self.data_dir.clone() else {
             return Ok(());
         };
@@ -296,7 +296,7 @@ mod tests {
     }
 
     /// The samples in the file of a seat: stream, time and values.
-    fn recorded(folder: &Path, game: Id, seat: usize) -> Vec<(String, u64, Vec<f32>)> {
+    fn recorded(folder: &Path, game: GameId, seat: usize) -> Vec<(String, u64, Vec<f32>)> {
         let mut all = Vec::new();
         let path = samples::path_of(folder, &game.to_string(), seat);
         let take = |chunk: SampleChunk| {
@@ -311,7 +311,7 @@ mod tests {
     #[tokio::test]
     async fn an_hour_of_thirty_samples_a_second_is_recorded_once_also_across_a_restart() {
         let folder = tempfile::tempdir().expect("a folder");
-        let (game, seat) = (Id::random(), Seat::new(2));
+        let (game, seat) = (GameId::random(), Seat::new(2));
         let start = || Arc::new(Samples::new(Some(folder.path().to_path_buf())));
         let mut server = start();
         let total = 30 * 3_600;
@@ -344,7 +344,7 @@ mod tests {
     async fn streams_keep_their_channels_and_are_bounded() {
         let folder = tempfile::tempdir().expect("a folder");
         let server = Arc::new(Samples::new(Some(folder.path().to_path_buf())));
-        let (game, seat) = (Id::random(), Seat::new(0));
+        let (game, seat) = (GameId::random(), Seat::new(0));
         let add = async |chunk| Arc::clone(&server).add(game, seat, chunk, HOUR).await;
         for number in 0..MAX_STREAMS {
             let added = add(chunk(&format!("stream{number}"), 0, 1)).await;
@@ -380,7 +380,7 @@ mod tests {
     fn what_is_on_its_way_creates_no_deleted_file() {
         let folder = tempfile::tempdir().expect("a folder");
         let server = Arc::new(Samples::new(Some(folder.path().to_path_buf())));
-        let game = Id::random();
+        let game = GameId::random();
         assert_eq!(server.append(game, 0, chunk("a", 0, 1)).expect("open"), 1);
         let file = Arc::clone(&server.files.lock().expect("no panic")[&(game, 0)]);
         let held = file.lock().expect("no panic");
@@ -400,8 +400,8 @@ mod tests {
             assert!(matches!(appended, Err(SampleError::Deleted)));
         });
         let mut deleted = Deleted::default();
-        let games = (0..=MAX_DELETED_GAMES).map(|_| Id::random());
-        let games: Vec<Id> = games.collect();
+        let games = (0..=MAX_DELETED_GAMES).map(|_| GameId::random());
+        let games: Vec<GameId> = games.collect();
         games.iter().for_each(|game| deleted.add(*game));
         assert_eq!(deleted.games.len(), MAX_DELETED_GAMES);
         assert!(!deleted.games.contains(&games[0]), "the oldest");

@@ -4,13 +4,13 @@ use chefshat_proto::v1;
 use chefshat_study::Change;
 
 pub use super::form::changes_to_bytes;
-use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::ids::{SecretHash, StudyId};
 
 /// The header of a study, which exists before it has participants.
 #[derive(Debug, Clone)]
 pub struct StudyHeader {
     /// The study. Its last four bytes are 0, so that links can leave them out.
-    pub id: Id,
+    pub id: StudyId,
     /// The settings, every field set.
     pub settings: v1::StudySettings,
     /// When it was created, milliseconds since the Unix epoch.

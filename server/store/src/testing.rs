@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use chefshat_engine::{RULES_VERSION, RuleSetSpec, SeedPlan};
 use chefshat_proto::v1;
-use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::ids::{Id, SecretHash, StudyId, TournamentId};
 use chefshat_room::journal::{Fill, GameHeader, GameStart};
 use chefshat_room::policy::{Durability, Policy};
 use chefshat_study::Change;
@@ -21,8 +21,8 @@ pub use failing::{FailingStore, Read};
 
 use crate::studies::{StoredStudy, StudyHeader, changes_to_bytes};
 use crate::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use crate::units::{StoredTraces, UnitKind, UnitRow, UnitWrite};
-use crate::{Store, StoreError};
+use crate::units::{StoredTraces, UnitKey, UnitRow, UnitWrite};
+use crate::{Store, StoreError, units_of};
 
 type Written<'s> = BoxFuture<'s, Result<(), StoreError>>;
 
@@ -39,18 +39,18 @@ pub trait TypedUnits: Store {
             header: header.to_bytes(),
             first: Some(tournament_row(0, &entries)),
         };
-        self.write_unit(UnitKind::Tournament.id(header.id), create)
+        self.write_unit(UnitKey::Tournament(header.id), create)
     }
 
     /// Adds a row to a tournament.
     fn append_tournament(
         &self,
-        tournament: Id,
+        tournament: TournamentId,
         row: u64,
         entries: Vec<TournamentEntry>,
     ) -> Written<'_> {
         let append = UnitWrite::Append(tournament_row(row, &entries));
-        self.write_unit(UnitKind::Tournament.id(tournament), append)
+        self.write_unit(UnitKey::Tournament(tournament), append)
     }
 
     /// The tournaments that are not over, and the newest ones that are.
@@ -60,9 +60,9 @@ pub trait TypedUnits: Store {
     ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
         async move {
             let mut found = Vec::new();
-            for id in self.units(UnitKind::Tournament, newest_over).await? {
-                let unit = self.unit(UnitKind::Tournament.id(id)).await?;
-                found.push(StoredTournament::decode(id, &unit.expect("it is there"))?);
+            for id in units_of(self, newest_over).await? {
+                let stored = self.unit(UnitKey::Tournament(id)).await?;
+                found.push(StoredTournament::decode(id, &stored.expect("it is there"))?);
             }
             Ok(found)
         }
@@ -76,42 +76,47 @@ pub trait TypedUnits: Store {
             header: header.to_bytes(),
             first: None,
         };
-        self.write_unit(UnitKind::Study.id(header.id), create)
+        self.write_unit(UnitKey::Study(header.id), create)
     }
 
     /// Adds a row to a study.
-    fn append_study(&self, study: Id, row: u64, changes: Vec<Change>) -> Written<'_> {
+    fn append_study(&self, study: StudyId, row: u64, changes: Vec<Change>) -> Written<'_> {
         let append = UnitWrite::Append(UnitRow {
             position: row,
             entries: changes_to_bytes(&changes),
             over: false,
         });
-        self.write_unit(UnitKind::Study.id(study), append)
+        self.write_unit(UnitKey::Study(study), append)
     }
 
     /// Replaces the rows of a study, and deletes traces of participants.
-    fn rewrite_study(&self, study: Id, changes: Vec<Change>, forgotten: Vec<u32>) -> Written<'_> {
+    fn rewrite_study(
+        &self,
+        study: StudyId,
+        changes: Vec<Change>,
+        forgotten: Vec<u32>,
+    ) -> Written<'_> {
         let rewrite = UnitWrite::Rewrite {
             entries: changes_to_bytes(&changes),
             forgotten,
         };
-        self.write_unit(UnitKind::Study.id(study), rewrite)
+        self.write_unit(UnitKey::Study(study), rewrite)
     }
 
     /// Deletes a study.
-    fn delete_study(&self, study: Id) -> Written<'_> {
-        self.write_unit(UnitKind::Study.id(study), UnitWrite::Delete)
+    fn delete_study(&self, study: StudyId) -> Written<'_> {
+        self.write_unit(UnitKey::Study(study), UnitWrite::Delete)
     }
 
     /// Adds interface traces to a study.
-    fn append_traces(&self, study: Id, traces: StoredTraces) -> Written<'_> {
-        self.write_unit(UnitKind::Study.id(study), UnitWrite::Traces(traces))
+    fn append_traces(&self, study: StudyId, traces: StoredTraces) -> Written<'_> {
+        self.write_unit(UnitKey::Study(study), UnitWrite::Traces(traces))
     }
 
     /// A study.
-    fn study(&self, study: Id) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {
+    fn study(&self, study: StudyId) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {
         async move {
-            let unit = self.unit(UnitKind::Study.id(study)).await?;
+            let unit = self.unit(UnitKey::Study(study)).await?;
             unit.map(|unit| StoredStudy::decode(study, &unit))
                 .transpose()
         }
@@ -119,8 +124,8 @@ pub trait TypedUnits: Store {
     }
 
     /// The ids of all studies.
-    fn studies(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
-        self.units(UnitKind::Study, usize::MAX)
+    fn studies(&self) -> BoxFuture<'_, Result<Vec<StudyId>, StoreError>> {
+        units_of(self, usize::MAX).boxed()
     }
 }
 
@@ -137,8 +142,8 @@ fn tournament_row(position: u64, entries: &[TournamentEntry]) -> UnitRow {
 /// The header of a game with this number.
 pub fn header(game: u8, durability: Durability) -> Arc<GameHeader> {
     Arc::new(GameHeader {
-        room_id: Id([200 + game; 16]),
-        game_id: Id([game; 16]),
+        room_id: Id::from_bytes([200 + game; 16]),
+        game_id: Id::from_bytes([game; 16]),
         name: format!("game {game}"),
         rules: RuleSetSpec::default().validate().expect("the standard"),
         policy: Policy {
@@ -180,7 +185,7 @@ pub fn summary(header: &GameHeader) -> Box<v1::RecordSummary> {
 /// The header of a tournament with this number.
 pub fn cup(number: u8) -> TournamentHeader {
     TournamentHeader {
-        id: Id([number; 16]),
+        id: Id::from_bytes([number; 16]),
         settings: v1::TournamentSettings {
             name: "Coppa dello chef".into(),
             format: v1::TournamentFormat::Swiss.into(),

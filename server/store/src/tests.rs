@@ -6,7 +6,7 @@ mod retained;
 mod studies;
 mod tournaments;
 
-use chefshat_room::ids::SecretHash;
+use chefshat_room::ids::{GameId, Id, SecretHash};
 use chefshat_room::journal::{Change, Fill};
 use chefshat_room::policy::Durability;
 use futures::FutureExt as _;
@@ -119,7 +119,7 @@ async fn a_signature_is_stored_with_the_end_of_its_game() {
 /// Ids of the games that need not be kept, as their first bytes.
 async fn prunable(store: &dyn Store, keep: Keep) -> Vec<u8> {
     let found = store.prunable(keep, 0, 9).await.expect("readable");
-    found.into_iter().map(|(_, id)| id.0[0]).collect()
+    found.into_iter().map(|(_, id)| id.bytes()[0]).collect()
 }
 
 fn newest(count: u64) -> Keep {
@@ -143,10 +143,16 @@ async fn the_newest_games_are_those_that_ended_last() {
         for game in [2, 3, 4] {
             let mut journal = created(store, game, Durability::Durable).await;
             finish(&mut journal, game).await;
-            store.mark_record_written(Id([game; 16])).await.expect("it");
+            store
+                .mark_record_written(Id::from_bytes([game; 16]))
+                .await
+                .expect("it");
         }
         finish(&mut first, 1).await;
-        store.mark_record_written(Id([1; 16])).await.expect("it");
+        store
+            .mark_record_written(Id::from_bytes([1; 16]))
+            .await
+            .expect("it");
         assert_eq!(prunable(store, newest(1)).await, [2, 3, 4]);
         assert_eq!(prunable(store, newest(2)).await, [2, 3]);
         assert_eq!(prunable(store, newest(4)).await, [0; 0]);
@@ -162,7 +168,7 @@ async fn the_newest_games_are_those_that_ended_last() {
         let found = store.prunable(newest(1), 0, 1).await.expect("readable");
         let after = store.prunable(newest(1), found[0].0, 9).await;
         assert_eq!(after.expect("readable").len(), 2, "{found:?}");
-        let deleted: Vec<Id> = [2, 3, 4].map(|game| Id([game; 16])).into();
+        let deleted: Vec<GameId> = [2, 3, 4].map(|game| Id::from_bytes([game; 16])).into();
         store.delete(deleted).await.expect("committed");
         let left = listed(store, 0).await;
         assert_eq!(left, [("game 1".into(), 4)]);
@@ -178,7 +184,10 @@ async fn an_import_is_kept_from_the_time_of_its_import() {
         assert_eq!(import.await, Ok(true));
         let mut newer = created(store, 2, Durability::Durable).await;
         finish(&mut newer, 2).await;
-        store.mark_record_written(Id([2; 16])).await.expect("it");
+        store
+            .mark_record_written(Id::from_bytes([2; 16]))
+            .await
+            .expect("it");
         if store.outlives_server() {
             assert_eq!(prunable(store, newest(1)).await, [0; 0], "no record yet");
             let written = store.mark_record_written(last_year.game_id);
@@ -208,10 +217,13 @@ async fn a_taken_game_id_is_refused_and_the_store_keeps_working() {
         let (mut journals, refused) = futures::join!(futures::future::join_all(others), refused);
         assert!(refused.is_err());
         finish(&mut journals[0], 2).await;
-        let game = store.finished(Id([2; 16])).await.expect("readable");
+        let game = store
+            .finished(Id::from_bytes([2; 16]))
+            .await
+            .expect("readable");
         assert!(game.is_some(), "the store keeps working");
         assert_eq!(import().await, Ok(false));
-        let taken = store.import(Id([2; 16]), *summary(&forged), Arc::from([]));
+        let taken = store.import(Id::from_bytes([2; 16]), *summary(&forged), Arc::from([]));
         assert_eq!(taken.await, Ok(false));
         assert!(store.failed().now_or_never().is_none(), "no failure");
     })
@@ -244,7 +256,10 @@ async fn an_import_does_not_take_the_id_of_a_running_game() {
         assert_eq!(import.await, Ok(true));
         let refused = store.create(imported, vec![entry()]).await;
         let refused = refused.err().expect("the id is taken");
-        assert_eq!(refused, StoreError::Taken(Id([3; 16])));
+        assert_eq!(
+            refused,
+            StoreError::Taken(GameId::from_bytes([3; 16]).to_string())
+        );
         // A game that ended without a record leaves its id.
         let mut journal = created(store, 4, Durability::Ephemeral).await;
         journal.finish(None, None).await.expect("committed");

@@ -3,13 +3,13 @@
 use chefshat_proto::v1;
 use chefshat_tournament::Change;
 
-use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::ids::{GameId, RoomId, SecretHash, TournamentId};
 
 /// The header of a tournament, which exists before anybody joins.
 #[derive(Debug, Clone)]
 pub struct TournamentHeader {
     /// The tournament.
-    pub id: Id,
+    pub id: TournamentId,
     /// The settings, every field set.
     pub settings: v1::TournamentSettings,
     /// When it was created, milliseconds since the Unix epoch.
@@ -40,9 +40,9 @@ pub enum TournamentEntry {
         /// Number of the game in the tournament.
         game: usize,
         /// The room.
-        room_id: Id,
+        room_id: RoomId,
         /// The game.
-        game_id: Id,
+        game_id: GameId,
     },
 }
 

@@ -4,7 +4,8 @@
 use chefshat_proto::v1;
 use sqlx::AssertSqlSafe;
 
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, Id, IsUnit, Study, StudyId, Tournament, TournamentId, UnitId};
+use chefshat_room::journal::GameHeader;
 
 /// What a unit is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -16,9 +17,12 @@ pub enum UnitKind {
 }
 
 impl UnitKind {
-    /// The id of a unit of this kind.
-    pub fn id(self, id: Id) -> UnitId {
-        UnitId { kind: self, id }
+    /// The unit of this kind whose stored id has these bytes.
+    pub(super) fn unit(self, id: [u8; 16]) -> UnitKey {
+        match self {
+            Self::Tournament => UnitKey::Tournament(Id::from_bytes(id)),
+            Self::Study => UnitKey::Study(Id::from_bytes(id)),
+        }
     }
 
     /// Its name in the plural.
@@ -67,13 +71,78 @@ pub(super) const HEADER: &str = "SELECT number, form, header FROM {units} WHERE 
 /// The rows of a unit, by its number.
 pub(super) const ROWS: &str = "SELECT {entries} FROM {rows} WHERE {unit} = $1 ORDER BY position";
 
+/// A kind of id that stores know: of tournaments or of studies.
+pub trait StoredKind: IsUnit + Sized + 'static {
+    /// The kind.
+    const KIND: UnitKind;
+    /// The unit with this id.
+    fn key(id: Id<Self>) -> UnitKey;
+    /// The id of a unit, if it is of this kind.
+    fn id_of(unit: UnitKey) -> Option<Id<Self>>;
+}
+
+impl StoredKind for Tournament {
+    const KIND: UnitKind = UnitKind::Tournament;
+
+    fn key(id: TournamentId) -> UnitKey {
+        UnitKey::Tournament(id)
+    }
+
+    fn id_of(unit: UnitKey) -> Option<TournamentId> {
+        match unit {
+            UnitKey::Tournament(id) => Some(id),
+            UnitKey::Study(_) => None,
+        }
+    }
+}
+
+impl StoredKind for Study {
+    const KIND: UnitKind = UnitKind::Study;
+
+    fn key(id: StudyId) -> UnitKey {
+        UnitKey::Study(id)
+    }
+
+    fn id_of(unit: UnitKey) -> Option<StudyId> {
+        match unit {
+            UnitKey::Study(id) => Some(id),
+            UnitKey::Tournament(_) => None,
+        }
+    }
+}
+
 /// Which unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct UnitId {
+pub enum UnitKey {
+    /// A tournament.
+    Tournament(TournamentId),
+    /// A study.
+    Study(StudyId),
+}
+
+impl UnitKey {
+    /// The tournament or study that a game is part of, if any.
+    pub fn of_game(header: &GameHeader) -> Option<Self> {
+        let tournament = header.tournament.map(|game| game.tournament);
+        let study = header.study.as_ref().map(|game| game.study);
+        (tournament.map(Self::Tournament)).or(study.map(Self::Study))
+    }
+
     /// Its kind.
-    pub kind: UnitKind,
+    pub fn kind(self) -> UnitKind {
+        match self {
+            Self::Tournament(_) => UnitKind::Tournament,
+            Self::Study(_) => UnitKind::Study,
+        }
+    }
+
     /// Its id.
-    pub id: Id,
+    pub fn id(self) -> UnitId {
+        match self {
+            Self::Tournament(id) => id.unit(),
+            Self::Study(id) => id.unit(),
+        }
+    }
 }
 
 /// What is written for a unit.
@@ -132,7 +201,7 @@ pub struct StoredTraces {
     /// Number of the participant.
     pub number: u32,
     /// The game.
-    pub game: Id,
+    pub game: GameId,
     /// Number of the session in which they were sent, from 1; 0 if it was not stored.
     pub session: u32,
     /// The traces, in order.

@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use chefshat_proto::v1;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, StudyId};
 use chefshat_room::journal::{Change, Entry, GameHeader};
-use chefshat_server::store::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
+use chefshat_server::store::units::{StoredTraces, StoredUnit, UnitKey, UnitKind, UnitWrite};
 use chefshat_server::store::{
     Journal, Listed, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame,
 };
@@ -22,7 +22,7 @@ const SLOWEST_COMMIT: Duration = Duration::from_millis(20);
 
 /// What is on the disk.
 pub(crate) struct Disk {
-    games: Mutex<BTreeMap<Id, OnDisk>>,
+    games: Mutex<BTreeMap<GameId, OnDisk>>,
     chance: Mutex<ChaCha8Rng>,
 }
 
@@ -43,12 +43,12 @@ impl Disk {
         })
     }
 
-    fn games(&self) -> MutexGuard<'_, BTreeMap<Id, OnDisk>> {
+    fn games(&self) -> MutexGuard<'_, BTreeMap<GameId, OnDisk>> {
         self.games.lock().expect("no panic")
     }
 
     /// Commits a change: half of the time passes before it is on the disk, half of it after.
-    async fn commit(&self, change: impl FnOnce(&mut BTreeMap<Id, OnDisk>)) {
+    async fn commit(&self, change: impl FnOnce(&mut BTreeMap<GameId, OnDisk>)) {
         let half = {
             let mut chance = self.chance.lock().expect("no panic");
             SLOWEST_COMMIT.mul_f64(chance.random_range(0.0..0.5))
@@ -83,7 +83,7 @@ impl DiskStore {
         }
     }
 
-    fn journal(&self, game: Id) -> Box<dyn Journal> {
+    fn journal(&self, game: GameId) -> Box<dyn Journal> {
         Box::new(DiskJournal {
             disk: Arc::clone(&self.disk),
             game,
@@ -142,12 +142,15 @@ impl Store for DiskStore {
         async move { Ok(finished) }.boxed()
     }
 
-    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
+    fn summary(
+        &self,
+        game: GameId,
+    ) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
         let summary = (self.disk.games().get(&game)).and_then(|game| game.summary.clone());
         async move { Ok(summary) }.boxed()
     }
 
-    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
+    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         let games = self.disk.games();
         let stored = (games.get(&game).filter(|game| game.finished)).map(|game| {
             StoredGame::Hosted(Arc::clone(&game.header), game.entries.clone().into(), None)
@@ -166,26 +169,26 @@ impl Store for DiskStore {
 
     fn import(
         &self,
-        game: Id,
+        game: GameId,
         summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
     ) -> BoxFuture<'_, Result<bool, StoreError>> {
         self.rest.import(game, summary, lines)
     }
 
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
         self.rest.without_record_file()
     }
 
-    fn mark_record_written(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn mark_record_written(&self, game: GameId) -> BoxFuture<'_, Result<(), StoreError>> {
         self.rest.mark_record_written(game)
     }
 
-    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
         self.rest.write_unit(unit, write)
     }
 
-    fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+    fn unit(&self, unit: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
         self.rest.unit(unit)
     }
 
@@ -193,11 +196,11 @@ impl Store for DiskStore {
         &self,
         kind: UnitKind,
         newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    ) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>> {
         self.rest.units(kind, newest_over)
     }
 
-    fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
+    fn traces(&self, study: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
         self.rest.traces(study)
     }
 
@@ -212,7 +215,7 @@ impl Store for DiskStore {
 
 struct DiskJournal {
     disk: Arc<Disk>,
-    game: Id,
+    game: GameId,
 }
 
 impl Journal for DiskJournal {
@@ -222,7 +225,7 @@ impl Journal for DiskJournal {
     ) -> BoxFuture<'a, Result<(), StoreError>> {
         async move {
             let new = std::mem::take(entries);
-            let append = |games: &mut BTreeMap<Id, OnDisk>| {
+            let append = |games: &mut BTreeMap<GameId, OnDisk>| {
                 let game = games.get_mut(&self.game).expect("created before");
                 game.entries.extend(new);
             };
@@ -243,7 +246,7 @@ impl Journal for DiskJournal {
         _signature: Option<v1::RecordSignature>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         let (id, aborted) = (self.game, summary.is_none());
-        let finish = move |games: &mut BTreeMap<Id, OnDisk>| {
+        let finish = move |games: &mut BTreeMap<GameId, OnDisk>| {
             let game = games.get_mut(&id).expect("created before");
             let closed =
                 (game.entries.iter()).any(|entry| matches!(entry.change, Change::Aborted(_)));

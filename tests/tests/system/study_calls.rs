@@ -19,7 +19,7 @@ use chefshat_server::host::Host;
 use chefshat_server::participants::ParticipantData;
 use chefshat_server::store::studies::StoredStudy;
 use chefshat_server::store::units::UnitKind;
-use chefshat_server::store::{SqliteStore, Store as _};
+use chefshat_server::store::{SqliteStore, Store as _, units_of};
 use chefshat_tests::patiently;
 use tonic::Streaming;
 use tonic::transport::Channel;
@@ -478,10 +478,7 @@ async fn a_participant_is_known_by_its_name_to_the_operator() {
     let stopping = patiently("the server to stop", host.stop());
     stopping.await.expect("a clean end");
     let store = SqliteStore::open(folder.path()).await.expect("a store");
-    let studies = store
-        .units(UnitKind::Study, usize::MAX)
-        .await
-        .expect("readable");
+    let studies = units_of(&store, usize::MAX).await.expect("readable");
     let stored = StoredStudy::read(&store, studies[0])
         .await
         .expect("readable");
@@ -542,10 +539,8 @@ async fn a_participant_is_deleted_from_a_study_of_a_server_that_is_stopped() {
     let (store, data) = with_data().await;
     let deleted = data.delete(&ana).await.expect("its games are over");
     assert_eq!(deleted.studies, 1);
-    let id = store
-        .units(UnitKind::Study, usize::MAX)
-        .await
-        .expect("readable")[0];
+    let studies = units_of(store.as_ref(), usize::MAX).await;
+    let id = studies.expect("readable")[0];
     let stored = StoredStudy::read(store.as_ref(), id)
         .await
         .expect("readable")

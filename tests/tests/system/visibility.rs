@@ -25,7 +25,7 @@ use chefshat_proto::v1::{
     self, Visibility, act_request, create_room_request::Start, record_line::Line, run_request,
     seat_command, seat_config, seat_update::Update, vector_setup,
 };
-use chefshat_room::ids::{Id, Token};
+use chefshat_room::ids::{RoomId, StudyId, Token, TournamentId, UnitId};
 use chefshat_server::access::{
     AccessSettings, MAX_SECRETS, Mode, NewToken, Role, SECRET_HEADER, Scope, TokenFile,
 };
@@ -153,7 +153,7 @@ struct Ids {
 
 impl Ids {
     fn unknown() -> Self {
-        let [room, game, tournament] = [(); 3].map(|()| Id::random().to_string());
+        let [room, game, tournament] = [(); 3].map(|()| UnitId::random().to_string());
         Self {
             room,
             game,
@@ -271,7 +271,7 @@ async fn callers(
         &subject.ids.game,
         &subject.ids.tournament,
     ]
-    .map(|id| Id::parse(id).expect("an id"));
+    .map(|id| UnitId::parse(id).expect("an id"));
     let forged = [room, tournament].map(|id| Token::random(id).to_text());
     let (forged, others) = (forged.each_ref(), &other.tickets[0]);
     let ticket = &subject.tickets[2];
@@ -380,7 +380,7 @@ async fn asked_counting(
     let mut rooms = RoomServiceClient::new(client.channel());
     let mut records = RecordServiceClient::new(client.channel());
     let mut tournaments = TournamentServiceClient::new(client.channel());
-    let wrong = |id: &str| Token::random(Id::parse(id).expect("an id")).to_text();
+    let wrong = |id: &str| Token::random(UnitId::parse(id).expect("an id")).to_text();
     let mut answers = BTreeMap::new();
     let (room_id, tournament_id) = (&ids.room, &ids.tournament);
     macro_rules! ask {
@@ -1135,7 +1135,7 @@ async fn asked_of_study(
     }
     macro_rules! ask_owner {
         ($name:literal, $call:ident, $request:ident) => {
-            let owner_token = Token::random(Id::parse(study_id).expect("an id")).to_text();
+            let owner_token = Token::random(StudyId::parse(study_id).expect("an id")).to_text();
             ask!(
                 $name,
                 owner.$call($request {
@@ -1203,7 +1203,7 @@ async fn asked_of_study(
         participant.save_answers(SaveAnswersRequest { session: session })
     );
     let request = v1::ListStudiesRequest {
-        owner_tokens: vec![Token::random(Id::parse(study_id).expect("an id")).to_text()],
+        owner_tokens: vec![Token::random(StudyId::parse(study_id).expect("an id")).to_text()],
     };
     let mut listed = owner.list_studies(request).await.expect("a list");
     assert_eq!(std::mem::take(&mut listed.get_mut().studies), []);
@@ -1258,7 +1258,7 @@ async fn a_wrong_secret_of_a_study_is_answered_like_an_unknown_study() {
         &*with(&session, end),
     );
     let unknown = (
-        &*Id::random().to_string(),
+        &*StudyId::random().to_string(),
         &*with(link, 0),
         &*with(&session, 0),
     );
@@ -1315,8 +1315,8 @@ async fn a_token_for_a_private_room_shows_it() {
     let client = server.client(Some(&host), &[]).await;
     let private = Subject::new(&client, Visibility::Private).await;
     let other = Subject::new(&client, Visibility::Private).await;
-    let scope = |id: &str| Id::parse(id).expect("an id");
-    let room = Scope::Room(scope(&private.ids.room));
+    let room = RoomId::parse(&private.ids.room).expect("an id");
+    let room = Scope::Room(room);
     let token = server.token(Role::Spectator, Some(room));
     let scoped = server.client(Some(&token), &[]).await;
     scoped.get_room(&private.ids.room).await.expect("its room");
@@ -1337,14 +1337,15 @@ async fn a_token_for_a_private_room_shows_it() {
     let player = server.client(Some(&player), &[]).await;
     let leave = |ids: Ids| {
         let mut service = RoomServiceClient::new(player.channel());
-        let ticket = Token::random(Id::parse(&ids.room).expect("an id")).to_text();
+        let ticket = Token::random(RoomId::parse(&ids.room).expect("an id")).to_text();
         async move {
             let request = v1::LeaveRoomRequest { ticket };
             answer(service.leave_room(request).await, &ids)
         }
     };
     assert_eq!(leave(hidden).await, leave(unknown).await);
-    let tournament = Scope::Tournament(scope(&private.ids.tournament));
+    let tournament = TournamentId::parse(&private.ids.tournament).expect("an id");
+    let tournament = Scope::Tournament(tournament);
     let token = server.token(Role::Spectator, Some(tournament));
     let scoped = server.client(Some(&token), &[]).await;
     let shown = scoped.tournament(&private.ids.tournament).await;
@@ -1451,7 +1452,7 @@ async fn games_that_are_not_public_are_not_rated() {
 async fn malformed_secrets_are_refused() {
     let server = Server::start(mode(Mode::Open)).await;
     let client = server.client(None, &[]).await;
-    let secret = Token::random(Id::random()).to_text();
+    let secret = Token::random(RoomId::random()).to_text();
     let ask = |values: Vec<&str>| {
         let mut request = Request::new(v1::GetServerInfoRequest {});
         for value in values {

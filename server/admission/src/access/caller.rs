@@ -4,7 +4,7 @@ use std::fmt;
 use std::net::IpAddr;
 use std::str::FromStr;
 
-use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::ids::{RoomId, SecretHash, TournamentId};
 use serde::{Deserialize, Serialize};
 
 use super::secrets::{Relation, Secrets};
@@ -66,9 +66,9 @@ impl FromStr for Role {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Scope {
     /// One room.
-    Room(Id),
+    Room(RoomId),
     /// One tournament with its rooms.
-    Tournament(Id),
+    Tournament(TournamentId),
 }
 
 impl fmt::Display for Scope {
@@ -105,7 +105,7 @@ impl Caller {
     }
 
     /// Whether its scope includes a room. `tournament` is the tournament that the room belongs to.
-    pub fn reaches_room(&self, room: Id, tournament: Option<Id>) -> bool {
+    pub fn reaches_room(&self, room: RoomId, tournament: Option<TournamentId>) -> bool {
         match self.scope {
             None => true,
             Some(Scope::Room(only)) => only == room,
@@ -114,7 +114,7 @@ impl Caller {
     }
 
     /// Whether its scope includes a tournament.
-    pub fn reaches_tournament(&self, tournament: Id) -> bool {
+    pub fn reaches_tournament(&self, tournament: TournamentId) -> bool {
         self.scope
             .is_none_or(|only| only == Scope::Tournament(tournament))
     }
@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn a_scope_is_one_room_or_one_tournament_with_its_rooms() {
-        let (room, tournament, other) = (Id([1; 16]), Id([2; 16]), Id([3; 16]));
+        let (room, tournament) = (RoomId::random(), TournamentId::random());
         let scoped = |scope| Caller {
             scope,
             ..Caller::default()
@@ -166,11 +166,13 @@ mod tests {
         assert!(everywhere.reaches_room(room, None) && everywhere.reaches_tournament(tournament));
         let in_room = scoped(Some(Scope::Room(room)));
         assert!(in_room.reaches_room(room, None) && in_room.reaches_room(room, Some(tournament)));
-        assert!(!in_room.reaches_room(other, Some(tournament)));
-        assert!(!in_room.reaches_tournament(tournament) && !in_room.reaches_tournament(room));
+        assert!(!in_room.reaches_room(RoomId::random(), Some(tournament)));
+        assert!(!in_room.reaches_tournament(tournament));
+        assert!(!in_room.reaches_tournament(TournamentId::from_bytes(*room.bytes())));
         let in_tournament = scoped(Some(Scope::Tournament(tournament)));
         assert!(in_tournament.reaches_room(room, Some(tournament)));
         assert!(!in_tournament.reaches_room(room, None));
+        let other = TournamentId::random();
         assert!(!in_tournament.reaches_room(room, Some(other)));
         assert!(in_tournament.reaches_tournament(tournament));
         assert!(!in_tournament.reaches_tournament(other));

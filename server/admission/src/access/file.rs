@@ -293,11 +293,12 @@ impl Line {
     fn read(self) -> Result<StoredToken, String> {
         let id: TokenId = self.id.parse()?;
         let wrong = |field: &str| format!("token {id}: `{field}` is not valid");
-        let parsed = |field, text: &str| Id::parse(text).ok_or_else(|| wrong(field));
         let scope = match (&self.room, &self.tournament) {
             (None, None) => None,
-            (Some(room), None) => Some(Scope::Room(parsed("room", room)?)),
-            (None, Some(it)) => Some(Scope::Tournament(parsed("tournament", it)?)),
+            (Some(room), None) => Some(Scope::Room(Id::parse(room).ok_or_else(|| wrong("room"))?)),
+            (None, Some(it)) => Some(Scope::Tournament(
+                Id::parse(it).ok_or_else(|| wrong("tournament"))?,
+            )),
             (Some(_), Some(_)) => return Err(wrong("room")),
         };
         let mut hash = [0; 32];

@@ -4,7 +4,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use chefshat_room::ids::{Id, SecretHash, Token};
+use chefshat_room::ids::{SecretHash, UnitId, UnitToken};
 
 /// The name of the request header that shows a secret. It may be repeated.
 pub const SECRET_HEADER: &str = "chefshat-secret";
@@ -37,7 +37,7 @@ pub enum Relation {
 
 /// The secrets of a caller.
 #[derive(Clone, Default)]
-pub struct Secrets(Option<Arc<[Token]>>);
+pub struct Secrets(Option<Arc<[UnitToken]>>);
 
 impl Secrets {
     /// Reads the values of the header, each of them one secret or several with commas in between,
@@ -52,29 +52,30 @@ impl Secrets {
                 return Err(SecretsRefused::TooMany);
             }
             let word = std::str::from_utf8(word.trim_ascii()).ok();
-            let token = word.and_then(Token::parse);
+            let token = word.and_then(UnitToken::parse);
             tokens.push(token.ok_or(SecretsRefused::Malformed)?);
         }
         Ok(Self::of(tokens))
     }
 
-    fn of(tokens: Vec<Token>) -> Self {
+    fn of(tokens: Vec<UnitToken>) -> Self {
         Self((!tokens.is_empty()).then(|| tokens.into()))
     }
 
     /// These secrets and one that a request contains, unless it is malformed.
     pub fn with(&self, secret: &str) -> Self {
-        let all = self.all().iter().copied().chain(Token::parse(secret));
+        let all = self.all().iter().copied().chain(UnitToken::parse(secret));
         Self::of(all.collect())
     }
 
-    /// The secrets of a room or tournament.
-    pub fn of_id(&self, id: Id) -> impl Iterator<Item = &Token> {
+    /// The secrets of a room, tournament or study.
+    pub fn of_id(&self, id: impl Into<UnitId>) -> impl Iterator<Item = &UnitToken> {
+        let id = id.into();
         self.all().iter().filter(move |token| token.subject == id)
     }
 
     /// Whether one of them is said to be of this room or tournament.
-    pub fn mention(&self, id: Id) -> bool {
+    pub fn mention(&self, id: impl Into<UnitId>) -> bool {
         self.of_id(id).next().is_some()
     }
 
@@ -82,7 +83,7 @@ impl Secrets {
     /// tickets have these hashes. In constant time for each.
     pub fn relation(
         &self,
-        id: Id,
+        id: impl Into<UnitId>,
         owner: &SecretHash,
         tickets: impl Iterator<Item = SecretHash> + Clone,
     ) -> Relation {
@@ -99,7 +100,7 @@ impl Secrets {
         relations.max().unwrap_or(Relation::Stranger)
     }
 
-    fn all(&self) -> &[Token] {
+    fn all(&self) -> &[UnitToken] {
         self.0.as_deref().unwrap_or_default()
     }
 }
@@ -116,18 +117,18 @@ mod tests {
 
     #[test]
     fn secrets_are_read_from_every_value() {
-        let (room, other) = (Id([1; 16]), Id([2; 16]));
+        let [room, other] = [1, 2].map(|id| UnitId::from_bytes([id; 16]));
         let tokens = [
-            Token::random(room),
-            Token::random(room),
-            Token::random(other),
+            UnitToken::random(room),
+            UnitToken::random(room),
+            UnitToken::random(other),
         ];
         let [first, second, third] = tokens.map(|token| token.to_text());
         let values = [first.clone(), format!("{second} , {third}")];
         let values = || values.iter().map(String::as_bytes);
         let secrets = Secrets::parse(values()).expect("three secrets");
         assert_eq!(secrets.of_id(room).count(), 2);
-        assert!(secrets.mention(other) && !secrets.mention(Id([3; 16])));
+        assert!(secrets.mention(other) && !secrets.mention(UnitId::from_bytes([3; 16])));
         assert!(!format!("{secrets:?}").contains(&first));
         let many = std::iter::repeat_n(first.as_bytes(), MAX_SECRETS);
         assert!(Secrets::parse(many.clone()).is_ok());
@@ -141,18 +142,18 @@ mod tests {
 
     #[test]
     fn the_best_secret_of_a_room_counts() {
-        let (room, other) = (Id([1; 16]), Id([2; 16]));
-        let (owner, ticket) = (Token::random(room), Token::random(room));
-        let relation = |tokens: Vec<Token>| {
+        let [room, other] = [1, 2].map(|id| UnitId::from_bytes([id; 16]));
+        let (owner, ticket) = (UnitToken::random(room), UnitToken::random(room));
+        let relation = |tokens: Vec<UnitToken>| {
             let tickets = [ticket.hash()].into_iter();
             Secrets::of(tokens).relation(room, &owner.hash(), tickets)
         };
-        let elsewhere = |token: Token| Token {
+        let elsewhere = |token: UnitToken| UnitToken {
             subject: other,
             ..token
         };
         assert_eq!(relation(vec![]), Relation::Stranger);
-        assert_eq!(relation(vec![Token::random(room)]), Relation::Stranger);
+        assert_eq!(relation(vec![UnitToken::random(room)]), Relation::Stranger);
         assert_eq!(relation(vec![ticket]), Relation::Participant);
         assert_eq!(relation(vec![ticket, owner]), Relation::Owner);
         assert_eq!(relation(vec![elsewhere(owner)]), Relation::Stranger);

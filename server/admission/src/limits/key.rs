@@ -2,7 +2,7 @@
 
 use std::net::{IpAddr, Ipv6Addr};
 
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{StudyId, TournamentId};
 
 use crate::access::{Caller, TokenId};
 
@@ -19,9 +19,9 @@ pub enum Key {
     /// addresses of their own.
     Proxies,
     /// A tournament that was resumed: who created it is unknown.
-    Tournament(Id),
+    Tournament(TournamentId),
     /// A study that was resumed: who created it is unknown.
-    Study(Id),
+    Study(StudyId),
     /// Rooms that were resumed: who created them is unknown.
     Resumed,
 }

@@ -35,7 +35,7 @@ use chefshat_hosting::cluster::{FoundBy, Location};
 use chefshat_hosting::config::FOLLOW_SEND_TIMEOUT;
 use chefshat_hosting::participants::{DataError, Participants, StudiesElsewhere};
 use chefshat_hosting::retention::Retention;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{RoomId, StudyId, TournamentId};
 use chefshat_store::{ForgetError, Keep};
 
 /// Most clients in a page.
@@ -124,7 +124,7 @@ impl AdminService for AdminCalls {
         request: Request<v1::AdminServiceCloseRoomRequest>,
     ) -> Result<Response<v1::AdminServiceCloseRoomResponse>, Status> {
         let key = charged(request.extensions());
-        let id = Id::parse(&request.into_inner().room_id).ok_or_else(room_unknown)?;
+        let id = RoomId::parse(&request.into_inner().room_id).ok_or_else(room_unknown)?;
         let handle = self.lookup.room_here(id, key).await?;
         let handle = handle.ok_or_else(room_unknown)?;
         info!(room = %handle.id(), "an operator closes a room");
@@ -139,7 +139,8 @@ impl AdminService for AdminCalls {
         request: Request<v1::AdminServiceCloseTournamentRequest>,
     ) -> Result<Response<v1::AdminServiceCloseTournamentResponse>, Status> {
         let key = charged(request.extensions());
-        let id = Id::parse(&request.into_inner().tournament_id).ok_or_else(tournament_unknown)?;
+        let id = TournamentId::parse(&request.into_inner().tournament_id)
+            .ok_or_else(tournament_unknown)?;
         let handle = self.lookup.tournament_here(id, key).await?;
         let handle = handle.ok_or_else(tournament_unknown)?;
         info!(tournament = %handle.id(), "an operator closes a tournament");
@@ -346,11 +347,11 @@ impl OtherNodes {
 }
 
 impl StudiesElsewhere for OtherNodes {
-    async fn delete_participant(&self, study: Id, number: u32) -> Result<(), DataError> {
+    async fn delete_participant(&self, study: StudyId, number: u32) -> Result<(), DataError> {
         let Some(gateway) = &self.0 else {
             return Err(DataError::StudyUnreachable);
         };
-        let found_by = FoundBy::Id(study);
+        let found_by = FoundBy::from(study);
         let located = gateway.directory().locate(&found_by, Key::Resumed).await;
         let Location::Node(peer) = located else {
             return Err(DataError::StudyUnreachable);

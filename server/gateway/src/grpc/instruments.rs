@@ -7,7 +7,7 @@ use std::time::Duration;
 use chefshat_engine::Seat;
 use chefshat_proto::v1::{self, instrument_service_server::InstrumentService};
 use chefshat_record::convert::{FieldProblem, check_label};
-use chefshat_room::ids::Token;
+use chefshat_room::ids::{Token, UnitToken};
 use chefshat_room::journal::Marked;
 use chefshat_room::{MARKERS_AT_ONCE, MAX_MARKERS, MarkError};
 use futures::{Stream, stream};
@@ -51,15 +51,15 @@ impl Instruments {
         let room = self.lookup.room(&caller, room_id).await?;
         let header = self.lookup.rooms().header(room.id());
         let is_study =
-            |id| header.is_some_and(|it| it.study.as_ref().is_some_and(|of| of.study == id));
-        let token = match Token::parse(owner_token) {
-            Some(token) if token.subject == room.id() => token,
+            |id| header.is_some_and(|it| it.study.as_ref().is_some_and(|of| of.study.unit() == id));
+        let secret = match UnitToken::parse(owner_token) {
+            Some(token) if token.subject == room.id().unit() => token.secret,
             Some(token) if is_study(token.subject) => {
-                Token::of_tournament_room(room.id(), &token.hash())
+                Token::of_tournament_room(room.id(), &token.hash()).secret
             }
             _ => return Err(owner_token_wrong()),
         };
-        Ok((room, token.secret))
+        Ok((room, secret))
     }
 
     /// The room and seat of a ticket, and whether its game has started.

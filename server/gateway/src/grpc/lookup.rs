@@ -21,7 +21,9 @@ use chefshat_hosting::cluster::{Elsewhere, FoundBy, Location};
 use chefshat_hosting::room::Handle;
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::tournaments::{TournamentHandle, Tournaments};
-use chefshat_room::ids::{Id, RequestKey, SecretHash, Token};
+use chefshat_room::ids::{
+    Id, RequestKey, RoomId, SecretHash, StudyId, Token, TournamentId, UnitId,
+};
 use chefshat_room::journal::{Change, Entry, GameHeader};
 use chefshat_room::policy::Visibility;
 use chefshat_store::{StoreError, StoredGame};
@@ -94,7 +96,7 @@ impl Lookup {
 
     fn room_in_memory(&self, found_by: &FoundBy) -> Option<Handle> {
         match found_by {
-            FoundBy::Id(id) => self.rooms.get(*id),
+            FoundBy::Id(id) => self.rooms.by_unit(*id),
             FoundBy::Code(code) => self.rooms.by_code(code),
             FoundBy::Game(game) => self.rooms.get(self.rooms.room_of(*game)?),
         }
@@ -102,7 +104,7 @@ impl Lookup {
 
     fn tournament_in_memory(&self, found_by: &FoundBy) -> Option<Arc<TournamentHandle>> {
         match found_by {
-            FoundBy::Id(id) => self.tournaments.get(*id),
+            FoundBy::Id(id) => self.tournaments.by_unit(*id),
             FoundBy::Code(code) => self.tournaments.by_code(code),
             FoundBy::Game(_) => None,
         }
@@ -139,7 +141,7 @@ impl Lookup {
 
     fn has_created(&self, request: RequestKey) -> bool {
         let id = request.created_id();
-        self.rooms.get(id).is_some() || self.tournaments.get(id).is_some()
+        self.rooms.by_unit(id).is_some() || self.tournaments.by_unit(id).is_some()
     }
 
     /// Sends a request for something new to the node that is to create it. `gateway`: `None` if another
@@ -166,8 +168,8 @@ impl Lookup {
     ) -> Result<bool, Status> {
         match self.rooms.directory().locate(found_by, caller).await {
             Location::Nowhere => Ok(false),
-            Location::Over(id, kind) => {
-                let shown = self.tournaments.show_ended(id, kind).await;
+            Location::Over(what) => {
+                let shown = self.tournaments.show_ended(what).await;
                 shown.map(|()| false).map_err(|error| {
                     warn!(%error, "what is over cannot be read");
                     owner_unreachable()
@@ -192,7 +194,7 @@ impl Lookup {
     pub(super) async fn room_or(
         &self,
         caller: &Caller,
-        id: Id,
+        id: RoomId,
         unknown: impl Fn() -> Status,
     ) -> Result<Handle, Status> {
         let unknown = || match self.rooms.is_shutting_down() && caller.secrets.mention(id) {
@@ -214,7 +216,7 @@ impl Lookup {
     }
 
     /// Checks that the scope of a caller who has the join code of a room includes it.
-    pub(super) fn check_joining(&self, caller: &Caller, room: Id) -> Result<(), Status> {
+    pub(super) fn check_joining(&self, caller: &Caller, room: RoomId) -> Result<(), Status> {
         let tournament = || self.rooms.header(room)?.tournament;
         check(caller, |caller| {
             caller.reaches_room(room, tournament().map(|game| game.tournament))
@@ -227,24 +229,26 @@ impl Lookup {
     pub(super) async fn room_of_ticket(
         &self,
         caller: &Caller,
-        room: Id,
+        room: RoomId,
         unknown: impl Fn() -> Status,
     ) -> Result<Handle, Status> {
-        let look = || self.look_for_ticket(caller, room, &unknown);
+        let look = || self.look_for_ticket(caller, room.unit(), &unknown);
         settled(&self.rooms, look).await
     }
 
-    /// As [`Lookup::room_of_ticket`], without waiting.
+    /// As [`Lookup::room_of_ticket`], without waiting, for a ticket that may be of a tournament.
     pub(super) async fn look_for_ticket(
         &self,
         caller: &Caller,
-        room: Id,
+        id: UnitId,
         unknown: impl Fn() -> Status,
     ) -> Result<Handle, Status> {
-        let found = self.room_here(room, Key::of_caller(caller)).await?;
+        let found = self
+            .room_here(FoundBy::Id(id), Key::of_caller(caller))
+            .await?;
         let handle = found.ok_or_else(&unknown)?;
         if caller.scope.is_some() {
-            let header = self.rooms.header(room).ok_or_else(room_gone)?;
+            let header = self.rooms.header(handle.id()).ok_or_else(room_gone)?;
             check(caller, |caller| reaches(caller, &header)).map_err(|refused| {
                 match header.policy.visibility {
                     Visibility::Private => unknown(),
@@ -257,8 +261,9 @@ impl Lookup {
 
     /// Whether the room or tournament of a ticket is in memory and runs, so that finding it takes no
     /// time.
-    pub(super) fn has_in_memory(&self, id: Id) -> bool {
-        self.tournaments.get(id).is_some() || self.rooms.get(id).is_some_and(|room| !room.is_gone())
+    pub(super) fn has_in_memory(&self, id: UnitId) -> bool {
+        self.tournaments.by_unit(id).is_some()
+            || self.rooms.by_unit(id).is_some_and(|room| !room.is_gone())
     }
 
     /// Whether a room is in the lists of a caller.
@@ -277,7 +282,7 @@ impl Lookup {
         caller: &Caller,
         id: &str,
     ) -> Result<Arc<TournamentHandle>, Status> {
-        let id = Id::parse(id).ok_or_else(tournament_unknown)?;
+        let id = TournamentId::parse(id).ok_or_else(tournament_unknown)?;
         let handle = self.tournament_here(id, Key::of_caller(caller)).await?;
         let handle = handle.ok_or_else(tournament_unknown)?;
         if handle.visibility() == Visibility::Private
@@ -294,11 +299,11 @@ impl Lookup {
     pub(super) fn tournament_of_ticket(
         &self,
         caller: &Caller,
-        id: Id,
+        id: UnitId,
         unknown: impl Fn() -> Status,
     ) -> Option<Result<(), Status>> {
-        let tournament = self.tournaments.get(id)?;
-        let checked = check(caller, |it| it.reaches_tournament(id));
+        let tournament = self.tournaments.by_unit(id)?;
+        let checked = check(caller, |it| it.reaches_tournament(tournament.id()));
         Some(checked.map_err(|refused| match tournament.visibility() {
             Visibility::Private => unknown(),
             Visibility::Public | Visibility::Unlisted => refused,
@@ -317,7 +322,7 @@ impl Lookup {
     pub(super) fn may_see_record(&self, caller: &Caller, summary: &v1::RecordSummary) -> bool {
         let is_private = summary.visibility() == v1::Visibility::Private;
         let ids = [&summary.room_id, &summary.tournament_id, &summary.study_id];
-        let mut ids = ids.into_iter().filter_map(|id| Id::parse(id));
+        let mut ids = ids.into_iter().filter_map(|id| UnitId::parse(id));
         let by_token = caller.relation() > Relation::Stranger
             && reaches_record(caller, &summary.room_id, &summary.tournament_id);
         !is_private || summary.added || by_token || ids.any(|id| caller.secrets.mention(id))
@@ -375,16 +380,16 @@ impl Lookup {
         if is_public || summary.added || caller.relation() > Relation::Stranger {
             return Some(true);
         }
-        let tournament = Id::parse(&summary.tournament_id);
+        let tournament = TournamentId::parse(&summary.tournament_id);
         let kept = tournament.and_then(|id| self.tournaments.get(id));
         let relation = kept.as_ref().map(|it| it.relation(&caller.secrets));
         if relation > Some(Relation::Stranger) {
             return Some(true);
         }
         // The games of a tournament may outlast it.
-        let forgotten = tournament.filter(|_| kept.is_none());
-        let study = Id::parse(&summary.study_id);
-        let room = Id::parse(&summary.room_id);
+        let forgotten = (tournament.filter(|_| kept.is_none())).map(TournamentId::unit);
+        let study = StudyId::parse(&summary.study_id).map(StudyId::unit);
+        let room = RoomId::parse(&summary.room_id);
         if let (Some(room), Some(owner)) = (room, owner) {
             let by_room = caller.secrets.relation(room, owner, std::iter::empty());
             let mut units = forgotten.into_iter().chain(study);
@@ -395,7 +400,7 @@ impl Lookup {
             }
         }
         // Reading a game takes time: only those that a ticket may be of are read.
-        let mut ids = room.into_iter().chain(forgotten);
+        let mut ids = room.map(RoomId::unit).into_iter().chain(forgotten);
         let may_take_part = study.is_none() && ids.any(|id| caller.secrets.mention(id));
         (!may_take_part).then_some(false)
     }
@@ -435,7 +440,10 @@ impl Lookup {
         if relation > Relation::Stranger {
             return relation;
         }
-        let ids = [Some(header.room_id), tournament_of(header)];
+        let ids = [
+            Some(header.room_id.unit()),
+            tournament_of(header).map(TournamentId::unit),
+        ];
         let secrets: Vec<_> = (ids.into_iter().flatten())
             .flat_map(|id| caller.secrets.of_id(id))
             .map(|token| token.secret)
@@ -462,7 +470,10 @@ impl Lookup {
                 _ => {}
             }
         }
-        let ids = [Some(header.room_id), tournament_of(header)];
+        let ids = [
+            Some(header.room_id.unit()),
+            tournament_of(header).map(TournamentId::unit),
+        ];
         let by_ticket = (ids.into_iter().flatten())
             .map(|id| (caller.secrets).relation(id, &header.owner, tickets.values().copied()));
         let relation = self.relation_by_header(caller, header);
@@ -496,16 +507,20 @@ impl Lookup {
         };
         let secrets = &caller.secrets;
         let by_room = secrets.relation(header.room_id, &header.owner, header.table.into_iter());
-        let by_owner_of = |id| match owns_unit_of(caller, id, (header.room_id, &header.owner)) {
-            true => Relation::Owner,
-            false => Relation::Stranger,
-        };
+        let by_owner_of =
+            |id: UnitId| match owns_unit_of(caller, id, (header.room_id, &header.owner)) {
+                true => Relation::Owner,
+                false => Relation::Stranger,
+            };
         let by_tournament = tournament_of(header).map(|id| match self.tournaments.get(id) {
             Some(tournament) => tournament.relation(secrets),
             // The server keeps the games of a tournament longer than the tournament.
-            None => by_owner_of(id),
+            None => by_owner_of(id.unit()),
         });
-        let by_study = header.study.as_ref().map(|game| by_owner_of(game.study));
+        let by_study = header
+            .study
+            .as_ref()
+            .map(|game| by_owner_of(game.study.unit()));
         by_token
             .max(by_room)
             .max(by_tournament.unwrap_or(Relation::Stranger))
@@ -515,7 +530,7 @@ impl Lookup {
 
 /// Whether a caller shows the owner token of a tournament or a study, which stands for that of each
 /// of its rooms. A room is given by its id and the hash of its owner token.
-fn owns_unit_of(caller: &Caller, unit: Id, (room, owner): (Id, &SecretHash)) -> bool {
+fn owns_unit_of(caller: &Caller, unit: UnitId, (room, owner): (RoomId, &SecretHash)) -> bool {
     caller.secrets.of_id(unit).any(|token| {
         let derived = Token::of_tournament_room(room, &token.hash());
         owner.is(&derived.hash())
@@ -538,7 +553,7 @@ fn least_to_read(header: &GameHeader) -> Relation {
     }
 }
 
-fn tournament_of(header: &GameHeader) -> Option<Id> {
+fn tournament_of(header: &GameHeader) -> Option<TournamentId> {
     header.tournament.map(|game| game.tournament)
 }
 

@@ -38,7 +38,7 @@ use chefshat_hosting::config::MAX_SEATS_PER_WATCH;
 use chefshat_hosting::room::{Loss, SeatAction};
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::tournaments::Tournaments;
-use chefshat_room::ids::{Id, Token};
+use chefshat_room::ids::{Id, RoomToken};
 use chefshat_wire::convert;
 use chefshat_wire::encoded::Updates;
 use chefshat_wire::encoded::peer::peer_service_server::PeerService;
@@ -271,12 +271,12 @@ impl PlayService for Play {
         let caller = Caller::of(request.extensions());
         let executing: Option<Executing> = request.extensions().get().cloned();
         let request = request.into_inner();
-        let token = Token::parse(&request.ticket).ok_or_else(ticket_unknown)?;
+        let token = RoomToken::parse(&request.ticket).ok_or_else(ticket_unknown)?;
         // Before the room is looked for: what is wrong with a command does not depend on the ticket.
         let command = Command::of(request.command)?;
         if let Some(executing) = executing
             .as_ref()
-            .filter(|_| !self.lookup.has_in_memory(token.subject))
+            .filter(|_| !self.lookup.has_in_memory(token.subject.unit()))
         {
             // Others are not delayed while it is looked for.
             executing.give_back();
@@ -392,7 +392,7 @@ mod tests {
         let tournaments = Tournaments::new(Arc::clone(&rooms), TaskTracker::new());
         let play = Play::new(rooms, tournaments, CancellationToken::new());
         let mut request = Request::new(v1::ActRequest {
-            ticket: Token::random(room).to_text(),
+            ticket: RoomToken::random(room).to_text(),
             command: Some(command),
         });
         let limits = CallLimits::new(Shares::default());

@@ -38,7 +38,7 @@ use chefshat_hosting::config::{
     MAX_IMPORT_MEMORY, MAX_IMPORTS, MAX_RECORDS_SENT, RECORD_SEND_TIMEOUT, ServerConfig,
 };
 use chefshat_hosting::tournaments::Tournaments;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 use chefshat_store::{Listed, Part, StoreError};
 
 /// Most lines in one message, and most bytes unless a single line is longer: well below the limit
@@ -327,7 +327,7 @@ impl RecordService for Records {
         let summary = summary
             .map_err(|error| refused(error.line, &error.problem))?
             .ok_or_else(|| refused(1, "the game has no deal"))?;
-        let game = Id::parse(&summary.game_id)
+        let game = GameId::parse(&summary.game_id)
             .ok_or_else(|| refused(1, "the game id does not have 32 hexadecimal digits"))?;
         let rooms = self.recorded.rooms();
         let is_ours = rooms.is_running(game) || self.tournaments.has_announced(game);
@@ -628,13 +628,13 @@ mod tests {
     use super::*;
     use chefshat_admission::access::Role;
     use chefshat_hosting::rooms::Rooms;
-    use chefshat_room::ids::Token;
+    use chefshat_room::ids::{RoomId, StudyId, Token, UnitToken};
     use chefshat_store::{MemoryStore, Store as _};
 
     fn header(game: u8) -> v1::RecordLine {
         v1::RecordLine {
             line: Some(Line::Header(v1::RecordHeader {
-                game_id: Id([game; 16]).to_string(),
+                game_id: GameId::from_bytes([game; 16]).to_string(),
                 ..v1::RecordHeader::default()
             })),
         }
@@ -642,7 +642,7 @@ mod tests {
 
     fn summary_of(game: u8) -> v1::RecordSummary {
         v1::RecordSummary {
-            game_id: Id([game; 16]).to_string(),
+            game_id: GameId::from_bytes([game; 16]).to_string(),
             state: v1::RoomState::Finished.into(),
             ..v1::RecordSummary::default()
         }
@@ -723,8 +723,8 @@ mod tests {
     #[tokio::test]
     async fn no_game_of_a_study_is_read_to_find_out_who_lists_it() {
         let (recorded, _) = recorded(&Arc::default());
-        let (room, study) = (Id([1; 16]), Id([2; 16]));
-        let token = Token::random(study);
+        let (room, study) = (RoomId::from_bytes([1; 16]), StudyId::from_bytes([2; 16]));
+        let token = UnitToken::random(study.unit());
         let owner = Token::of_tournament_room(room, &token.hash()).hash();
         let summary = v1::RecordSummary {
             room_id: room.to_string(),
@@ -735,7 +735,7 @@ mod tests {
             study_id: study.to_string(),
             ..summary.clone()
         };
-        let lists = |summary, secrets: &[Token]| {
+        let lists = |summary, secrets: &[UnitToken]| {
             let caller = (secrets.iter()).fold(Caller::default(), |caller, secret| {
                 caller.showing(&secret.to_text())
             });
@@ -743,11 +743,11 @@ mod tests {
         };
         // Its owner sees it; a participant, who knows the ids of the room and the study, does not.
         assert_eq!(lists(&of_study, &[token]), Some(true));
-        let participant = [Token::random(study), Token::random(room)];
+        let participant = [study.unit(), room.unit()].map(Token::random);
         assert_eq!(lists(&of_study, &participant), Some(false));
         // Others are read if the caller may have a ticket.
-        assert_eq!(lists(&summary, &[Token::random(room)]), None);
-        assert_eq!(lists(&summary, &[Token::random(study)]), Some(false));
+        assert_eq!(lists(&summary, &[Token::random(room.unit())]), None);
+        assert_eq!(lists(&summary, &[Token::random(study.unit())]), Some(false));
         assert_eq!(lists(&summary, &[]), Some(false));
     }
 
@@ -756,7 +756,7 @@ mod tests {
         let store = Arc::new(MemoryStore::default());
         for game in 1..=3 {
             let lines = Arc::from([header(game)]);
-            let imported = store.import(Id([game; 16]), summary_of(game), lines);
+            let imported = store.import(GameId::from_bytes([game; 16]), summary_of(game), lines);
             assert_eq!(imported.await, Ok(true));
         }
         let (recorded, tournaments) = recorded(&store);
@@ -778,7 +778,10 @@ mod tests {
             let sending = records.send_all(&caller, &request, &filter, (Key::Local, None), &sender);
             tokio::pin!(sending);
             assert!(sending.as_mut().now_or_never().is_none());
-            store.delete(vec![Id([1; 16])]).await.expect("deleted");
+            store
+                .delete(vec![GameId::from_bytes([1; 16])])
+                .await
+                .expect("deleted");
             drop(all);
             sending.await.expect("the others follow");
         }

@@ -23,7 +23,7 @@ use chefshat_admission::access::Caller;
 use chefshat_admission::limits::{COST_OF_BUILT_IN_GAME, COST_OF_ROOM, CallLimits, Key, Payer};
 use chefshat_hosting::room::{Handle, JoinRequest};
 use chefshat_hosting::rooms::{CreateError, Rooms};
-use chefshat_room::ids::{CODE_LENGTH, Id, Token, normal_code};
+use chefshat_room::ids::{CODE_LENGTH, RoomId, RoomToken, Token, normal_code};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_store::StoreError;
 use chefshat_wire::convert;
@@ -78,7 +78,7 @@ impl RoomCalls {
         self.calls.may_try_code(key).map_err(refused)?;
         let found = match room_id {
             "" => self.lookup().room_here(join_code, key).await?,
-            id => match Id::parse(id) {
+            id => match RoomId::parse(id) {
                 Some(id) => self.lookup().room_here(id, key).await?,
                 None => None,
             },
@@ -335,7 +335,7 @@ impl RoomService for RoomCalls {
         request: Request<v1::LeaveRoomRequest>,
     ) -> Result<Response<v1::LeaveRoomResponse>, Status> {
         let caller = Caller::of(request.extensions());
-        let ticket = Token::parse(&request.into_inner().ticket).ok_or_else(ticket_unknown)?;
+        let ticket = RoomToken::parse(&request.into_inner().ticket).ok_or_else(ticket_unknown)?;
         let lookup = self.lookup();
         let handle = lookup
             .room_of_ticket(&caller, ticket.subject, ticket_unknown)

@@ -42,7 +42,7 @@ use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::studies::{
     CreateProblem, ExportError, ExportedFile, NotAdded, Stopped, Studies, StudyHandle,
 };
-use chefshat_room::ids::{Id, RequestKey};
+use chefshat_room::ids::{Id, RequestKey, StudyId};
 use chefshat_store::StoreError;
 use chefshat_wire::convert;
 
@@ -88,12 +88,12 @@ impl StudyCalls {
 
     /// The study with this id, if this node has it. If another node does, the error sends the request
     /// there.
-    async fn here(&self, id: Id, caller: Key) -> Result<Option<Arc<StudyHandle>>, Status> {
+    async fn here(&self, id: StudyId, caller: Key) -> Result<Option<Arc<StudyHandle>>, Status> {
         let known = self.studies.get(id);
         if let Some(handle) = known.clone().filter(|handle| !handle.is_stopped()) {
             return Ok(Some(handle));
         }
-        let found_by = FoundBy::Id(id);
+        let found_by = FoundBy::from(id);
         let checked = (self.lookup).check_not_elsewhere(&found_by, caller, || known.is_some());
         checked.await?;
         Ok(self.studies.get(id))

@@ -15,7 +15,7 @@ use chefshat_admission::limits::Key;
 use chefshat_hosting::cluster::{Directory, FoundBy, Location, Peer};
 use chefshat_hosting::room::Handle;
 use chefshat_hosting::rooms::Rooms;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::UnitId;
 
 /// How long a client waits: as long as its longest pause, after which it begins with the shortest.
 pub(super) const PATIENCE: Duration = Duration::from_secs(5);
@@ -88,7 +88,7 @@ pub(super) async fn awaited(
     directory: &dyn Directory,
     peer: &Peer,
     channel: Channel,
-    ids: BTreeSet<Id>,
+    ids: BTreeSet<UnitId>,
 ) {
     let mut health = HealthClient::new(channel);
     let mut pauses = Pauses::new();

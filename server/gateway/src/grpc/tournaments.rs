@@ -44,7 +44,7 @@ use chefshat_hosting::tournaments::{
     CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem, TournamentHandle,
     Tournaments,
 };
-use chefshat_room::ids::{Id, RequestKey, Token, normal_code, random_bytes};
+use chefshat_room::ids::{RequestKey, Token, TournamentId, normal_code, random_bytes};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::ABSENCE_TIME_IN_TOURNAMENTS;
 use chefshat_store::StoreError;
@@ -108,7 +108,7 @@ impl TournamentCalls {
         let lookup = self.recorded.lookup();
         let found = match id {
             "" => lookup.tournament_here(join_code, key).await?,
-            id => match Id::parse(id) {
+            id => match TournamentId::parse(id) {
                 Some(id) => lookup.tournament_here(id, key).await?,
                 None => None,
             },

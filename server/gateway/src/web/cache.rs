@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 use tokio::sync::OnceCell;
 use tokio::time::Instant;
 
@@ -14,7 +14,7 @@ use tokio::time::Instant;
 pub(super) const KEPT_FOR: Duration = Duration::from_secs(60);
 
 /// A game, and the number of deletions on this server before its value is made.
-pub(super) type Key = (Id, u64);
+pub(super) type Key = (GameId, u64);
 
 /// Values by game.
 #[derive(Debug)]
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
 
     fn game(number: usize) -> Key {
-        let id = Id::parse(&format!("{number:032x}"));
+        let id = GameId::parse(&format!("{number:032x}"));
         (id.expect("an id"), 0)
     }
 

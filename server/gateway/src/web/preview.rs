@@ -15,7 +15,7 @@ use bytes::Bytes;
 use chefshat_proto::v1::{self, record_line::Line, record_service_client::RecordServiceClient};
 use chefshat_record::jsonl;
 use chefshat_record::outcome::outcome;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, Id};
 use http::uri::{Authority, Scheme};
 use http::{Extensions, Request, Response, header};
 use prost::Message as _;
@@ -62,9 +62,9 @@ const FORWARDED_PROTO: &str = "x-forwarded-proto";
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Link {
     /// The page of its replay.
-    Replay(Id),
+    Replay(GameId),
     /// The picture of its end.
-    Picture(Id),
+    Picture(GameId),
 }
 
 impl Link {
@@ -134,7 +134,7 @@ impl Previews {
     /// It is not shown.
     pub(super) async fn picture<S>(
         &self,
-        game: Id,
+        game: GameId,
         services: S,
         extensions: &Extensions,
     ) -> Result<File, Unshown>
@@ -165,7 +165,7 @@ impl Previews {
     /// It is not shown.
     pub(super) async fn title<S>(
         &self,
-        game: Id,
+        game: GameId,
         services: S,
         extensions: &Extensions,
     ) -> Result<Title, Unshown>
@@ -188,7 +188,7 @@ impl Previews {
         &self,
         kept: &Cache<T>,
         patience: Duration,
-        game: Id,
+        game: GameId,
         services: S,
         extensions: &Extensions,
         make: impl FnOnce(&[v1::RecordLine]) -> Option<M> + Send + 'static,
@@ -230,7 +230,11 @@ impl Previews {
 }
 
 /// The record of a game, if everybody may read it and it is not too long.
-async fn record<S>(services: S, game: Id, extensions: &Extensions) -> Option<Vec<v1::RecordLine>>
+async fn record<S>(
+    services: S,
+    game: GameId,
+    extensions: &Extensions,
+) -> Option<Vec<v1::RecordLine>>
 where
     S: Service<Request<Body>, Response = Response<Body>>,
     S::Error: Into<BoxError>,
@@ -267,7 +271,7 @@ fn title(lines: &[v1::RecordLine]) -> Option<Title> {
 /// characters that HTML escapes. `has_picture`: whether there is a picture of it.
 pub(super) fn document(
     document: &[u8],
-    game: Id,
+    game: GameId,
     title: &Title,
     origin: &str,
     has_picture: bool,
@@ -377,7 +381,7 @@ mod tests {
 
     const GAME: &str = "0123456789abcdef0123456789abcdef";
 
-    fn game() -> Id {
+    fn game() -> GameId {
         Id::parse(GAME).expect("an id")
     }
 

@@ -10,8 +10,8 @@ use futures::future::{BoxFuture, ready};
 
 use chefshat_admission::limits::Key;
 use chefshat_cluster::Load;
-use chefshat_room::ids::{Id, normal_code};
-use chefshat_store::cluster::Kind;
+use chefshat_room::ids::{GameId, Id, IsUnit, RoomId, TournamentId, UnitId, normal_code};
+use chefshat_store::cluster::Subject;
 use chefshat_store::{ResumableGame, StoreError};
 
 /// Another node of the cluster.
@@ -31,7 +31,7 @@ pub enum Location {
     /// Another node owns it.
     Node(Peer),
     /// It is over, and the node that had it is gone. Every node may load it to show its end.
-    Over(Id, Kind),
+    Over(Subject),
     /// No node has it.
     Nowhere,
     /// The directory cannot be read now.
@@ -52,16 +52,16 @@ pub struct Elsewhere {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FoundBy {
     /// By its id.
-    Id(Id),
+    Id(UnitId),
     /// By its join code, in its normal form.
     Code(String),
     /// A room by its game, which is not over.
-    Game(Id),
+    Game(GameId),
 }
 
-impl From<Id> for FoundBy {
-    fn from(id: Id) -> Self {
-        Self::Id(id)
+impl<T: IsUnit> From<Id<T>> for FoundBy {
+    fn from(id: Id<T>) -> Self {
+        Self::Id(id.unit())
     }
 }
 
@@ -92,10 +92,13 @@ pub trait Directory: Send + Sync + 'static {
     fn locate<'a>(&'a self, found_by: &'a FoundBy, caller: Key) -> BoxFuture<'a, Location>;
 
     /// Whether a tournament of another node is over, so that no record of its games is withheld.
-    fn is_over(&self, tournament: Id) -> BoxFuture<'_, bool>;
+    fn is_over(&self, tournament: TournamentId) -> BoxFuture<'_, bool>;
 
     /// The room of a game that is over, if its end is still shown.
-    fn ended_room(&self, _room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
+    fn ended_room(
+        &self,
+        _room: RoomId,
+    ) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
         ready(Ok(None)).boxed()
     }
 
@@ -118,7 +121,7 @@ impl Directory for SingleServer {
         ready((Arc::from(""), Vec::new())).boxed()
     }
 
-    fn is_over(&self, _tournament: Id) -> BoxFuture<'_, bool> {
+    fn is_over(&self, _tournament: TournamentId) -> BoxFuture<'_, bool> {
         ready(false).boxed()
     }
 

@@ -6,7 +6,7 @@ use std::future::Future;
 use std::sync::{Mutex, MutexGuard};
 
 use chefshat_cluster::NodeId;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::UnitId;
 use tokio::sync::{Notify, watch};
 use tokio::time::{Instant, sleep_until};
 use tokio_util::sync::CancellationToken;
@@ -24,7 +24,7 @@ pub struct NodeLease {
     /// Whether another node has reached this one since it joined, or there was none. Until then it
     /// creates nothing and takes nothing over.
     reached: watch::Sender<bool>,
-    news: Mutex<BTreeSet<(Id, UnitEvent)>>,
+    news: Mutex<BTreeSet<(UnitId, UnitEvent)>>,
     has_news: Notify,
 }
 
@@ -112,7 +112,7 @@ impl NodeLease {
     /// The write failed, or the task stops.
     pub async fn published<T>(
         &self,
-        unit: Id,
+        unit: UnitId,
         end: &CancellationToken,
         written: impl Future<Output = Result<T, StoreError>>,
     ) -> Result<T, StoreError> {
@@ -138,13 +138,13 @@ impl NodeLease {
     }
 
     /// Tells the task of the node about a unit.
-    pub fn report(&self, unit: Id, news: UnitEvent) {
+    pub fn report(&self, unit: UnitId, news: UnitEvent) {
         self.all_news().insert((unit, news));
         self.has_news.notify_one();
     }
 
     /// Waits until there is news, and returns it.
-    pub(crate) async fn news(&self) -> BTreeSet<(Id, UnitEvent)> {
+    pub(crate) async fn news(&self) -> BTreeSet<(UnitId, UnitEvent)> {
         loop {
             let news = std::mem::take(&mut *self.all_news());
             if !news.is_empty() {
@@ -154,7 +154,7 @@ impl NodeLease {
         }
     }
 
-    fn all_news(&self) -> MutexGuard<'_, BTreeSet<(Id, UnitEvent)>> {
+    fn all_news(&self) -> MutexGuard<'_, BTreeSet<(UnitId, UnitEvent)>> {
         (self.news.lock()).expect("nothing panics under this lock")
     }
 }

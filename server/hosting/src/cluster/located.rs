@@ -14,7 +14,7 @@ use super::directory::{Directory, FoundBy, Location, Peer};
 use super::lease::NodeLease;
 use chefshat_admission::limits::{FairSemaphore, Key, Shares};
 use chefshat_cluster::Load;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{RoomId, TournamentId};
 use chefshat_store::cluster::{self, ClusterStore, LivingNode, NodeId};
 use chefshat_store::{ResumableGame, StoreError};
 
@@ -90,7 +90,7 @@ impl StoreDirectory {
         };
         if found.node.is_some() && found.node == self.lease.node() {
             return Ok(match found.over {
-                true => Location::Over(found.id, found.kind),
+                true => Location::Over(found.subject),
                 false => Location::Here,
             });
         }
@@ -100,7 +100,7 @@ impl StoreDirectory {
         };
         Ok(match peer {
             Some(peer) => Location::Node(peer),
-            None if found.over => Location::Over(found.id, found.kind),
+            None if found.over => Location::Over(found.subject),
             // A node will soon take it over.
             None => Location::Unknown,
         })
@@ -149,7 +149,7 @@ impl StoreDirectory {
 }
 
 impl Directory for StoreDirectory {
-    fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
+    fn ended_room(&self, room: RoomId) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
         self.store.ended_room(room)
     }
 
@@ -216,9 +216,9 @@ impl Directory for StoreDirectory {
         async move { self.living().await.unreached }.boxed()
     }
 
-    fn is_over(&self, tournament: Id) -> BoxFuture<'_, bool> {
+    fn is_over(&self, tournament: TournamentId) -> BoxFuture<'_, bool> {
         async move {
-            let found = self.store.locate(tournament).await;
+            let found = self.store.locate(tournament.unit()).await;
             found.is_ok_and(|found| found.is_some_and(|location| location.over))
         }
         .boxed()

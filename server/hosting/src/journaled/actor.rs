@@ -126,7 +126,7 @@ fn fail<U: Journaled>(unit: &mut U, error: &StoreError) {
     if let Some(lease) = core.rooms.lease()
         && !core.handle.end.is_cancelled()
     {
-        lease.report(id, UnitEvent::Stopped);
+        lease.report(id.unit(), UnitEvent::Stopped);
     }
     unit.end_streams();
 }

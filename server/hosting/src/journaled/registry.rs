@@ -13,9 +13,9 @@ use crate::cluster::UnitEvent;
 use crate::rooms::Rooms;
 use chefshat_admission::limits::{FairSemaphore, Key, Permit, Refused};
 use chefshat_base::tasks::{named, short};
-use chefshat_room::ids::{Id, RequestKey, Token, normal_code};
-use chefshat_store::StoreError;
-use chefshat_store::units::{StoredUnit, UnitKind, UnitRow, UnitWrite};
+use chefshat_room::ids::{Id, RequestKey, Token, UnitId, normal_code};
+use chefshat_store::units::{StoredKind as _, StoredUnit, UnitKind, UnitRow, UnitWrite};
+use chefshat_store::{StoreError, units_of};
 
 /// Why a unit was not created. `P`: why its settings are refused.
 #[derive(Debug, thiserror::Error)]
@@ -47,7 +47,7 @@ pub enum CreateProblem<P: std::error::Error> {
 type Problem<U> = CreateProblem<<U as Journaled>::SettingsProblem>;
 
 /// The owner token of what a request creates: repetitions have the same.
-pub(crate) fn owner_of(request: Option<RequestKey>) -> Token {
+pub(crate) fn owner_of<T>(request: Option<RequestKey>) -> Token<T> {
     request.map_or_else(|| Token::random(Id::random()), |key| key.owner())
 }
 
@@ -113,7 +113,7 @@ impl<U: Journaled> Registry<U> {
     /// The request id was used for another one, its creator has too many, or `make` failed.
     pub(crate) async fn create_once(
         self: &Arc<Self>,
-        owner: Token,
+        owner: Token<U::Kind>,
         charged: Key,
         make: impl Future<Output = Result<New<U>, Problem<U>>> + Send + 'static,
     ) -> Result<Arc<Handle<U>>, Problem<U>> {
@@ -126,7 +126,7 @@ impl<U: Journaled> Registry<U> {
                     false => Err(CreateProblem::RequestIdUsed(U::KIND)),
                 };
             }
-            match Reservation::of(self, owner.subject, charged)? {
+            match Reservation::of(self, owner.subject.unit(), charged)? {
                 Some(reservation) => break reservation,
                 None => created.await,
             }
@@ -163,7 +163,7 @@ impl<U: Journaled> Registry<U> {
             header: U::header_to_bytes(header),
             first,
         };
-        let unit = U::KIND.id(header.id());
+        let unit = U::Kind::key(header.id());
         self.rooms.store().write_unit(unit, create).await
     }
 
@@ -175,10 +175,10 @@ impl<U: Journaled> Registry<U> {
     pub async fn restore(&self) -> Result<usize, StoreError> {
         let store = self.rooms.store();
         let mut count = 0;
-        for id in store.units(U::KIND, U::MOST).await? {
-            match store.unit(U::KIND.id(id)).await {
+        for id in units_of::<U::Kind>(store.as_ref(), U::MOST).await? {
+            match store.unit(U::Kind::key(id)).await {
                 Ok(Some(stored)) => {
-                    count += usize::from(self.resume(id, stored).await && self.runs(id));
+                    count += usize::from(self.resume(id, stored).await && self.runs(id.unit()));
                 }
                 Ok(None) => {}
                 Err(problem) => self.leave_unchanged(id, &problem.to_string()),
@@ -192,7 +192,7 @@ impl<U: Journaled> Registry<U> {
 
     /// Resumes a unit, whose rooms must be restored already. Returns whether it is here; one that cannot
     /// be read is logged and left unchanged.
-    pub(crate) async fn resume(&self, id: Id, stored: StoredUnit) -> bool {
+    pub(crate) async fn resume(&self, id: Id<U::Kind>, stored: StoredUnit) -> bool {
         // A long one takes a while, and others are played meanwhile.
         let folding = tokio::task::spawn_blocking(move || U::fold(id, &stored));
         match (folding.await).unwrap_or_else(|problem| Err(problem.to_string())) {
@@ -219,7 +219,7 @@ impl<U: Journaled> Registry<U> {
         }
     }
 
-    fn leave_unchanged(&self, id: Id, problem: &str) {
+    fn leave_unchanged(&self, id: Id<U::Kind>, problem: &str) {
         U::set_unreadable(id, &self.rooms);
         error!(%id, problem, "a {} cannot be resumed; it is left unchanged", U::KIND);
     }
@@ -243,39 +243,41 @@ impl<U: Journaled> Registry<U> {
     }
 
     /// Whether this unit runs here, or is being created.
-    pub(crate) fn runs(&self, id: Id) -> bool {
+    pub(crate) fn runs(&self, unit: UnitId) -> bool {
         let table = self.lock();
         let running = |handle: &Arc<Handle<U>>| !handle.is_stopped();
-        table.get(id).is_some_and(running) || table.is_in_creation(id)
+        table.get(unit).is_some_and(running) || table.is_in_creation(unit)
     }
 
     /// Makes the task of a unit end without publishing anything more.
-    pub(crate) fn fence(&self, id: Id) {
-        if let Some(handle) = self.get(id) {
+    pub(crate) fn fence(&self, unit: UnitId) {
+        if let Some(handle) = self.by_unit(unit) {
             handle.end.cancel();
         }
     }
 
     /// Ends the task of a unit, and forgets the unit unless it is over: another node may have it.
-    pub async fn stop_one(&self, id: Id) {
+    pub async fn stop_one(&self, unit: UnitId) {
         loop {
             let created = self.created.notified();
-            if !self.lock().is_in_creation(id) {
+            if !self.lock().is_in_creation(unit) {
                 break;
             }
             created.await;
         }
-        let Some(handle) = self.get(id) else { return };
+        let Some(handle) = self.by_unit(unit) else {
+            return;
+        };
         handle.end.cancel();
         handle.mailbox.closed().await;
         if !handle.is_over() {
-            self.forget_one(id);
+            self.forget_one(handle.id());
         }
     }
 
     /// Removes a unit from memory.
-    pub(crate) fn forget_one(&self, id: Id) {
-        self.lock().remove_id(id);
+    pub(crate) fn forget_one(&self, id: Id<U::Kind>) {
+        self.lock().remove_id(id.unit());
     }
 
     /// Stops beginning and counting games; those that end from here on count when the server is
@@ -290,8 +292,13 @@ impl<U: Journaled> Registry<U> {
     }
 
     /// The unit with this id.
-    pub fn get(&self, id: Id) -> Option<Arc<Handle<U>>> {
-        self.lock().get(id).cloned()
+    pub fn get(&self, id: Id<U::Kind>) -> Option<Arc<Handle<U>>> {
+        self.by_unit(id.unit())
+    }
+
+    /// The unit with this id, if it is of this kind.
+    pub fn by_unit(&self, unit: UnitId) -> Option<Arc<Handle<U>>> {
+        self.lock().get(unit).cloned()
     }
 
     /// The unit with this join code.
@@ -314,13 +321,13 @@ impl<U: Journaled> Registry<U> {
 /// A unit that is being created, and its place.
 struct Reservation<U: Journaled> {
     registry: Arc<Registry<U>>,
-    id: Id,
+    id: UnitId,
     place: Option<Permit>,
 }
 
 impl<U: Journaled> Reservation<U> {
     /// Reserves a place for a unit; `None` if it is being created or has just been.
-    fn of(registry: &Arc<Registry<U>>, id: Id, charged: Key) -> Result<Option<Self>, Refused> {
+    fn of(registry: &Arc<Registry<U>>, id: UnitId, charged: Key) -> Result<Option<Self>, Refused> {
         let mut table = registry.lock();
         if table.is_in_creation(id) || table.get(id).is_some() {
             return Ok(None);

@@ -6,15 +6,15 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use super::unit::{Handle, Journaled, UnitHeader as _};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::UnitId;
 
 pub(super) struct Table<U: Journaled> {
     /// In the order of their creation.
     by_number: BTreeMap<u64, Arc<Handle<U>>>,
-    numbers: HashMap<Id, u64>,
+    numbers: HashMap<UnitId, u64>,
     codes: HashMap<String, u64>,
     /// Units that are being created.
-    in_creation: HashSet<Id>,
+    in_creation: HashSet<UnitId>,
 }
 
 impl<U: Journaled> Default for Table<U> {
@@ -30,7 +30,7 @@ impl<U: Journaled> Default for Table<U> {
 
 impl<U: Journaled> Table<U> {
     /// The unit with this id.
-    pub(super) fn get(&self, id: Id) -> Option<&Arc<Handle<U>>> {
+    pub(super) fn get(&self, id: UnitId) -> Option<&Arc<Handle<U>>> {
         self.by_number.get(self.numbers.get(&id)?)
     }
 
@@ -49,24 +49,24 @@ impl<U: Journaled> Table<U> {
     }
 
     /// Whether the unit is being created.
-    pub(super) fn is_in_creation(&self, id: Id) -> bool {
+    pub(super) fn is_in_creation(&self, id: UnitId) -> bool {
         self.in_creation.contains(&id)
     }
 
     /// Notes that a unit is being created.
-    pub(super) fn reserve(&mut self, id: Id) {
+    pub(super) fn reserve(&mut self, id: UnitId) {
         self.in_creation.insert(id);
     }
 
     /// Notes that a unit is not being created any more.
-    pub(super) fn release(&mut self, id: Id) {
+    pub(super) fn release(&mut self, id: UnitId) {
         self.in_creation.remove(&id);
     }
 
     /// Adds a unit in place of one with the same id. Units that are over are removed when there are
     /// more than [`Journaled::MOST`].
     pub(super) fn enter(&mut self, handle: Arc<Handle<U>>) {
-        let id = handle.id();
+        let id = handle.id().unit();
         self.remove_id(id);
         while self.by_number.len() >= U::MOST
             && let Some(number) = (self.by_number.iter())
@@ -75,7 +75,7 @@ impl<U: Journaled> Table<U> {
         {
             self.remove(number);
         }
-        let [first, second] = [id.0[0], id.0[1]].map(u64::from);
+        let [first, second] = [id.bytes()[0], id.bytes()[1]].map(u64::from);
         let mut number = (handle.header.created_at_ms() << 16) | (first << 8) | second;
         while self.by_number.contains_key(&number) {
             number += 1;
@@ -88,7 +88,7 @@ impl<U: Journaled> Table<U> {
     }
 
     /// Removes a unit that is deleted, or that another node may have.
-    pub(super) fn remove_id(&mut self, id: Id) {
+    pub(super) fn remove_id(&mut self, id: UnitId) {
         if let Some(number) = self.numbers.get(&id).copied() {
             self.remove(number);
         }
@@ -96,7 +96,7 @@ impl<U: Journaled> Table<U> {
 
     fn remove(&mut self, number: u64) {
         if let Some(handle) = self.by_number.remove(&number) {
-            self.numbers.remove(&handle.id());
+            self.numbers.remove(&handle.id().unit());
             if let Some(code) = handle.header.join_code() {
                 self.codes.remove(code);
             }

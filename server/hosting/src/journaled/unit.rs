@@ -10,14 +10,17 @@ use tokio_util::sync::CancellationToken;
 use crate::rooms::Rooms;
 use chefshat_admission::limits::{Key, Permit, Refused};
 use chefshat_base::tasks::LongTask;
-use chefshat_room::ids::{Id, SecretHash, Token};
+use chefshat_room::ids::{Id, RoomId, RoomToken, SecretHash, Token};
 use chefshat_store::StoreError;
-use chefshat_store::units::{StoredUnit, UnitKind, UnitRow, UnitWrite};
+use chefshat_store::units::{StoredKind, StoredUnit, UnitKind, UnitRow, UnitWrite};
 
 /// What a unit is from its creation on.
 pub trait UnitHeader: Send + Sync {
+    /// The kind of its id.
+    type Kind: StoredKind;
+
     /// The unit.
-    fn id(&self) -> Id;
+    fn id(&self) -> Id<Self::Kind>;
     /// The hash of the owner token.
     fn owner(&self) -> &SecretHash;
     /// When it was created, milliseconds since the Unix epoch.
@@ -32,8 +35,10 @@ pub trait UnitHeader: Send + Sync {
 /// called. Until the server stops, that is the order in which they stand here;
 /// `conclude` is also asked first.
 pub trait Journaled: Sized + Send + Sync + 'static {
+    /// The kind of its id.
+    type Kind: StoredKind;
     /// What does not change.
-    type Header: UnitHeader;
+    type Header: UnitHeader<Kind = Self::Kind>;
     /// The settings, prepared.
     type Plan: Send + Sync;
     /// The value that changes.
@@ -50,7 +55,7 @@ pub trait Journaled: Sized + Send + Sync + 'static {
     type SettingsProblem: std::error::Error + Send + 'static;
 
     /// The kind.
-    const KIND: UnitKind;
+    const KIND: UnitKind = Self::Kind::KIND;
     /// Its task.
     const TASK: LongTask;
     /// Messages that wait for the task, at most.
@@ -66,13 +71,13 @@ pub trait Journaled: Sized + Send + Sync + 'static {
     ///
     /// # Errors
     /// Why this version cannot read it.
-    fn fold(id: Id, stored: &StoredUnit) -> Result<Folded<Self>, String>;
+    fn fold(id: Id<Self::Kind>, stored: &StoredUnit) -> Result<Folded<Self>, String>;
     /// What readers of a unit that was in the store share.
     fn share(common: &Self::Common, folded: &Folded<Self>) -> Self::Shared;
     /// Handles a unit that cannot be read.
-    fn set_unreadable(_id: Id, _rooms: &Rooms) {}
+    fn set_unreadable(_id: Id<Self::Kind>, _rooms: &Rooms) {}
     /// Who is charged for the games of a unit whose creator is unknown.
-    fn key_of(id: Id) -> Key;
+    fn key_of(id: Id<Self::Kind>) -> Key;
     /// The refusal of a unit whose creator, or the server, has this number already.
     fn too_many(limit: u64) -> Refused;
     /// Applies an entry.
@@ -178,19 +183,20 @@ impl<U: Journaled> Handle<U> {
     }
 
     /// Its id.
-    pub fn id(&self) -> Id {
+    pub fn id(&self) -> Id<U::Kind> {
         self.header.id()
     }
 
     /// Whether this is its owner's token.
     pub fn is_owner(&self, token: &str) -> bool {
-        let is_own =
-            |token: Token| token.subject == self.id() && self.header.owner().matches(&token.secret);
+        let is_own = |token: Token<U::Kind>| {
+            token.subject == self.id() && self.header.owner().matches(&token.secret)
+        };
         Token::parse(token).is_some_and(is_own)
     }
 
     /// The owner token of a room of one of its games.
-    pub(crate) fn room_owner(&self, room: Id) -> Token {
+    pub(crate) fn room_owner(&self, room: RoomId) -> RoomToken {
         Token::of_tournament_room(room, self.header.owner())
     }
 
@@ -322,14 +328,14 @@ impl<U: Journaled> Unit<U> {
             over: U::is_over(&self.state),
         };
         let store = self.rooms.store();
-        let written = store.write_unit(U::KIND.id(id), UnitWrite::Append(row));
+        let written = store.write_unit(U::Kind::key(id), UnitWrite::Append(row));
         match self.rooms.lease() {
-            Some(lease) => lease.published(id, &self.handle.end, written).await,
+            Some(lease) => lease.published(id.unit(), &self.handle.end, written).await,
             None => written.await,
         }
     }
 
-    pub(super) fn id(&self) -> Id {
+    pub(super) fn id(&self) -> Id<U::Kind> {
         self.handle.id()
     }
 }

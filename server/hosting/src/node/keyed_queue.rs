@@ -4,13 +4,13 @@
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 
-use chefshat_room::ids::Id;
+use chefshat_room::ids::UnitId;
 use tokio::sync::oneshot;
 use tokio::sync::oneshot::error::TryRecvError;
 
 /// The end of the latest work with each unit.
 #[derive(Default)]
-pub(super) struct KeyedQueue(BTreeMap<Id, oneshot::Receiver<Infallible>>);
+pub(super) struct KeyedQueue(BTreeMap<UnitId, oneshot::Receiver<Infallible>>);
 
 /// A place in the order of a unit. Dropping it lets the next one come.
 pub(super) struct Queued {
@@ -20,7 +20,7 @@ pub(super) struct Queued {
 
 impl KeyedQueue {
     /// The place after all that were taken for the unit.
-    pub(super) fn take(&mut self, unit: Id) -> Queued {
+    pub(super) fn take(&mut self, unit: UnitId) -> Queued {
         let (ends, ended) = oneshot::channel();
         Queued {
             before: self.0.insert(unit, ended),
@@ -29,7 +29,7 @@ impl KeyedQueue {
     }
 
     /// Whether nothing is being done with a unit.
-    pub(super) fn is_idle(&mut self, unit: Id) -> bool {
+    pub(super) fn is_idle(&mut self, unit: UnitId) -> bool {
         let Some(latest) = self.0.get_mut(&unit) else {
             return true;
         };
@@ -66,7 +66,7 @@ mod tests {
 
     #[test]
     fn one_comes_after_another_and_units_without_work_are_forgotten() {
-        let (unit, other) = (Id([1; 16]), Id([2; 16]));
+        let (unit, other) = (UnitId::from_bytes([1; 16]), UnitId::from_bytes([2; 16]));
         let mut queue = KeyedQueue::default();
         let (first, mut second) = (queue.take(unit), queue.take(unit));
         drop(queue.take(other));

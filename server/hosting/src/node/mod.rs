@@ -25,7 +25,7 @@ pub use units::Hosted;
 
 use crate::cluster::{NodeLease, UnitEvent};
 use chefshat_base::tasks::{LongTask, named, short};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::UnitId;
 use chefshat_store::StoreError;
 use chefshat_store::cluster::{ClusterStore, Epoch, Heartbeat, Load, NodeId, NodeInfo};
 use keyed_queue::KeyedQueue;
@@ -143,19 +143,19 @@ impl Drop for ClusterNode {
 
 /// What a request to the database, or work with a unit, comes to.
 enum Event {
-    Answer(Input<Id>),
+    Answer(Input<UnitId>),
     /// Orphans were found.
-    Found(Vec<(Id, Epoch)>),
+    Found(Vec<(UnitId, Epoch)>),
     /// Claims of orphans, with the epochs at which they were seen, were answered.
-    Claimed(Vec<(Id, Epoch, ClaimAnswer)>),
+    Claimed(Vec<(UnitId, Epoch, ClaimAnswer)>),
     /// This node is too full: these units are for others.
-    TooFull(Vec<(Id, NodeId)>),
+    TooFull(Vec<(UnitId, NodeId)>),
     /// A unit was released at this epoch because this node cannot resume it.
-    GivenUp(Id, Epoch),
+    GivenUp(UnitId, Epoch),
     /// A unit has nothing to run at this epoch.
-    NothingToRun(Id, Epoch),
+    NothingToRun(UnitId, Epoch),
     /// A beat was answered, and the node was asked to hand over what it owns.
-    AskedToDrain(Input<Id>),
+    AskedToDrain(Input<UnitId>),
     /// A unit was resumed or stopped, and nothing follows.
     Nothing,
     /// The node is removed from the database.
@@ -163,24 +163,24 @@ enum Event {
 }
 
 struct Task {
-    node: Node<Id>,
+    node: Node<UnitId>,
     /// Orphans that were found, and when first.
-    orphans: BTreeMap<Id, Instant>,
+    orphans: BTreeMap<UnitId, Instant>,
     info: NodeInfo,
     store: Arc<dyn ClusterStore>,
     units: Arc<Units>,
     lease: Arc<NodeLease>,
     began: Instant,
     /// The epochs at which units are resumed here.
-    running: BTreeMap<Id, Epoch>,
+    running: BTreeMap<UnitId, Epoch>,
     /// Units that this node leaves to others, and until when: it could not resume them, or has handed
     /// them over.
-    left_alone: BTreeMap<Id, Instant>,
+    left_alone: BTreeMap<UnitId, Instant>,
     /// The next owners of units that are handed over because this node is too full.
-    next_owners: BTreeMap<Id, NodeId>,
+    next_owners: BTreeMap<UnitId, NodeId>,
     /// Units that are this node's, at these epochs, and have nothing to run: ephemeral rooms that have
     /// stopped.
-    nothing_to_run: BTreeMap<Id, Epoch>,
+    nothing_to_run: BTreeMap<UnitId, Epoch>,
     queue: KeyedQueue,
     answers: JoinSet<Event>,
     releases: Arc<Semaphore>,
@@ -260,7 +260,7 @@ impl Task {
         u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
-    fn put_in(&mut self, input: Input<Id>) {
+    fn put_in(&mut self, input: Input<UnitId>) {
         let now_ms = self.now_ms();
         let mut claims = Vec::new();
         for output in self.node.handle(input, now_ms) {
@@ -287,7 +287,7 @@ impl Task {
     }
 
     /// Takes the answer of the database to something.
-    fn answered(&mut self, input: Input<Id>) {
+    fn answered(&mut self, input: Input<UnitId>) {
         let is_beat = matches!(input, Input::Beat { .. });
         if let Input::Released(unit, _, true) = input
             && self.next_owners.remove(&unit).is_some()
@@ -305,7 +305,7 @@ impl Task {
     /// after its next beat: for example a room whose creation was answered after the end of the lease,
     /// when the rooms of the node had been stopped.
     fn resume_missing(&mut self) {
-        let owned: BTreeMap<Id, Epoch> = self.node.owned().collect();
+        let owned: BTreeMap<UnitId, Epoch> = self.node.owned().collect();
         (self.nothing_to_run).retain(|unit, epoch| owned.get(unit) == Some(epoch));
         for (unit, epoch) in owned {
             let is_missing = !self.nothing_to_run.contains_key(&unit)
@@ -319,7 +319,7 @@ impl Task {
         }
     }
 
-    fn put_out(&mut self, output: Output<Id>) {
+    fn put_out(&mut self, output: Output<UnitId>) {
         let store = Arc::clone(&self.store);
         match output {
             Output::Beat => {
@@ -385,7 +385,7 @@ impl Task {
     }
 
     /// Claims units together.
-    fn claim(&mut self, orphans: Vec<(Id, Epoch)>) {
+    fn claim(&mut self, orphans: Vec<(UnitId, Epoch)>) {
         let store = Arc::clone(&self.store);
         let claims = orphans
             .iter()
@@ -402,7 +402,7 @@ impl Task {
         self.spawn(claiming, unanswered);
     }
 
-    fn claimed(&mut self, claims: Vec<(Id, Epoch, ClaimAnswer)>) {
+    fn claimed(&mut self, claims: Vec<(UnitId, Epoch, ClaimAnswer)>) {
         let is_any_won = (claims.iter()).any(|(.., it)| matches!(it, ClaimAnswer::Won(_)));
         for (unit, seen, answer) in claims {
             self.put_in(Input::Claimed(unit, seen, answer));
@@ -415,7 +415,7 @@ impl Task {
 
     /// Takes orphans over. A full node first leaves them to others, and takes those that stay without
     /// an owner: games that are acknowledged come before its limit.
-    fn found(&mut self, mut orphans: Vec<(Id, Epoch)>) {
+    fn found(&mut self, mut orphans: Vec<(UnitId, Epoch)>) {
         orphans.retain(|(unit, _)| !self.left_alone.contains_key(unit));
         let now = Instant::now();
         let earlier = std::mem::take(&mut self.orphans);
@@ -439,7 +439,7 @@ impl Task {
         self.take_over(orphans);
     }
 
-    fn take_over(&mut self, mut orphans: Vec<(Id, Epoch)>) {
+    fn take_over(&mut self, mut orphans: Vec<(UnitId, Epoch)>) {
         if !*self.reached.borrow() {
             return;
         }
@@ -449,7 +449,7 @@ impl Task {
 
     /// Compares how full the nodes are.
     fn balance(&mut self) {
-        let owned: BTreeMap<Id, Epoch> = self.node.owned().collect();
+        let owned: BTreeMap<UnitId, Epoch> = self.node.owned().collect();
         self.next_owners.retain(|unit, _| owned.contains_key(unit));
         let may_move = *self.reached.borrow() && self.node.may_claim(self.now_ms());
         if !may_move || !self.next_owners.is_empty() {
@@ -476,7 +476,7 @@ impl Task {
     }
 
     /// Hands units over to nodes that are less full.
-    fn hand_over(&mut self, mut units: Vec<(Id, NodeId)>) {
+    fn hand_over(&mut self, mut units: Vec<(UnitId, NodeId)>) {
         if self.node.phase() != Phase::Serving {
             return;
         }
@@ -491,7 +491,7 @@ impl Task {
         }
     }
 
-    fn given_up(&mut self, unit: Id, epoch: Epoch) {
+    fn given_up(&mut self, unit: UnitId, epoch: Epoch) {
         let minutes = LEFT_ALONE.as_secs() / 60;
         self.units.metrics().not_resumed();
         error!(%unit, minutes, "nothing of it can be resumed here; for some time it is left to other nodes");
@@ -535,7 +535,7 @@ impl Task {
     }
 
     /// Stops a unit at once.
-    fn stop(&mut self, unit: Id) {
+    fn stop(&mut self, unit: UnitId) {
         self.units.fence(unit);
         self.running.remove(&unit);
         let units = Arc::clone(&self.units);
@@ -548,7 +548,7 @@ impl Task {
 
     /// Something of a unit has stopped by itself, so all of it stops. If the node still owns it, it
     /// resumes it after its next beat.
-    fn has_stopped(&mut self, unit: Id) {
+    fn has_stopped(&mut self, unit: UnitId) {
         // What was created here is at the first epoch.
         let epoch = self.running.get(&unit).copied().unwrap_or(Epoch::FIRST);
         self.stop(unit);
@@ -558,7 +558,7 @@ impl Task {
     /// Does something with a unit after what is done with it already.
     fn queue(
         &mut self,
-        unit: Id,
+        unit: UnitId,
         work: impl Future<Output = Event> + Send + 'static,
         if_it_panics: Event,
     ) {

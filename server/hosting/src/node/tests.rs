@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use chefshat_proto::v1;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{Id, RoomId, TournamentId};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::{Durability, Policy};
 use futures::FutureExt as _;
@@ -23,7 +23,7 @@ use crate::tournaments::{Entry, TournamentHandle, Tournaments};
 use chefshat_admission::limits::Key;
 use chefshat_base::tasks::{LongTask, polls};
 use chefshat_store::Store;
-use chefshat_store::cluster::{ClusterStore, Kind, NodeInfo};
+use chefshat_store::cluster::{ClusterStore, NodeInfo, Subject};
 use chefshat_store::testing::{Database, FakeStore};
 use chefshat_wire::convert;
 
@@ -142,7 +142,7 @@ impl TestNode {
     }
 
     /// Waits until a room runs here.
-    async fn has(&self, room: Id) -> Handle {
+    async fn has(&self, room: RoomId) -> Handle {
         let found = async {
             loop {
                 match self.rooms.get(room) {
@@ -155,7 +155,7 @@ impl TestNode {
     }
 
     /// Waits until a room does not run here any more.
-    async fn loses(&self, room: Id) {
+    async fn loses(&self, room: RoomId) {
         let lost = async {
             while self.rooms.get(room).is_some() {
                 sleep(Duration::from_millis(10)).await;
@@ -165,7 +165,7 @@ impl TestNode {
     }
 
     /// Waits until a tournament runs here.
-    async fn has_tournament(&self, id: Id) -> Arc<TournamentHandle> {
+    async fn has_tournament(&self, id: TournamentId) -> Arc<TournamentHandle> {
         let found = async {
             loop {
                 match self.tournaments.get(id) {
@@ -440,7 +440,7 @@ async fn a_unit_whose_room_stops_while_others_are_resumed_runs_after_the_next_be
         .await
         .expect("the store is here");
     let lease = second.rooms.lease().expect("a node");
-    lease.report(room, UnitEvent::Stopped);
+    lease.report(room.unit(), UnitEvent::Stopped);
     // Until everything waits for the store.
     sleep(Duration::from_millis(1)).await;
     second.store.loads_held.send_replace(false);
@@ -669,7 +669,7 @@ async fn looking_for_rooms_takes_no_longer_if_the_database_hangs_and_many_look()
     node.store.cut_off.send_replace(true);
     let began = Instant::now();
     let rooms: Vec<_> = (0..100)
-        .map(|number| FoundBy::Id(Id([number; 16])))
+        .map(|number| FoundBy::Id(Id::from_bytes([number; 16])))
         .collect();
     let looks = (rooms.iter()).map(|room| node.rooms.directory().locate(room, Key::Local));
     for location in futures::future::join_all(looks).await {
@@ -761,11 +761,11 @@ async fn the_end_of_a_game_is_read_once_for_all_who_ask_when_its_node_is_gone() 
     drop(first);
 
     second.store.ends_unreadable.send_replace(true);
-    let asked = second.tournaments.show_ended(room.id(), Kind::Room);
+    let asked = second.tournaments.show_ended(Subject::Room(room.id()));
     soon(asked).await.expect_err("it cannot be read now");
     second.store.ends_unreadable.send_replace(false);
     second.store.ends_read.send_replace(0);
-    let asked = (0..10).map(|_| second.tournaments.show_ended(room.id(), Kind::Room));
+    let asked = (0..10).map(|_| second.tournaments.show_ended(Subject::Room(room.id())));
     for shown in soon(futures::future::join_all(asked)).await {
         shown.expect("readable");
     }

@@ -9,10 +9,10 @@ use crate::rooms::Rooms;
 use crate::studies::Studies;
 use crate::tournaments::Tournaments;
 use chefshat_base::metrics::Metrics;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::UnitId;
 use chefshat_store::StoreError;
 use chefshat_store::cluster::{ClusterStore, Epoch, Load, NodeId};
-use chefshat_store::units::UnitKind;
+use chefshat_store::units::UnitKey;
 use tokio::sync::Semaphore;
 use tokio::time::{Duration, sleep, timeout};
 
@@ -51,7 +51,7 @@ pub(super) struct Units {
     /// How long ephemeral games may continue when the node hands over.
     grace: Duration,
     /// The units that are to run here, with their epochs.
-    wanted: Mutex<BTreeMap<Id, Epoch>>,
+    wanted: Mutex<BTreeMap<UnitId, Epoch>>,
     loads: Semaphore,
 }
 
@@ -80,11 +80,11 @@ impl Units {
 
     /// Units to hand over, each with its next owner, so that these nodes get about these numbers of
     /// rooms: rooms that nobody plays in first, tournaments and studies last.
-    pub(super) async fn to_hand_over(&self, moves: Vec<(NodeId, u64)>) -> Vec<(Id, NodeId)> {
+    pub(super) async fn to_hand_over(&self, moves: Vec<(NodeId, u64)>) -> Vec<(UnitId, NodeId)> {
         let mut units = Vec::new();
         for (unit, rooms) in self.rooms.durable_units() {
             let waits = match rooms.as_slice() {
-                [room] if room.id() == unit => Some(room.has_started().await == Ok(false)),
+                [room] if room.id().unit() == unit => Some(room.has_started().await == Ok(false)),
                 _ => None,
             };
             units.push((waits, rooms.len() as u64, unit));
@@ -107,42 +107,43 @@ impl Units {
     }
 
     /// From here on, a unit is to run here at this epoch.
-    pub(super) fn want(&self, unit: Id, epoch: Epoch) {
+    pub(super) fn want(&self, unit: UnitId, epoch: Epoch) {
         self.wanted().insert(unit, epoch);
     }
 
     /// From here on, a unit is not to run here.
-    pub(super) fn unwant(&self, unit: Id) {
+    pub(super) fn unwant(&self, unit: UnitId) {
         self.wanted().remove(&unit);
     }
 
     /// Prevents a unit from publishing anything from here on. It ends with [`Units::stop`].
-    pub(super) fn fence(&self, unit: Id) {
+    pub(super) fn fence(&self, unit: UnitId) {
         self.unwant(unit);
         self.tournaments.fence(unit);
         self.studies.fence(unit);
         self.rooms.fence_unit(unit);
     }
 
-    fn wanted(&self) -> MutexGuard<'_, BTreeMap<Id, Epoch>> {
+    fn wanted(&self) -> MutexGuard<'_, BTreeMap<UnitId, Epoch>> {
         (self.wanted.lock()).expect("nothing panics under this lock")
     }
 
     /// Whether a unit runs here, or is being created.
-    fn runs(&self, unit: Id) -> bool {
+    fn runs(&self, unit: UnitId) -> bool {
         self.rooms.runs(unit) || self.tournaments.runs(unit) || self.studies.runs(unit)
     }
 
     /// Whether something of a unit is here: it runs, is being created, or is over.
-    pub(super) fn has(&self, unit: Id) -> bool {
+    pub(super) fn has(&self, unit: UnitId) -> bool {
         self.runs(unit)
-            || self.rooms.is_over(unit) == Some(true)
-            || self.tournaments.get(unit).is_some()
+            || (self.rooms.by_unit(unit))
+                .is_some_and(|room| self.rooms.is_over(room.id()) == Some(true))
+            || self.tournaments.by_unit(unit).is_some()
     }
 
     /// Runs a unit that the node owns at this epoch, as long as it is wanted. Tries again while the
     /// database cannot be read.
-    pub(super) async fn resume(&self, unit: Id, epoch: Epoch) -> Resumed {
+    pub(super) async fn resume(&self, unit: UnitId, epoch: Epoch) -> Resumed {
         // It was created here, and its node learns of it from its beat.
         let is_new = epoch == Epoch::FIRST;
         if is_new && self.runs(unit) {
@@ -163,15 +164,15 @@ impl Units {
     }
 
     /// Reads and runs a unit.
-    async fn load(&self, unit: Id, epoch: Epoch) -> Result<Resumed, StoreError> {
+    async fn load(&self, unit: UnitId, epoch: Epoch) -> Result<Resumed, StoreError> {
         let _permit = self.loads.acquire().await.expect("it is never closed");
         let Some(loaded) = self.store.load(unit, epoch).await? else {
             return Ok(Resumed::Nothing);
         };
         let games = self.rooms.resume_all(loaded.games).await;
         let has_unit = match loaded.stored {
-            Some((UnitKind::Tournament, stored)) => self.tournaments.resume(unit, stored).await,
-            Some((UnitKind::Study, stored)) => self.studies.resume(unit, stored).await,
+            Some((UnitKey::Tournament(id), stored)) => self.tournaments.resume(id, stored).await,
+            Some((UnitKey::Study(id), stored)) => self.studies.resume(id, stored).await,
             None => false,
         };
         let is_resumed = games > 0 || has_unit;
@@ -183,7 +184,7 @@ impl Units {
     }
 
     /// Ends everything of a unit that runs here.
-    pub(super) async fn stop(&self, unit: Id) {
+    pub(super) async fn stop(&self, unit: UnitId) {
         self.tournaments.stop_one(unit).await;
         self.studies.stop_one(unit).await;
         self.rooms.stop_unit(unit).await;
@@ -191,14 +192,14 @@ impl Units {
 
     /// Waits until a unit is not an ephemeral room in which a game is running, or for the grace: no
     /// other node can resume it.
-    pub(super) async fn until_ephemeral_over(&self, unit: Id) {
+    pub(super) async fn until_ephemeral_over(&self, unit: UnitId) {
         // If it is not over in time, it is ended.
         let _ = timeout(self.grace, self.rooms.until_ephemeral_over(unit)).await;
     }
 
     /// Releases a unit that cannot be resumed here, as long as it is wanted. Returns whether the
     /// database knows.
-    pub(super) async fn give_up(&self, unit: Id, epoch: Epoch) -> bool {
+    pub(super) async fn give_up(&self, unit: UnitId, epoch: Epoch) -> bool {
         while self.wanted().get(&unit) == Some(&epoch) {
             if self.release(unit, epoch, None).await {
                 self.unwant(unit);
@@ -211,7 +212,7 @@ impl Units {
 
     /// Ends everything of a unit after its next commits, and gives it up, to this node if one is named.
     /// Returns whether the database knows.
-    pub(super) async fn release(&self, unit: Id, epoch: Epoch, next: Option<NodeId>) -> bool {
+    pub(super) async fn release(&self, unit: UnitId, epoch: Epoch, next: Option<NodeId>) -> bool {
         self.tournaments.stop_one(unit).await;
         self.studies.stop_one(unit).await;
         self.rooms.suspend_unit(unit).await;

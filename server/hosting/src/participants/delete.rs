@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::pseudonym::{Named, Pseudonym, Redactions};
 use chefshat_record::{atomic_file, jsonl, samples};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, Id};
 
 use super::data::{DataError, ParticipantData, blocking};
 use super::files::{Candidate, Skipped, records_with};
@@ -25,7 +25,7 @@ pub struct Deleted {
     /// What stands for the name now.
     pub pseudonym: String,
     /// The games of the store that contained the name.
-    pub stored_games: BTreeSet<Id>,
+    pub stored_games: BTreeSet<GameId>,
     /// Number of games that contained the name, in the store or in files.
     pub games: u64,
     /// Number of tournaments that contained the name.

@@ -15,8 +15,8 @@ use tokio::sync::mpsc;
 use super::data::{DataError, ParticipantData, blocking};
 use super::files::{Skipped, records_with};
 use chefshat_store::tournaments::{StoredTournament, TournamentEntry};
-use chefshat_store::units::UnitKind;
-use chefshat_store::{Part, StoreError};
+use chefshat_store::units::UnitKey;
+use chefshat_store::{Part, StoreError, units_of};
 
 /// Page size of the list of records.
 const AT_A_TIME: usize = 100;
@@ -72,8 +72,8 @@ impl ParticipantData {
         let files = self.export_files(who, known, &mut sheet).await?;
         skipped.named.extend(files.named);
         skipped.other.extend(files.other);
-        for id in self.store.units(UnitKind::Tournament, usize::MAX).await? {
-            let unit = self.store.unit(UnitKind::Tournament.id(id)).await?;
+        for id in units_of(self.store.as_ref(), usize::MAX).await? {
+            let unit = self.store.unit(UnitKey::Tournament(id)).await?;
             let Some(unit) = unit else { continue };
             let tournament = match StoredTournament::decode(id, &unit) {
                 Ok(tournament) => tournament,

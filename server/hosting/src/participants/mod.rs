@@ -20,7 +20,7 @@ pub use data::{DataError, ParticipantData};
 pub use delete::Deleted;
 pub use files::Skipped;
 
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, StudyId};
 
 use crate::rooms::Rooms;
 use crate::studies::Studies;
@@ -32,7 +32,7 @@ pub trait StudiesElsewhere: Sync {
     /// Deletes the data of a participant of a study.
     fn delete_participant(
         &self,
-        study: Id,
+        study: StudyId,
         number: u32,
     ) -> impl Future<Output = Result<(), DataError>> + Send;
 }
@@ -182,7 +182,7 @@ impl Participants {
     }
 
     /// The games that are over and whose rooms show the participant.
-    async fn games_with(&self, who: &Named) -> Vec<Id> {
+    async fn games_with(&self, who: &Named) -> Vec<GameId> {
         let mut games = Vec::new();
         for handle in self.rooms.all(true) {
             if let Some(header) = self.rooms.header(handle.id())
@@ -196,7 +196,7 @@ impl Participants {
     }
 
     /// Removes the rooms that are over and show the participant.
-    async fn hide_rooms(&self, who: &Named, changed: &BTreeSet<Id>) {
+    async fn hide_rooms(&self, who: &Named, changed: &BTreeSet<GameId>) {
         for handle in self.rooms.all(true) {
             let header = self.rooms.header(handle.id());
             let is_changed = header.is_some_and(|it| changed.contains(&it.game_id));

@@ -4,17 +4,16 @@
 use std::sync::Arc;
 
 use chefshat_record::pseudonym::Named;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 use chefshat_study::{Answer, Change, Study};
 use serde_json::json;
 
 use super::data::{DataError, ParticipantData};
 use super::export::Sheet;
 use chefshat_base::clock::since_epoch_ms;
-use chefshat_store::StoreError;
 use chefshat_store::samples::Samples;
 use chefshat_store::studies::StoredStudy;
-use chefshat_store::units::UnitKind;
+use chefshat_store::{StoreError, units_of};
 use chefshat_wire::convert;
 
 impl ParticipantData {
@@ -92,7 +91,7 @@ impl ParticipantData {
             });
             let devices: Vec<_> = devices.collect();
             let games = games_of(&stored.changes, number);
-            let games: Vec<String> = games.iter().map(Id::to_string).collect();
+            let games: Vec<String> = games.iter().map(GameId::to_string).collect();
             let mut lines = vec![json!({ "study": {
                 "studyId": id.to_string(),
                 "name": stored.header.settings.name,
@@ -155,7 +154,7 @@ impl ParticipantData {
         unreadable: &mut Vec<String>,
     ) -> Result<Vec<(StoredStudy, u32)>, StoreError> {
         let mut found = Vec::new();
-        for id in self.store.units(UnitKind::Study, usize::MAX).await? {
+        for id in units_of(self.store.as_ref(), usize::MAX).await? {
             let stored = match StoredStudy::read(self.store.as_ref(), id).await {
                 Err(StoreError::Unreadable(problem)) => {
                     unreadable.push(problem);
@@ -177,9 +176,9 @@ impl ParticipantData {
 }
 
 /// The games of a participant.
-fn games_of(changes: &[Change], wanted: u32) -> Vec<Id> {
+fn games_of(changes: &[Change], wanted: u32) -> Vec<GameId> {
     let games = changes.iter().filter_map(|change| match change {
-        Change::Placed { number, game } if *number == wanted => Some(Id(game.game)),
+        Change::Placed { number, game } if *number == wanted => Some(convert::game_of(game)),
         _ => None,
     });
     games.collect()

@@ -18,7 +18,7 @@ use super::shared::SharedRoom;
 use super::task::{self, Room, TaskContext};
 use chefshat_admission::limits::{Key, Payer};
 use chefshat_base::clock::RoomClock;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::RoomId;
 use chefshat_room::journal::AbortReason;
 use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError};
 use chefshat_store::Journal;
@@ -31,7 +31,7 @@ pub struct RoomGone;
 /// A handle to a room.
 #[derive(Clone)]
 pub struct Handle {
-    id: Id,
+    id: RoomId,
     mailbox: mpsc::Sender<Message>,
     shared: Arc<SharedRoom<Room>>,
     fence: CancellationToken,
@@ -102,7 +102,7 @@ impl std::fmt::Debug for Handle {
 
 impl Handle {
     /// The id of the room.
-    pub fn id(&self) -> Id {
+    pub fn id(&self) -> RoomId {
         self.id
     }
 

@@ -13,7 +13,7 @@ use super::subscriber::DeliveryOptions;
 use super::table_view::SentState;
 use chefshat_admission::limits::{Hint, Key, Payer};
 use chefshat_record::convert::FieldProblem;
-use chefshat_room::ids::Token;
+use chefshat_room::ids::RoomToken;
 use chefshat_room::journal::{AbortReason, Marked, ParticipantKind};
 use chefshat_room::{
     Answer, ConnectionId, ExpressError, Expression, HintError, JoinError, LeaveError, MarkError,
@@ -59,7 +59,7 @@ pub struct Joined {
     /// The seat.
     pub seat: Seat,
     /// Its ticket.
-    pub ticket: Token,
+    pub ticket: RoomToken,
     /// The room with it.
     pub room: Box<v1::Room>,
 }
@@ -90,7 +90,7 @@ pub struct AttachRequest {
     /// Set when the seat has left the stream.
     pub detached: Arc<AtomicBool>,
     /// The seat's ticket, if the server attaches the client.
-    pub assigned_ticket: Option<Token>,
+    pub assigned_ticket: Option<RoomToken>,
 }
 
 /// Which connection an attachment takes its seat or participant from. One that comes through another

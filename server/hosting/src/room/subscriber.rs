@@ -14,7 +14,7 @@ use std::time::Duration;
 use chefshat_engine::{Event, Seat, Viewer};
 use chefshat_proto::v1::{self, seat_update::Update};
 use chefshat_record::convert::seat_number;
-use chefshat_room::ids::Token;
+use chefshat_room::ids::RoomToken;
 use chefshat_room::log::RoomEvent;
 use chefshat_room::{Awaited, ConnectionId, Core, MAX_EVENTS_KEPT};
 
@@ -237,7 +237,7 @@ impl Subscriber {
 
     /// Tells a seat that it is attached, with a snapshot if requested. `ticket`: set if the server
     /// attached a participant of a tournament.
-    pub fn confirm_attached(&mut self, core: &Core, request_id: u32, ticket: Option<Token>) {
+    pub fn confirm_attached(&mut self, core: &Core, request_id: u32, ticket: Option<RoomToken>) {
         let Role::Seat(connection) = &self.role else {
             return;
         };

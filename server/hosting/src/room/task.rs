@@ -17,7 +17,7 @@ use std::time::Duration;
 use chefshat_agents::{Budget, MonteCarlo};
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::RoomId;
 use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError, ReportOutcome, Searched};
 use futures::future::BoxFuture;
 use futures::stream::FuturesUnordered;
@@ -114,9 +114,9 @@ impl TaskContext {
 /// Maintains the list of rooms.
 pub trait RoomWatcher: Send + Sync {
     /// The game of a room has ended; the room is still listed.
-    fn game_over(&self, room: Id);
+    fn game_over(&self, room: RoomId);
     /// The room is gone.
-    fn gone(&self, room: Id);
+    fn gone(&self, room: RoomId);
 }
 
 /// Spawns the task of a room and returns the sender of its mailbox and where readers share it.

@@ -29,7 +29,7 @@ use chefshat_admission::access::TokenId;
 use chefshat_admission::limits::{Background, Key, Payer, Searches, Shares};
 use chefshat_base::clock::RoomClock;
 use chefshat_base::metrics::{Metrics, SearchOutcome};
-use chefshat_room::ids::{Id, SecretHash, Token};
+use chefshat_room::ids::{Id, RoomId, RoomToken, SecretHash};
 use chefshat_room::journal::{Change, Entry, Fill, GameHeader, GameStart};
 use chefshat_room::policy::{AbortPolicy, Policy};
 use chefshat_room::{Answer, ConnectionId, Core, JoinError, MAX_EVENTS_KEPT};
@@ -40,8 +40,8 @@ use chefshat_wire::outbox::{Outbox, OutboxStream};
 struct NullWatcher;
 
 impl RoomWatcher for NullWatcher {
-    fn game_over(&self, _room: Id) {}
-    fn gone(&self, _room: Id) {}
+    fn game_over(&self, _room: RoomId) {}
+    fn gone(&self, _room: RoomId) {}
 }
 
 /// The owner's secret.
@@ -94,8 +94,8 @@ async fn room_in(
     change: impl FnOnce(Box<dyn Journal>) -> Box<dyn Journal>,
 ) -> Handle {
     let header = Arc::new(GameHeader {
-        room_id: Id([1; 16]),
-        game_id: Id([2; 16]),
+        room_id: Id::from_bytes([1; 16]),
+        game_id: Id::from_bytes([2; 16]),
         name: String::new(),
         rules: RuleSetSpec {
             stop: Stop::Shifts(shifts),
@@ -163,7 +163,7 @@ async fn room_in(
 struct AttachedSeat {
     seat: Seat,
     connection: ConnectionId,
-    ticket: Token,
+    ticket: RoomToken,
     updates: OutboxStream,
 }
 
@@ -189,7 +189,7 @@ async fn take_seat_from(room: &Handle, charged: Key) -> AttachedSeat {
     attach_from(room, joined.ticket, charged).await
 }
 
-fn attachment(ticket: &Token, outbox: Arc<Outbox>) -> AttachRequest {
+fn attachment(ticket: &RoomToken, outbox: Arc<Outbox>) -> AttachRequest {
     AttachRequest {
         secret: ticket.secret,
         request_id: 0,
@@ -211,11 +211,11 @@ fn attachment(ticket: &Token, outbox: Arc<Outbox>) -> AttachRequest {
     }
 }
 
-async fn attach(room: &Handle, ticket: Token) -> AttachedSeat {
+async fn attach(room: &Handle, ticket: RoomToken) -> AttachedSeat {
     attach_from(room, ticket, Key::Local).await
 }
 
-async fn attach_from(room: &Handle, ticket: Token, charged: Key) -> AttachedSeat {
+async fn attach_from(room: &Handle, ticket: RoomToken, charged: Key) -> AttachedSeat {
     let (outbox, updates) = Outbox::new();
     let attachment = AttachRequest {
         charged: charged.into(),
@@ -1011,7 +1011,11 @@ async fn an_owner_who_closes_its_room_leaves_the_seats_that_are_its_own() {
         let closed = room.close(OWNER, closes).await;
         assert!(closed.expect("the room exists").is_some());
         let entries = loop {
-            match store.finished(Id([2; 16])).await.expect("readable") {
+            match store
+                .finished(Id::from_bytes([2; 16]))
+                .await
+                .expect("readable")
+            {
                 Some(StoredGame::Hosted(_, entries, _)) => break entries,
                 _ => tokio::time::sleep(Duration::from_millis(5)).await,
             }

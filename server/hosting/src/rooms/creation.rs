@@ -17,7 +17,9 @@ use chefshat_base::SERVER_VERSION;
 use chefshat_base::clock::{RoomClock, since_epoch_ms};
 use chefshat_base::tasks::short;
 use chefshat_room::Core;
-use chefshat_room::ids::{Id, RequestKey, Token, join_code, random_bytes};
+use chefshat_room::ids::{
+    GameId, RequestKey, RoomId, RoomToken, Token, UnitId, join_code, random_bytes,
+};
 use chefshat_room::journal::{
     Fill, GameHeader, GameStart, SeatedParticipant, StudyGame, TournamentGame,
 };
@@ -91,9 +93,9 @@ pub struct Seating {
     /// What its game is part of.
     pub part_of: PartOf,
     /// The room's owner token, with the id that the tournament or study has committed before.
-    pub owner: Token,
+    pub owner: RoomToken,
     /// The game's id.
-    pub game_id: Id,
+    pub game_id: GameId,
     /// The participants on the open seats.
     pub participants: BTreeMap<usize, SeatedParticipant>,
     /// The server's part of the seed, if several games share the deals.
@@ -111,10 +113,10 @@ pub enum PartOf {
 
 impl PartOf {
     /// What changes hands with it in a cluster.
-    fn unit(&self) -> Id {
+    fn unit(&self) -> UnitId {
         match self {
-            Self::Tournament(game) => game.tournament,
-            Self::Study(game) => game.study,
+            Self::Tournament(game) => game.tournament.unit(),
+            Self::Study(game) => game.study.unit(),
         }
     }
 
@@ -141,7 +143,7 @@ pub struct Created {
     /// The join code.
     pub join_code: String,
     /// The owner token.
-    pub owner: Token,
+    pub owner: RoomToken,
 }
 
 impl Rooms {
@@ -154,7 +156,7 @@ impl Rooms {
         let owner = match (&new.seating, &new.request) {
             (Some(seating), _) => seating.owner,
             (None, Some(request)) => request.owner(),
-            (None, None) => Token::random(Id::random()),
+            (None, None) => Token::random(RoomId::random()),
         };
         let reservation = loop {
             // A repetition of a request whose room is still being created waits for it.
@@ -232,16 +234,16 @@ enum Claim {
 /// Space in the table for a room that is being created.
 struct Reservation {
     rooms: Arc<Rooms>,
-    owner: Token,
+    owner: RoomToken,
     place: Option<Permit>,
 }
 
 impl Reservation {
     /// Reserves space for the room of this owner token.
-    fn of(rooms: &Arc<Rooms>, owner: Token, new: &NewRoom) -> Result<Claim, CreateError> {
+    fn of(rooms: &Arc<Rooms>, owner: RoomToken, new: &NewRoom) -> Result<Claim, CreateError> {
         let charged = new.charged;
         let seating = new.seating.as_ref();
-        let unit = seating.map_or(owner.subject, |seating| seating.part_of.unit());
+        let unit = seating.map_or(owner.subject.unit(), |seating| seating.part_of.unit());
         let mut table = rooms.lock();
         if let Some(entry) = table.get(owner.subject) {
             return match entry.header.owner.matches(&owner.secret) {
@@ -253,7 +255,7 @@ impl Reservation {
                 false => Err(CreateError::RequestIdUsed),
             };
         }
-        if table.in_creation.contains_key(&owner.subject) {
+        if table.in_creation.contains_key(&owner.subject.unit()) {
             return Ok(Claim::InProgress);
         }
         let place = rooms.places.try_take(charged);
@@ -280,7 +282,7 @@ impl Reservation {
         let clock = RoomClock::of_age(Duration::ZERO, &rooms.context.process_clock);
         let mut header = Arc::new(GameHeader {
             room_id,
-            game_id: seating.map_or_else(Id::random, |seating| seating.game_id),
+            game_id: seating.map_or_else(GameId::random, |seating| seating.game_id),
             name: new.name,
             rules: new.rules,
             policy: new.policy,
@@ -338,7 +340,7 @@ impl Reservation {
             };
             let handle = spawn_room(core, clock, None, journal, context);
             let durable = rooms.is_durable(&header);
-            if let Some(lease) = rooms.lease().filter(|_| header.unit() == room_id) {
+            if let Some(lease) = rooms.lease().filter(|_| header.unit() == room_id.unit()) {
                 let ephemeral = !durable;
                 lease.report(header.unit(), UnitEvent::Created { ephemeral });
             }
@@ -367,7 +369,10 @@ impl Reservation {
 
 impl Drop for Reservation {
     fn drop(&mut self) {
-        self.rooms.lock().in_creation.remove(&self.owner.subject);
+        self.rooms
+            .lock()
+            .in_creation
+            .remove(&self.owner.subject.unit());
         self.rooms.created.notify_waiters();
     }
 }

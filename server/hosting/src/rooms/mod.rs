@@ -28,7 +28,7 @@ use crate::webhooks::Webhooks;
 use chefshat_admission::limits::{Background, FairSemaphore, Key, NotStored, Searches, Shares};
 use chefshat_base::clock::ProcessClock;
 use chefshat_base::metrics::Metrics;
-use chefshat_room::ids::{Id, normal_code};
+use chefshat_room::ids::{GameId, RoomId, SeriesId, TournamentId, UnitId, normal_code};
 use chefshat_room::journal::{GameHeader, TournamentGame};
 use chefshat_store::samples::Samples;
 use chefshat_store::{Store, StoreError};
@@ -39,12 +39,21 @@ use table::{Entry, LockedTable, Table};
 /// How many join codes are tried for a room or tournament: another one of the cluster may have a code.
 pub(crate) const CODES_TRIED: u32 = 3;
 
+/// Games whose records are withheld.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Withheld {
+    /// Those of a series.
+    Series(SeriesId),
+    /// All of a tournament.
+    Tournament(TournamentId),
+}
+
 /// The rooms of a server.
 pub struct Rooms {
     table: Mutex<Table>,
     /// Series of games with the same deals that are not finished, and tournaments all of whose
     /// games are withheld.
-    closed: Mutex<BTreeSet<Id>>,
+    closed: Mutex<BTreeSet<Withheld>>,
     /// Notified when a game has ended or a room is gone.
     changed: Notify,
     /// Notified when the creation of a room has ended.
@@ -153,7 +162,7 @@ impl Rooms {
     ///
     /// # Errors
     /// The store or the file system failed; doing it again completes it.
-    pub async fn delete_games(&self, games: Vec<Id>) -> Result<(), StoreError> {
+    pub async fn delete_games(&self, games: Vec<GameId>) -> Result<(), StoreError> {
         self.delete_samples(&games).await?;
         self.context.store.delete(games).await
     }
@@ -163,13 +172,13 @@ impl Rooms {
     ///
     /// # Errors
     /// The store or the file system failed; doing it again completes it.
-    pub async fn prune_games(&self, games: Vec<Id>) -> Result<Vec<Id>, StoreError> {
+    pub async fn prune_games(&self, games: Vec<GameId>) -> Result<Vec<GameId>, StoreError> {
         let deleted = self.context.store.prune(games).await?;
         self.delete_samples(&deleted).await?;
         Ok(deleted)
     }
 
-    async fn delete_samples(&self, games: &[Id]) -> Result<(), StoreError> {
+    async fn delete_samples(&self, games: &[GameId]) -> Result<(), StoreError> {
         let deleting = self.samples.delete(games.to_vec()).await;
         deleting.map_err(|error| StoreError::Failed(format!("deleting samples: {error}")))
     }
@@ -195,13 +204,13 @@ impl Rooms {
     }
 
     /// The room with this id.
-    pub fn get(&self, id: Id) -> Option<Handle> {
-        let table = self.lock();
-        let number = table.numbers.get(&id)?;
-        table
-            .by_number
-            .get(number)
-            .map(|entry| entry.handle.clone())
+    pub fn get(&self, id: RoomId) -> Option<Handle> {
+        self.by_unit(id.unit())
+    }
+
+    /// The room with this id, if it is one.
+    pub fn by_unit(&self, id: UnitId) -> Option<Handle> {
+        Some(self.lock().get(id)?.handle.clone())
     }
 
     /// The room with this join code.
@@ -242,37 +251,37 @@ impl Rooms {
     }
 
     /// What was fixed about the game of a room before it started.
-    pub fn header(&self, id: Id) -> Option<Arc<GameHeader>> {
+    pub fn header(&self, id: RoomId) -> Option<Arc<GameHeader>> {
         Some(Arc::clone(&self.lock().get(id)?.header))
     }
 
     /// The room in which a game is running or waiting to start.
-    pub fn room_of(&self, game: Id) -> Option<Id> {
+    pub fn room_of(&self, game: GameId) -> Option<RoomId> {
         Some(self.lock().of_game(game)?.handle.id())
     }
 
     /// Whether a game is running or waiting to start here.
-    pub fn is_running(&self, game: Id) -> bool {
+    pub fn is_running(&self, game: GameId) -> bool {
         self.room_of(game).is_some()
     }
 
     /// Whether a room has stopped before its game is over.
-    pub fn is_suspended(&self, id: Id) -> bool {
+    pub fn is_suspended(&self, id: RoomId) -> bool {
         self.lock().get(id).is_some_and(|entry| entry.suspended)
     }
 
     /// Whether the game of a room is over; `None` if the room is unknown or suspended.
-    pub fn is_over(&self, id: Id) -> Option<bool> {
+    pub fn is_over(&self, id: RoomId) -> Option<bool> {
         let table = self.lock();
-        let entry = table.by_number.get(table.numbers.get(&id)?)?;
+        let entry = table.get(id)?;
         (!entry.suspended).then_some(entry.over)
     }
 
     /// Removes a room whose game is over: it shows a participant whose data are deleted.
-    pub fn forget(&self, id: Id) {
+    pub fn forget(&self, id: RoomId) {
         let mut table = self.lock();
         let over = table.get(id).is_some_and(|entry| entry.over);
-        if let Some(number) = table.numbers.get(&id).copied().filter(|_| over) {
+        if let Some(number) = table.number_of(id).filter(|_| over) {
             table.remove(number);
         }
     }
@@ -295,22 +304,24 @@ impl Rooms {
 
     /// Withholds the records of a series, or of all games of a tournament, or releases them once
     /// all have ended.
-    pub fn withhold(&self, series: Id, withheld: bool) {
+    pub fn withhold(&self, games: Withheld, withheld: bool) {
         let mut closed = self.closed();
         if withheld {
-            closed.insert(series);
+            closed.insert(games);
         } else {
-            closed.remove(&series);
+            closed.remove(&games);
         }
     }
 
     /// Whether the record of a game is withheld.
     pub fn is_withheld(&self, game: TournamentGame) -> bool {
         let closed = self.closed();
-        closed.contains(&game.tournament) || game.series.is_some_and(|it| closed.contains(&it))
+        let series = game.series.map(Withheld::Series);
+        closed.contains(&Withheld::Tournament(game.tournament))
+            || series.is_some_and(|series| closed.contains(&series))
     }
 
-    fn closed(&self) -> MutexGuard<'_, BTreeSet<Id>> {
+    fn closed(&self) -> MutexGuard<'_, BTreeSet<Withheld>> {
         (self.closed.lock()).expect("no code that holds this lock can panic")
     }
 
@@ -454,10 +465,10 @@ impl std::fmt::Debug for Rooms {
 struct Watcher(Weak<Rooms>);
 
 impl RoomWatcher for Watcher {
-    fn game_over(&self, room: Id) {
+    fn game_over(&self, room: RoomId) {
         if let Some(rooms) = self.0.upgrade() {
             let mut table = rooms.lock();
-            if let Some(number) = table.numbers.get(&room).copied()
+            if let Some(number) = table.number_of(room)
                 && let Some(entry) = table.by_number.get_mut(&number)
             {
                 entry.over = true;
@@ -468,10 +479,10 @@ impl RoomWatcher for Watcher {
         }
     }
 
-    fn gone(&self, room: Id) {
+    fn gone(&self, room: RoomId) {
         if let Some(rooms) = self.0.upgrade() {
             let mut table = rooms.lock();
-            if let Some(number) = table.numbers.get(&room).copied() {
+            if let Some(number) = table.number_of(room) {
                 match table.by_number.get_mut(&number) {
                     Some(entry) if !entry.over => entry.suspended = true,
                     _ => table.remove(number),

@@ -17,7 +17,7 @@ use crate::room::spawn_room;
 use chefshat_admission::limits::Key;
 use chefshat_base::clock::{RoomClock, since_epoch_ms};
 use chefshat_room::Core;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 use chefshat_room::journal::Fill;
 use chefshat_store::{ResumableGame, Store, StoreError};
 use chefshat_wire::convert;
@@ -76,7 +76,7 @@ impl Rooms {
         {
             let mut table = self.lock();
             // What stopped here before its end was known.
-            if let Some(number) = table.numbers.get(&room).copied() {
+            if let Some(number) = table.number_of(room) {
                 table.remove(number);
             }
             table.make_space(self.max_rooms);
@@ -135,7 +135,7 @@ impl Rooms {
 
 /// Recorded players that have been read: one may play in many rooms.
 #[derive(Default)]
-struct Players(HashMap<(Id, u32), Option<Arc<RecordedPlayer>>>);
+struct Players(HashMap<(GameId, u32), Option<Arc<RecordedPlayer>>>);
 
 impl Players {
     /// The recorded players of seats that replay one. If a record is gone, the policy's substitute
@@ -170,7 +170,7 @@ impl Players {
 
 async fn read(
     store: &Arc<dyn Store>,
-    (game, seat): (Id, u32),
+    (game, seat): (GameId, u32),
 ) -> Result<Arc<RecordedPlayer>, String> {
     let stored = (store.finished(game).await)
         .map_err(|error| error.to_string())?

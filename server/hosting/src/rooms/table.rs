@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 
 use crate::room::Handle;
 use chefshat_admission::limits::{Permit, Refused};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, RoomId, UnitId};
 use chefshat_room::journal::GameHeader;
 use chefshat_store::StoreError;
 
@@ -43,12 +43,12 @@ pub(super) struct Table {
     pub(super) next_number: u64,
     /// In the order of their creation.
     pub(super) by_number: BTreeMap<u64, Entry>,
-    pub(super) numbers: HashMap<Id, u64>,
+    pub(super) numbers: HashMap<UnitId, u64>,
     pub(super) codes: HashMap<String, u64>,
     /// The rooms of games, by the ids of the games.
-    games: HashMap<Id, u64>,
+    games: HashMap<GameId, u64>,
     /// Rooms that are being created, for which space is reserved, with their units.
-    pub(super) in_creation: HashMap<Id, Id>,
+    pub(super) in_creation: HashMap<UnitId, UnitId>,
     pub(super) shutting_down: bool,
     /// Removed rooms, until the table is unlocked: the last handle of a room may end it, and a room
     /// that ends looks into the table.
@@ -112,15 +112,19 @@ impl Entry {
 }
 
 impl Table {
-    pub(super) fn get(&self, id: Id) -> Option<&Entry> {
-        self.by_number.get(self.numbers.get(&id)?)
+    pub(super) fn get(&self, id: impl Into<UnitId>) -> Option<&Entry> {
+        self.by_number.get(&self.number_of(id)?)
+    }
+
+    pub(super) fn number_of(&self, id: impl Into<UnitId>) -> Option<u64> {
+        self.numbers.get(&id.into()).copied()
     }
 
     /// Reserves space for a room that will be created.
     pub(super) fn reserve(
         &mut self,
-        id: Id,
-        unit: Id,
+        id: RoomId,
+        unit: UnitId,
         max_rooms: usize,
     ) -> Result<(), CreateError> {
         if self.shutting_down {
@@ -133,14 +137,14 @@ impl Table {
                 return Err(CreateError::TooMany(max_rooms));
             }
         }
-        self.in_creation.insert(id, unit);
+        self.in_creation.insert(id.unit(), unit);
         Ok(())
     }
 
     pub(super) fn enter(&mut self, entry: Entry) {
         let number = self.next_number;
         self.next_number += 1;
-        self.numbers.insert(entry.handle.id(), number);
+        self.numbers.insert(entry.handle.id().unit(), number);
         let code = entry.header.join_code.clone();
         let taken_by = self.codes.get(&code).and_then(|it| self.by_number.get(it));
         // The codes of rooms that are over are given to new ones, which are found by them.
@@ -152,7 +156,7 @@ impl Table {
     }
 
     /// The room of a game that is not over.
-    pub(super) fn of_game(&self, game: Id) -> Option<&Entry> {
+    pub(super) fn of_game(&self, game: GameId) -> Option<&Entry> {
         let entry = self.by_number.get(self.games.get(&game)?)?;
         (!entry.over).then_some(entry)
     }
@@ -170,7 +174,7 @@ impl Table {
         }
     }
 
-    pub(super) fn any_open(&self, which: impl Fn(Id) -> bool) -> bool {
+    pub(super) fn any_open(&self, which: impl Fn(RoomId) -> bool) -> bool {
         self.by_number
             .values()
             .any(|entry| entry.is_open() && which(entry.handle.id()))
@@ -195,7 +199,7 @@ impl Table {
 
     pub(super) fn remove(&mut self, number: u64) {
         if let Some(entry) = self.by_number.remove(&number) {
-            self.numbers.remove(&entry.handle.id());
+            self.numbers.remove(&entry.handle.id().unit());
             if self.games.get(&entry.header.game_id) == Some(&number) {
                 self.games.remove(&entry.header.game_id);
             }

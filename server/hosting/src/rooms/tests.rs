@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::*;
-use chefshat_room::ids::{SecretHash, Token};
+use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::{
     AbortReason, Change, Entry, Fill, ParticipantKind, SeatedParticipant,
 };
@@ -29,11 +29,11 @@ async fn participants_of_a_tournament_are_committed_with_their_room() {
         fills: vec![fill; 4],
         seating: Some(Seating {
             part_of: PartOf::Tournament(TournamentGame {
-                tournament: Id([1; 16]),
+                tournament: Id::from_bytes([1; 16]),
                 series: None,
             }),
-            owner: Token::random(Id([2; 16])),
-            game_id: Id([3; 16]),
+            owner: Token::random(Id::from_bytes([2; 16])),
+            game_id: Id::from_bytes([3; 16]),
             participants: BTreeMap::from([(0, seated("Ada")), (2, seated("Bo"))]),
             server_seed: None,
         }),
@@ -59,8 +59,8 @@ async fn a_room_that_is_over_takes_no_join_code_from_an_open_one() {
     let header = rooms.header(open).expect("it exists");
     // Its code was that of a room that another node had.
     let former = GameHeader {
-        room_id: Id([8; 16]),
-        game_id: Id([9; 16]),
+        room_id: Id::from_bytes([8; 16]),
+        game_id: Id::from_bytes([9; 16]),
         ..(*header).clone()
     };
     let entries = vec![Entry {
@@ -76,7 +76,7 @@ async fn a_room_that_is_over_takes_no_join_code_from_an_open_one() {
             concluded: true,
         })
         .await;
-    assert!(rooms.get(Id([8; 16])).is_some(), "it is shown");
+    assert!(rooms.get(Id::from_bytes([8; 16])).is_some(), "it is shown");
     let found = rooms.by_code(&header.join_code).expect("it is open");
     assert_eq!(found.id(), open);
 }
@@ -95,17 +95,17 @@ async fn the_room_of_a_game_is_found_until_the_game_is_over() {
     for (room, game) in &made {
         assert_eq!(rooms.room_of(*game), Some(*room));
     }
-    assert_eq!(rooms.room_of(Id([0; 16])), None);
+    assert_eq!(rooms.room_of(Id::from_bytes([0; 16])), None);
     let [(first, ended), (_, removed), (third, other)] = made[..] else {
         unreachable!("three were made");
     };
     {
         let mut table = rooms.lock();
-        let number = table.numbers[&first];
+        let number = table.numbers[&first.unit()];
         table.by_number.get_mut(&number).expect("listed").over = true;
     }
     assert_eq!(rooms.room_of(ended), None);
-    let number = rooms.lock().numbers[&made[1].0];
+    let number = rooms.lock().numbers[&made[1].0.unit()];
     rooms.lock().remove(number);
     assert_eq!(rooms.room_of(removed), None);
     assert_eq!(rooms.room_of(other), Some(third));

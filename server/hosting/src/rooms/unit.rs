@@ -9,11 +9,11 @@ use chefshat_proto::v1::RoomState;
 
 use super::{Rooms, Table};
 use crate::room::Handle;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::UnitId;
 
 impl Rooms {
     /// Whether the room that is this unit runs here, or is being created.
-    pub(crate) fn runs(&self, unit: Id) -> bool {
+    pub(crate) fn runs(&self, unit: UnitId) -> bool {
         let table = self.lock();
         table.get(unit).is_some_and(|entry| entry.is_open())
             || table.in_creation.contains_key(&unit)
@@ -29,9 +29,9 @@ impl Rooms {
 
     /// The rooms that wait or play, by their units; those of units of which nothing is lost with this
     /// server.
-    pub(crate) fn durable_units(&self) -> BTreeMap<Id, Vec<Handle>> {
+    pub(crate) fn durable_units(&self) -> BTreeMap<UnitId, Vec<Handle>> {
         let table = self.lock();
-        let mut units = BTreeMap::<Id, Vec<Handle>>::new();
+        let mut units = BTreeMap::<UnitId, Vec<Handle>>::new();
         let mut lost = BTreeSet::new();
         for entry in table.by_number.values().filter(|entry| entry.is_open()) {
             let unit = entry.header.unit();
@@ -45,7 +45,7 @@ impl Rooms {
     }
 
     /// Stops all rooms of a unit at once, which publish nothing more, unless their games are over.
-    pub(crate) fn fence_unit(&self, unit: Id) {
+    pub(crate) fn fence_unit(&self, unit: UnitId) {
         for (handle, _) in self.open_of(unit) {
             handle.fence();
         }
@@ -62,31 +62,37 @@ impl Rooms {
 
     /// Stops all rooms of a unit, and forgets them when they have ended: another node may have
     /// them. Those whose games are over stay.
-    pub async fn stop_unit(&self, unit: Id) {
+    pub async fn stop_unit(&self, unit: UnitId) {
         self.end_unit(unit, |handle, _| async move { handle.fence() })
             .await;
     }
 
     /// Waits until a room is not one in which an ephemeral game is running.
-    pub(crate) async fn until_ephemeral_over(&self, room: Id) {
-        let Some(handle) = self.get(room) else { return };
+    pub(crate) async fn until_ephemeral_over(&self, unit: UnitId) {
+        let Some(handle) = self.by_unit(unit) else {
+            return;
+        };
         let described = handle.describe().await.ok();
         if described.is_none_or(|room| room.state() == RoomState::Waiting) {
             return;
         }
         let plays = |entry: &super::Entry| entry.is_open() && !entry.durable;
-        self.until(|table| !table.get(room).is_some_and(plays))
+        self.until(|table| !table.get(unit).is_some_and(plays))
             .await;
     }
 
     /// Suspends the durable rooms of a unit after their next commit, ends the others, and forgets
     /// them: this node hands the unit over.
-    pub(crate) async fn suspend_unit(&self, unit: Id) {
+    pub(crate) async fn suspend_unit(&self, unit: UnitId) {
         let end = |handle: Handle, durable| async move { handle.end(durable).await };
         self.end_unit(unit, end).await;
     }
 
-    async fn end_unit<F: Future<Output = ()>>(&self, unit: Id, end: impl Fn(Handle, bool) -> F) {
+    async fn end_unit<F: Future<Output = ()>>(
+        &self,
+        unit: UnitId,
+        end: impl Fn(Handle, bool) -> F,
+    ) {
         self.until_created(unit).await;
         for (handle, durable) in self.open_of(unit) {
             end(handle, durable).await;
@@ -102,7 +108,7 @@ impl Rooms {
     }
 
     /// Waits until no room of a unit is being created.
-    async fn until_created(&self, unit: Id) {
+    async fn until_created(&self, unit: UnitId) {
         loop {
             let created = self.created.notified();
             if !self.lock().in_creation.values().any(|of| *of == unit) {
@@ -112,7 +118,7 @@ impl Rooms {
         }
     }
 
-    fn open_of(&self, unit: Id) -> Vec<(Handle, bool)> {
+    fn open_of(&self, unit: UnitId) -> Vec<(Handle, bool)> {
         let table = self.lock();
         let open = table.of_unit(unit).filter(|(_, entry)| entry.is_open());
         open.map(|(_, entry)| (entry.handle.clone(), entry.durable))
@@ -122,7 +128,7 @@ impl Rooms {
 
 impl Table {
     /// The rooms of a unit, with their numbers.
-    fn of_unit(&self, unit: Id) -> impl Iterator<Item = (u64, &super::Entry)> {
+    fn of_unit(&self, unit: UnitId) -> impl Iterator<Item = (u64, &super::Entry)> {
         let entries = self.by_number.iter();
         entries
             .filter(move |(_, entry)| entry.header.unit() == unit)

@@ -12,7 +12,7 @@ use chefshat_study::{Device, DeviceSession, ItemAnswer, Participant, Study};
 use prost::Message as _;
 
 use chefshat_admission::limits::{FairSemaphore, Key, Permit, Refused};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::StudyId;
 
 /// When it is worth trying again to create a study, or to add to one.
 pub(super) const RETRY_STUDIES: Duration = Duration::from_secs(3_600);
@@ -41,7 +41,7 @@ struct Answers {
 impl StudyData {
     /// Takes what a study has, even beyond the budget: a study that was stored is always resumed.
     /// Who sent it is unknown.
-    pub(super) fn of(study: &Study, id: Id, budget: &Arc<FairSemaphore>) -> Self {
+    pub(super) fn of(study: &Study, id: StudyId, budget: &Arc<FairSemaphore>) -> Self {
         let take = |bytes| budget.take_many_anyway(Key::Study(id), bytes);
         let participants = study.participants();
         let bytes: usize = (participants.values())

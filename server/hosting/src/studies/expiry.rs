@@ -9,7 +9,7 @@ use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
 use tracing::{info, warn};
 
 use super::{Studies, StudyHandle};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::StudyId;
 
 /// Time between two checks of the dates.
 const CHECK_INTERVAL: Duration = Duration::from_secs(600);
@@ -40,7 +40,7 @@ impl Studies {
     pub async fn delete_when_due(self: Arc<Self>) {
         let mut checks = interval(CHECK_INTERVAL);
         checks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut passed: BTreeMap<Id, Passed> = BTreeMap::new();
+        let mut passed: BTreeMap<StudyId, Passed> = BTreeMap::new();
         loop {
             checks.tick().await;
             let studies = self.past_their_dates();
@@ -79,7 +79,7 @@ impl Studies {
                 }
             });
             let deleting = stream::iter(deleting).buffer_unordered(DELETED_AT_ONCE);
-            let failed: Vec<Id> = deleting.filter_map(future::ready).collect().await;
+            let failed: Vec<StudyId> = deleting.filter_map(future::ready).collect().await;
             for id in failed {
                 passed.entry(id).and_modify(|it| it.requested = None);
             }

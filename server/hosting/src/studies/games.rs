@@ -15,11 +15,11 @@ use super::task::StudyTask;
 use crate::config::TOURNAMENT_RETRY;
 use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
 use chefshat_base::tasks::short;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, RoomId};
 use chefshat_room::journal::{Change, Fill, GameStart, SeatedParticipant, StudyGame, StudyMember};
 use chefshat_room::policy::Policy;
 use chefshat_store::{StoreError, StoredGame};
-use chefshat_wire::convert::PARTICIPANT_KIND;
+use chefshat_wire::convert::{self, PARTICIPANT_KIND};
 
 impl StudyTask {
     /// Assigns rooms to the games of participants who are there and have none.
@@ -28,8 +28,8 @@ impl StudyTask {
             if !self.unit.state.is_connected(number) {
                 continue;
             }
-            let (room, game) = (Id::random(), Id::random());
-            for change in self.unit.state.place(number, room.0, game.0) {
+            let (room, game) = (RoomId::random(), GameId::random());
+            for change in self.unit.state.place(number, *room.bytes(), *game.bytes()) {
                 self.fold(change);
             }
         }
@@ -59,7 +59,7 @@ impl StudyTask {
                 }
                 continue;
             }
-            let room = Id(game.placed.room);
+            let room = convert::room_of(&game.placed);
             if self.unit.rooms.is_over(room) == Some(false) || self.unit.rooms.is_suspended(room) {
                 continue;
             }
@@ -84,14 +84,14 @@ impl StudyTask {
         if let Some(change) = (self.unit.state).game_ended(number, id, outcome, (self.now)()) {
             self.fold(change);
         }
-        let room = Id(game.placed.room);
+        let room = convert::room_of(&game.placed);
         self.closing.remove(&room);
         self.retired.remove(&(room, number));
     }
 
     /// The outcome of a game whose room is over or gone; `None` if it has no room yet.
     async fn outcome(&self, game: &PlayedGame) -> Result<Option<Outcome>, StoreError> {
-        let id = Id(game.placed.game);
+        let id = convert::game_of(&game.placed);
         let stored = match self.unit.rooms.store().finished(id).await {
             Err(StoreError::Unreadable(problem)) => {
                 error!(game = %id, problem, "a game of a study cannot be read, and counts as broken off");
@@ -107,7 +107,11 @@ impl StudyTask {
             }));
         }
         // A game that was aborted before it began has no record.
-        let had_room = self.unit.rooms.get(Id(game.placed.room)).is_some();
+        let had_room = self
+            .unit
+            .rooms
+            .get(convert::room_of(&game.placed))
+            .is_some();
         Ok(had_room.then_some(Outcome::Aborted))
     }
 
@@ -160,7 +164,7 @@ impl StudyTask {
             let Some(game) = left.and_then(|it| it.games.last()) else {
                 continue;
             };
-            let (room, seat) = (Id(game.placed.room), Seat::new(game.placed.seat));
+            let (room, seat) = (convert::room_of(&game.placed), Seat::new(game.placed.seat));
             let Some(handle) = self.unit.rooms.get(room) else {
                 continue;
             };
@@ -184,7 +188,7 @@ impl StudyTask {
         let condition = &settings.conditions[placed.condition];
         let plan = &self.unit.handle.plan.conditions[placed.condition];
         let small = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
-        let room = Id(placed.room);
+        let room = convert::room_of(placed);
         let players = self.unit.state.players_of(number).into_iter();
         let players = players.filter_map(|it| Some((it, self.unit.state.participant(it)?)));
         let players: Vec<_> = players.collect();
@@ -235,7 +239,7 @@ impl StudyTask {
             name: settings
                 .title
                 .chars()
-                .take(chefshat_wire::convert::MAX_NAME_CHARS)
+                .take(convert::MAX_NAME_CHARS)
                 .collect(),
             rules: match placed.practice {
                 true => plan.practice_rules,
@@ -279,7 +283,7 @@ impl StudyTask {
                     labels: plan.labels,
                 })),
                 owner: self.unit.handle.room_owner(room),
-                game_id: Id(placed.game),
+                game_id: convert::game_of(placed),
                 participants: seated.collect(),
                 server_seed: None,
             }),

@@ -18,9 +18,9 @@ use crate::journaled::{Handle, Stopped};
 use crate::rooms::Rooms;
 use chefshat_admission::limits::{Key, Permit, Refused};
 use chefshat_base::tasks::short;
-use chefshat_room::ids::{Id, SecretHash, Token};
+use chefshat_room::ids::{GameId, RoomId, RoomToken, SecretHash, Token};
 use chefshat_store::StoreError;
-use chefshat_store::units::{StoredTraces, UnitKind, UnitWrite};
+use chefshat_store::units::{StoredTraces, UnitKey, UnitWrite};
 use chefshat_wire::convert::{self, StudyPlan};
 
 /// Most interface traces in one request.
@@ -169,7 +169,7 @@ impl StudyHandle {
     }
 
     fn short_id(&self) -> [u8; 12] {
-        std::array::from_fn(|index| self.header.id.0[index])
+        std::array::from_fn(|index| self.header.id.bytes()[index])
     }
 
     /// What a participant sees now; `None` if it has not begun.
@@ -181,7 +181,7 @@ impl StudyHandle {
             // A game is placed before its room exists.
             game.place = game
                 .place
-                .filter(|(room, _)| rooms.get(Id(*room)).is_some());
+                .filter(|(room, _)| rooms.get(RoomId::from_bytes(*room)).is_some());
         }
         Some(convert::study_view(view, |room| {
             self.ticket_of(room, number).to_text()
@@ -197,7 +197,7 @@ impl StudyHandle {
     }
 
     /// The ticket of a participant's seat in a room. One who has no group has the room alone.
-    pub(super) fn ticket_of(&self, room: Id, number: u32) -> Token {
+    pub(super) fn ticket_of(&self, room: RoomId, number: u32) -> RoomToken {
         let has_group = |study: &Study| {
             study
                 .participant(number)
@@ -386,7 +386,7 @@ impl StudyHandle {
             return Ok(proceeded);
         }
         if let Some(room) = self.read(|study| study.room_of_test(at.number))
-            && let Some(room) = rooms.get(Id(room))
+            && let Some(room) = rooms.get(RoomId::from_bytes(room))
         {
             room.close_without_token().await;
             return Ok(Ok(0));
@@ -487,7 +487,7 @@ impl StudyHandle {
     pub async fn record_traces(
         &self,
         (number, session): (u32, u32),
-        game: Id,
+        game: GameId,
         traces: Vec<v1::StudyTrace>,
         rooms: &Rooms,
     ) -> Result<Result<(), TraceRefusal>, StoreError> {
@@ -505,7 +505,7 @@ impl StudyHandle {
             if participant.session != session {
                 return Ok(Err(Refusal::Superseded.into()));
             }
-            if !(participant.games.iter()).any(|played| played.placed.game == game.0) {
+            if !(participant.games.iter()).any(|played| played.placed.game == *game.bytes()) {
                 return Ok(Err(TraceRefusal::GameUnknown));
             }
             if !study.settings().traces || traces.is_empty() {
@@ -523,7 +523,7 @@ impl StudyHandle {
             game,
             traces,
         };
-        let unit = UnitKind::Study.id(self.id());
+        let unit = UnitKey::Study(self.id());
         let traces = UnitWrite::Traces(traces);
         let store = Arc::clone(rooms.store());
         // Deletion waits for it even if the caller goes.

@@ -29,7 +29,7 @@ use crate::rooms::Rooms;
 use chefshat_admission::limits::{FairSemaphore, Key, Refused};
 use chefshat_base::clock::{TimeOfDay, since_epoch_ms};
 use chefshat_base::tasks::short;
-use chefshat_room::ids::{Id, RequestKey, Token, random_bytes};
+use chefshat_room::ids::{Id, RequestKey, StudyId, StudyToken, Token, random_bytes};
 use chefshat_store::StoreError;
 use chefshat_store::studies::StudyHeader;
 use chefshat_wire::convert::{self, StudyPlan};
@@ -66,8 +66,8 @@ impl Studies {
     }
 
     /// The id of the study that this request creates.
-    pub fn created_id(request: RequestKey) -> Id {
-        shortened(request.owner().subject)
+    pub fn created_id(request: RequestKey) -> StudyId {
+        shortened(request.created_id())
     }
 
     /// Creates a study. Returns it with its owner token.
@@ -79,7 +79,7 @@ impl Studies {
         settings: v1::StudySettings,
         request: Option<RequestKey>,
         charged: Key,
-    ) -> Result<(Arc<StudyHandle>, Token), CreateProblem> {
+    ) -> Result<(Arc<StudyHandle>, StudyToken), CreateProblem> {
         let durable = self.rooms.store().outlives_server();
         // Long settings take milliseconds to check.
         let checking = tokio::task::spawn_blocking(move || check(settings, durable));
@@ -87,7 +87,7 @@ impl Studies {
             .map_err(|error| StoreError::Failed(format!("checking settings failed: {error}")))?
             .map_err(CreateProblem::Settings)?;
         self.check_accepting()?;
-        let owner = owner_of(request);
+        let owner: StudyToken = owner_of(request);
         let owner = Token {
             subject: shortened(owner.subject),
             ..owner
@@ -100,7 +100,7 @@ impl Studies {
     async fn make(
         &self,
         checked: Checked,
-        owner: Token,
+        owner: StudyToken,
         charged: Key,
     ) -> Result<New<StudyTask>, CreateProblem> {
         // A repeated request for a study that there is does not come here.
@@ -167,10 +167,10 @@ impl Studies {
     }
 
     /// The id that begins with these bytes, as links have them.
-    pub fn full_id(short: [u8; 12]) -> Id {
+    pub fn full_id(short: [u8; 12]) -> StudyId {
         let mut id = [0; 16];
         id[..short.len()].copy_from_slice(&short);
-        Id(id)
+        Id::from_bytes(id)
     }
 }
 
@@ -188,9 +188,9 @@ fn check(settings: v1::StudySettings, durable: bool) -> Result<Checked, Settings
 }
 
 /// An id whose last four bytes are 0, so that links can leave them out.
-fn shortened(id: Id) -> Id {
-    Id(std::array::from_fn(|index| match index {
-        0..12 => id.0[index],
+fn shortened(id: StudyId) -> StudyId {
+    Id::from_bytes(std::array::from_fn(|index| match index {
+        0..12 => id.bytes()[index],
         _ => 0,
     }))
 }

@@ -9,7 +9,7 @@ use tokio::sync::{Mutex as AsyncMutex, watch};
 use super::data::StudyData;
 use chefshat_admission::limits::{FairSemaphore, Permit};
 use chefshat_base::clock::TimeOfDay;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 
 /// What all studies of a server share.
 #[derive(Debug)]
@@ -34,7 +34,7 @@ pub struct StudyShared {
     pub(super) deleting: Mutex<BTreeSet<u32>>,
     /// Number of interface traces by participant and game, since the server was started. Locked while
     /// traces are added or deleted.
-    pub(super) traces: Arc<AsyncMutex<BTreeMap<(u32, Id), usize>>>,
+    pub(super) traces: Arc<AsyncMutex<BTreeMap<(u32, GameId), usize>>>,
     pub(super) streams: AtomicU64,
 }
 

@@ -17,14 +17,16 @@ use crate::journaled::{Folded, Journaled, Unit, UnitHeader};
 use chefshat_admission::limits::{Key, Refused};
 use chefshat_base::clock::TimeOfDay;
 use chefshat_base::tasks::LongTask;
-use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::ids::{self, GameId, RoomId, SecretHash, StudyId};
 use chefshat_store::StoreError;
 use chefshat_store::studies::{StoredStudy, StudyHeader, changes_to_bytes};
-use chefshat_store::units::{StoredUnit, UnitKind, UnitWrite};
+use chefshat_store::units::{StoredUnit, UnitKey, UnitWrite};
 use chefshat_wire::convert::{self, StudyPlan};
 
 impl UnitHeader for StudyHeader {
-    fn id(&self) -> Id {
+    type Kind = ids::Study;
+
+    fn id(&self) -> StudyId {
         self.id
     }
 
@@ -52,9 +54,9 @@ pub struct StudyTask {
     /// When the task began.
     began: Instant,
     /// Rooms that were asked to close.
-    pub(super) closing: BTreeSet<Id>,
+    pub(super) closing: BTreeSet<RoomId>,
     /// Rooms that were asked to give up the seat of a participant.
-    pub(super) retired: BTreeSet<(Id, u32)>,
+    pub(super) retired: BTreeSet<(RoomId, u32)>,
     /// When rooms whose creation failed are tried again.
     pub(super) retry: Option<Instant>,
     /// Those who wait for the deletion of the study, once that is requested.
@@ -62,6 +64,7 @@ pub struct StudyTask {
 }
 
 impl Journaled for StudyTask {
+    type Kind = ids::Study;
     type Header = StudyHeader;
     type Plan = StudyPlan;
     type State = Study;
@@ -71,7 +74,6 @@ impl Journaled for StudyTask {
     type Common = Budgets;
     type SettingsProblem = SettingsProblem;
 
-    const KIND: UnitKind = UnitKind::Study;
     const TASK: LongTask = LongTask::Study;
     const MAILBOX: usize = STUDY_MAILBOX;
     const MOST: usize = MAX_STUDIES;
@@ -84,7 +86,7 @@ impl Journaled for StudyTask {
         changes_to_bytes(changes)
     }
 
-    fn fold(id: Id, stored: &StoredUnit) -> Result<Folded<Self>, String> {
+    fn fold(id: StudyId, stored: &StoredUnit) -> Result<Folded<Self>, String> {
         let stored = StoredStudy::decode(id, stored).map_err(|problem| problem.to_string())?;
         let (plan, state) = restored(&stored).map_err(|problem| problem.to_string())?;
         Ok(Folded {
@@ -102,7 +104,7 @@ impl Journaled for StudyTask {
         StudyShared::new(memory, Arc::new(data))
     }
 
-    fn key_of(id: Id) -> Key {
+    fn key_of(id: StudyId) -> Key {
         Key::Study(id)
     }
 
@@ -272,10 +274,13 @@ impl Journaled for StudyTask {
             .iter()
             .filter_map(|number| self.unit.state.participant(*number));
         let games: Vec<_> = played.flat_map(|it| &it.games).collect();
-        let ids: BTreeSet<Id> = games.iter().map(|game| Id(game.placed.game)).collect();
+        let ids: BTreeSet<GameId> = games
+            .iter()
+            .map(|game| convert::game_of(&game.placed))
+            .collect();
         counts.retain(|(number, _), _| !due.contains(number));
         for game in &games {
-            self.unit.rooms.forget(Id(game.placed.room));
+            self.unit.rooms.forget(convert::room_of(&game.placed));
         }
         let count = ids.len();
         self.unit
@@ -302,18 +307,18 @@ impl Journaled for StudyTask {
         let played = participants.flat_map(|it| it.games.iter().map(|game| (it.test, game)));
         let played: Vec<_> = played.collect();
         for (_, game) in &played {
-            self.unit.rooms.forget(Id(game.placed.room));
+            self.unit.rooms.forget(convert::room_of(&game.placed));
         }
         // Those of a group have one game.
-        let games: BTreeMap<Id, bool> = (played.iter())
-            .map(|(test, game)| (Id(game.placed.game), *test))
+        let games: BTreeMap<GameId, bool> = (played.iter())
+            .map(|(test, game)| (convert::game_of(&game.placed), *test))
             .collect();
         let count = games.values().filter(|test| !**test).count();
         let games = games.into_keys().collect();
         let store = self.unit.rooms.store();
         // The games first: a repetition completes what was interrupted in between.
         self.unit.rooms.delete_games(games).await?;
-        let unit = Self::KIND.id(self.unit.handle.id());
+        let unit = UnitKey::Study(self.unit.handle.id());
         store.write_unit(unit, UnitWrite::Delete).await?;
         info!(study = %self.unit.handle.id(), games = count, "a study was deleted");
         // Those who asked while it was deleted get the same answer.

@@ -13,7 +13,9 @@ use tokio::time::advance;
 use super::*;
 use crate::config::{MAX_STUDIES, ServerConfig};
 use chefshat_base::tasks::{LongTask, polls};
+use chefshat_room::ids::{GameId, RoomId};
 use chefshat_store::testing::{FailingStore, TypedUnits as _};
+use chefshat_store::units::UnitKey;
 use chefshat_store::{MemoryStore, Store};
 
 /// How long a participant may be away.
@@ -261,7 +263,11 @@ async fn a_study_that_cannot_be_read_keeps_no_other_from_being_resumed() {
         created.expect("valid settings").0.id()
     };
     let [broken, readable] = [create().await, create().await];
-    failing.unreadable.lock().expect("no panic").insert(broken);
+    failing
+        .unreadable
+        .lock()
+        .expect("no panic")
+        .insert(broken.unit());
     let studies = server(&store);
     assert_eq!(studies.restore().await, Ok(1));
     assert!(studies.get(broken).is_none() && studies.get(readable).is_some());
@@ -304,11 +310,7 @@ async fn a_game_that_cannot_be_read_back_ends_no_study() {
 async fn a_study_that_runs_is_not_resumed_beside_itself() {
     let lab = Lab::new().await;
     let id = lab.study.id();
-    let stored = lab
-        .store
-        .unit(StudyTask::KIND.id(id))
-        .await
-        .expect("readable");
+    let stored = lab.store.unit(UnitKey::Study(id)).await.expect("readable");
     let stored = stored.expect("stored");
     assert!(lab.studies.resume(id, stored).await);
     let found = lab.studies.get(id).expect("it runs");
@@ -503,7 +505,7 @@ async fn a_restart_rewrites_a_journal_once_and_only_if_something_is_left() {
 #[tokio::test]
 async fn a_record_from_elsewhere_is_no_data_of_a_study() {
     let lab = Lab::new().await;
-    let game = Id([9; 16]);
+    let game = GameId::from_bytes([9; 16]);
     let summary = v1::RecordSummary::default();
     let imported = lab.store.import(game, summary, Arc::from([])).await;
     assert_eq!(imported, Ok(true));
@@ -834,7 +836,7 @@ async fn traces_that_were_sent_again_are_exported_once() {
     settings.traces = true;
     let lab = Lab::with(&ServerConfig::default(), settings, 1).await;
     let _present = lab.begin().await;
-    let game = |study: &Study| Id(study.participants()[&1].games[0].placed.game);
+    let game = |study: &Study| GameId::from_bytes(study.participants()[&1].games[0].placed.game);
     let game = lab.study.read(game);
     let trace = |at_ms| v1::StudyTrace {
         kind: v1::StudyTraceKind::CardPicked.into(),
@@ -1104,7 +1106,7 @@ async fn a_game_waits_for_a_partner_who_does_not_come_no_longer_than_for_one_who
         assert_eq!(consented.expect("it runs"), Ok(0));
         lab.settled().await;
     }
-    let room = |study: &Study| Id(study.participants()[&1].games[0].placed.room);
+    let room = |study: &Study| RoomId::from_bytes(study.participants()[&1].games[0].placed.room);
     let room = lab.study.read(room);
     let header = lab.studies.rooms().header(room).expect("it has a room");
     assert_eq!(header.policy.waiting_time, Duration::from_secs(30));

@@ -11,7 +11,7 @@ use super::task::TournamentTask;
 use crate::config::MAX_EARLY_WITHDRAWALS_OF_CALLER;
 use crate::journaled::Stopped;
 use chefshat_admission::limits::Key;
-use chefshat_room::ids::{SecretHash, Token};
+use chefshat_room::ids::{SecretHash, TournamentToken};
 use chefshat_store::tournaments::TournamentEntry;
 
 impl TournamentHandle {
@@ -22,7 +22,7 @@ impl TournamentHandle {
     pub async fn change_by_hand(
         &self,
         what: ByHand,
-    ) -> Result<Result<Option<Token>, ByHandRefusal>, Stopped> {
+    ) -> Result<Result<Option<TournamentToken>, ByHandRefusal>, Stopped> {
         let over = match &what {
             // A repeated request is answered in every state of the tournament.
             ByHand::Replace { participant, by } => {
@@ -46,7 +46,7 @@ impl TournamentHandle {
         &self,
         participant: usize,
         by: &Newcomer,
-    ) -> Option<Result<Option<Token>, ByHandRefusal>> {
+    ) -> Option<Result<Option<TournamentToken>, ByHandRefusal>> {
         let ticket = self.ticket_with(Some(by.request_id()?));
         self.committed().replaced_before(participant, by, ticket)
     }
@@ -58,8 +58,8 @@ impl TournamentState {
         &self,
         participant: usize,
         by: &Newcomer,
-        ticket: Token,
-    ) -> Option<Result<Option<Token>, ByHandRefusal>> {
+        ticket: TournamentToken,
+    ) -> Option<Result<Option<TournamentToken>, ByHandRefusal>> {
         let known = self.participant_of(&ticket.hash())?;
         let has = &self.core.participants()[known];
         let mut asked = by.entrant(has);
@@ -83,7 +83,10 @@ fn connects(entrant: &Entrant) -> bool {
 
 impl TournamentTask {
     /// Makes a change by hand. Returns the ticket of a new participant who connects.
-    pub(super) fn change_by_hand(&mut self, what: ByHand) -> Result<Option<Token>, ByHandRefusal> {
+    pub(super) fn change_by_hand(
+        &mut self,
+        what: ByHand,
+    ) -> Result<Option<TournamentToken>, ByHandRefusal> {
         match what {
             ByHand::Withdraw { who, charged } => self.withdraw(who, charged)?,
             ByHand::Remove { participant } => self.leave(participant, Leaving::Removed)?,
@@ -140,7 +143,7 @@ impl TournamentTask {
         &mut self,
         participant: usize,
         by: &Newcomer,
-    ) -> Result<Option<Token>, ByHandRefusal> {
+    ) -> Result<Option<TournamentToken>, ByHandRefusal> {
         let ticket = self.unit.handle.ticket_with(by.request_id());
         if let Some(answer) = self.unit.state.replaced_before(participant, by, ticket) {
             return answer;

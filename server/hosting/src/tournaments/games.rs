@@ -16,9 +16,9 @@ use tracing::{error, warn};
 use super::message::Call;
 use super::task::TournamentTask;
 use crate::config::TOURNAMENT_RETRY;
-use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
+use crate::rooms::{CreateError, NewRoom, PartOf, Seating, Withheld};
 use chefshat_base::tasks::short;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, Id, RoomId};
 use chefshat_room::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
 use chefshat_store::tournaments::TournamentEntry;
 use chefshat_store::{StoreError, StoredGame};
@@ -31,7 +31,7 @@ impl TournamentTask {
         if let Some(deal) = self.unit.state.core.games()[game].deal {
             self.unit
                 .rooms
-                .withhold(self.unit.handle.series(deal), true);
+                .withhold(Withheld::Series(self.unit.handle.series(deal)), true);
         }
         self.without_room.insert(game);
         self.seen.remove(&game);
@@ -78,7 +78,12 @@ impl TournamentTask {
     }
 
     /// The result of a game whose room is over or gone; `None` if it must be played again.
-    async fn ended(&self, game: usize, room: Id, game_id: Id) -> Result<Option<Ended>, StoreError> {
+    async fn ended(
+        &self,
+        game: usize,
+        room: RoomId,
+        game_id: GameId,
+    ) -> Result<Option<Ended>, StoreError> {
         // An imported record with this id is not the tournament's game.
         let is_ours = |game: &StoredGame| {
             (game.tournament()).is_some_and(|game| game.tournament == self.unit.handle.id())

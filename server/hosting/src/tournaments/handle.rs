@@ -12,10 +12,10 @@ use super::message::{Call, Connection, Entry, JoinRefusal, Message};
 use super::state::TournamentState;
 use super::task::TournamentTask;
 use crate::journaled::{Handle, Stopped};
-use crate::rooms::Rooms;
+use crate::rooms::{Rooms, Withheld};
 use chefshat_admission::access::{Relation, Secrets};
 use chefshat_base::tasks::short;
-use chefshat_room::ids::{Id, SecretHash, Token};
+use chefshat_room::ids::{Id, RoomId, RoomToken, SecretHash, SeriesId, Token, TournamentToken};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_room::policy::Visibility;
 use chefshat_wire::convert;
@@ -74,7 +74,10 @@ impl TournamentHandle {
     ///
     /// # Errors
     /// The server ends, or (inner result) the request is refused.
-    pub async fn join(&self, entry: Entry) -> Result<Result<(usize, Token), JoinRefusal>, Stopped> {
+    pub async fn join(
+        &self,
+        entry: Entry,
+    ) -> Result<Result<(usize, TournamentToken), JoinRefusal>, Stopped> {
         // A repeated request is answered in every state of the tournament.
         let repeated = entry.request_id.and_then(|_| {
             let ticket = self.ticket_of(&entry);
@@ -93,7 +96,7 @@ impl TournamentHandle {
     ///
     /// # Errors
     /// The game has no physical table now.
-    pub fn physical_room(&self, number: usize) -> Result<Token, TableProblem> {
+    pub fn physical_room(&self, number: usize) -> Result<RoomToken, TableProblem> {
         let state = self.committed();
         let game = (state.core.games().get(number)).ok_or(TableProblem::Unknown)?;
         if !game.physical {
@@ -135,7 +138,7 @@ impl TournamentHandle {
     pub async fn enter(
         &self,
         participant: usize,
-        ticket: &Token,
+        ticket: &TournamentToken,
         number: u64,
         connection: Connection,
     ) {
@@ -164,12 +167,12 @@ impl TournamentHandle {
     }
 
     /// The ticket for a request to join.
-    pub(super) fn ticket_of(&self, entry: &Entry) -> Token {
+    pub(super) fn ticket_of(&self, entry: &Entry) -> TournamentToken {
         self.ticket_with(entry.request_id.as_ref())
     }
 
     /// The ticket for a request with this id, or a random one.
-    pub(super) fn ticket_with(&self, request_id: Option<&[u8; 32]>) -> Token {
+    pub(super) fn ticket_with(&self, request_id: Option<&[u8; 32]>) -> TournamentToken {
         match request_id {
             Some(id) => Token::of_request(self.header.id, &self.header.owner, id),
             None => Token::random(self.header.id),
@@ -255,7 +258,7 @@ impl TournamentHandle {
     /// Closes the rooms of running games of a tournament that is over: it was closed, perhaps just
     /// before the server ended.
     pub(super) fn close_rooms(&self, rooms: &Rooms) {
-        let placed: Vec<Id> = (self.committed().placed.values())
+        let placed: Vec<RoomId> = (self.committed().placed.values())
             .map(|(room, _)| *room)
             .collect();
         for room in placed {
@@ -275,14 +278,14 @@ impl TournamentHandle {
         let over = state.core.state().is_over();
         for &deal in deals {
             let withheld = !over && !state.core.is_deal_open(deal);
-            rooms.withhold(self.series(deal), withheld);
+            rooms.withhold(Withheld::Series(self.series(deal)), withheld);
         }
     }
 
     /// The id of the series of games with this deal.
-    pub(super) fn series(&self, deal: u32) -> Id {
+    pub(super) fn series(&self, deal: u32) -> SeriesId {
         let hash = self.of_deal(b"chefshat.v1 series", deal);
-        Id(std::array::from_fn(|index| hash[index]))
+        Id::from_bytes(std::array::from_fn(|index| hash[index]))
     }
 
     /// The server's part of the seed of games with this deal.

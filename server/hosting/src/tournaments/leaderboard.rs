@@ -453,7 +453,7 @@ mod tests {
     /// Stores a game that another node has played.
     async fn played(store: &MemoryStore, header: &GameHeader, game: u64, winner: &str) {
         let header = GameHeader {
-            game_id: Id(u128::from(game).to_be_bytes()),
+            game_id: Id::from_bytes(u128::from(game).to_be_bytes()),
             ..header.clone()
         };
         let created = store.create(Arc::new(header), Vec::new()).await;
@@ -483,7 +483,7 @@ mod tests {
         }
         // A deleted game counts until all are read again.
         store
-            .delete(vec![Id(1_u128.to_be_bytes())])
+            .delete(vec![Id::from_bytes(1_u128.to_be_bytes())])
             .await
             .expect("deleted");
         tokio::time::advance(LEADERBOARD_READ_AGAIN).await;

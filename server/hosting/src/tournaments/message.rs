@@ -8,7 +8,7 @@ use tokio::sync::{mpsc, oneshot};
 
 use crate::room::Supersedes;
 use chefshat_admission::limits::Key;
-use chefshat_room::ids::{Id, SecretHash, Token};
+use chefshat_room::ids::{RoomId, SecretHash, TournamentToken};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_wire::outbox::{Outbox, StreamEnd};
 
@@ -16,7 +16,7 @@ use chefshat_wire::outbox::{Outbox, StreamEnd};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Call {
     /// Its game is played in this room.
-    Seat(Id),
+    Seat(RoomId),
     /// The connection with this number keeps the participant.
     HeldBy(u64),
     /// A newer connection has taken over the participant.
@@ -233,7 +233,10 @@ pub enum ByHandRefusal {
 /// A message to the task of a tournament.
 pub enum Message {
     /// Joins.
-    Join(Entry, oneshot::Sender<Result<(usize, Token), JoinRefusal>>),
+    Join(
+        Entry,
+        oneshot::Sender<Result<(usize, TournamentToken), JoinRefusal>>,
+    ),
     /// Starts it.
     Begin(oneshot::Sender<Result<(), BeginProblem>>),
     /// Closes it.
@@ -241,7 +244,7 @@ pub enum Message {
     /// Changes something by hand.
     ByHand(
         ByHand,
-        oneshot::Sender<Result<Option<Token>, ByHandRefusal>>,
+        oneshot::Sender<Result<Option<TournamentToken>, ByHandRefusal>>,
     ),
     /// Attaches the stream with this number to a participant who has a ticket.
     Enter(usize, SecretHash, u64, Connection),

@@ -35,7 +35,7 @@ use crate::journaled::{self, Folded, New, Registry, owner_of};
 use crate::rooms::{CODES_TRIED, Rooms};
 use chefshat_admission::limits::Key;
 use chefshat_base::clock::since_epoch_ms;
-use chefshat_room::ids::{Id, RequestKey, Token, join_code, random_bytes};
+use chefshat_room::ids::{GameId, RequestKey, TournamentToken, join_code, random_bytes};
 use chefshat_store::StoreError;
 use chefshat_store::tournaments::{TournamentEntry, TournamentHeader};
 use chefshat_wire::convert::{self, TournamentPlan};
@@ -64,7 +64,7 @@ impl Tournaments {
         plan: TournamentPlan,
         request: Option<RequestKey>,
         charged: Key,
-    ) -> Result<(Arc<TournamentHandle>, Token), CreateProblem> {
+    ) -> Result<(Arc<TournamentHandle>, TournamentToken), CreateProblem> {
         let core = Tournament::new(plan.core.clone()).map_err(CreateProblem::Settings)?;
         self.check_accepting()?;
         let owner = owner_of(request);
@@ -78,7 +78,7 @@ impl Tournaments {
         name: &str,
         plan: TournamentPlan,
         core: Tournament,
-        owner: Token,
+        owner: TournamentToken,
     ) -> Result<New<TournamentTask>, CreateProblem> {
         check_start(plan.start_at_ms).map_err(CreateProblem::Settings)?;
         let mut header = TournamentHeader {
@@ -114,7 +114,7 @@ impl Tournaments {
     }
 
     /// Whether a tournament has announced a game with this id.
-    pub fn has_announced(&self, game: Id) -> bool {
+    pub fn has_announced(&self, game: GameId) -> bool {
         let announces = |(_, handle): &(u64, Arc<TournamentHandle>)| {
             (handle.committed().placed.values()).any(|(_, announced)| *announced == game)
         };

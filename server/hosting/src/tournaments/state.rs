@@ -9,7 +9,7 @@ use tokio::sync::Mutex as AsyncMutex;
 
 use super::message::{Entry, JoinRefusal};
 use super::shared::{AsOf, Shared};
-use chefshat_room::ids::{Id, SecretHash, Token};
+use chefshat_room::ids::{GameId, RoomId, SecretHash, TournamentToken};
 use chefshat_store::tournaments::{StoredTournament, TournamentEntry};
 use chefshat_wire::convert::{self, TournamentPlan};
 
@@ -31,7 +31,7 @@ pub struct TournamentState {
     /// Hashed tickets of participants; built-in ones have none.
     pub(super) tickets: BTreeMap<usize, SecretHash>,
     /// Rooms and game ids of the tournament's games.
-    pub(super) placed: BTreeMap<usize, (Id, Id)>,
+    pub(super) placed: BTreeMap<usize, (RoomId, GameId)>,
     /// Ids of the connections that have participants now.
     pub(super) connected: BTreeMap<usize, u64>,
 }
@@ -59,8 +59,8 @@ impl TournamentState {
     pub(super) fn joined_before(
         &self,
         entry: &Entry,
-        ticket: Token,
-    ) -> Option<Result<(usize, Token), JoinRefusal>> {
+        ticket: TournamentToken,
+    ) -> Option<Result<(usize, TournamentToken), JoinRefusal>> {
         let participant = self.participant_of(&ticket.hash())?;
         Some(
             match self.core.participants()[participant] == entry.entrant() {

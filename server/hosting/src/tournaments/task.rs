@@ -13,14 +13,14 @@ use super::message::{Call, Connection, Entry, JoinRefusal, Message};
 use super::state::{Common, TournamentShared, TournamentState, restored};
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX, TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
 use crate::journaled::{Folded, Handle, Journaled, Unit, UnitHeader};
-use crate::rooms::Rooms;
+use crate::rooms::{Rooms, Withheld};
 use chefshat_admission::limits::{Key, Refused};
 use chefshat_base::clock::{RoomClock, since_epoch_ms};
 use chefshat_base::tasks::LongTask;
-use chefshat_room::ids::{Id, SecretHash, Token};
+use chefshat_room::ids::{self, RoomId, SecretHash, TournamentId, TournamentToken};
 use chefshat_store::StoreError;
 use chefshat_store::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use chefshat_store::units::{StoredUnit, UnitKind};
+use chefshat_store::units::StoredUnit;
 use chefshat_wire::convert::TournamentPlan;
 use chefshat_wire::outbox::StreamEnd;
 
@@ -28,7 +28,9 @@ use chefshat_wire::outbox::StreamEnd;
 const RETRY_TOURNAMENTS: Duration = Duration::from_secs(60);
 
 impl UnitHeader for TournamentHeader {
-    fn id(&self) -> Id {
+    type Kind = ids::Tournament;
+
+    fn id(&self) -> TournamentId {
         self.id
     }
 
@@ -74,6 +76,7 @@ pub struct TournamentTask {
 }
 
 impl Journaled for TournamentTask {
+    type Kind = ids::Tournament;
     type Header = TournamentHeader;
     type Plan = TournamentPlan;
     type State = TournamentState;
@@ -83,7 +86,6 @@ impl Journaled for TournamentTask {
     type Common = Common;
     type SettingsProblem = SettingsProblem;
 
-    const KIND: UnitKind = UnitKind::Tournament;
     const TASK: LongTask = LongTask::Tournament;
     const MAILBOX: usize = TOURNAMENT_MAILBOX;
     const MOST: usize = MAX_TOURNAMENTS;
@@ -96,7 +98,7 @@ impl Journaled for TournamentTask {
         TournamentEntry::to_bytes(entries)
     }
 
-    fn fold(id: Id, stored: &StoredUnit) -> Result<Folded<Self>, String> {
+    fn fold(id: TournamentId, stored: &StoredUnit) -> Result<Folded<Self>, String> {
         let stored = StoredTournament::decode(id, stored).map_err(|problem| problem.to_string())?;
         let (plan, state) = restored(&stored)?;
         Ok(Folded {
@@ -112,11 +114,11 @@ impl Journaled for TournamentTask {
     }
 
     /// The deals that it would withhold are unknown.
-    fn set_unreadable(id: Id, rooms: &Rooms) {
-        rooms.withhold(id, true);
+    fn set_unreadable(id: TournamentId, rooms: &Rooms) {
+        rooms.withhold(Withheld::Tournament(id), true);
     }
 
-    fn key_of(id: Id) -> Key {
+    fn key_of(id: TournamentId) -> Key {
         Key::Tournament(id)
     }
 
@@ -309,7 +311,7 @@ impl TournamentTask {
         u64::try_from(self.clock.now().as_millis()).unwrap_or(u64::MAX)
     }
 
-    fn join(&mut self, entry: Entry) -> Result<(usize, Token), JoinRefusal> {
+    fn join(&mut self, entry: Entry) -> Result<(usize, TournamentToken), JoinRefusal> {
         let token = self.unit.handle.ticket_of(&entry);
         if let Some(answer) = self.unit.state.joined_before(&entry, token) {
             return answer;
@@ -390,7 +392,7 @@ impl TournamentTask {
     }
 
     /// Rooms in which a participant has a seat now.
-    fn rooms_of(&self, participant: usize) -> Vec<Id> {
+    fn rooms_of(&self, participant: usize) -> Vec<RoomId> {
         let state = &self.unit.state;
         let games = state.core.playing().filter(|number| {
             let game = &state.core.games()[*number];

@@ -7,6 +7,7 @@ use futures::FutureExt as _;
 use super::*;
 use crate::config::{MAX_TOURNAMENTS, ServerConfig};
 use chefshat_admission::limits::Key;
+use chefshat_room::ids::{GameId, TournamentId, TournamentToken};
 use chefshat_store::testing::{FailingStore, TypedUnits as _};
 use chefshat_store::{SqliteStore, Store};
 use chefshat_tournament::{ByHandProblem, GameState};
@@ -49,7 +50,7 @@ async fn creating_a_tournament_completes_even_if_the_caller_is_cancelled() {
     assert_eq!(found.id(), handle.id());
     let stored = store.tournaments(0).await.expect("readable");
     assert_eq!(stored.len(), 1);
-    assert!(tournaments.get(Id::random()).is_none());
+    assert!(tournaments.get(TournamentId::random()).is_none());
     assert!(tournaments.by_code("").is_none());
 }
 
@@ -148,7 +149,7 @@ async fn a_forged_record_of_a_coming_game_is_not_counted() {
             _ => changes.changed().await.expect("the tournament exists"),
         }
     };
-    let game = Id::parse(&forged).expect("an id");
+    let game = GameId::parse(&forged).expect("an id");
     let summary = v1::RecordSummary {
         game_id: forged.clone(),
         state: v1::RoomState::Finished.into(),
@@ -344,7 +345,7 @@ async fn a_pause_ends_by_itself() {
 }
 
 /// A withdrawal with a ticket.
-fn withdrawal(ticket: &Token) -> ByHand {
+fn withdrawal(ticket: &TournamentToken) -> ByHand {
     ByHand::Withdraw {
         who: Who::Ticket(ticket.hash()),
         charged: Key::Local,
@@ -375,7 +376,7 @@ async fn the_ticket_of_a_participant_ends_with_its_place() {
         joined.expect("joined")
     };
     let change = async |what| handle.change_by_hand(what).await.expect("the task runs");
-    let known = |ticket: &Token| handle.participant_of(&ticket.secret);
+    let known = |ticket: &TournamentToken| handle.participant_of(&ticket.secret);
     let (ada, adas) = join("Ada").await;
     assert_eq!(known(&adas), Some(ada));
     assert_eq!(change(withdrawal(&adas)).await, Ok(None));
@@ -485,7 +486,7 @@ async fn one_caller_cannot_join_and_withdraw_for_ever() {
         let joined = handle.join(entrant("fickle")).await.expect("the task runs");
         joined.expect("joined").1
     };
-    let go = async |ticket: &Token, address: [u8; 4]| {
+    let go = async |ticket: &TournamentToken, address: [u8; 4]| {
         let what = ByHand::Withdraw {
             who: Who::Ticket(ticket.hash()),
             charged: Key::Address(address.into()),

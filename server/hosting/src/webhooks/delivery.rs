@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use bytes::Bytes;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::UnitId;
 use hmac::{Hmac, KeyInit as _, Mac as _};
 use http::StatusCode;
 use sha2::Sha256;
@@ -37,7 +37,7 @@ pub(super) struct Delivery {
     settings: WebhookSettings,
     waiting: mpsc::Receiver<Event>,
     /// By room or tournament. None is empty.
-    lines: BTreeMap<Id, Line>,
+    lines: BTreeMap<UnitId, Line>,
     /// Number of the next line.
     next_line: u64,
     /// When the next event may be sent: the receiver may be away.
@@ -118,7 +118,7 @@ impl Delivery {
 
     /// The line whose first event is sent next, and when. What was not sent yet comes before what
     /// failed, and among these the oldest.
-    fn next(&self) -> Option<(Id, Instant)> {
+    fn next(&self) -> Option<(UnitId, Instant)> {
         let now = Instant::now();
         let from = self.held_up_until.unwrap_or(now).max(now);
         let at = |line: &Line| line.again_at.unwrap_or(from).max(from);
@@ -129,7 +129,7 @@ impl Delivery {
     }
 
     /// Sends the first event of a line, and settles it unless it is to be repeated.
-    async fn attempt(&mut self, about: Id, outcomes: &Outcomes, closing: &CancellationToken) {
+    async fn attempt(&mut self, about: UnitId, outcomes: &Outcomes, closing: &CancellationToken) {
         let event = &self.lines[&about].events[0];
         let id = event.id.clone();
         let sent = tokio::select! {
@@ -159,7 +159,7 @@ impl Delivery {
     }
 
     /// Sets when an event is sent again, or gives it up.
-    fn failed(&mut self, about: Id, problem: &PostError, outcomes: &Outcomes) {
+    fn failed(&mut self, about: UnitId, problem: &PostError, outcomes: &Outcomes) {
         let now = Instant::now();
         self.held_up_until = Some(now + self.next_hold_up);
         self.next_hold_up = (2 * self.next_hold_up).min(MAX_HOLD_UP);
@@ -186,7 +186,7 @@ impl Delivery {
     }
 
     /// Removes the first event of a line.
-    fn settle(&mut self, about: Id) {
+    fn settle(&mut self, about: UnitId) {
         let Some(line) = self.lines.get_mut(&about) else {
             return;
         };

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::UnitId;
 use tokio::sync::OwnedSemaphorePermit;
 
 use chefshat_admission::limits::LogPace;
@@ -16,7 +16,7 @@ const LINES_PER_MINUTE: u32 = 10;
 #[derive(Debug)]
 pub(super) struct Event {
     /// The room or tournament it is about. Events about the same one are delivered in order.
-    pub(super) about: Id,
+    pub(super) about: UnitId,
     /// The same for the same event, also if two servers announce it.
     pub(super) id: String,
     pub(super) body: Bytes,

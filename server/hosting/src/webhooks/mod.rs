@@ -7,10 +7,11 @@ mod delivery;
 mod event;
 mod settings;
 
+use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use chefshat_proto::v1;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{TournamentId, UnitId};
 use chefshat_room::journal::GameHeader;
 use serde_json::{Value, json};
 use tokio::sync::{Semaphore, mpsc};
@@ -83,7 +84,7 @@ impl Webhooks {
     }
 
     /// A tournament has started.
-    pub fn tournament_started(&self, tournament: Id, name: &str, participants: usize) {
+    pub fn tournament_started(&self, tournament: TournamentId, name: &str, participants: usize) {
         self.announce("tournament.started", tournament, tournament, || {
             json!({
                 "tournament_id": tournament.to_string(),
@@ -94,7 +95,7 @@ impl Webhooks {
     }
 
     /// A tournament is over: finished, or closed before.
-    pub fn tournament_ended(&self, tournament: Id, name: &str, finished: bool) {
+    pub fn tournament_ended(&self, tournament: TournamentId, name: &str, finished: bool) {
         self.announce("tournament.ended", tournament, tournament, || {
             json!({
                 "tournament_id": tournament.to_string(),
@@ -105,7 +106,13 @@ impl Webhooks {
     }
 
     /// Queues an event, or drops it if too many wait. `of`: what its id names.
-    fn announce(&self, kind: &str, of: Id, about: Id, data: impl FnOnce() -> Value) {
+    fn announce(
+        &self,
+        kind: &str,
+        of: impl fmt::Display,
+        about: impl Into<UnitId>,
+        data: impl FnOnce() -> Value,
+    ) {
         let Some(queue) = &self.0 else {
             return;
         };
@@ -126,7 +133,7 @@ impl Webhooks {
         });
         // It fails only once nothing is delivered any more.
         let _ = queue.events.try_send(Event {
-            about,
+            about: about.into(),
             id,
             body: body.to_string().into(),
             _place: place,

@@ -92,7 +92,7 @@ async fn an_event_is_sent_until_it_is_received_and_signed_each_time() {
     let webhooks = Webhooks::new(settings(port), Arc::clone(&metrics));
     let closing = CancellationToken::new();
     let delivering = tokio::spawn(webhooks.clone().deliver(closing.clone()));
-    let cup = Id::random();
+    let cup = TournamentId::random();
     webhooks.tournament_started(cup, "Coppa", 8);
     webhooks.tournament_ended(cup, "Coppa", true);
     let mut seen = Vec::new();
@@ -123,7 +123,7 @@ async fn what_has_no_space_is_dropped_and_what_waits_at_the_end_is_tried_once_mo
     let webhooks = Webhooks::new(settings(port), Arc::clone(&metrics));
     // Nothing is delivered yet.
     for _ in 0..MAX_WAITING + 3 {
-        webhooks.tournament_started(Id::random(), "Coppa", 8);
+        webhooks.tournament_started(TournamentId::random(), "Coppa", 8);
     }
     assert_eq!(webhooks.waiting(), MAX_WAITING);
     assert_eq!(metrics.webhooks(WebhookOutcome::Dropped), 3);
@@ -149,7 +149,7 @@ async fn what_is_not_received_in_any_attempt_is_given_up() {
     let metrics = Arc::new(Metrics::default());
     let webhooks = Webhooks::new(settings(port), Arc::clone(&metrics));
     let closing = CancellationToken::new();
-    webhooks.tournament_started(Id::random(), "Coppa", 8);
+    webhooks.tournament_started(TournamentId::random(), "Coppa", 8);
     let delivering = tokio::spawn(webhooks.clone().deliver(closing.clone()));
     for _ in 0..MAX_ATTEMPTS {
         assert_eq!(names(&mut requests, 1).await, ["Coppa"]);
@@ -202,10 +202,10 @@ async fn a_refused_event_is_not_repeated_and_delays_nothing() {
         let patient = settings(port).pausing(PATIENCE * 10);
         let webhooks = Webhooks::new(patient, Arc::clone(&metrics));
         let closing = CancellationToken::new();
-        let cup = Id::random();
+        let cup = TournamentId::random();
         webhooks.tournament_started(cup, "Refused", 8);
         webhooks.tournament_ended(cup, "Next of it", true);
-        webhooks.tournament_started(Id::random(), "Other", 8);
+        webhooks.tournament_started(TournamentId::random(), "Other", 8);
         let delivering = tokio::spawn(webhooks.clone().deliver(closing.clone()));
         let sent = names(&mut requests, 3).await;
         assert_eq!(sent, ["Refused", "Other", "Next of it"], "{status}");
@@ -225,11 +225,11 @@ async fn an_event_that_is_sent_again_is_overtaken_by_others_and_not_by_the_next_
         let metrics = Arc::new(Metrics::default());
         let webhooks = Webhooks::new(settings(port), Arc::clone(&metrics));
         let closing = CancellationToken::new();
-        let cup = Id::random();
+        let cup = TournamentId::random();
         webhooks.tournament_started(cup, "Failing", 8);
         webhooks.tournament_ended(cup, "Next of it", true);
         for other in ["One", "Two", "Three"] {
-            webhooks.tournament_started(Id::random(), other, 8);
+            webhooks.tournament_started(TournamentId::random(), other, 8);
         }
         let delivering = tokio::spawn(webhooks.clone().deliver(closing.clone()));
         let sent = names(&mut requests, 4).await;

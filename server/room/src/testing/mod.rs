@@ -46,8 +46,8 @@ impl Table {
 
     pub fn with_rules(policy: Policy, fills: Vec<Fill>, rules: RuleSetSpec) -> Self {
         let header = Arc::new(GameHeader {
-            room_id: Id([1; 16]),
-            game_id: Id([2; 16]),
+            room_id: Id::from_bytes([1; 16]),
+            game_id: Id::from_bytes([2; 16]),
             name: "table".into(),
             rules: rules.validate().expect("a valid rule set"),
             rules_version: RULES_VERSION,
@@ -322,7 +322,7 @@ pub fn with_jokers_at(
 /// The game of a study whose participant has seat 0.
 pub fn study_game(labels: SeatLabels) -> StudyGame {
     StudyGame {
-        study: Id([9; 16]),
+        study: Id::from_bytes([9; 16]),
         name: "study".into(),
         condition: "condition".into(),
         levels: [("factor".to_owned(), "level".to_owned())].into(),

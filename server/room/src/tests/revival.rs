@@ -451,7 +451,7 @@ fn a_long_branch_is_taken_over_in_pieces_and_across_a_restart() {
     let mut table = Table::with_rules(Policy::default(), vec![OPEN; 4], rules);
     let mut header = GameHeader::clone(table.core.header());
     header.start.branch = Some(Branch {
-        game: Id([9; 16]),
+        game: Id::from_bytes([9; 16]),
         same_deals: true,
         taken_over: vec![TakenOver { seed, actions }],
     });

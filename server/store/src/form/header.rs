@@ -11,6 +11,7 @@ use prost::encoding::{DecodeContext, decode_key, skip_field};
 
 use super::entry::{number_of, value_of};
 use super::{Unreadable, action, array, check_form};
+use crate::units::{UnitKey, UnitKind};
 use chefshat_room::ids::{Id, SecretHash};
 use chefshat_room::journal::{GameHeader, SeatLabels, StudyGame, StudyMember, TournamentGame};
 use chefshat_wire::convert;
@@ -137,8 +138,8 @@ pub(crate) fn header_to_bytes(header: &GameHeader) -> Vec<u8> {
     };
     let taken_over = header.start.branch.iter().flat_map(|b| &b.taken_over);
     HeaderForm {
-        room_id: header.room_id.0.to_vec(),
-        game_id: header.game_id.0.to_vec(),
+        room_id: header.room_id.bytes().to_vec(),
+        game_id: header.game_id.bytes().to_vec(),
         name: header.name.clone(),
         rules: Some(rules_to_proto(&header.rules)),
         rules_version: header.rules_version,
@@ -155,8 +156,9 @@ pub(crate) fn header_to_bytes(header: &GameHeader) -> Vec<u8> {
             .flat_map(|part| &part.actions)
             .map(|action| action.index().into())
             .collect(),
-        tournament: (header.tournament).map_or_else(Vec::new, |game| game.tournament.0.to_vec()),
-        series: (header.series()).map_or_else(Vec::new, |series| series.0.to_vec()),
+        tournament: (header.tournament)
+            .map_or_else(Vec::new, |game| game.tournament.bytes().to_vec()),
+        series: (header.series()).map_or_else(Vec::new, |series| series.bytes().to_vec()),
         table: (header.table).map_or_else(Vec::new, |table| table.bytes().to_vec()),
         study: header.study.as_deref().map(study_to_form),
         server_version: header.server_version.clone(),
@@ -174,7 +176,7 @@ fn study_to_form(game: &StudyGame) -> StudyForm {
     });
     let first = members.next().unwrap_or_default();
     StudyForm {
-        study: game.study.0.to_vec(),
+        study: game.study.bytes().to_vec(),
         name: game.name.clone(),
         condition: game.condition.clone(),
         levels: game.levels.clone(),
@@ -213,7 +215,7 @@ fn study_from_form(form: StudyForm) -> Result<StudyGame, Unreadable> {
     };
     let members = std::iter::once(first).chain(form.others);
     Ok(StudyGame {
-        study: Id(array(&form.study, "the study's id")?),
+        study: Id::from_bytes(array(&form.study, "the study's id")?),
         name: form.name,
         condition: form.condition,
         levels: form.levels,
@@ -240,19 +242,19 @@ pub(crate) fn stored_header(bytes: Option<&[u8]>) -> Result<GameHeader, Unreadab
 ///
 /// # Errors
 /// This version cannot read it.
-pub(crate) fn stored_unit(form: i64, header: Option<&[u8]>) -> Result<Option<Id>, Unreadable> {
+pub(crate) fn stored_unit(form: i64, header: Option<&[u8]>) -> Result<Option<UnitKey>, Unreadable> {
     check_form(form)?;
     let Some(header) = header else {
         return Ok(None);
     };
     let header = HeaderForm::decode(header)?;
-    let unit = match header.study {
-        Some(study) => study.study,
-        None => header.tournament,
+    let (kind, id) = match header.study {
+        Some(study) => (UnitKind::Study, study.study),
+        None => (UnitKind::Tournament, header.tournament),
     };
-    match unit.is_empty() {
+    match id.is_empty() {
         true => Ok(None),
-        false => array(&unit, "the id of what it is part of").map(|id| Some(Id(id))),
+        false => array(&id, "the id of what it is part of").map(|id| Some(kind.unit(id))),
     }
 }
 
@@ -282,8 +284,8 @@ pub(crate) fn header_from_bytes(bytes: &[u8]) -> Result<GameHeader, Unreadable> 
     let actions: Vec<ActionId> = actions.collect::<Result<_, _>>()?;
     let start = form.start.unwrap_or_default();
     Ok(GameHeader {
-        room_id: Id(array(&form.room_id, "the room's id")?),
-        game_id: Id(array(&form.game_id, "the game's id")?),
+        room_id: Id::from_bytes(array(&form.room_id, "the room's id")?),
+        game_id: Id::from_bytes(array(&form.game_id, "the game's id")?),
         name: form.name,
         rules_version: form.rules_version,
         server_version: match form.server_version.as_str() {
@@ -324,10 +326,10 @@ pub(crate) fn header_from_bytes(bytes: &[u8]) -> Result<GameHeader, Unreadable> 
             None
         } else {
             Some(TournamentGame {
-                tournament: Id(array(&form.tournament, "the tournament's id")?),
+                tournament: Id::from_bytes(array(&form.tournament, "the tournament's id")?),
                 series: match form.series.as_slice() {
                     [] => None,
-                    series => Some(Id(array(series, "the series' id")?)),
+                    series => Some(Id::from_bytes(array(series, "the series' id")?)),
                 },
             })
         },

@@ -12,8 +12,8 @@ use super::{Unreadable, array};
 use crate::Store;
 use crate::error::StoreError;
 use crate::studies::{StoredStudy, StudyHeader};
-use crate::units::{StoredTraces, StoredUnit, UnitKind, UnitWrite};
-use chefshat_room::ids::{Id, SecretHash};
+use crate::units::{StoredTraces, StoredUnit, UnitKey, UnitWrite};
+use chefshat_room::ids::{Id, SecretHash, StudyId};
 
 #[derive(Clone, PartialEq, Message)]
 struct HeaderForm {
@@ -267,7 +267,7 @@ impl StudyHeader {
     /// Its encoding.
     pub fn to_bytes(&self) -> Vec<u8> {
         HeaderForm {
-            id: self.id.0.to_vec(),
+            id: self.id.bytes().to_vec(),
             settings: Some(self.settings.clone()),
             created_at_ms: self.created_at_ms,
             owner: self.owner.bytes().to_vec(),
@@ -308,7 +308,7 @@ pub(crate) fn stored_traces(
     let form = TracesForm::decode(bytes)?;
     Ok(StoredTraces {
         number,
-        game: Id(array(game, "the game's id")?),
+        game: Id::from_bytes(array(game, "the game's id")?),
         session: form.session,
         traces: form.traces,
     })
@@ -321,7 +321,7 @@ pub(crate) fn stored_traces(
 fn study_from_bytes(bytes: &[u8]) -> Result<StudyHeader, Unreadable> {
     let form = HeaderForm::decode(bytes)?;
     Ok(StudyHeader {
-        id: Id(array(&form.id, "the study's id")?),
+        id: Id::from_bytes(array(&form.id, "the study's id")?),
         settings: form.settings.unwrap_or_default(),
         created_at_ms: form.created_at_ms,
         owner: SecretHash::from_bytes(array(&form.owner, "the owner's hash")?),
@@ -348,8 +348,8 @@ impl StoredStudy {
     ///
     /// # Errors
     /// The store failed, or the study cannot be read.
-    pub async fn read(store: &dyn Store, id: Id) -> Result<Option<Self>, StoreError> {
-        let unit = store.unit(UnitKind::Study.id(id)).await?;
+    pub async fn read(store: &dyn Store, id: StudyId) -> Result<Option<Self>, StoreError> {
+        let unit = store.unit(UnitKey::Study(id)).await?;
         unit.map(|unit| Self::decode(id, &unit)).transpose()
     }
 
@@ -357,10 +357,10 @@ impl StoredStudy {
     ///
     /// # Errors
     /// It cannot be read.
-    pub fn decode(id: Id, unit: &StoredUnit) -> Result<Self, StoreError> {
+    pub fn decode(id: StudyId, unit: &StoredUnit) -> Result<Self, StoreError> {
         let decoded = unit.decode(study_from_bytes, study_changes_from_bytes);
         let (header, changes) =
-            decoded.map_err(|problem| UnitKind::Study.id(id).unreadable(&problem))?;
+            decoded.map_err(|problem| UnitKey::Study(id).unreadable(&problem))?;
         Ok(Self {
             header,
             changes,
@@ -374,7 +374,7 @@ impl StoredStudy {
     /// The store failed.
     pub async fn rewrite(
         store: &dyn Store,
-        id: Id,
+        id: StudyId,
         changes: &[Change],
         forgotten: Vec<u32>,
     ) -> Result<(), StoreError> {
@@ -382,7 +382,7 @@ impl StoredStudy {
             entries: changes_to_bytes(changes),
             forgotten,
         };
-        store.write_unit(UnitKind::Study.id(id), rewrite).await
+        store.write_unit(UnitKey::Study(id), rewrite).await
     }
 }
 

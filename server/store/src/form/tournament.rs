@@ -8,8 +8,8 @@ use super::entry::{KINDS, number_of, value_of};
 use super::{Unreadable, array};
 use crate::error::StoreError;
 use crate::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
-use crate::units::{StoredUnit, UnitKind};
-use chefshat_room::ids::{Id, SecretHash};
+use crate::units::{StoredUnit, UnitKey};
+use chefshat_room::ids::{Id, SecretHash, TournamentId};
 
 #[derive(Clone, PartialEq, Message)]
 struct HeaderForm {
@@ -209,7 +209,7 @@ impl TournamentHeader {
     /// Its encoding.
     pub fn to_bytes(&self) -> Vec<u8> {
         HeaderForm {
-            id: self.id.0.to_vec(),
+            id: self.id.bytes().to_vec(),
             settings: Some(self.settings.clone()),
             created_at_ms: self.created_at_ms,
             join_code: self.join_code.clone(),
@@ -227,7 +227,7 @@ impl TournamentHeader {
 pub(crate) fn tournament_from_bytes(bytes: &[u8]) -> Result<TournamentHeader, Unreadable> {
     let form = HeaderForm::decode(bytes)?;
     Ok(TournamentHeader {
-        id: Id(array(&form.id, "the tournament's id")?),
+        id: Id::from_bytes(array(&form.id, "the tournament's id")?),
         settings: form.settings.unwrap_or_default(),
         created_at_ms: form.created_at_ms,
         join_code: form.join_code,
@@ -270,8 +270,8 @@ impl StoredTournament {
     ///
     /// # Errors
     /// It cannot be read.
-    pub fn decode(id: Id, unit: &StoredUnit) -> Result<Self, StoreError> {
-        Self::readable(unit).map_err(|problem| UnitKind::Tournament.id(id).unreadable(&problem))
+    pub fn decode(id: TournamentId, unit: &StoredUnit) -> Result<Self, StoreError> {
+        Self::readable(unit).map_err(|problem| UnitKey::Tournament(id).unreadable(&problem))
     }
 
     pub(super) fn readable(unit: &StoredUnit) -> Result<Self, Unreadable> {
@@ -300,8 +300,8 @@ fn kind_of(entry: &TournamentEntry) -> KindForm {
             game_id,
         } => KindForm::Placed(PlacedForm {
             game: wide(*game),
-            room_id: room_id.0.to_vec(),
-            game_id: game_id.0.to_vec(),
+            room_id: room_id.bytes().to_vec(),
+            game_id: game_id.bytes().to_vec(),
         }),
         TournamentEntry::Change(change) => match change {
             Change::Joined(entrant) => KindForm::Joined(entrant_to_form(entrant)),
@@ -365,8 +365,8 @@ fn entry_of(kind: KindForm) -> Result<TournamentEntry, Unreadable> {
         KindForm::Placed(form) => {
             return Ok(TournamentEntry::Placed {
                 game: narrow(form.game)?,
-                room_id: Id(array(&form.room_id, "a room's id")?),
-                game_id: Id(array(&form.game_id, "a game's id")?),
+                room_id: Id::from_bytes(array(&form.room_id, "a room's id")?),
+                game_id: Id::from_bytes(array(&form.game_id, "a game's id")?),
             });
         }
         KindForm::Joined(form) => Change::Joined(entrant_from_form(form)?),

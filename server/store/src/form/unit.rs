@@ -2,8 +2,8 @@
 
 use super::{FORM, Unreadable, check_form, study};
 use crate::error::StoreError;
-use crate::units::{StoredTraces, StoredUnit, UnitId};
-use chefshat_room::ids::Id;
+use crate::units::{StoredTraces, StoredUnit, UnitKey};
+use chefshat_room::ids::StudyId;
 
 impl StoredUnit {
     /// A new one.
@@ -35,7 +35,7 @@ impl StoredUnit {
 
 impl StoredTraces {
     /// From columns of a table; one that cannot be read is logged and left out.
-    pub(crate) fn read(study: Id, number: u32, game: &[u8], traces: &[u8]) -> Option<Self> {
+    pub(crate) fn read(study: StudyId, number: u32, game: &[u8], traces: &[u8]) -> Option<Self> {
         study::stored_traces(number, game, traces)
             .inspect_err(|problem| {
                 tracing::error!(%study, %problem, "traces of a game are left out");
@@ -44,10 +44,10 @@ impl StoredTraces {
     }
 }
 
-impl UnitId {
+impl UnitKey {
     /// That the unit cannot be read.
     pub(crate) fn unreadable(self, problem: &Unreadable) -> StoreError {
-        let Self { kind, id } = self;
+        let (kind, id) = (self.kind(), self.id());
         StoreError::Unreadable(format!("{kind} {id} cannot be read: {problem}"))
     }
 }

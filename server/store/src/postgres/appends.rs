@@ -53,7 +53,7 @@ async fn append(connection: &mut PgConnection, rows: &[Arc<Row>]) -> sqlx::Resul
          ON CONFLICT DO NOTHING
          RETURNING game, position",
     )
-    .bind(all(rows, |row| row.owned.id.0.as_slice()))
+    .bind(all(rows, |row| row.owned.id.bytes().as_slice()))
     .bind(all(rows, |row| row.owned.epoch))
     .bind(all(rows, |row| row.game))
     .bind(all(rows, |row| row.position))
@@ -121,7 +121,7 @@ pub(super) async fn report_hole(
             .into_sql_str(),
     };
     let is_hole: bool = sqlx::query_scalar(open)
-        .bind(owned.id.0.as_slice())
+        .bind(owned.id.bytes().as_slice())
         .bind(owned.epoch)
         .bind(position - 1)
         .fetch_one(connection)

@@ -11,7 +11,7 @@ use super::values::integer;
 use crate::cluster::Epoch;
 use crate::form::{self, FORM};
 use chefshat_base::clock::since_epoch_ms;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::UnitId;
 use chefshat_room::journal::{Change, Entry};
 
 /// What became of claims.
@@ -28,10 +28,13 @@ pub(super) async fn claim(
     connection: &mut PgConnection,
     node: i64,
     expire_after: i64,
-    orphans: &[(Id, Epoch)],
+    orphans: &[(UnitId, Epoch)],
 ) -> sqlx::Result<Claims> {
     let seen: Vec<i64> = orphans.iter().map(|(_, seen)| integer(seen.0)).collect();
-    let units: Vec<&[u8]> = orphans.iter().map(|(unit, _)| unit.0.as_slice()).collect();
+    let units: Vec<&[u8]> = orphans
+        .iter()
+        .map(|(unit, _)| unit.bytes().as_slice())
+        .collect();
     let locked: Vec<(Vec<u8>, Option<i64>, bool)> = sqlx::query_as(
         "WITH locked AS (
              SELECT unit, node, durable, form, rules_version FROM owned
@@ -78,8 +81,8 @@ pub(super) async fn claim(
             return Ok(Claims::Busy);
         }
     }
-    let epoch = |(unit, seen): &(Id, Epoch)| {
-        let is_claimed = claimed.iter().any(|claimed| *claimed == unit.0);
+    let epoch = |(unit, seen): &(UnitId, Epoch)| {
+        let is_claimed = claimed.iter().any(|claimed| *claimed == unit.bytes());
         is_claimed.then(|| seen.next())
     };
     Ok(Claims::Made(orphans.iter().map(epoch).collect()))

@@ -17,13 +17,12 @@ use super::owned::rooms;
 use super::values::{ROOM, integer, kind_of, millis, text};
 use super::{PostgresStore, lock};
 use crate::cluster::{
-    Beat, ClusterStore, Epoch, Heartbeat, Kind, LivingNode, Location, NodeId, NodeInfo, NodeStatus,
-    Unit, WithoutNode,
+    Beat, ClusterStore, Epoch, Heartbeat, LivingNode, LoadedUnit, Location, NodeId, NodeInfo,
+    NodeStatus, Subject, WithoutNode,
 };
 use crate::form::FORM;
-use crate::units::UnitKind;
 use crate::{ResumableGame, StoreError};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, Id, RoomId, UnitId};
 
 /// Nodes that own nothing and have not beaten for this long are forgotten.
 const FORGET_NODES_AFTER_MS: i64 = 24 * 60 * 60 * 1_000;
@@ -44,7 +43,7 @@ macro_rules! locations {
 
 impl PostgresStore {
     /// One attempt to claim units.
-    async fn try_claim(&self, orphans: &[(Id, Epoch)]) -> Result<Claims, StoreError> {
+    async fn try_claim(&self, orphans: &[(UnitId, Epoch)]) -> Result<Claims, StoreError> {
         let (node, expire_after) = (self.node()?, self.expire_after());
         let orphans = orphans.to_vec();
         let claims = self.control.read(move |connection| {
@@ -62,7 +61,7 @@ impl PostgresStore {
         claims.await
     }
 
-    async fn claim_one(&self, orphan: (Id, Epoch)) -> Result<Option<Epoch>, StoreError> {
+    async fn claim_one(&self, orphan: (UnitId, Epoch)) -> Result<Option<Epoch>, StoreError> {
         for _ in 0..CLAIM_ATTEMPTS {
             if let Claims::Made(mut claimed) = self.try_claim(&[orphan]).await? {
                 return Ok(claimed.pop().flatten());
@@ -110,7 +109,7 @@ impl PostgresStore {
         let row = self.reader.read(|connection| {
             let query = sqlx::query(query);
             match value {
-                LocatedBy::Id(id) => query.bind(id.0.to_vec()),
+                LocatedBy::Id(id) => query.bind(id.to_vec()),
                 LocatedBy::Code(code) => query.bind(code),
             }
             .fetch_optional(connection)
@@ -121,7 +120,7 @@ impl PostgresStore {
 }
 
 enum LocatedBy {
-    Id(Id),
+    Id([u8; 16]),
     Code(String),
 }
 
@@ -194,7 +193,7 @@ impl ClusterStore for PostgresStore {
         .boxed()
     }
 
-    fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(Id, Epoch)>, StoreError>> {
+    fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(UnitId, Epoch)>, StoreError>> {
         async move {
             let expire_after = self.expire_after();
             let node = self.node()?;
@@ -228,7 +227,7 @@ impl ClusterStore for PostgresStore {
         .boxed()
     }
 
-    fn handed_over(&self) -> BoxFuture<'_, (Id, Epoch)> {
+    fn handed_over(&self) -> BoxFuture<'_, (UnitId, Epoch)> {
         async move {
             let mut handed = self.handed.lock().await;
             let listen = || Handed::listen(self.sessions.clone(), self.closing.clone());
@@ -257,7 +256,7 @@ impl ClusterStore for PostgresStore {
 
     fn claim_all(
         &self,
-        orphans: Vec<(Id, Epoch)>,
+        orphans: Vec<(UnitId, Epoch)>,
     ) -> BoxFuture<'_, Result<Vec<Option<Epoch>>, StoreError>> {
         async move {
             if orphans.len() > 1
@@ -274,7 +273,11 @@ impl ClusterStore for PostgresStore {
         .boxed()
     }
 
-    fn load(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<Option<Unit>, StoreError>> {
+    fn load(
+        &self,
+        unit: UnitId,
+        epoch: Epoch,
+    ) -> BoxFuture<'_, Result<Option<LoadedUnit>, StoreError>> {
         async move {
             let node = self.node()?;
             let at = integer(epoch.0);
@@ -288,7 +291,7 @@ impl ClusterStore for PostgresStore {
                                                  AND (NOT over OR ended_ms >= clock_ms() - $4))
                      ORDER BY number",
                 )
-                .bind(unit.0.to_vec())
+                .bind(unit.bytes().to_vec())
                 .bind(node)
                 .bind(at)
                 .bind(retention)
@@ -302,15 +305,15 @@ impl ClusterStore for PostgresStore {
             let (rooms, others): (Vec<_>, Vec<_>) =
                 (items.into_iter()).partition(|item| item.get::<i16, _>(4) == ROOM);
             let kind = others.iter().find_map(|item| kind_of(item.get(4)));
-            let stored = match kind {
-                Some(kind) => (self.control.unit(kind.id(unit)).await?).map(|it| (kind, it)),
+            let stored = match kind.map(|kind| kind.unit(*unit.bytes())) {
+                Some(unit) => (self.control.unit(unit).await?).map(|it| (unit, it)),
                 None => None,
             };
             let rooms = self.control.rooms(rooms).await?;
             if stored.is_some() {
                 lock(&self.epochs).insert(unit, at);
             }
-            Ok(Some(Unit {
+            Ok(Some(LoadedUnit {
                 stored,
                 // At the epoch that was asked for: if another one has come since, they are fenced.
                 games: (rooms.into_iter())
@@ -323,7 +326,7 @@ impl ClusterStore for PostgresStore {
 
     fn release(
         &self,
-        unit: Id,
+        unit: UnitId,
         epoch: Epoch,
         next: Option<NodeId>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
@@ -356,8 +359,8 @@ impl ClusterStore for PostgresStore {
         .boxed()
     }
 
-    fn locate(&self, id: Id) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
-        self.locate_where(locations!("WHERE id = $1"), LocatedBy::Id(id))
+    fn locate(&self, id: UnitId) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
+        self.locate_where(locations!("WHERE id = $1"), LocatedBy::Id(*id.bytes()))
             .boxed()
     }
 
@@ -373,19 +376,19 @@ impl ClusterStore for PostgresStore {
         .boxed()
     }
 
-    fn locate_game(&self, game: Id) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
+    fn locate_game(&self, game: GameId) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
         self.locate_where(
             locations!("WHERE game_id = $1 AND NOT over"),
-            LocatedBy::Id(game),
+            LocatedBy::Id(*game.bytes()),
         )
         .boxed()
     }
 
-    fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
+    fn ended_room(&self, room: RoomId) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
         async move {
             let rows = self.reader.read(move |connection| {
                 sqlx::query(rooms!("id = $1 AND over"))
-                    .bind(room.0.to_vec())
+                    .bind(room.bytes().to_vec())
                     .fetch_all(connection)
                     .boxed()
             });
@@ -519,9 +522,9 @@ async fn tidy(
 }
 
 /// A unit and its epoch, from a row.
-fn unit_at(row: &PgRow) -> Option<(Id, Epoch)> {
+fn unit_at(row: &PgRow) -> Option<(UnitId, Epoch)> {
     let epoch: i64 = row.get(1);
-    Some((id_of(row, 0)?, Epoch(epoch.cast_unsigned())))
+    Some((Id::from_bytes(id_of(row, 0)?), Epoch(epoch.cast_unsigned())))
 }
 
 /// A node, and what it said when it joined.
@@ -540,20 +543,19 @@ fn number(row: &PgRow, column: &str) -> u64 {
     row.get::<i64, _>(column).cast_unsigned()
 }
 
-fn id_of(row: &PgRow, column: usize) -> Option<Id> {
-    row.get::<&[u8], _>(column).try_into().ok().map(Id)
+fn id_of(row: &PgRow, column: usize) -> Option<[u8; 16]> {
+    row.get::<&[u8], _>(column).try_into().ok()
 }
 
 fn location(row: &PgRow) -> Result<Location, StoreError> {
     let odd = || StoreError::Failed("an id in the database does not have 16 bytes".into());
+    let id = id_of(row, 0).ok_or_else(odd)?;
     Ok(Location {
-        id: id_of(row, 0).ok_or_else(odd)?,
-        kind: match kind_of(row.get(1)) {
-            None => Kind::Room,
-            Some(UnitKind::Tournament) => Kind::Tournament,
-            Some(UnitKind::Study) => Kind::Study,
+        subject: match kind_of(row.get(1)) {
+            None => Subject::Room(Id::from_bytes(id)),
+            Some(kind) => Subject::Unit(kind.unit(id)),
         },
-        unit: id_of(row, 2).ok_or_else(odd)?,
+        unit: Id::from_bytes(id_of(row, 2).ok_or_else(odd)?),
         node: row
             .get::<Option<i64>, _>(3)
             .map(|node| NodeId(node.cast_unsigned())),

@@ -20,7 +20,7 @@ use super::writer::{Answers, Work, confirming};
 use crate::StoreError;
 use crate::forget::Rewrite;
 use crate::form::FORM;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 
 /// A command to a writer. Its answer is the number of the game, if it has one, else 0.
 #[derive(Debug)]
@@ -30,7 +30,7 @@ pub(super) enum Command {
         owned: Owned,
         node: i64,
         join_code: String,
-        game_id: Id,
+        game_id: GameId,
         rules_version: u32,
         created_at_ms: u64,
         /// Header and first row; `None`: the game is ephemeral.
@@ -51,16 +51,16 @@ pub(super) enum Command {
     },
     /// Stores a game that was played elsewhere.
     Import {
-        game_id: Id,
+        game_id: GameId,
         record: Vec<u8>,
         summary: Box<v1::RecordSummary>,
     },
     /// Marks the record of a game as written to a file.
-    RecordWritten { game_id: Id },
+    RecordWritten { game_id: GameId },
     /// Deletes finished games that no tournament or study needs.
-    Prune { games: Vec<Id> },
+    Prune { games: Vec<GameId> },
     /// Deletes finished games.
-    Delete { games: Vec<Id> },
+    Delete { games: Vec<GameId> },
     /// Removes a participant from games and tournaments that are over.
     Rewrite(Rewrite),
     /// Writes something for a tournament or study.
@@ -124,7 +124,7 @@ impl Command {
             } => import(connection, *game_id, record, summary, again).await?,
             Self::RecordWritten { game_id } => {
                 sqlx::query("UPDATE games SET filed = true WHERE game_id = $1 AND NOT filed")
-                    .bind(game_id.0.as_slice())
+                    .bind(game_id.bytes().as_slice())
                     .execute(connection)
                     .await?;
                 return Ok(Ok(0));
@@ -193,13 +193,13 @@ impl Command {
              )
              SELECT (SELECT number FROM game), EXISTS (SELECT FROM place), EXISTS (SELECT FROM owner)",
         )
-        .bind(game_id.0.as_slice())
+        .bind(game_id.bytes().as_slice())
         .bind(FORM)
         .bind(header)
         .bind(integer(*created_at_ms))
         .bind(*node)
-        .bind(owned.id.0.as_slice())
-        .bind(owned.unit.0.as_slice())
+        .bind(owned.id.bytes().as_slice())
+        .bind(owned.unit.bytes().as_slice())
         .bind(owned.epoch)
         .bind(text(join_code))
         .bind(i64::from(*rules_version))
@@ -222,8 +222,8 @@ impl Command {
                 "number FROM owned LEFT JOIN games USING (game_id)
                  WHERE id = $1 AND game_id = $2 AND epoch = $3 AND header IS NOT DISTINCT FROM $4"
             ))
-            .bind(owned.id.0.as_slice())
-            .bind(game_id.0.as_slice())
+            .bind(owned.id.bytes().as_slice())
+            .bind(game_id.bytes().as_slice())
             .bind(owned.epoch)
             .bind(header)
             .fetch_optional(connection)
@@ -233,7 +233,7 @@ impl Command {
             }
         }
         Ok(Err(match owner {
-            true => StoreError::Taken(*game_id),
+            true => StoreError::Taken(game_id.to_string()),
             false => owned.fenced(),
         }))
     }
@@ -253,7 +253,7 @@ async fn lock_ids(connection: &mut PgConnection, work: &[Arc<Command>]) -> sqlx:
             } => Some(game_id),
             _ => None,
         })
-        .map(|id| i64::from_be_bytes(std::array::from_fn(|index| id.0[index])))
+        .map(|id| i64::from_be_bytes(std::array::from_fn(|index| id.bytes()[index])))
         .collect();
     keys.sort_unstable();
     keys.dedup();
@@ -267,15 +267,15 @@ async fn lock_ids(connection: &mut PgConnection, work: &[Arc<Command>]) -> sqlx:
 }
 
 /// Deletes those of these finished games that no tournament or study needs.
-async fn prune(connection: &mut PgConnection, games: &[Id]) -> sqlx::Result<i64> {
+async fn prune(connection: &mut PgConnection, games: &[GameId]) -> sqlx::Result<i64> {
     let games = locked(connection, games).await?;
     let (free, _) = divided(connection, games).await?;
-    let free: Vec<Id> = free.iter().map(|game| game.game).collect();
+    let free: Vec<GameId> = free.iter().map(|game| game.game).collect();
     delete(connection, &free).await
 }
 
-async fn delete(connection: &mut PgConnection, games: &[Id]) -> sqlx::Result<i64> {
-    let ids: Vec<&[u8]> = games.iter().map(|id| id.0.as_slice()).collect();
+async fn delete(connection: &mut PgConnection, games: &[GameId]) -> sqlx::Result<i64> {
+    let ids: Vec<&[u8]> = games.iter().map(|id| id.bytes().as_slice()).collect();
     sqlx::query(
         "WITH game AS (
              DELETE FROM games WHERE number IN (

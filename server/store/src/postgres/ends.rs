@@ -13,7 +13,7 @@ use super::writer::confirming;
 use crate::StoreError;
 use crate::form::FORM;
 use chefshat_base::clock::since_epoch_ms;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 
 /// The end of a game with a record.
 #[derive(Debug)]
@@ -25,7 +25,7 @@ pub(super) struct End {
 /// An ephemeral game that has ended.
 #[derive(Debug)]
 pub(super) struct WholeGame {
-    pub(super) game_id: Id,
+    pub(super) game_id: GameId,
     pub(super) header: Vec<u8>,
     pub(super) entries: Vec<u8>,
     pub(super) end: End,
@@ -51,7 +51,7 @@ async fn not_ended(
     let over = sqlx::query(confirming!(
         "id FROM owned WHERE id = $1 AND epoch = $2 AND over"
     ))
-    .bind(owned.id.0.as_slice())
+    .bind(owned.id.bytes().as_slice())
     .bind(owned.epoch)
     .fetch_optional(&mut *connection)
     .await?;
@@ -95,7 +95,7 @@ pub(super) async fn finish(
     );
     let finished = with_summary(query, &end.summary)
         .bind(end.signature.as_deref())
-        .bind(owned.id.0.as_slice())
+        .bind(owned.id.bytes().as_slice())
         .bind(owned.epoch)
         .bind(number)
         .bind(rows)
@@ -131,7 +131,7 @@ pub(super) async fn give_up(
          UPDATE owned SET over = true, ended_ms = clock_ms() FROM open
          WHERE owned.id = $1 AND ($4 IS NULL OR EXISTS (SELECT FROM closed))",
     )
-    .bind(owned.id.0.as_slice())
+    .bind(owned.id.bytes().as_slice())
     .bind(owned.epoch)
     // Only an aborted game can end before the deal.
     .bind(i32::from(v1::RoomState::Aborted))
@@ -176,9 +176,9 @@ pub(super) async fn whole(
     );
     let ended = with_summary(query, &game.end.summary)
         .bind(game.end.signature.as_deref())
-        .bind(owned.id.0.as_slice())
+        .bind(owned.id.bytes().as_slice())
         .bind(owned.epoch)
-        .bind(game.game_id.0.as_slice())
+        .bind(game.game_id.bytes().as_slice())
         .bind(FORM)
         .bind(game.header.as_slice())
         .bind(game.entries.as_slice())
@@ -190,7 +190,7 @@ pub(super) async fn whole(
                 number,
                 has_record: true,
             },
-            None => Ended::Refused(StoreError::Taken(game.game_id)),
+            None => Ended::Refused(StoreError::Taken(game.game_id.to_string())),
         }),
         None => not_ended(connection, owned, None).await,
     }
@@ -199,7 +199,7 @@ pub(super) async fn whole(
 /// Stores a game that was played elsewhere.
 pub(super) async fn import(
     connection: &mut PgConnection,
-    game_id: Id,
+    game_id: GameId,
     record: &[u8],
     summary: &v1::RecordSummary,
     again: bool,
@@ -221,7 +221,7 @@ pub(super) async fn import(
          SELECT number FROM game",
     );
     let imported = with_summary(query, summary)
-        .bind(game_id.0.as_slice())
+        .bind(game_id.bytes().as_slice())
         .bind(FORM)
         .bind(record)
         .fetch_optional(&mut *connection)
@@ -237,7 +237,7 @@ pub(super) async fn import(
             "number FROM games JOIN added_records ON game = number
              WHERE game_id = $1 AND record = $2"
         ))
-        .bind(game_id.0.as_slice())
+        .bind(game_id.bytes().as_slice())
         .bind(record)
         .fetch_optional(connection)
         .await?;
@@ -245,7 +245,7 @@ pub(super) async fn import(
             return Ok(Ended::Before);
         }
     }
-    Ok(Ended::Refused(StoreError::Taken(game_id)))
+    Ok(Ended::Refused(StoreError::Taken(game_id.to_string())))
 }
 
 /// Adds games to the end of the list of finished games. From here to the commit, nobody else does.

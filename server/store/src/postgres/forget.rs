@@ -104,7 +104,7 @@ impl Reader {
         .await?;
         let Some(game) = game else { return Ok(None) };
         let id: Vec<u8> = game.get(0);
-        let id = id.try_into().map(Id).map_err(|_| {
+        let id = id.try_into().map(Id::from_bytes).map_err(|_| {
             StoreError::Failed(format!("game number {number} has an id that is damaged"))
         })?;
         let journal = self.read(|connection| {

@@ -12,7 +12,7 @@ use tracing::debug;
 
 use crate::cluster::Epoch;
 use chefshat_base::tasks::{self, LongTask};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{Id, UnitId};
 
 /// The channel of the database.
 const CHANNEL: &str = "chefshat";
@@ -30,7 +30,7 @@ const WAITING: usize = 1_024;
 /// expire after this number of milliseconds.
 pub(super) async fn release(
     connection: &mut PgConnection,
-    (unit, epoch): (Id, i64),
+    (unit, epoch): (UnitId, i64),
     (node, next): (i64, Option<i64>),
     expire_after: i64,
 ) -> sqlx::Result<()> {
@@ -49,7 +49,7 @@ pub(super) async fn release(
          SELECT pg_notify($5, concat_ws(' ', next.node, encode($1, 'hex'), $2)) FROM next
          WHERE EXISTS (SELECT FROM released WHERE NOT over)",
     )
-    .bind(unit.0.as_slice())
+    .bind(unit.bytes().as_slice())
     .bind(epoch)
     .bind(node)
     .bind(expire_after)
@@ -61,7 +61,7 @@ pub(super) async fn release(
 }
 
 /// A node, and a unit at an epoch that it is to claim.
-type Named = (i64, Id, Epoch);
+type Named = (i64, UnitId, Epoch);
 
 /// The units that are handed over to any node.
 pub(super) struct Handed {

@@ -46,14 +46,14 @@ pub use transfer::{TransferError, Transferred, transfer};
 use super::decode_pool::DecodePool;
 use super::ephemeral::{EphemeralJournal, Scratch};
 use super::form;
-use super::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
+use super::units::{StoredTraces, StoredUnit, UnitKey, UnitKind, UnitWrite};
 use super::{
     ForgetError, Forgotten, Journal, Keep, Listed, Part, ResumableGame, Store, StoreError,
     StoredGame,
 };
 use appends::Row;
 use chefshat_base::metrics::StoreMetrics;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, StudyId, UnitId, random_bytes};
 use chefshat_room::journal::{Entry, GameHeader};
 use chefshat_room::policy::Durability;
 use commands::Command;
@@ -128,7 +128,7 @@ pub struct PostgresStore {
     /// The node; 0: none has joined.
     node: AtomicI64,
     /// The epochs at which the tournaments and studies of this node are written.
-    epochs: Mutex<HashMap<Id, i64>>,
+    epochs: Mutex<HashMap<UnitId, i64>>,
     scratch: Scratch,
     closing: CancellationToken,
     writing: Mutex<Vec<JoinHandle<()>>>,
@@ -208,15 +208,15 @@ impl PostgresStore {
     }
 
     /// The epoch at which this node writes a tournament or study.
-    fn epoch_of(&self, unit: Id) -> Result<i64, StoreError> {
+    fn epoch_of(&self, unit: UnitId) -> Result<i64, StoreError> {
         let epoch = lock(&self.epochs).get(&unit).copied();
         epoch.ok_or(StoreError::Fenced(unit))
     }
 
     /// What is written for a tournament or study, and by whom.
-    fn change(&self, unit: UnitId, write: UnitWrite) -> Result<units::Change, StoreError> {
+    fn change(&self, unit: UnitKey, write: UnitWrite) -> Result<units::Change, StoreError> {
         let owned = || {
-            let (unit, epoch) = (unit.id, self.epoch_of(unit.id)?);
+            let (unit, epoch) = (unit.id(), self.epoch_of(unit.id())?);
             let id = unit;
             Ok::<_, StoreError>(Owned { id, unit, epoch })
         };
@@ -232,12 +232,12 @@ impl PostgresStore {
                 header,
                 first,
             },
-            UnitWrite::Append(row) => units::Change::Append(unit.kind, owned()?, row),
+            UnitWrite::Append(row) => units::Change::Append(unit.kind(), owned()?, row),
             UnitWrite::Rewrite { entries, forgotten } => {
-                units::Change::Rewrite(unit.kind, owned()?, entries, forgotten)
+                units::Change::Rewrite(unit.kind(), owned()?, entries, forgotten)
             }
-            UnitWrite::Traces(traces) => units::Change::Traces(owned()?, Id::random(), traces),
-            UnitWrite::Delete => units::Change::Delete(unit.kind, owned()?),
+            UnitWrite::Traces(traces) => units::Change::Traces(owned()?, random_bytes(), traces),
+            UnitWrite::Delete => units::Change::Delete(unit.kind(), owned()?),
         })
     }
 
@@ -245,9 +245,9 @@ impl PostgresStore {
     fn place(&self, header: &GameHeader) -> Result<Owned, StoreError> {
         let unit = header.unit();
         Ok(Owned {
-            id: header.room_id,
+            id: header.room_id.unit(),
             unit,
-            epoch: match unit == header.room_id {
+            epoch: match unit == header.room_id.unit() {
                 true => FIRST_EPOCH,
                 false => self.epoch_of(unit)?,
             },
@@ -258,7 +258,7 @@ impl PostgresStore {
     fn resumable(&self, room: StoredRoom, epoch: i64) -> ResumableGame {
         let journal = DurableJournal {
             owned: Owned {
-                id: room.header.room_id,
+                id: room.header.room_id.unit(),
                 unit: room.header.unit(),
                 epoch,
             },
@@ -353,11 +353,14 @@ impl Store for PostgresStore {
         self.own_games(ended_since_ms).boxed()
     }
 
-    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
+    fn summary(
+        &self,
+        game: GameId,
+    ) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
         self.reader.summary(game).boxed()
     }
 
-    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
+    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         self.reader.finished(game).boxed()
     }
 
@@ -372,7 +375,7 @@ impl Store for PostgresStore {
 
     fn import(
         &self,
-        game_id: Id,
+        game_id: GameId,
         mut summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
     ) -> BoxFuture<'_, Result<bool, StoreError>> {
@@ -405,14 +408,14 @@ impl Store for PostgresStore {
         keep: Keep,
         after: u64,
         count: usize,
-    ) -> BoxFuture<'_, Result<Vec<(u64, Id)>, StoreError>> {
+    ) -> BoxFuture<'_, Result<Vec<(u64, GameId)>, StoreError>> {
         let part = (after, count);
         (self.reader)
             .prunable(keep, part, self.options.record_files)
             .boxed()
     }
 
-    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    fn prune(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
         async move {
             let prune = Command::Prune {
                 games: games.clone(),
@@ -423,7 +426,7 @@ impl Store for PostgresStore {
         .boxed()
     }
 
-    fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn delete(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
             let delete = Command::Delete { games };
             self.commands.commit(Arc::new(delete)).await.map(drop)
@@ -442,11 +445,11 @@ impl Store for PostgresStore {
         .boxed()
     }
 
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
         self.reader.without_record_file().boxed()
     }
 
-    fn mark_record_written(&self, game_id: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn mark_record_written(&self, game_id: GameId) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
             let written = Command::RecordWritten { game_id };
             self.commands.commit(Arc::new(written)).await.map(drop)
@@ -454,7 +457,7 @@ impl Store for PostgresStore {
         .boxed()
     }
 
-    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
             let is_new = matches!(write, UnitWrite::Create { .. });
             let is_deletion = matches!(write, UnitWrite::Delete);
@@ -463,17 +466,17 @@ impl Store for PostgresStore {
                 .commit(Arc::new(Command::Unit(change)))
                 .await?;
             if is_new {
-                lock(&self.epochs).insert(unit.id, FIRST_EPOCH);
+                lock(&self.epochs).insert(unit.id(), FIRST_EPOCH);
             }
             if is_deletion {
-                lock(&self.epochs).remove(&unit.id);
+                lock(&self.epochs).remove(&unit.id());
             }
             Ok(())
         }
         .boxed()
     }
 
-    fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+    fn unit(&self, unit: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
         self.reader.unit(unit).boxed()
     }
 
@@ -483,7 +486,7 @@ impl Store for PostgresStore {
         &self,
         kind: UnitKind,
         newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    ) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>> {
         async move {
             match kind {
                 UnitKind::Study => self.reader.studies().await,
@@ -493,7 +496,7 @@ impl Store for PostgresStore {
         .boxed()
     }
 
-    fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
+    fn traces(&self, study: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
         self.reader.traces(study).boxed()
     }
 

@@ -21,7 +21,7 @@ use crate::decode_pool::DecodePool;
 use crate::form::{self, OWNER_WITHIN, Unreadable, check_form, stored_header};
 use crate::{Keep, Listed, Part, StoreError, StoredGame, listed};
 use chefshat_base::tasks::short;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, Id};
 use chefshat_room::journal::{Entry, GameHeader};
 
 /// How long one read may take.
@@ -220,10 +220,13 @@ impl Reader {
     }
 
     /// See `Store::summary`.
-    pub(super) async fn summary(&self, game: Id) -> Result<Option<v1::RecordSummary>, StoreError> {
+    pub(super) async fn summary(
+        &self,
+        game: GameId,
+    ) -> Result<Option<v1::RecordSummary>, StoreError> {
         let row: Option<PgRow> = (self.read(|connection| {
             sqlx::query("SELECT summary FROM games WHERE game_id = $1 AND summary IS NOT NULL")
-                .bind(game.0.to_vec())
+                .bind(game.bytes().to_vec())
                 .fetch_optional(connection)
                 .boxed()
         }))
@@ -237,14 +240,14 @@ impl Reader {
     }
 
     /// See `Store::finished`.
-    pub(super) async fn finished(&self, game: Id) -> Result<Option<StoredGame>, StoreError> {
+    pub(super) async fn finished(&self, game: GameId) -> Result<Option<StoredGame>, StoreError> {
         let row = self.read(|connection| {
             sqlx::query(
                 "SELECT number, form, header, record, signature
                  FROM games LEFT JOIN added_records ON game = number
                  WHERE game_id = $1 AND summary IS NOT NULL",
             )
-            .bind(game.0.to_vec())
+            .bind(game.bytes().to_vec())
             .fetch_optional(connection)
             .boxed()
         });
@@ -322,7 +325,7 @@ impl Reader {
         keep: Keep,
         (after, count): (u64, usize),
         record_files: bool,
-    ) -> Result<Vec<(u64, Id)>, StoreError> {
+    ) -> Result<Vec<(u64, GameId)>, StoreError> {
         let (mut after, mut page) = (integer(after), count);
         let mut found = Vec::new();
         loop {
@@ -345,8 +348,8 @@ impl Reader {
     }
 
     /// Those of these games that are not stored.
-    pub(super) async fn missing(&self, mut games: Vec<Id>) -> Result<Vec<Id>, StoreError> {
-        let ids: Vec<Vec<u8>> = games.iter().map(|id| id.0.to_vec()).collect();
+    pub(super) async fn missing(&self, mut games: Vec<GameId>) -> Result<Vec<GameId>, StoreError> {
+        let ids: Vec<Vec<u8>> = games.iter().map(|id| id.bytes().to_vec()).collect();
         let stored: Vec<Vec<u8>> = (self.read(move |connection| {
             sqlx::query_scalar("SELECT game_id FROM games WHERE game_id = ANY ($1)")
                 .bind(ids)
@@ -354,12 +357,12 @@ impl Reader {
                 .boxed()
         }))
         .await?;
-        games.retain(|game| !stored.iter().any(|id| id.as_slice() == game.0));
+        games.retain(|game| !stored.iter().any(|id| id.as_slice() == game.bytes()));
         Ok(games)
     }
 
     /// See `Store::without_record_file`.
-    pub(super) async fn without_record_file(&self) -> Result<Vec<Id>, StoreError> {
+    pub(super) async fn without_record_file(&self) -> Result<Vec<GameId>, StoreError> {
         let ids: Vec<Vec<u8>> = (self.read(|connection| {
             sqlx::query_scalar(
                 "SELECT game_id FROM games WHERE NOT filed AND summary IS NOT NULL ORDER BY number",
@@ -368,7 +371,7 @@ impl Reader {
             .boxed()
         }))
         .await?;
-        let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
+        let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id::from_bytes);
         Ok(ids.into_iter().filter_map(id).collect())
     }
 }

@@ -13,15 +13,15 @@ use super::values::integer;
 use crate::Keep;
 use crate::form;
 use crate::tournaments::StoredTournament;
-use crate::units::{ROWS, StoredUnit, UnitKind};
-use chefshat_room::ids::Id;
+use crate::units::{ROWS, StoredUnit, UnitKey, UnitKind};
+use chefshat_room::ids::{GameId, Id, TournamentId, UnitId};
 
 /// A finished game, with its encoding and header.
 pub(super) struct Candidate {
     pub(super) number: i64,
-    pub(super) game: Id,
+    pub(super) game: GameId,
     /// What it is part of; the outer one is `None` if this version cannot read that.
-    unit: Option<Option<Id>>,
+    unit: Option<Option<UnitKey>>,
 }
 
 impl Candidate {
@@ -29,7 +29,7 @@ impl Candidate {
     fn of(row: &PgRow) -> Option<Self> {
         Some(Self {
             number: row.get(0),
-            game: Id(row.get::<&[u8], _>(1).try_into().ok()?),
+            game: Id::from_bytes(row.get::<&[u8], _>(1).try_into().ok()?),
             unit: form::stored_unit(row.get(2), row.get(3)).ok(),
         })
     }
@@ -67,9 +67,9 @@ pub(super) fn old<'c>(
 /// Those of these games that are over, locked.
 pub(super) async fn locked(
     connection: &mut PgConnection,
-    games: &[Id],
+    games: &[GameId],
 ) -> sqlx::Result<Vec<Candidate>> {
-    let ids: Vec<&[u8]> = games.iter().map(|id| id.0.as_slice()).collect();
+    let ids: Vec<&[u8]> = games.iter().map(|id| id.bytes().as_slice()).collect();
     let rows = sqlx::query(
         "SELECT number, game_id, form, header FROM games
          WHERE game_id = ANY ($1) AND state <> 0 ORDER BY number FOR UPDATE",
@@ -85,7 +85,7 @@ pub(super) async fn divided(
     connection: &mut PgConnection,
     games: Vec<Candidate>,
 ) -> sqlx::Result<(Vec<Candidate>, Vec<Candidate>)> {
-    let units: BTreeSet<Id> = games.iter().filter_map(|game| game.unit?).collect();
+    let units: BTreeSet<UnitKey> = games.iter().filter_map(|game| game.unit?).collect();
     let needing = needing(connection, &units).await?;
     let is_free = |game: &Candidate| match game.unit {
         Some(Some(unit)) => !needing.contains(&unit),
@@ -98,19 +98,20 @@ pub(super) async fn divided(
 /// Those of these tournaments and studies that need their games.
 async fn needing(
     connection: &mut PgConnection,
-    units: &BTreeSet<Id>,
-) -> sqlx::Result<BTreeSet<Id>> {
+    units: &BTreeSet<UnitKey>,
+) -> sqlx::Result<BTreeSet<UnitKey>> {
     if units.is_empty() {
         return Ok(BTreeSet::new());
     }
-    let ids: Vec<&[u8]> = units.iter().map(|id| id.0.as_slice()).collect();
+    let ids: Vec<UnitId> = units.iter().map(|unit| unit.id()).collect();
+    let ids: Vec<&[u8]> = ids.iter().map(|id| id.bytes().as_slice()).collect();
     let studies: Vec<Vec<u8>> =
         sqlx::query_scalar("SELECT study_id FROM studies WHERE study_id = ANY ($1)")
             .bind(ids.clone())
             .fetch_all(&mut *connection)
             .await?;
-    let mut needing: BTreeSet<Id> = (studies.into_iter())
-        .filter_map(|id| id.try_into().ok().map(Id))
+    let mut needing: BTreeSet<UnitKey> = (studies.into_iter())
+        .filter_map(|id| Some(UnitKind::Study.unit(id.try_into().ok()?)))
         .collect();
     let tournaments = sqlx::query(
         "SELECT number, tournament_id, form, header, over FROM tournaments
@@ -123,6 +124,7 @@ async fn needing(
         let Ok(id) = row.get::<&[u8], _>(1).try_into() else {
             continue;
         };
+        let id = TournamentId::from_bytes(id);
         let is_readable = async {
             let rows = sqlx::query_scalar(UnitKind::Tournament.sql(ROWS))
                 .bind(row.get::<i64, _>(0))
@@ -133,11 +135,11 @@ async fn needing(
                 header: row.get(3),
                 rows,
             };
-            Ok::<_, sqlx::Error>(StoredTournament::decode(Id(id), &stored).is_ok())
+            Ok::<_, sqlx::Error>(StoredTournament::decode(id, &stored).is_ok())
         };
         let is_over: bool = row.get(4);
         if !is_over || !is_readable.await? {
-            needing.insert(Id(id));
+            needing.insert(UnitKey::Tournament(id));
         }
     }
     Ok(needing)

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use chefshat_engine::{RULES_VERSION, RuleSetSpec, SeedPlan};
 use chefshat_postgres::Database;
 use chefshat_proto::v1;
-use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::ids::{GameId, Id, SecretHash};
 use chefshat_room::journal::{
     AbortReason, Change, Entry, Fill, GameHeader, GameStart, TournamentGame,
 };
@@ -23,10 +23,10 @@ use chefshat_tournament::Change as TournamentChange;
 use sqlx::postgres::PgConnection;
 
 use super::*;
-use crate::cluster::{ClusterStore, Epoch, Heartbeat, Kind, NodeId, NodeInfo};
+use crate::cluster::{ClusterStore, Epoch, Heartbeat, NodeId, NodeInfo, Subject};
 use crate::testing::TypedUnits as _;
 use crate::tournaments::{TournamentEntry, TournamentHeader};
-use crate::units::UnitKind;
+use crate::units::UnitKey;
 
 /// What a node without rooms says.
 const REACHED: Heartbeat = Heartbeat {
@@ -116,8 +116,8 @@ async fn waiting(connection: &mut PgConnection, wait_event: &str) -> i32 {
 /// A room with the id `room`, whose game has the same id.
 fn header(room: u8, tournament: Option<u8>, durability: Durability) -> Arc<GameHeader> {
     Arc::new(GameHeader {
-        room_id: Id([room; 16]),
-        game_id: Id([room; 16]),
+        room_id: Id::from_bytes([room; 16]),
+        game_id: Id::from_bytes([room; 16]),
         name: format!("room {room}"),
         rules: RuleSetSpec::default().validate().expect("the standard"),
         policy: Policy {
@@ -139,7 +139,7 @@ fn header(room: u8, tournament: Option<u8>, durability: Durability) -> Arc<GameH
         join_code: format!("ROOM{room}"),
         owner: SecretHash::of(b"owner"),
         tournament: tournament.map(|tournament| TournamentGame {
-            tournament: Id([tournament; 16]),
+            tournament: Id::from_bytes([tournament; 16]),
             series: None,
         }),
         table: None,
@@ -153,7 +153,7 @@ fn durable(room: u8) -> Arc<GameHeader> {
 
 fn cup(tournament: u8) -> Arc<TournamentHeader> {
     Arc::new(TournamentHeader {
-        id: Id([tournament; 16]),
+        id: Id::from_bytes([tournament; 16]),
         settings: v1::TournamentSettings::default(),
         created_at_ms: 1_000,
         join_code: format!("CUP{tournament}"),
@@ -164,7 +164,7 @@ fn cup(tournament: u8) -> Arc<TournamentHeader> {
 
 fn summary(room: u8) -> Box<v1::RecordSummary> {
     Box::new(v1::RecordSummary {
-        game_id: Id([room; 16]).to_string(),
+        game_id: GameId::from_bytes([room; 16]).to_string(),
         room_name: format!("room {room}"),
         state: v1::RoomState::Finished.into(),
         created_at_ms: 1_000,
@@ -205,14 +205,17 @@ async fn append(journal: &mut Box<dyn Journal>, number: u64) -> Result<(), Store
 
 /// Number of rows of a tournament's journal.
 async fn tournament_rows(store: &PostgresStore, tournament: u8) -> u64 {
-    let unit = UnitKind::Tournament.id(Id([tournament; 16]));
+    let unit = UnitKey::Tournament(Id::from_bytes([tournament; 16]));
     let stored = store.unit(unit).await.expect("readable");
     stored.expect("it exists").rows.len() as u64
 }
 
 /// The only game of a unit.
 async fn resumed(store: &PostgresStore, unit: u8, epoch: Epoch) -> ResumableGame {
-    let unit = store.load(Id([unit; 16]), epoch).await.expect("readable");
+    let unit = store
+        .load(Id::from_bytes([unit; 16]), epoch)
+        .await
+        .expect("readable");
     let mut games = unit.expect("it is owned").games;
     assert_eq!(games.len(), 1);
     games.remove(0)

@@ -17,7 +17,7 @@ use crate::sqlite::{
 };
 use crate::{DATABASE_FILE, OpenError, StoreError};
 use chefshat_record::atomic_file::WriteError;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::random_bytes;
 use chefshat_room::journal::GameHeader;
 
 /// Rows in one statement, and how many bytes of journals at most, nearly.
@@ -241,7 +241,7 @@ async fn insert_traces(
         "INSERT INTO study_traces (trace_id, study, participant, game_id, traces)
          VALUES ($1, $2, $3, $4, $5)",
     )
-    .bind(Id::random().0.as_slice())
+    .bind(random_bytes::<16>().as_slice())
     .bind(traces.study)
     .bind(traces.participant)
     .bind(traces.game_id.as_slice())
@@ -339,8 +339,8 @@ async fn own_game(connection: &mut PgConnection, game: &GameRow) -> Result<bool,
         "INSERT INTO owned (id, unit, kind, epoch, join_code, game_id, durable, form, rules_version)
          VALUES ($1, $2, 0, $3, $4, $5, true, $6, $7)",
     )
-    .bind(header.room_id.0.as_slice())
-    .bind(header.unit().0.as_slice())
+    .bind(header.room_id.bytes().as_slice())
+    .bind(header.unit().bytes().as_slice())
     .bind(FIRST_EPOCH)
     .bind(text(&header.join_code))
     .bind(game.game_id.as_slice())

@@ -12,15 +12,15 @@ use super::values::{FIRST_EPOCH, Owned, integer, number_of, text};
 use super::writer::confirming;
 use crate::StoreError;
 use crate::form::{self, FORM};
-use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitId, UnitKind, UnitRow};
-use chefshat_room::ids::Id;
+use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitKey, UnitKind, UnitRow};
+use chefshat_room::ids::{StudyId, UnitId};
 
 /// What is written for a unit.
 #[derive(Debug)]
 pub(super) enum Change {
     /// A node creates it.
     Create {
-        unit: UnitId,
+        unit: UnitKey,
         node: i64,
         join_code: Option<String>,
         header: Vec<u8>,
@@ -31,7 +31,7 @@ pub(super) enum Change {
     /// Its owner replaces its journal by one row, and deletes the interface traces of participants.
     Rewrite(UnitKind, Owned, Vec<u8>, Vec<u32>),
     /// Its owner adds interface traces; the id identifies them, so that they are added once.
-    Traces(Owned, Id, StoredTraces),
+    Traces(Owned, [u8; 16], StoredTraces),
     /// Its owner deletes it.
     Delete(UnitKind, Owned),
 }
@@ -55,11 +55,11 @@ impl Change {
                 let created = create(connection, *unit, *node, names, again).await?;
                 if let (Ok(Created::Now), Some(row)) = (&created, first) {
                     let owned = Owned {
-                        id: unit.id,
-                        unit: unit.id,
+                        id: unit.id(),
+                        unit: unit.id(),
                         epoch: FIRST_EPOCH,
                     };
-                    append(connection, unit.kind, owned, row).await?;
+                    append(connection, unit.kind(), owned, row).await?;
                 }
                 return Ok(created.map(|_| 0));
             }
@@ -92,12 +92,12 @@ enum Created {
 /// Creates a unit. What stands in place of a missing join code cannot be typed as one.
 async fn create(
     connection: &mut PgConnection,
-    unit: UnitId,
+    unit: UnitKey,
     node: i64,
     (join_code, header): (Option<&str>, &[u8]),
     again: bool,
 ) -> sqlx::Result<Result<Created, StoreError>> {
-    let row = sqlx::query(unit.kind.sql(
+    let row = sqlx::query(unit.kind().sql(
         "WITH owner AS (
              SELECT node FROM nodes WHERE node = $1
          ), place AS (
@@ -110,12 +110,12 @@ async fn create(
          SELECT EXISTS (SELECT FROM place), EXISTS (SELECT FROM owner)",
     ))
     .bind(node)
-    .bind(unit.id.0.as_slice())
+    .bind(unit.id().bytes().as_slice())
     .bind(FIRST_EPOCH)
     .bind(FORM)
     .bind(header)
     .bind(join_code.map(text))
-    .bind(number_of(unit.kind))
+    .bind(number_of(unit.kind()))
     .fetch_one(&mut *connection)
     .await?;
     let (placed, owner): (bool, bool) = (row.get(0), row.get(1));
@@ -123,10 +123,10 @@ async fn create(
         return Ok(Ok(Created::Now));
     }
     if again {
-        let own = sqlx::query(unit.kind.sql(confirming!(
+        let own = sqlx::query(unit.kind().sql(confirming!(
             "{unit_id} FROM {units} WHERE {unit_id} = $1 AND header = $2"
         )))
-        .bind(unit.id.0.as_slice())
+        .bind(unit.id().bytes().as_slice())
         .bind(header)
         .fetch_optional(connection)
         .await?;
@@ -135,8 +135,8 @@ async fn create(
         }
     }
     Ok(Err(match owner {
-        true => StoreError::Taken(unit.id),
-        false => StoreError::Fenced(unit.id),
+        true => StoreError::Taken(unit.id().to_string()),
+        false => StoreError::Fenced(unit.id()),
     }))
 }
 
@@ -157,7 +157,7 @@ async fn append(
          WHERE $3 = 0 OR (SELECT true FROM {rows} WHERE {unit} = number AND position = $3 - 1)
          ON CONFLICT DO NOTHING RETURNING {unit}",
     ))
-    .bind(owned.id.0.as_slice())
+    .bind(owned.id.bytes().as_slice())
     .bind(owned.epoch)
     .bind(position)
     .bind(row.entries.as_slice())
@@ -173,7 +173,7 @@ async fn append(
         "{unit} FROM {units} JOIN {rows} ON {unit} = number
          WHERE {unit_id} = $1 AND position = $3 AND epoch = $2 AND {entries} = $4"
     )))
-    .bind(owned.id.0.as_slice())
+    .bind(owned.id.bytes().as_slice())
     .bind(owned.epoch)
     .bind(position)
     .bind(row.entries.as_slice())
@@ -186,13 +186,13 @@ async fn append(
 }
 
 /// Marks a tournament, whose row is locked, as over.
-async fn end(connection: &mut PgConnection, id: Id) -> sqlx::Result<()> {
+async fn end(connection: &mut PgConnection, id: UnitId) -> sqlx::Result<()> {
     for text in [
         "UPDATE owned SET over = true, ended_ms = clock_ms() WHERE id = $1",
         "UPDATE tournaments SET over = true WHERE tournament_id = $1",
     ] {
         sqlx::query(text)
-            .bind(id.0.as_slice())
+            .bind(id.bytes().as_slice())
             .execute(&mut *connection)
             .await?;
     }
@@ -223,7 +223,7 @@ async fn rewrite(
          ON CONFLICT ({unit}, position) DO UPDATE SET epoch = excluded.epoch, {entries} = excluded.{entries}
          RETURNING {unit}",
     ))
-    .bind(owned.id.0.as_slice())
+    .bind(owned.id.bytes().as_slice())
     .bind(owned.epoch)
     .bind(forgotten.iter().map(|it| i64::from(*it)).collect::<Vec<_>>())
     .bind(entries)
@@ -236,7 +236,7 @@ async fn rewrite(
 async fn add_traces(
     connection: &mut PgConnection,
     owned: Owned,
-    id: Id,
+    id: [u8; 16],
     traces: &StoredTraces,
 ) -> sqlx::Result<bool> {
     sqlx::query_scalar(
@@ -249,11 +249,11 @@ async fn add_traces(
          )
          SELECT EXISTS (SELECT FROM owner)",
     )
-    .bind(owned.id.0.as_slice())
+    .bind(owned.id.bytes().as_slice())
     .bind(owned.epoch)
-    .bind(id.0.as_slice())
+    .bind(id.as_slice())
     .bind(i64::from(traces.number))
-    .bind(traces.game.0.as_slice())
+    .bind(traces.game.bytes().as_slice())
     .bind(form::traces_to_bytes(traces))
     .fetch_one(connection)
     .await
@@ -274,7 +274,7 @@ async fn delete(connection: &mut PgConnection, kind: UnitKind, owned: Owned) -> 
          )
          DELETE FROM owned USING owner WHERE owned.id = owner.id RETURNING owned.id",
     ))
-    .bind(owned.id.0.as_slice())
+    .bind(owned.id.bytes().as_slice())
     .bind(owned.epoch)
     .fetch_optional(&mut *connection)
     .await?;
@@ -282,7 +282,7 @@ async fn delete(connection: &mut PgConnection, kind: UnitKind, owned: Owned) -> 
         return Ok(true);
     }
     let another = sqlx::query("SELECT id FROM owned WHERE id = $1")
-        .bind(owned.id.0.as_slice())
+        .bind(owned.id.bytes().as_slice())
         .fetch_optional(connection)
         .await?;
     Ok(another.is_none())
@@ -290,10 +290,10 @@ async fn delete(connection: &mut PgConnection, kind: UnitKind, owned: Owned) -> 
 
 impl Reader {
     /// See `Store::unit`.
-    pub(super) async fn unit(&self, unit: UnitId) -> Result<Option<StoredUnit>, StoreError> {
+    pub(super) async fn unit(&self, unit: UnitKey) -> Result<Option<StoredUnit>, StoreError> {
         let row: Option<PgRow> = (self.read(|connection| {
-            sqlx::query(unit.kind.sql(HEADER))
-                .bind(unit.id.0.to_vec())
+            sqlx::query(unit.kind().sql(HEADER))
+                .bind(unit.id().bytes().to_vec())
                 .fetch_optional(connection)
                 .boxed()
         }))
@@ -301,7 +301,7 @@ impl Reader {
         let Some(row) = row else { return Ok(None) };
         let number: i64 = row.get(0);
         let rows = self.read(|connection| {
-            sqlx::query_scalar(unit.kind.sql(ROWS))
+            sqlx::query_scalar(unit.kind().sql(ROWS))
                 .bind(number)
                 .fetch_all(connection)
                 .boxed()
@@ -313,23 +313,23 @@ impl Reader {
         }))
     }
 
-    /// The ids of all studies, oldest first.
-    pub(super) async fn studies(&self) -> Result<Vec<Id>, StoreError> {
+    /// All studies, oldest first.
+    pub(super) async fn studies(&self) -> Result<Vec<UnitKey>, StoreError> {
         let ids = self.read(|connection| {
             sqlx::query_scalar("SELECT study_id FROM studies ORDER BY number")
                 .fetch_all(connection)
                 .boxed()
         });
-        Ok(ids_of(ids.await?))
+        Ok(read_units(UnitKind::Study, ids.await?))
     }
 
-    /// The ids of the tournaments of a node that are not over, and of the newest ones of the cluster
+    /// The tournaments of a node that are not over, and of the newest ones of the cluster
     /// that are; oldest first.
     pub(super) async fn tournaments(
         &self,
         node: i64,
         newest_over: usize,
-    ) -> Result<Vec<Id>, StoreError> {
+    ) -> Result<Vec<UnitKey>, StoreError> {
         let ids = self.read(|connection| {
             sqlx::query_scalar(
                 "SELECT tournament_id FROM tournaments WHERE number IN (
@@ -346,18 +346,18 @@ impl Reader {
             .fetch_all(connection)
             .boxed()
         });
-        Ok(ids_of(ids.await?))
+        Ok(read_units(UnitKind::Tournament, ids.await?))
     }
 
     /// See `Store::traces`.
-    pub(super) async fn traces(&self, study: Id) -> Result<Vec<StoredTraces>, StoreError> {
+    pub(super) async fn traces(&self, study: StudyId) -> Result<Vec<StoredTraces>, StoreError> {
         let rows: Vec<(i64, Vec<u8>, Vec<u8>)> = (self.read(|connection| {
             sqlx::query_as(
                 "SELECT participant, game_id, traces
                  FROM study_traces JOIN studies ON study = studies.number
                  WHERE study_id = $1 ORDER BY study_traces.number",
             )
-            .bind(study.0.to_vec())
+            .bind(study.bytes().to_vec())
             .fetch_all(connection)
             .boxed()
         }))
@@ -370,7 +370,7 @@ impl Reader {
     }
 }
 
-fn ids_of(ids: Vec<Vec<u8>>) -> Vec<Id> {
-    let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
-    ids.into_iter().filter_map(id).collect()
+fn read_units(kind: UnitKind, ids: Vec<Vec<u8>>) -> Vec<UnitKey> {
+    let unit = |id: Vec<u8>| id.try_into().ok().map(|id| kind.unit(id));
+    ids.into_iter().filter_map(unit).collect()
 }

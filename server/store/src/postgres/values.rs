@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::StoreError;
 use crate::units::UnitKind;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::UnitId;
 
 /// The epoch of what has just been created.
 pub(super) const FIRST_EPOCH: i64 = 1;
@@ -37,8 +37,8 @@ pub(super) fn kind_of(number: i16) -> Option<UnitKind> {
 /// A room or tournament, and the epoch at which its owner writes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Owned {
-    pub(super) id: Id,
-    pub(super) unit: Id,
+    pub(super) id: UnitId,
+    pub(super) unit: UnitId,
     pub(super) epoch: i64,
 }
 

@@ -8,7 +8,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 
 use super::errors::{BUSY_LIMIT, CORRUPT, FILE, NOT_A_DATABASE, explain, has_code};
 use super::open::{APPLICATION_ID, OpenError, SHRINKABLE, make_private};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, Id};
 
 /// What a copy of a database contains.
 #[derive(Debug)]
@@ -18,7 +18,7 @@ pub struct DatabaseCopy {
     /// Number of games that resume when a server starts.
     pub unfinished: u64,
     /// The games whose record has been written to a file.
-    pub recorded: Vec<Id>,
+    pub recorded: Vec<GameId>,
 }
 
 /// Copies the database of a data directory into a folder that has none. A server may use it: the

@@ -99,7 +99,7 @@ impl Reader {
         .map_err(failure)?;
         let Some(row) = row else { return Ok(None) };
         let id: Vec<u8> = row.get(0);
-        let id = id.try_into().map(Id).map_err(|_| {
+        let id = id.try_into().map(Id::from_bytes).map_err(|_| {
             StoreError::Failed(format!("game number {number} has an id that is damaged"))
         })?;
         Ok(Some(GameRows {

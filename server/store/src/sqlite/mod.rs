@@ -44,7 +44,7 @@ pub(crate) use open::{moved, moved_to};
 use super::decode_pool::DecodePool;
 use super::ephemeral::{EphemeralJournal, Reservations, Scratch};
 use super::form;
-use super::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
+use super::units::{StoredTraces, StoredUnit, UnitKey, UnitKind, UnitWrite};
 use super::{
     DiskUsage, ForgetError, Forgotten, Journal, Listed, Part, ResumableGame, Store, StoreError,
     StoredGame,
@@ -52,7 +52,7 @@ use super::{
 use crate::Keep;
 use chefshat_base::metrics::StoreMetrics;
 use chefshat_base::tasks::{LongTask, named};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, StudyId};
 use chefshat_room::journal::{Entry, GameHeader};
 use chefshat_room::policy::Durability;
 use errors::explain;
@@ -214,7 +214,7 @@ impl Store for SqliteStore {
         let decoding = self.decoding.clone();
         async move {
             let game = header.game_id;
-            let taken = StoreError::Taken(game);
+            let taken = StoreError::Taken(game.to_string());
             let reserved = self.reserved.take(game).ok_or_else(|| taken.clone())?;
             if header.policy.durability == Durability::Ephemeral {
                 if self.reader.has_game(game).await? {
@@ -255,11 +255,14 @@ impl Store for SqliteStore {
             .boxed()
     }
 
-    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
+    fn summary(
+        &self,
+        game: GameId,
+    ) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
         self.reader.summary(game).boxed()
     }
 
-    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
+    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         self.reader.finished(game).boxed()
     }
 
@@ -274,7 +277,7 @@ impl Store for SqliteStore {
 
     fn import(
         &self,
-        game: Id,
+        game: GameId,
         mut summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
     ) -> BoxFuture<'_, Result<bool, StoreError>> {
@@ -323,7 +326,7 @@ impl Store for SqliteStore {
         keep: Keep,
         after: u64,
         count: usize,
-    ) -> BoxFuture<'_, Result<Vec<(u64, Id)>, StoreError>> {
+    ) -> BoxFuture<'_, Result<Vec<(u64, GameId)>, StoreError>> {
         // What waits for space must not keep what frees some.
         let unwritten = !self.space.has_some();
         (self.reader)
@@ -331,7 +334,7 @@ impl Store for SqliteStore {
             .boxed()
     }
 
-    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    fn prune(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
         async move {
             let prune = WriteCommand::Prune {
                 games: games.clone(),
@@ -348,7 +351,7 @@ impl Store for SqliteStore {
         .boxed()
     }
 
-    fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn delete(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<(), StoreError>> {
         self.commands.send(WriteCommand::Delete { games }).boxed()
     }
 
@@ -364,21 +367,21 @@ impl Store for SqliteStore {
         .boxed()
     }
 
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
         self.reader.without_record_file().boxed()
     }
 
-    fn mark_record_written(&self, game_id: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn mark_record_written(&self, game_id: GameId) -> BoxFuture<'_, Result<(), StoreError>> {
         self.commands
             .send(WriteCommand::RecordWritten { game_id })
             .boxed()
     }
 
-    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
         self.commands.send(WriteCommand::Unit(unit, write)).boxed()
     }
 
-    fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+    fn unit(&self, unit: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
         self.reader.unit(unit).boxed()
     }
 
@@ -386,11 +389,11 @@ impl Store for SqliteStore {
         &self,
         kind: UnitKind,
         newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    ) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>> {
         self.reader.units(kind, newest_over).boxed()
     }
 
-    fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
+    fn traces(&self, study: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
         self.reader.traces(study).boxed()
     }
 

@@ -17,9 +17,9 @@ use super::rows::{self, Read};
 use crate::Keep;
 use crate::decode_pool::DecodePool;
 use crate::form::{self, OWNER_WITHIN, Unreadable, check_form, stored_header};
-use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitId, UnitKind};
+use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitKey, UnitKind};
 use crate::{Listed, Part, ResumableGame, StoreError, StoredGame, listed};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, Id, StudyId};
 
 /// Most ended games whose rooms are restored: the newest ones, because clients know the end of
 /// older ones.
@@ -109,11 +109,14 @@ impl Reader {
     }
 
     /// See `Store::summary`.
-    pub(super) async fn summary(&self, game: Id) -> Result<Option<v1::RecordSummary>, StoreError> {
+    pub(super) async fn summary(
+        &self,
+        game: GameId,
+    ) -> Result<Option<v1::RecordSummary>, StoreError> {
         let summary: Option<Vec<u8>> = sqlx::query_scalar(
             "SELECT summary FROM games WHERE game_id = $1 AND summary IS NOT NULL",
         )
-        .bind(game.0.as_slice())
+        .bind(game.bytes().as_slice())
         .fetch_optional(&self.pool)
         .await
         .map_err(failure)?;
@@ -126,13 +129,13 @@ impl Reader {
     }
 
     /// See `Store::finished`.
-    pub(super) async fn finished(&self, game: Id) -> Result<Option<StoredGame>, StoreError> {
+    pub(super) async fn finished(&self, game: GameId) -> Result<Option<StoredGame>, StoreError> {
         let row = sqlx::query(
             "SELECT number, form, header, record, last_row, signature
              FROM games LEFT JOIN added_records ON game = number
              WHERE game_id = $1 AND summary IS NOT NULL",
         )
-        .bind(game.0.as_slice())
+        .bind(game.bytes().as_slice())
         .fetch_optional(&self.pool)
         .await
         .map_err(failure)?;
@@ -162,23 +165,23 @@ impl Reader {
     }
 
     /// Whether a game with this id is stored, over or not.
-    pub(super) async fn has_game(&self, game: Id) -> Result<bool, StoreError> {
+    pub(super) async fn has_game(&self, game: GameId) -> Result<bool, StoreError> {
         sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM games WHERE game_id = $1)")
-            .bind(game.0.as_slice())
+            .bind(game.bytes().as_slice())
             .fetch_one(&self.pool)
             .await
             .map_err(failure)
     }
 
     /// See `Store::unit`.
-    pub(super) async fn unit(&self, unit: UnitId) -> Result<Option<StoredUnit>, StoreError> {
-        let row = sqlx::query(unit.kind.sql(HEADER))
-            .bind(unit.id.0.as_slice())
+    pub(super) async fn unit(&self, unit: UnitKey) -> Result<Option<StoredUnit>, StoreError> {
+        let row = sqlx::query(unit.kind().sql(HEADER))
+            .bind(unit.id().bytes().as_slice())
             .fetch_optional(&self.pool)
             .await
             .map_err(failure)?;
         let Some(row) = row else { return Ok(None) };
-        let rows = sqlx::query_scalar(unit.kind.sql(ROWS))
+        let rows = sqlx::query_scalar(unit.kind().sql(ROWS))
             .bind(row.get::<i64, _>(0))
             .fetch_all(&self.pool)
             .await
@@ -195,7 +198,7 @@ impl Reader {
         &self,
         kind: UnitKind,
         newest_over: usize,
-    ) -> Result<Vec<Id>, StoreError> {
+    ) -> Result<Vec<UnitKey>, StoreError> {
         let newest_over = i64::try_from(newest_over).unwrap_or(i64::MAX);
         let query = match kind {
             UnitKind::Tournament => sqlx::query_scalar(
@@ -211,17 +214,17 @@ impl Reader {
             UnitKind::Study => sqlx::query_scalar("SELECT study_id FROM studies ORDER BY number"),
         };
         let ids: Vec<Vec<u8>> = query.fetch_all(&self.pool).await.map_err(failure)?;
-        let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
-        Ok(ids.into_iter().filter_map(id).collect())
+        let unit = |id: Vec<u8>| id.try_into().ok().map(|id| kind.unit(id));
+        Ok(ids.into_iter().filter_map(unit).collect())
     }
 
     /// See `Store::traces`.
-    pub(super) async fn traces(&self, study: Id) -> Result<Vec<StoredTraces>, StoreError> {
+    pub(super) async fn traces(&self, study: StudyId) -> Result<Vec<StoredTraces>, StoreError> {
         let rows = sqlx::query(
             "SELECT participant, game_id, traces FROM study_traces
              WHERE study = (SELECT number FROM studies WHERE study_id = $1) ORDER BY number",
         )
-        .bind(study.0.as_slice())
+        .bind(study.bytes().as_slice())
         .fetch_all(&self.pool)
         .await
         .map_err(failure)?;
@@ -310,7 +313,7 @@ impl Reader {
         mut after: u64,
         count: usize,
         unwritten: bool,
-    ) -> Result<Vec<(u64, Id)>, StoreError> {
+    ) -> Result<Vec<(u64, GameId)>, StoreError> {
         let integer = |number: u64| i64::try_from(number).unwrap_or(i64::MAX);
         let mut connection = self.pool.acquire().await.map_err(failure)?;
         let (mut found, mut units) = (Vec::new(), Units::default());
@@ -343,7 +346,7 @@ impl Reader {
                 let Ok(id) = id.try_into() else { continue };
                 let needed = units.need(&mut connection, form, header.as_deref());
                 if !needed.await.map_err(failure)? {
-                    found.push((number.unsigned_abs(), Id(id)));
+                    found.push((number.unsigned_abs(), Id::from_bytes(id)));
                 }
                 if found.len() >= count {
                     return Ok(found);
@@ -354,14 +357,14 @@ impl Reader {
     }
 
     /// See `Store::without_record_file`.
-    pub(super) async fn without_record_file(&self) -> Result<Vec<Id>, StoreError> {
+    pub(super) async fn without_record_file(&self) -> Result<Vec<GameId>, StoreError> {
         let ids: Vec<Vec<u8>> = sqlx::query_scalar(
             "SELECT game_id FROM games WHERE filed = 0 AND summary IS NOT NULL ORDER BY number",
         )
         .fetch_all(&self.pool)
         .await
         .map_err(failure)?;
-        let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id);
+        let id = |bytes: Vec<u8>| bytes.try_into().ok().map(Id::from_bytes);
         Ok(ids.into_iter().filter_map(id).collect())
     }
 }

@@ -9,12 +9,12 @@ use sqlx::sqlite::SqliteConnection;
 
 use crate::form;
 use crate::tournaments::StoredTournament;
-use crate::units::{ROWS, StoredUnit, UnitKind};
-use chefshat_room::ids::Id;
+use crate::units::{ROWS, StoredUnit, UnitKey, UnitKind};
+use chefshat_room::ids::{StudyId, TournamentId};
 
 /// Which tournaments and studies need their games, as far as they were asked about.
 #[derive(Default)]
-pub(super) struct Units(HashMap<Id, bool>);
+pub(super) struct Units(HashMap<UnitKey, bool>);
 
 impl Units {
     /// Whether a game with this encoding and header is needed.
@@ -32,25 +32,31 @@ impl Units {
         if let Some(needs) = self.0.get(&unit) {
             return Ok(*needs);
         }
-        let needs = is_study(connection, unit).await? || is_open(connection, unit).await?;
+        let needs = match unit {
+            UnitKey::Study(study) => is_study(connection, study).await?,
+            UnitKey::Tournament(tournament) => is_open(connection, tournament).await?,
+        };
         self.0.insert(unit, needs);
         Ok(needs)
     }
 }
 
-async fn is_study(connection: &mut SqliteConnection, unit: Id) -> sqlx::Result<bool> {
+async fn is_study(connection: &mut SqliteConnection, study: StudyId) -> sqlx::Result<bool> {
     sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM studies WHERE study_id = $1)")
-        .bind(unit.0.as_slice())
+        .bind(study.bytes().as_slice())
         .fetch_one(connection)
         .await
 }
 
-/// Whether this is a tournament that is not over or cannot be read.
-async fn is_open(connection: &mut SqliteConnection, unit: Id) -> sqlx::Result<bool> {
+/// Whether a tournament is there, and is not over or cannot be read.
+async fn is_open(
+    connection: &mut SqliteConnection,
+    tournament: TournamentId,
+) -> sqlx::Result<bool> {
     let kind = UnitKind::Tournament;
     let row =
         sqlx::query("SELECT number, form, header, over FROM tournaments WHERE tournament_id = $1")
-            .bind(unit.0.as_slice())
+            .bind(tournament.bytes().as_slice())
             .fetch_optional(&mut *connection)
             .await?;
     let Some(row) = row else { return Ok(false) };
@@ -66,5 +72,5 @@ async fn is_open(connection: &mut SqliteConnection, unit: Id) -> sqlx::Result<bo
         header: row.get(2),
         rows,
     };
-    Ok(StoredTournament::decode(unit, &stored).is_err())
+    Ok(StoredTournament::decode(tournament, &stored).is_err())
 }

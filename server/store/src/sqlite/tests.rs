@@ -26,7 +26,7 @@ use crate::form;
 use crate::testing::{TypedUnits as _, cup};
 use crate::tournaments::TournamentEntry;
 use crate::{Journal, Keep, Part, Store, StoreError, StoredGame};
-use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::ids::{GameId, Id, SecretHash};
 use chefshat_room::journal::{
     AbortReason, Branch, Change, Decided, Entry, Fill, GameHeader, GameStart, Marked,
     ParticipantKind, RecordedSeat, SeatLabels, SeatedParticipant, Source, StudyGame, TakenOver,
@@ -36,8 +36,8 @@ use chefshat_room::testing::{study_game, study_member};
 
 fn header(game: u8, durability: Durability) -> GameHeader {
     GameHeader {
-        room_id: Id([game ^ 0xff; 16]),
-        game_id: Id([game; 16]),
+        room_id: Id::from_bytes([game ^ 0xff; 16]),
+        game_id: Id::from_bytes([game; 16]),
         name: "a room with ünïcode".into(),
         rules: RuleSetSpec::default().validate().expect("the standard"),
         rules_version: RULES_VERSION,
@@ -59,7 +59,7 @@ fn header(game: u8, durability: Durability) -> GameHeader {
             },
             Fill::BuiltIn(AgentKind::Greedy.into()),
             Fill::Replay(RecordedSeat {
-                game: Id([9; 16]),
+                game: Id::from_bytes([9; 16]),
                 seat: Seat::new(2),
             }),
         ],
@@ -69,7 +69,7 @@ fn header(game: u8, durability: Durability) -> GameHeader {
         start: GameStart {
             script: None,
             branch: Some(Branch {
-                game: Id([8; 16]),
+                game: Id::from_bytes([8; 16]),
                 same_deals: true,
                 taken_over: vec![
                     TakenOver {
@@ -172,14 +172,14 @@ fn summary(header: &GameHeader) -> Box<v1::RecordSummary> {
         ended_at_ms: header.created_at_ms + 1_000,
         seats: vec![
             v1::Participant {
-                name: format!("player of {:?}", header.game_id.0[0]),
+                name: format!("player of {:?}", header.game_id.bytes()[0]),
                 kind: v1::ParticipantKind::Robot.into(),
                 ..v1::Participant::default()
             },
             v1::Participant {
                 seat: 1,
-                name: format!("name of {:?}", header.game_id.0[0]),
-                built_in_agent: format!("agent of {:?}", header.game_id.0[0]),
+                name: format!("name of {:?}", header.game_id.bytes()[0]),
+                built_in_agent: format!("agent of {:?}", header.game_id.bytes()[0]),
                 kind: v1::ParticipantKind::Agent.into(),
                 ..v1::Participant::default()
             },
@@ -197,7 +197,7 @@ async fn opened(folder: &Path) -> SqliteStore {
 }
 
 /// The journal of a hosted game that has ended.
-async fn finished_journal(store: &SqliteStore, game: Id) -> Vec<Entry> {
+async fn finished_journal(store: &SqliteStore, game: GameId) -> Vec<Entry> {
     let stored = store.finished(game).await.expect("readable");
     let Some(StoredGame::Hosted(_, journal, _)) = stored else {
         panic!("not stored: {stored:?}");
@@ -539,8 +539,8 @@ async fn an_unreadable_game_is_left_unchanged_and_others_resume() {
     connection.close().await.expect("closed");
     let store = opened(folder.path()).await;
     let unfinished = store.resumable_games(u64::MAX).await.expect("readable");
-    let games: Vec<Id> = unfinished.iter().map(|game| game.header.game_id).collect();
-    assert_eq!(games, [Id([3; 16])]);
+    let games: Vec<GameId> = unfinished.iter().map(|game| game.header.game_id).collect();
+    assert_eq!(games, [Id::from_bytes([3; 16])]);
 }
 
 /// Stores two finished games with [`entries`], whose rows alternate, and closes the database.
@@ -620,7 +620,7 @@ async fn an_import_of_an_earlier_version_is_kept_from_the_first_start_of_this_on
     let folder = tempfile::tempdir().expect("a folder");
     let store = opened(folder.path()).await;
     let imported = header(1, Durability::Durable);
-    for game in [imported.game_id, Id([2; 16])] {
+    for game in [imported.game_id, Id::from_bytes([2; 16])] {
         let import = store.import(game, *summary(&imported), Arc::from([])).await;
         assert_eq!(import, Ok(true));
         store.mark_record_written(game).await.expect("committed");
@@ -656,7 +656,7 @@ async fn games_without_record_files_are_pruned_while_the_disk_is_full() {
     let waited = tokio::time::timeout(Duration::ZERO, waiting).await;
     assert!(waited.is_err() && !store.has_space());
     let found = store.prunable(Keep::default(), 0, 9).await;
-    let games: Vec<Id> = found.expect("readable").iter().map(|it| it.1).collect();
+    let games: Vec<GameId> = found.expect("readable").iter().map(|it| it.1).collect();
     assert_eq!(games, [older.game_id]);
 }
 
@@ -679,7 +679,7 @@ async fn games_of_what_cannot_be_read_are_not_pruned() {
         for game in 1..=2 {
             let header = Arc::new(GameHeader {
                 tournament: Some(chefshat_room::journal::TournamentGame {
-                    tournament: Id([9; 16]),
+                    tournament: Id::from_bytes([9; 16]),
                     series: None,
                 }),
                 ..header(game, Durability::Durable)
@@ -697,7 +697,10 @@ async fn games_of_what_cannot_be_read_are_not_pruned() {
         let store = opened(folder.path()).await;
         let found = store.prunable(Keep::default(), 0, 9).await;
         assert_eq!(found.expect("readable").is_empty(), needed, "{damage}");
-        store.prune(vec![Id([1; 16])]).await.expect("committed");
+        store
+            .prune(vec![Id::from_bytes([1; 16])])
+            .await
+            .expect("committed");
         let left = store.finished_games().await;
         assert_eq!(left, Ok(1 + u64::from(needed)), "{damage}");
         store.close().await;

@@ -3,7 +3,7 @@
 use sqlx::sqlite::SqliteConnection;
 
 use crate::form::{self, FORM};
-use crate::units::{UnitId, UnitKind, UnitRow, UnitWrite};
+use crate::units::{UnitKey, UnitKind, UnitRow, UnitWrite};
 
 const CREATE: &str = "INSERT INTO {units} ({unit_id}, form, header) VALUES ($1, $2, $3)
      ON CONFLICT ({unit_id}) DO NOTHING";
@@ -19,13 +19,13 @@ const DELETE: &str = "DELETE FROM {units} WHERE {unit_id} = $1";
 /// Writes something for a unit; `false` if its id is taken.
 pub(super) async fn write(
     connection: &mut SqliteConnection,
-    unit: UnitId,
+    unit: UnitKey,
     change: &UnitWrite,
 ) -> sqlx::Result<bool> {
     match change {
         UnitWrite::Create { header, first, .. } => {
-            let created = sqlx::query(unit.kind.sql(CREATE))
-                .bind(unit.id.0.as_slice())
+            let created = sqlx::query(unit.kind().sql(CREATE))
+                .bind(unit.id().bytes().as_slice())
                 .bind(FORM)
                 .bind(header.as_slice())
                 .execute(&mut *connection)
@@ -46,7 +46,7 @@ pub(super) async fn write(
                      WHERE study = (SELECT number FROM studies WHERE study_id = $1)
                        AND participant = $2",
                 )
-                .bind(unit.id.0.as_slice())
+                .bind(unit.id().bytes().as_slice())
                 .bind(participant)
                 .execute(&mut *connection)
                 .await?;
@@ -63,9 +63,9 @@ pub(super) async fn write(
                 "INSERT INTO study_traces (study, participant, game_id, traces)
                  SELECT number, $2, $3, $4 FROM studies WHERE study_id = $1",
             )
-            .bind(unit.id.0.as_slice())
+            .bind(unit.id().bytes().as_slice())
             .bind(traces.number)
-            .bind(traces.game.0.as_slice())
+            .bind(traces.game.bytes().as_slice())
             .bind(form::traces_to_bytes(traces))
             .execute(&mut *connection)
             .await?;
@@ -81,16 +81,16 @@ pub(super) async fn write(
 
 async fn append(
     connection: &mut SqliteConnection,
-    unit: UnitId,
+    unit: UnitKey,
     row: &UnitRow,
 ) -> sqlx::Result<()> {
-    let added = sqlx::query(unit.kind.sql(APPEND))
-        .bind(unit.id.0.as_slice())
+    let added = sqlx::query(unit.kind().sql(APPEND))
+        .bind(unit.id().bytes().as_slice())
         .bind(i64::try_from(row.position).unwrap_or(i64::MAX))
         .bind(row.entries.as_slice())
         .execute(&mut *connection)
         .await?;
-    if added.rows_affected() == 0 && unit.kind == UnitKind::Tournament {
+    if added.rows_affected() == 0 && unit.kind() == UnitKind::Tournament {
         // Nothing deletes a tournament: what is to be committed would be lost.
         return Err(sqlx::Error::RowNotFound);
     }
@@ -103,11 +103,11 @@ async fn append(
 /// Runs a statement about one unit.
 async fn run(
     connection: &mut SqliteConnection,
-    unit: UnitId,
+    unit: UnitKey,
     text: &'static str,
 ) -> sqlx::Result<()> {
-    sqlx::query(unit.kind.sql(text))
-        .bind(unit.id.0.as_slice())
+    sqlx::query(unit.kind().sql(text))
+        .bind(unit.id().bytes().as_slice())
         .execute(connection)
         .await
         .map(drop)

@@ -24,10 +24,10 @@ use super::units;
 use crate::StoreError;
 use crate::forget::Rewrite;
 use crate::form::FORM;
-use crate::units::{UnitId, UnitWrite};
+use crate::units::{UnitKey, UnitWrite};
 use chefshat_base::clock::since_epoch_ms;
 use chefshat_base::metrics::StoreMetrics;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 
 /// Commands that may wait for the writer.
 pub(super) const QUEUE: usize = 1_024;
@@ -46,7 +46,7 @@ pub(super) enum WriteCommand {
     /// Creates a game.
     Create {
         number: i64,
-        game_id: Id,
+        game_id: GameId,
         header: Vec<u8>,
         /// Lowest number of its rows.
         first_row: i64,
@@ -66,7 +66,7 @@ pub(super) enum WriteCommand {
     /// Stores a game that was only in memory until it ended.
     Whole {
         number: i64,
-        game_id: Id,
+        game_id: GameId,
         header: Vec<u8>,
         row: i64,
         entries: Vec<u8>,
@@ -76,18 +76,18 @@ pub(super) enum WriteCommand {
     /// Stores a game that was played elsewhere.
     Import {
         number: i64,
-        game_id: Id,
+        game_id: GameId,
         record: Vec<u8>,
         summary: Box<v1::RecordSummary>,
     },
     /// Marks the record of a game as written to a file.
-    RecordWritten { game_id: Id },
+    RecordWritten { game_id: GameId },
     /// Deletes finished games that no tournament or study needs.
-    Prune { games: Vec<Id> },
+    Prune { games: Vec<GameId> },
     /// Deletes finished games.
-    Delete { games: Vec<Id> },
+    Delete { games: Vec<GameId> },
     /// Writes something for a tournament or study.
-    Unit(UnitId, UnitWrite),
+    Unit(UnitKey, UnitWrite),
     /// Removes a participant from games and tournaments that are over.
     Rewrite(Box<Rewrite>),
     /// No command follows.
@@ -129,7 +129,7 @@ pub(super) struct Row {
 pub(super) type Pending = (WriteCommand, oneshot::Sender<Result<(), StoreError>>);
 
 /// Ids of commands that were refused because it is taken, by the index of the command.
-type Taken = BTreeMap<usize, Id>;
+type Taken = BTreeMap<usize, String>;
 
 /// Executes commands until all senders are gone. While the disk is full, all but deletions wait:
 /// nothing of such a transaction was committed. After any other failure it executes none: the outcome of the failed
@@ -195,7 +195,7 @@ fn send_replies(pending: &mut Vec<Pending>, committed: &Result<Taken, StoreError
         let answer = match committed {
             Ok(taken) => taken
                 .get(&index)
-                .map_or(Ok(()), |id| Err(StoreError::Taken(*id))),
+                .map_or(Ok(()), |id| Err(StoreError::Taken(id.clone()))),
             Err(failure) => Err(failure.clone()),
         };
         // The room may have gone.
@@ -314,7 +314,7 @@ async fn write(
                 if create(connection, *number, *game_id, header, *first_row).await? {
                     rows.extend(first);
                 } else {
-                    taken.insert(index, *game_id);
+                    taken.insert(index, game_id.to_string());
                 }
             }
             WriteCommand::Finish {
@@ -349,7 +349,7 @@ async fn write(
                 signature,
             } => {
                 if !create(connection, *number, *game_id, header, *row).await? {
-                    taken.insert(index, *game_id);
+                    taken.insert(index, game_id.to_string());
                     continue;
                 }
                 sqlx::query("UPDATE games SET last_row = $2, signature = $3 WHERE number = $1")
@@ -379,7 +379,7 @@ async fn write(
                      ON CONFLICT (game_id) DO NOTHING",
                 )
                 .bind(*number)
-                .bind(game_id.0.as_slice())
+                .bind(game_id.bytes().as_slice())
                 .bind(FORM)
                 .execute(&mut *connection)
                 .await?;
@@ -391,12 +391,12 @@ async fn write(
                         .await?;
                     summarise(connection, *number, last_listed, summary).await?;
                 } else {
-                    taken.insert(index, *game_id);
+                    taken.insert(index, game_id.to_string());
                 }
             }
             WriteCommand::Unit(unit, change) => {
                 if !units::write(connection, *unit, change).await? {
-                    taken.insert(index, unit.id);
+                    taken.insert(index, unit.id().to_string());
                 }
             }
             WriteCommand::Prune { games } => prune(connection, games).await?,
@@ -408,7 +408,7 @@ async fn write(
             WriteCommand::Rewrite(changes) => rewrite(connection, changes).await?,
             WriteCommand::RecordWritten { game_id } => {
                 sqlx::query("UPDATE games SET filed = 1 WHERE game_id = $1")
-                    .bind(game_id.0.as_slice())
+                    .bind(game_id.bytes().as_slice())
                     .execute(&mut *connection)
                     .await?;
             }
@@ -441,12 +441,12 @@ async fn free_pages(connection: &mut SqliteConnection) {
 }
 
 /// Deletes those of these finished games that no tournament or study needs.
-async fn prune(connection: &mut SqliteConnection, games: &[Id]) -> sqlx::Result<()> {
+async fn prune(connection: &mut SqliteConnection, games: &[GameId]) -> sqlx::Result<()> {
     let mut units = Units::default();
     for game in games {
         let row: Option<(i64, Option<Vec<u8>>)> =
             sqlx::query_as("SELECT form, header FROM games WHERE game_id = $1 AND state <> 0")
-                .bind(game.0.as_slice())
+                .bind(game.bytes().as_slice())
                 .fetch_optional(&mut *connection)
                 .await?;
         let Some((form, header)) = row else { continue };
@@ -458,7 +458,7 @@ async fn prune(connection: &mut SqliteConnection, games: &[Id]) -> sqlx::Result<
 }
 
 /// Deletes a finished game.
-async fn delete(connection: &mut SqliteConnection, game: Id) -> sqlx::Result<()> {
+async fn delete(connection: &mut SqliteConnection, game: GameId) -> sqlx::Result<()> {
     for text in [
         with_own_rows!(
             "(row, game) = (SELECT last_row, number FROM games WHERE game_id = $1 AND state <> 0)",
@@ -469,7 +469,7 @@ async fn delete(connection: &mut SqliteConnection, game: Id) -> sqlx::Result<()>
         "DELETE FROM games WHERE game_id = $1 AND state <> 0",
     ] {
         sqlx::query(text)
-            .bind(game.0.as_slice())
+            .bind(game.bytes().as_slice())
             .execute(&mut *connection)
             .await?;
     }
@@ -499,7 +499,7 @@ fn insert(mut rows: usize) -> String {
 async fn create(
     connection: &mut SqliteConnection,
     number: i64,
-    game_id: Id,
+    game_id: GameId,
     header: &[u8],
     first_row: i64,
 ) -> sqlx::Result<bool> {
@@ -509,7 +509,7 @@ async fn create(
          ON CONFLICT (game_id) DO NOTHING",
     )
     .bind(number)
-    .bind(game_id.0.as_slice())
+    .bind(game_id.bytes().as_slice())
     .bind(FORM)
     .bind(header)
     .bind(first_row)

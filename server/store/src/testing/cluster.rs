@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use chefshat_cluster::{Created, LeaseTimes, Load, Tables, Written};
 use chefshat_proto::v1;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, RoomId, StudyId, UnitId};
 use chefshat_room::journal::{Change, Entry, GameHeader};
 use chefshat_room::policy::Durability;
 use futures::FutureExt as _;
@@ -16,10 +16,10 @@ use tokio::sync::{Mutex as AsyncMutex, broadcast, watch};
 use tokio::time::{Instant, sleep};
 
 use crate::cluster::{
-    Beat, ClusterStore, Epoch, Heartbeat, Kind, LivingNode, Location, NodeId, NodeInfo, NodeStatus,
-    Unit,
+    Beat, ClusterStore, Epoch, Heartbeat, LivingNode, LoadedUnit, Location, NodeId, NodeInfo,
+    NodeStatus, Subject,
 };
-use crate::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
+use crate::units::{StoredTraces, StoredUnit, UnitKey, UnitKind, UnitWrite};
 use crate::{Journal, Listed, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame};
 
 #[derive(Clone)]
@@ -33,17 +33,17 @@ enum Row {
 #[derive(Clone, Copy)]
 struct Released {
     by: NodeId,
-    unit: (Id, Epoch),
+    unit: (UnitId, Epoch),
     next: Option<NodeId>,
 }
 
 /// What all nodes share.
 pub struct Database {
     began: Instant,
-    tables: Mutex<Tables<Id, Row>>,
-    games: Mutex<BTreeMap<Id, Arc<GameHeader>>>,
-    /// The headers of tournaments.
-    tournaments: Mutex<BTreeMap<Id, Vec<u8>>>,
+    tables: Mutex<Tables<UnitId, Row>>,
+    games: Mutex<BTreeMap<UnitId, Arc<GameHeader>>>,
+    /// The tournaments with their headers.
+    tournaments: Mutex<BTreeMap<UnitId, (UnitKey, Vec<u8>)>>,
     /// With what each has said last.
     nodes: Mutex<BTreeMap<NodeId, (NodeInfo, Heartbeat)>>,
     drain: Mutex<Option<NodeId>>,
@@ -71,41 +71,42 @@ impl Database {
         u64::try_from(self.began.elapsed().as_millis()).expect("not that long")
     }
 
-    fn orphans(&self) -> Vec<(Id, Epoch)> {
+    fn orphans(&self) -> Vec<(UnitId, Epoch)> {
         self.tables().orphans(self.now_ms(), usize::MAX)
     }
 
-    fn is_ephemeral(&self, id: Id) -> bool {
+    fn is_ephemeral(&self, id: UnitId) -> bool {
         let games = self.games.lock().expect("no test panics here");
         let header = games.get(&id);
         header.is_some_and(|it| it.policy.durability == Durability::Ephemeral)
     }
 
     /// Makes a room one of another version of the rules.
-    pub fn make_foreign(&self, room: Id) {
+    pub fn make_foreign(&self, room: RoomId) {
         let mut games = self.games.lock().expect("no test panics here");
-        let header = games.get_mut(&room).expect("it exists");
+        let header = games.get_mut(&room.unit()).expect("it exists");
         Arc::make_mut(header).rules_version += 1;
     }
 
     /// Makes a room one of this version again.
-    pub fn make_native(&self, room: Id) {
+    pub fn make_native(&self, room: RoomId) {
         let mut games = self.games.lock().expect("no test panics here");
-        let header = games.get_mut(&room).expect("it exists");
+        let header = games.get_mut(&room.unit()).expect("it exists");
         Arc::make_mut(header).rules_version -= 1;
     }
 
-    fn tables(&self) -> MutexGuard<'_, Tables<Id, Row>> {
+    fn tables(&self) -> MutexGuard<'_, Tables<UnitId, Row>> {
         self.tables.lock().expect("no test panics here")
     }
 
     /// The owner of a unit.
-    pub fn owner(&self, unit: Id) -> Option<NodeId> {
-        self.tables().owner(unit)
+    pub fn owner(&self, unit: impl Into<UnitId>) -> Option<NodeId> {
+        self.tables().owner(unit.into())
     }
 
     /// Gives a unit to another node although its owner has a lease.
-    pub fn take_away(&self, unit: Id, node: NodeId) {
+    pub fn take_away(&self, unit: impl Into<UnitId>, node: NodeId) {
+        let unit = unit.into();
         let mut tables = self.tables();
         let epoch = tables.epoch(unit).expect("it exists");
         tables.release(unit, epoch);
@@ -129,9 +130,9 @@ impl Database {
     }
 
     /// The names of those seated by the journal of a room, in order.
-    pub fn seated(&self, room: Id) -> Vec<String> {
+    pub fn seated(&self, room: RoomId) -> Vec<String> {
         let tables = self.tables();
-        let rows = tables.journal(room).iter();
+        let rows = tables.journal(room.unit()).iter();
         let entries = rows.flat_map(|row| match &row.entries {
             Row::Game(entries) => entries.as_slice(),
             Row::Unit(_) => &[],
@@ -149,7 +150,7 @@ pub struct FakeStore {
     database: Arc<Database>,
     node: Mutex<NodeId>,
     /// The epochs of the tournaments of this node.
-    epochs: Mutex<BTreeMap<Id, Epoch>>,
+    epochs: Mutex<BTreeMap<UnitId, Epoch>>,
     /// Whether the database cannot be reached.
     pub cut_off: watch::Sender<bool>,
     /// Whether beats do not reach it.
@@ -253,7 +254,7 @@ impl FakeJournal {
     fn written(&self, written: Written) -> Result<(), StoreError> {
         match written {
             Written::Committed => Ok(()),
-            Written::Refused => Err(StoreError::Fenced(self.header.room_id)),
+            Written::Refused => Err(StoreError::Fenced(self.header.room_id.unit())),
         }
     }
 }
@@ -266,7 +267,7 @@ impl Journal for FakeJournal {
         async move {
             self.reached().await;
             let row = Row::Game(entries.clone());
-            let room = self.header.room_id;
+            let room = self.header.room_id.unit();
             let written = (self.database.tables()).append(room, self.epoch, self.rows, row);
             self.written(written)?;
             self.rows += 1;
@@ -287,7 +288,7 @@ impl Journal for FakeJournal {
     ) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
             self.reached().await;
-            let room = self.header.room_id;
+            let room = self.header.room_id.unit();
             let written = (self.database.tables()).finish(room, self.epoch, self.rows);
             self.written(written)?;
             let finished = &self.database.finished;
@@ -302,10 +303,10 @@ impl Journal for FakeJournal {
     }
 }
 
-fn created(created: Created, id: Id) -> Result<(), StoreError> {
+fn created(created: Created, id: UnitId) -> Result<(), StoreError> {
     match created {
         Created::Created => Ok(()),
-        Created::Taken => Err(StoreError::Taken(id)),
+        Created::Taken => Err(StoreError::Taken(id.to_string())),
         Created::Refused => Err(StoreError::Fenced(id)),
     }
 }
@@ -322,12 +323,12 @@ impl Store for FakeStore {
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
         async move {
             self.reached().await;
-            let room = header.room_id;
+            let room = header.room_id.unit();
             {
                 let mut taken = self.codes_taken.lock().expect("no test panics here");
                 if taken.1.len() < taken.0 {
                     taken.1.push(header.join_code.clone());
-                    return Err(StoreError::Taken(header.game_id));
+                    return Err(StoreError::Taken(header.game_id.to_string()));
                 }
             }
             let row = Row::Game(entries.clone());
@@ -338,11 +339,11 @@ impl Store for FakeStore {
                     Epoch::FIRST
                 }
                 Some(game) => {
+                    let unit = game.tournament.unit();
                     let epochs = self.epochs.lock().expect("no test panics here");
-                    let epoch = epochs.get(&game.tournament).copied();
+                    let epoch = epochs.get(&unit).copied();
                     let epoch = epoch.ok_or(StoreError::Fenced(room))?;
-                    let made =
-                        (self.database.tables()).create_in(game.tournament, epoch, room, row);
+                    let made = (self.database.tables()).create_in(unit, epoch, room, row);
                     created(made, room)?;
                     epoch
                 }
@@ -362,11 +363,14 @@ impl Store for FakeStore {
         unreachable!("a node resumes units")
     }
 
-    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
+    fn summary(
+        &self,
+        game: GameId,
+    ) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
         self.database.finished.summary(game)
     }
 
-    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
+    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         self.database.finished.finished(game)
     }
 
@@ -381,7 +385,7 @@ impl Store for FakeStore {
 
     fn import(
         &self,
-        game: Id,
+        game: GameId,
         summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
     ) -> BoxFuture<'_, Result<bool, StoreError>> {
@@ -392,19 +396,19 @@ impl Store for FakeStore {
         self.database.finished.finished_games()
     }
 
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
         self.database.finished.without_record_file()
     }
 
-    fn mark_record_written(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn mark_record_written(&self, game: GameId) -> BoxFuture<'_, Result<(), StoreError>> {
         self.database.finished.mark_record_written(game)
     }
 
-    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
-        assert_eq!(unit.kind, UnitKind::Tournament, "tests have no studies");
+    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
+        assert_eq!(unit.kind(), UnitKind::Tournament, "tests have no studies");
         async move {
             self.reached().await;
-            let id = unit.id;
+            let id = unit.id();
             let mut epochs = self.epochs.lock().expect("no test panics here");
             match write {
                 UnitWrite::Create { header, first, .. } => {
@@ -413,7 +417,7 @@ impl Store for FakeStore {
                     created(self.database.tables().create(id, self.node(), row), id)?;
                     epochs.insert(id, Epoch::FIRST);
                     let mut all = (self.database.tournaments.lock()).expect("no test panics here");
-                    all.insert(id, header);
+                    all.insert(id, (unit, header));
                     Ok(())
                 }
                 UnitWrite::Append(row) => {
@@ -436,16 +440,16 @@ impl Store for FakeStore {
         .boxed()
     }
 
-    fn unit(&self, _: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+    fn unit(&self, _: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
         async { Ok(None) }.boxed()
     }
 
     /// None is over, and a node resumes units.
-    fn units(&self, _: UnitKind, _: usize) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    fn units(&self, _: UnitKind, _: usize) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>> {
         async { Ok(Vec::new()) }.boxed()
     }
 
-    fn traces(&self, _: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
+    fn traces(&self, _: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
         async { Ok(Vec::new()) }.boxed()
     }
 
@@ -507,7 +511,7 @@ impl ClusterStore for FakeStore {
         .boxed()
     }
 
-    fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(Id, Epoch)>, StoreError>> {
+    fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(UnitId, Epoch)>, StoreError>> {
         async move {
             self.may_panic("orphans");
             self.reached().await;
@@ -519,7 +523,7 @@ impl ClusterStore for FakeStore {
         .boxed()
     }
 
-    fn handed_over(&self) -> BoxFuture<'_, (Id, Epoch)> {
+    fn handed_over(&self) -> BoxFuture<'_, (UnitId, Epoch)> {
         async move {
             let mut released = self.released.lock().await;
             loop {
@@ -551,7 +555,7 @@ impl ClusterStore for FakeStore {
 
     fn claim_all(
         &self,
-        orphans: Vec<(Id, Epoch)>,
+        orphans: Vec<(UnitId, Epoch)>,
     ) -> BoxFuture<'_, Result<Vec<Option<Epoch>>, StoreError>> {
         async move {
             self.may_panic("claim");
@@ -572,7 +576,11 @@ impl ClusterStore for FakeStore {
         .boxed()
     }
 
-    fn load(&self, unit: Id, epoch: Epoch) -> BoxFuture<'_, Result<Option<Unit>, StoreError>> {
+    fn load(
+        &self,
+        unit: UnitId,
+        epoch: Epoch,
+    ) -> BoxFuture<'_, Result<Option<LoadedUnit>, StoreError>> {
         async move {
             self.may_panic("load");
             self.reached().await;
@@ -609,17 +617,17 @@ impl ClusterStore for FakeStore {
                     Row::Game(_) => None,
                 });
                 let all = (self.database.tournaments.lock()).expect("no test panics here");
-                let unit = StoredUnit::new(all[&id].clone(), rows.collect());
-                stored = Some((UnitKind::Tournament, unit));
+                let (unit, header) = all[&id].clone();
+                stored = Some((unit, StoredUnit::new(header, rows.collect())));
             }
-            Ok(Some(Unit { stored, games }))
+            Ok(Some(LoadedUnit { stored, games }))
         }
         .boxed()
     }
 
     fn release(
         &self,
-        unit: Id,
+        unit: UnitId,
         epoch: Epoch,
         next: Option<NodeId>,
     ) -> BoxFuture<'_, Result<(), StoreError>> {
@@ -648,19 +656,25 @@ impl ClusterStore for FakeStore {
         .boxed()
     }
 
-    fn locate(&self, id: Id) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
+    fn locate(&self, id: UnitId) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
         async move {
             self.reached().await;
             let tables = self.database.tables();
-            let epoch = tables.epoch(id);
-            Ok(epoch.map(|epoch| Location {
-                id,
-                kind: Kind::Room,
-                unit: id,
-                node: tables.owner(id),
-                epoch,
-                over: false,
-            }))
+            let games = self.database.games.lock().expect("no test panics here");
+            let units = (self.database.tournaments.lock()).expect("no test panics here");
+            let subject = match games.get(&id) {
+                Some(header) => Some(Subject::Room(header.room_id)),
+                None => units.get(&id).map(|(unit, _)| Subject::Unit(*unit)),
+            };
+            Ok(
+                (tables.epoch(id).zip(subject)).map(|(epoch, subject)| Location {
+                    subject,
+                    unit: id,
+                    node: tables.owner(id),
+                    epoch,
+                    over: false,
+                }),
+            )
         }
         .boxed()
     }
@@ -672,11 +686,11 @@ impl ClusterStore for FakeStore {
         async { Ok(None) }.boxed()
     }
 
-    fn locate_game(&self, _: Id) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
+    fn locate_game(&self, _: GameId) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
         async { Ok(None) }.boxed()
     }
 
-    fn ended_room(&self, room: Id) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
+    fn ended_room(&self, room: RoomId) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
         async move {
             self.reached().await;
             self.ends_read.send_modify(|count| *count += 1);
@@ -687,10 +701,10 @@ impl ClusterStore for FakeStore {
             }
             let tables = self.database.tables();
             let games = self.database.games.lock().expect("no test panics here");
-            let Some(header) = games.get(&room) else {
+            let Some(header) = games.get(&room.unit()) else {
                 return Ok(None);
             };
-            let rows = tables.journal(room);
+            let rows = tables.journal(room.unit());
             let entries = rows.iter().flat_map(|row| match &row.entries {
                 Row::Game(entries) => entries.clone(),
                 Row::Unit(_) => Vec::new(),

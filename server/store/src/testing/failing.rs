@@ -11,12 +11,12 @@ use futures::FutureExt as _;
 use futures::future::{BoxFuture, ready};
 use tokio::sync::{Semaphore, watch};
 
-use crate::units::{StoredTraces, StoredUnit, UnitId, UnitKind, UnitWrite};
+use crate::units::{StoredTraces, StoredUnit, UnitKey, UnitKind, UnitWrite};
 use crate::{
     ForgetError, Forgotten, Journal, Keep, Listed, MemoryStore, Part, ResumableGame, Store,
     StoreError, StoredGame,
 };
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, StudyId, UnitId};
 use chefshat_room::journal::{Entry, GameHeader};
 
 /// A memory store whose appends fail after a number of them.
@@ -29,7 +29,7 @@ pub struct FailingStore {
     /// Permits for commits of tournaments; each commit uses one.
     pub tournament_commits: Arc<Semaphore>,
     /// Tournaments and studies that cannot be read.
-    pub unreadable: Mutex<BTreeSet<Id>>,
+    pub unreadable: Mutex<BTreeSet<UnitId>>,
     /// Whether finished games cannot be read, but for their summaries.
     pub games_unreadable: AtomicBool,
 }
@@ -110,12 +110,15 @@ impl Store for FailingStore {
         self.inner.resumable_games(ended_since_ms)
     }
 
-    fn summary(&self, game: Id) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
+    fn summary(
+        &self,
+        game: GameId,
+    ) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
         self.count(Read::Summary);
         self.inner.summary(game)
     }
 
-    fn finished(&self, game: Id) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
+    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
         if self.games_unreadable.load(Ordering::Relaxed) {
             let unreadable = StoreError::Unreadable("an injected problem".to_owned());
             return ready(Err(unreadable)).boxed();
@@ -141,7 +144,7 @@ impl Store for FailingStore {
 
     fn import(
         &self,
-        game: Id,
+        game: GameId,
         summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
     ) -> BoxFuture<'_, Result<bool, StoreError>> {
@@ -157,15 +160,15 @@ impl Store for FailingStore {
         keep: Keep,
         after: u64,
         count: usize,
-    ) -> BoxFuture<'_, Result<Vec<(u64, Id)>, StoreError>> {
+    ) -> BoxFuture<'_, Result<Vec<(u64, GameId)>, StoreError>> {
         self.inner.prunable(keep, after, count)
     }
 
-    fn prune(&self, games: Vec<Id>) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    fn prune(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
         self.inner.prune(games)
     }
 
-    fn delete(&self, games: Vec<Id>) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn delete(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<(), StoreError>> {
         self.inner.delete(games)
     }
 
@@ -173,18 +176,18 @@ impl Store for FailingStore {
         self.inner.forget(who)
     }
 
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
         self.inner.without_record_file()
     }
 
-    fn mark_record_written(&self, game: Id) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn mark_record_written(&self, game: GameId) -> BoxFuture<'_, Result<(), StoreError>> {
         self.inner.mark_record_written(game)
     }
 
-    fn write_unit(&self, unit: UnitId, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
+    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
         async move {
             if matches!(
-                (unit.kind, &write),
+                (unit.kind(), &write),
                 (UnitKind::Tournament, UnitWrite::Append(_))
             ) {
                 let permit = self.tournament_commits.acquire().await;
@@ -195,9 +198,9 @@ impl Store for FailingStore {
         .boxed()
     }
 
-    fn unit(&self, unit: UnitId) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+    fn unit(&self, unit: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
         let unreadable = self.unreadable.lock();
-        match (unreadable.expect("no code that holds it can panic")).contains(&unit.id) {
+        match (unreadable.expect("no code that holds it can panic")).contains(&unit.id()) {
             true => ready(Err(injected_failure())).boxed(),
             false => self.inner.unit(unit),
         }
@@ -207,12 +210,12 @@ impl Store for FailingStore {
         &self,
         kind: UnitKind,
         newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<Id>, StoreError>> {
+    ) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>> {
         self.count(Read::Units);
         self.inner.units(kind, newest_over)
     }
 
-    fn traces(&self, study: Id) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
+    fn traces(&self, study: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
         self.inner.traces(study)
     }
 

@@ -132,14 +132,14 @@ async fn a_participant_is_removed_from_its_games_and_others_stay() {
         let mut other = created_of_others(store).await;
         finish(&mut other, 2).await;
         for game in [1, 2] {
-            let written = store.mark_record_written(Id([game; 16]));
+            let written = store.mark_record_written(Id::from_bytes([game; 16]));
             written.await.expect("committed");
         }
 
         let forgotten = store.forget(&ana()).await.expect("it is over");
         assert_eq!(forgotten.games, [header.game_id]);
         let has_files = store.outlives_server();
-        let filed: &[Id] = if has_files { &[header.game_id] } else { &[] };
+        let filed: &[GameId] = if has_files { &[header.game_id] } else { &[] };
         assert_eq!(forgotten.filed, filed);
         let redactions = Redactions {
             names: 4,
@@ -243,7 +243,7 @@ async fn of_those_who_share_a_name_only_the_one_meant_is_removed() {
 
         let with_key = with_fingerprint("key of Ana");
         let forgotten = store.forget(&with_key).await.expect("it is over");
-        assert_eq!(forgotten.games, [Id([1; 16])]);
+        assert_eq!(forgotten.games, [Id::from_bytes([1; 16])]);
         let redactions = Redactions {
             names: 2,
             expressions: 1,
@@ -339,7 +339,10 @@ async fn what_is_not_over_prevents_it() {
         finish(&mut over, 2).await;
         let refused = store.forget(&ana()).await;
         assert!(matches!(refused, Err(ForgetError::GameRunning(name)) if name == "Ana"));
-        let stored = store.finished(Id([2; 16])).await.expect("readable");
+        let stored = store
+            .finished(Id::from_bytes([2; 16]))
+            .await
+            .expect("readable");
         assert!(format!("{stored:?}").contains("Ana"), "nothing was changed");
         let ended = journal.finish(Some(summary_of(&header)), None);
         ended.await.expect("committed");

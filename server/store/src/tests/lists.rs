@@ -9,7 +9,7 @@ async fn lists_are_filtered_and_paged() {
 
 /// A summary with a robot and a built-in agent.
 fn with_seats(header: &GameHeader) -> Box<v1::RecordSummary> {
-    let number = header.game_id.0[0];
+    let number = header.game_id.bytes()[0];
     let seats = vec![
         v1::Participant {
             name: format!("player of {number}"),

@@ -1,5 +1,6 @@
 //! What retention leaves alone, in each store.
 
+use chefshat_room::ids::{GameId, Id, StudyId, TournamentId};
 use chefshat_room::journal::{GameHeader, StudyGame, TournamentGame};
 use chefshat_room::testing::study_member;
 use chefshat_tournament::Change as TournamentChange;
@@ -8,8 +9,8 @@ use super::*;
 use crate::studies::StudyHeader;
 use crate::tournaments::TournamentEntry;
 
-const TOURNAMENT: Id = Id([7; 16]);
-const STUDY: Id = Id([8; 16]);
+const TOURNAMENT: TournamentId = TournamentId::from_bytes([7; 16]);
+const STUDY: StudyId = StudyId::from_bytes([8; 16]);
 
 /// What a game is part of.
 #[derive(Clone, Copy)]
@@ -55,7 +56,7 @@ async fn play(store: &dyn Store, game: u8, of: Of, durability: Durability) {
 }
 
 async fn written(store: &dyn Store, game: u8) {
-    let written = store.mark_record_written(Id([game; 16])).await;
+    let written = store.mark_record_written(Id::from_bytes([game; 16])).await;
     written.expect("committed");
 }
 
@@ -63,7 +64,10 @@ async fn written(store: &dyn Store, game: u8) {
 async fn stored(store: &dyn Store) -> Vec<u8> {
     let mut stored = Vec::new();
     for game in 1..=5 {
-        let found = store.finished(Id([game; 16])).await.expect("readable");
+        let found = store
+            .finished(Id::from_bytes([game; 16]))
+            .await
+            .expect("readable");
         stored.extend(found.map(|_| game));
     }
     stored
@@ -92,11 +96,17 @@ async fn games_of_what_is_not_over_are_neither_offered_nor_deleted() {
         assert_eq!(prunable(store, newest(1)).await, [3, 4]);
         // One page has no game that may go.
         let found = store.prunable(newest(1), 0, 1).await.expect("readable");
-        assert_eq!(found.iter().map(|(_, id)| id.0[0]).collect::<Vec<_>>(), [3]);
+        assert_eq!(
+            found
+                .iter()
+                .map(|(_, id)| id.bytes()[0])
+                .collect::<Vec<_>>(),
+            [3]
+        );
 
-        let all: Vec<Id> = (1..=4).map(|game| Id([game; 16])).collect();
+        let all: Vec<GameId> = (1..=4).map(|game| Id::from_bytes([game; 16])).collect();
         let deleted = store.prune(all.clone()).await.expect("committed");
-        assert_eq!(deleted, [Id([3; 16]), Id([4; 16])]);
+        assert_eq!(deleted, [Id::from_bytes([3; 16]), Id::from_bytes([4; 16])]);
         assert_eq!(stored(store).await, [1, 2, 5]);
         if store.outlives_server() {
             let unwritten = store.without_record_file().await.expect("readable");
@@ -122,7 +132,10 @@ async fn a_deletion_on_purpose_asks_nobody() {
         let created = store.create_tournament(Arc::new(cup(7)), Vec::new()).await;
         created.expect("committed");
         play(store, 1, Of::Tournament, Durability::Durable).await;
-        store.delete(vec![Id([1; 16])]).await.expect("committed");
+        store
+            .delete(vec![Id::from_bytes([1; 16])])
+            .await
+            .expect("committed");
         assert_eq!(stored(store).await, [0; 0]);
     })
     .await;

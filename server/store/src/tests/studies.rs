@@ -9,7 +9,7 @@ use crate::studies::StudyHeader;
 
 fn header(study: u8) -> Arc<StudyHeader> {
     Arc::new(StudyHeader {
-        id: Id([study; 16]),
+        id: Id::from_bytes([study; 16]),
         settings: v1::StudySettings {
             name: format!("study {study}"),
             ..v1::StudySettings::default()
@@ -160,7 +160,7 @@ fn traces(number: u32) -> StoredTraces {
     StoredTraces {
         number,
         session: 2,
-        game: Id([9; 16]),
+        game: Id::from_bytes([9; 16]),
         traces: vec![v1::StudyTrace {
             kind: v1::StudyTraceKind::Hover.into(),
             target: format!("card of {number}"),
@@ -172,12 +172,12 @@ fn traces(number: u32) -> StoredTraces {
 #[tokio::test]
 async fn stored_studies_are_read_back_and_forget_participants() {
     with_each_store(async |store| {
-        let (id, other) = (Id([1; 16]), Id([2; 16]));
+        let (id, other) = (StudyId::from_bytes([1; 16]), Id::from_bytes([2; 16]));
         for study in [1, 2] {
             store.create_study(header(study)).await.expect("committed");
         }
         let taken = store.create_study(header(1)).await;
-        assert_eq!(taken, Err(StoreError::Taken(id)));
+        assert_eq!(taken, Err(StoreError::Taken(id.to_string())));
         let changes = every_change();
         let (first, rest) = changes.split_at(4);
         for (row, changes) in [first, rest].into_iter().enumerate() {
@@ -193,7 +193,13 @@ async fn stored_studies_are_read_back_and_forget_participants() {
         let stored = store.study(id).await.expect("readable").expect("stored");
         assert_eq!((stored.changes, stored.rows), (changes, 2));
         assert_eq!(format!("{:?}", stored.header), format!("{:?}", header(1)));
-        assert!(store.study(Id([3; 16])).await.expect("readable").is_none());
+        assert!(
+            store
+                .study(Id::from_bytes([3; 16]))
+                .await
+                .expect("readable")
+                .is_none()
+        );
         let all = [1, 2, 1].map(traces).to_vec();
         assert_eq!(store.traces(id).await, Ok(all));
 

@@ -24,8 +24,8 @@ async fn stored_tournaments_are_read_back_in_order() {
             made.await.expect("committed");
         }
         let taken = store.create_tournament(numbered(3), Vec::new()).await;
-        assert_eq!(taken, Err(StoreError::Taken(Id([3; 16]))));
-        let stored = store.append_tournament(Id([3; 16]), 1, rest.to_vec());
+        assert_eq!(taken, Err(StoreError::Taken(numbered(3).id.to_string())));
+        let stored = store.append_tournament(Id::from_bytes([3; 16]), 1, rest.to_vec());
         stored.await.expect("committed");
         let found = store.tournaments(9).await.expect("readable");
         assert_eq!(found.len(), 2);
@@ -54,7 +54,7 @@ async fn newest(store: &dyn Store) {
         (5, None),
     ];
     for (number, end) in ends {
-        let id = Id([number; 16]);
+        let id = Id::from_bytes([number; 16]);
         let header = numbered(number);
         let begun = vec![change(Change::Begun { rounds: 1 })];
         let made = store.create_tournament(header, begun);
@@ -72,7 +72,10 @@ async fn newest(store: &dyn Store) {
         (usize::MAX, &[1, 2, 3, 4, 5]),
     ] {
         let found = store.tournaments(newest_over).await.expect("readable");
-        let numbers: Vec<u8> = found.iter().map(|stored| stored.header.id.0[0]).collect();
+        let numbers: Vec<u8> = found
+            .iter()
+            .map(|stored| stored.header.id.bytes()[0])
+            .collect();
         assert_eq!(numbers, expected, "{newest_over}");
         assert!(found.iter().all(|stored| stored.rows == 2));
     }

@@ -51,8 +51,8 @@ pub use standings::{confidence_to_proto, standings_to_proto};
 pub use start::{start_from_proto, start_to_proto};
 pub use study::{
     ConditionPlan, MAX_HOSTED_SHIFTS, PARTICIPANT_KIND, StudyPlan, complete_settings,
-    device_from_proto, device_to_proto, participant_state, study_participant, study_plan,
-    study_to_proto,
+    device_from_proto, device_to_proto, game_of, participant_state, room_of, study_participant,
+    study_plan, study_to_proto,
 };
 pub use study_view::{answers_from_proto, answers_to_proto, study_view};
 pub use summary::summary;

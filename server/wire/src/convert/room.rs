@@ -205,7 +205,7 @@ pub fn describe(core: &Core) -> v1::Room {
 /// The commitment to the seed of a game; empty if its creator fixed the seed, or if nothing is
 /// dealt.
 pub(super) fn seed_commitment(header: &GameHeader) -> Vec<u8> {
-    let commitment = header.seed.commitment(&header.game_id.0);
+    let commitment = header.seed.commitment(header.game_id.bytes());
     commitment
         .filter(|_| !header.is_physical())
         .map_or_else(Vec::new, |hash| hash.to_vec())
@@ -332,8 +332,8 @@ mod tests {
             let mut table = Table::empty(policy, vec![OPEN; 4]);
             let mut header = GameHeader::clone(table.core.header());
             header.tournament = Some(TournamentGame {
-                tournament: Id([3; 16]),
-                series: series.then_some(Id([4; 16])),
+                tournament: Id::from_bytes([3; 16]),
+                series: series.then_some(Id::from_bytes([4; 16])),
             });
             table.core = Core::new(Arc::new(header));
             table.fill();

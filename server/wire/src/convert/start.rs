@@ -15,7 +15,7 @@ pub(super) fn origin(header: &GameHeader) -> v1::GameOrigin {
         v1::GameOrigin::Branched
     } else if header.start.script.is_some() {
         v1::GameOrigin::Scripted
-    } else if header.seed.commitment(&header.game_id.0).is_some() {
+    } else if header.seed.commitment(header.game_id.bytes()).is_some() {
         v1::GameOrigin::Dealt
     } else {
         v1::GameOrigin::FixedSeed

@@ -7,13 +7,13 @@ use std::sync::Arc;
 use chefshat_engine::RuleSet;
 use chefshat_proto::v1::{self, rule_set, study_item, study_stage};
 use chefshat_record::convert::{FieldProblem, rules_from_proto, rules_to_proto};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, Id, RoomId, StudyId};
 use chefshat_room::journal::{Fill, ParticipantKind, SeatLabels};
 use chefshat_room::policy::{Durability, Policy, Visibility};
 use chefshat_study::{
     AnswerSet, Arrival, Condition, Consent, Device, ExternalQuestionnaire, Factor, GROUP_SIZES,
     Groups, Hide, Item, ItemKind, Labels, Language, LeftOverPolicy, Order, Outcome, Part,
-    Participant, PlayedGame, Pointer, Questionnaire, Recruiting, ScreenOut, Settings,
+    Participant, PlacedGame, PlayedGame, Pointer, Questionnaire, Recruiting, ScreenOut, Settings,
     SettingsProblem, ShownIf, Stage, Status, Study, Task, Template, Text,
 };
 
@@ -669,9 +669,19 @@ fn inner(path: &str, of_field: &FieldProblem) -> SettingsProblem {
     )
 }
 
+/// The room of a game of a study, whose core knows only the bytes of ids.
+pub fn room_of(placed: &PlacedGame) -> RoomId {
+    Id::from_bytes(placed.room)
+}
+
+/// The id of a game of a study.
+pub fn game_of(placed: &PlacedGame) -> GameId {
+    Id::from_bytes(placed.game)
+}
+
 /// A study as a message, for researchers.
 pub fn study_to_proto(
-    id: Id,
+    id: StudyId,
     settings: &v1::StudySettings,
     created_at_ms: u64,
     open_link: String,
@@ -718,7 +728,7 @@ pub fn study_participant(
     study: &Study,
     plan: &StudyPlan,
     number_of: u32,
-    join_code: impl Fn(Id) -> String,
+    join_code: impl Fn(RoomId) -> String,
 ) -> Option<v1::StudyParticipant> {
     let participant = study.participant(number_of)?;
     let conditions = &study.settings().conditions;
@@ -761,7 +771,7 @@ fn study_game(
     plan: &StudyPlan,
     (number_of, participant): (u32, &Participant),
     game: &PlayedGame,
-    join_code: &impl Fn(Id) -> String,
+    join_code: &impl Fn(RoomId) -> String,
 ) -> v1::StudyGame {
     let placed = &game.placed;
     let condition = &plan.conditions[placed.condition];
@@ -781,12 +791,12 @@ fn study_game(
         seed_index: placed.seed_index.map(number),
         seat: number(placed.seat),
         attempt: placed.attempt,
-        room_id: Id(placed.room).to_string(),
-        game_id: Id(placed.game).to_string(),
+        room_id: room_of(placed).to_string(),
+        game_id: game_of(placed).to_string(),
         ended: ended.into(),
         ended_at_ms,
         join_code: match is_first && has_open {
-            true => join_code(Id(placed.room)),
+            true => join_code(room_of(placed)),
             false => String::new(),
         },
         robot_behaviour: match runs {

@@ -2,7 +2,7 @@
 //! that is.
 
 use chefshat_proto::v1::{self, study_item, study_item_answer, study_shown_item, study_view};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, RoomId};
 use chefshat_study::{
     Answer, Content, End, Hide, ItemAnswer, ShownGame, ShownItem, ShownItemIf, ShownQuestionnaire,
     View,
@@ -12,7 +12,7 @@ use super::number;
 use super::study::{answer_set_to_proto, item_kind};
 
 /// A view as a message. `ticket_of` has the ticket of the participant's seat in a room.
-pub fn study_view(view: View, ticket_of: impl FnOnce(Id) -> String) -> v1::StudyView {
+pub fn study_view(view: View, ticket_of: impl FnOnce(RoomId) -> String) -> v1::StudyView {
     use study_view::Content as Message;
     v1::StudyView {
         title: view.title,
@@ -90,12 +90,12 @@ fn shown_item_if(condition: &ShownItemIf) -> v1::StudyShownItemIf {
     }
 }
 
-fn shown_game(game: &ShownGame, ticket_of: impl FnOnce(Id) -> String) -> v1::StudyShownGame {
+fn shown_game(game: &ShownGame, ticket_of: impl FnOnce(RoomId) -> String) -> v1::StudyShownGame {
     let (room_id, game_id, ticket) = match game.place {
         None => (String::new(), String::new(), String::new()),
         Some((room, game)) => {
-            let room = Id(room);
-            (room.to_string(), Id(game).to_string(), ticket_of(room))
+            let (room, game) = (RoomId::from_bytes(room), GameId::from_bytes(game));
+            (room.to_string(), game.to_string(), ticket_of(room))
         }
     };
     let hide = game.hide.iter().map(|part| match part {

@@ -13,7 +13,7 @@ use super::agent::{agent_from_proto, check_real_cards};
 use super::kind::{kind_from_proto, kind_to_proto};
 use super::number;
 use super::policy::{policy_from_proto, policy_to_proto};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, RoomId, SeriesId};
 use chefshat_room::policy::{AbortPolicy, Policy};
 
 /// Defaults of fields that a request leaves unset.
@@ -291,8 +291,8 @@ pub fn tournament_participants(tournament: &Tournament) -> Vec<v1::TournamentPar
 pub fn tournament_game(
     index: usize,
     tournament: &Tournament,
-    placed: Option<(Id, Id)>,
-    series: Option<Id>,
+    placed: Option<(RoomId, GameId)>,
+    series: Option<SeriesId>,
     plan: &TournamentPlan,
 ) -> v1::TournamentGame {
     let game = &tournament.games()[index];

@@ -25,7 +25,7 @@ use chefshat_base::tasks::short;
 use chefshat_hosting::config::MAX_SEATS_PER_STREAM;
 use chefshat_hosting::room::subscriber::DeliveryOptions;
 use chefshat_hosting::room::{AttachRequest, NotAttached, RoomGone, Supersedes};
-use chefshat_room::ids::Token;
+use chefshat_room::ids::{RoomToken, UnitToken};
 use chefshat_wire::encoded::Updates;
 use chefshat_wire::outbox::StreamEnd;
 
@@ -56,7 +56,7 @@ impl Reader {
             let problem = FieldProblem::new("entropy", format!("at most {MAX_ENTROPY} bytes"));
             return self.refuse_field(handle, request_id, "ENTROPY_REFUSED", &problem);
         }
-        let Some(token) = Token::parse(&attach.ticket) else {
+        let Some(token) = UnitToken::parse(&attach.ticket) else {
             return self.refuse(handle, request_id, &ticket_unknown());
         };
         if !self.lookup().has_in_memory(token.subject) && waits(&self.rooms) {
@@ -93,9 +93,12 @@ impl Reader {
                 _ => self.refuse(handle, request_id, &status),
             };
         }
-        let token = Token::parse(&attach.ticket).expect("it was parsed to find its room");
-        match self.tournaments.get(token.subject) {
-            Some(tournament) => self.enter(tournament, token, parked.attach, handle).await,
+        let token = UnitToken::parse(&attach.ticket).expect("it was parsed to find its room");
+        match self.tournaments.by_unit(token.subject) {
+            Some(tournament) => {
+                let attach = parked.attach;
+                self.enter(tournament, &token.secret, attach, handle).await;
+            }
             None => {
                 let supersedes = self.supersedes();
                 self.bind(parked.attach, handle, None, supersedes).await;
@@ -174,11 +177,12 @@ impl Reader {
         let Some(parking) = &self.parked else {
             return false;
         };
-        let token = (parking.get(handle)).and_then(|parked| Token::parse(&parked.attach.ticket));
+        let token =
+            (parking.get(handle)).and_then(|parked| UnitToken::parse(&parked.attach.ticket));
         let to = (in_scope.as_ref().err())
             .and_then(is_elsewhere)
             .map(|it| &it.peer);
-        token.is_some_and(|Token { secret, .. }| {
+        token.is_some_and(|UnitToken { secret, .. }| {
             let remote = self.remote.as_ref();
             parking.has_before(handle, &secret)
                 || remote.is_some_and(|it| it.has_before(handle, &secret, to))
@@ -239,7 +243,7 @@ impl Reader {
         &mut self,
         attach: v1::Attach,
         handle: u32,
-        assigned_ticket: Option<Token>,
+        assigned_ticket: Option<RoomToken>,
         supersedes: Supersedes,
     ) {
         let request_id = attach.request_id;
@@ -264,10 +268,10 @@ impl Reader {
         &mut self,
         attach: v1::Attach,
         handle: u32,
-        assigned_ticket: Option<Token>,
+        assigned_ticket: Option<RoomToken>,
         supersedes: Supersedes,
     ) -> Result<bool, RoomGone> {
-        let Some(token) = Token::parse(&attach.ticket) else {
+        let Some(token) = RoomToken::parse(&attach.ticket) else {
             return Ok(false);
         };
         // It was found before. A node that has just stopped it is about to resume it, or another is.
@@ -354,14 +358,18 @@ impl Reader {
 
 /// Looks for the room or tournament of a ticket, which is still to be compared. An error says who
 /// else has it, that nobody can be asked now, or why the caller does not reach it.
-async fn look(lookup: &Lookup, caller: &Caller, token: Token) -> Result<(), Status> {
+async fn look(lookup: &Lookup, caller: &Caller, token: UnitToken) -> Result<(), Status> {
     look_once(lookup, caller, token)
         .await
         .unwrap_or_else(|| Err(owner_unreachable()))
 }
 
 /// As [`look`]; `None` if it changes hands.
-async fn look_once(lookup: &Lookup, caller: &Caller, token: Token) -> Option<Result<(), Status>> {
+async fn look_once(
+    lookup: &Lookup,
+    caller: &Caller,
+    token: UnitToken,
+) -> Option<Result<(), Status>> {
     if let Some(in_scope) = lookup.tournament_of_ticket(caller, token.subject, ticket_unknown) {
         return Some(in_scope);
     }

@@ -14,7 +14,7 @@ use chefshat_hosting::config::ServerConfig;
 use chefshat_hosting::room::{JoinRequest, Joined, Loss};
 use chefshat_hosting::rooms::{NewRoom, Rooms};
 use chefshat_hosting::tournaments::{Call, Entry, Tournaments};
-use chefshat_room::ids::Token;
+use chefshat_room::ids::{RoomToken, TournamentToken};
 use chefshat_room::journal::ParticipantKind;
 use chefshat_store::MemoryStore;
 use chefshat_wire::convert;
@@ -220,8 +220,8 @@ async fn a_seat_whose_room_stops_while_the_gateway_is_asked_is_attached_on_anoth
     next.receive(3, Command::Attach(attach.clone())).await;
     assert_eq!(next.questions(), [3]);
     // As a node does whose lease has ended. It, or another one, resumes the room later.
-    let ticket = Token::parse(&attach.ticket).expect("a ticket");
-    server.rooms.stop_unit(ticket.subject).await;
+    let ticket = RoomToken::parse(&attach.ticket).expect("a ticket");
+    server.rooms.stop_unit(ticket.subject.unit()).await;
     next.read(Input::StillOpen(3)).await;
     // An agent gives up a seat that is refused, and its game would wait for it.
     let end = next.updates.next().now_or_never().flatten();
@@ -258,8 +258,8 @@ async fn a_participant_whose_tournament_stops_while_the_gateway_is_asked_enters_
     let (handle, call) = next.called().await;
     next.reader.follow_call(handle, call).await;
     assert_eq!(next.questions(), [3]);
-    let ticket = Token::parse(&attach.ticket).expect("a ticket");
-    server.tournaments.stop_one(ticket.subject).await;
+    let ticket = TournamentToken::parse(&attach.ticket).expect("a ticket");
+    server.tournaments.stop_one(ticket.subject.unit()).await;
     next.read(Input::StillOpen(3)).await;
     let end = next.updates.next().now_or_never().flatten();
     assert_eq!(end.expect("an end").err(), Some(StreamEnd::RoomGone));

@@ -8,7 +8,7 @@ use std::pin::Pin;
 use std::task::{Context, Poll, ready};
 
 use chefshat_proto::v1::{self, seat_command::Command};
-use chefshat_room::ids::Token;
+use chefshat_room::ids::UnitToken;
 use futures::{StreamExt as _, stream};
 use tokio::time::{Instant, Sleep, sleep};
 use tokio_util::task::AbortOnDropHandle;
@@ -43,7 +43,7 @@ impl Parked {
 
     /// Whether it has this secret, as a participant of a tournament and its seats have the same.
     pub(super) fn has_secret(&self, secret: &[u8; 32]) -> bool {
-        Token::parse(&self.attach.ticket).is_some_and(|token| token.secret == *secret)
+        UnitToken::parse(&self.attach.ticket).is_some_and(|token| token.secret == *secret)
     }
 }
 
@@ -130,7 +130,7 @@ impl Parking {
     pub(super) fn poll_found(
         &mut self,
         context: &mut Context<'_>,
-        begin: impl FnOnce(Vec<(u32, Token)>, Vec<(u32, Token)>) -> Search,
+        begin: impl FnOnce(Vec<(u32, UnitToken)>, Vec<(u32, UnitToken)>) -> Search,
     ) -> Poll<Vec<Found>> {
         if self.search.is_none() {
             if self.waiting.is_empty() {
@@ -155,10 +155,10 @@ impl Parking {
         Poll::Ready(found)
     }
 
-    fn tokens(&self, is_meant: impl Fn(u32) -> bool) -> Vec<(u32, Token)> {
+    fn tokens(&self, is_meant: impl Fn(u32) -> bool) -> Vec<(u32, UnitToken)> {
         let meant = self.waiting.iter().filter(|(handle, _)| is_meant(**handle));
         let tokens = meant.filter_map(|(handle, parked)| {
-            let token = Token::parse(&parked.attach.ticket)?;
+            let token = UnitToken::parse(&parked.attach.ticket)?;
             Some((*handle, token))
         });
         tokens.collect()
@@ -169,9 +169,9 @@ impl Parking {
 /// found, it looks for all that were parked before it too: the seats of a participant, which its
 /// client attaches before it, change hands together with it, and must not be attached after it.
 pub(super) async fn search<F>(
-    mut first: Vec<(u32, Token)>,
-    all: Vec<(u32, Token)>,
-    look: impl Fn(Token) -> F,
+    mut first: Vec<(u32, UnitToken)>,
+    all: Vec<(u32, UnitToken)>,
+    look: impl Fn(UnitToken) -> F,
 ) -> Vec<Found>
 where
     F: Future<Output = Option<Result<(), Status>>>,

@@ -24,7 +24,7 @@ use chefshat_hosting::config::ServerConfig;
 use chefshat_hosting::room::{JoinRequest, Joined};
 use chefshat_hosting::rooms::{NewRoom, Rooms};
 use chefshat_hosting::tournaments::Tournaments;
-use chefshat_room::ids::{Id, Token};
+use chefshat_room::ids::{RoomId, RoomToken, Token, TournamentId, UnitId, UnitToken};
 use chefshat_room::journal::{Change, Entry, ParticipantKind, SeatedParticipant};
 use chefshat_store::{MemoryStore, ResumableGame};
 use chefshat_wire::outbox::{Outbox, OutboxStream, StreamEnd};
@@ -62,7 +62,7 @@ impl Directory for Says {
         ready(self.now.lock().expect("no panic").clone()).boxed()
     }
 
-    fn is_over(&self, _tournament: Id) -> BoxFuture<'_, bool> {
+    fn is_over(&self, _tournament: TournamentId) -> BoxFuture<'_, bool> {
         ready(false).boxed()
     }
 
@@ -97,7 +97,7 @@ impl Node {
     }
 
     /// Resumes the room of a seat that another node had.
-    async fn take_over(&self, former: &Self, ticket: Token) {
+    async fn take_over(&self, former: &Self, ticket: RoomToken) {
         let header = former
             .rooms
             .header(ticket.subject)
@@ -143,7 +143,7 @@ impl Node {
     }
 }
 
-fn attachment(ticket: &Token) -> v1::Attach {
+fn attachment<T>(ticket: &Token<T>) -> v1::Attach {
     v1::Attach {
         ticket: ticket.to_text(),
         ..v1::Attach::default()
@@ -152,7 +152,7 @@ fn attachment(ticket: &Token) -> v1::Attach {
 
 /// The ticket of a seat in a room that no node has in memory.
 fn elsewhere() -> v1::Attach {
-    attachment(&Token::random(Id([7; 16])))
+    attachment(&Token::random(UnitId::from_bytes([7; 16])))
 }
 
 impl Stream {
@@ -258,7 +258,7 @@ async fn a_seat_is_attached_when_its_room_has_been_taken_over() {
     let attach = former.seat().await;
     let next = Node::start(&Says::only(Location::Unknown));
     let mut stream = next.stream();
-    let ticket = Token::parse(&attach.ticket).expect("a ticket");
+    let ticket = RoomToken::parse(&attach.ticket).expect("a ticket");
     stream.read(0, Command::Attach(attach));
     stream.read(0, Command::Detach(v1::Detach {}));
     stream.search().await;
@@ -333,9 +333,10 @@ async fn an_attachment_to_a_node_that_has_just_died_ends_no_stream() {
 #[tokio::test]
 async fn what_changes_hands_together_is_found_in_its_order() {
     // A takeover between the looks for a seat and for its participant.
-    let [seat, other, participant] = [1, 2, 3].map(|id| Token::random(Id([id; 16])));
+    let [seat, other, participant] =
+        [1, 2, 3].map(|id| Token::random(UnitId::from_bytes([id; 16])));
     let taken_over = Mutex::new(false);
-    let look = |token: Token| {
+    let look = |token: UnitToken| {
         let mut taken_over = taken_over.lock().expect("no panic");
         *taken_over |= token.subject == participant.subject;
         let is_found = *taken_over && token.subject != other.subject;
@@ -355,10 +356,10 @@ async fn what_changes_hands_together_is_found_in_its_order() {
 async fn a_participant_waits_for_the_seats_that_its_client_attached_before() {
     let node = Node::start(&Says::only(Location::Unknown));
     let mut stream = node.stream();
-    let seat = Token::random(Id([1; 16]));
+    let seat = Token::random(RoomId::from_bytes([1; 16]));
     let participant = Token {
-        subject: Id([2; 16]),
-        ..seat
+        subject: TournamentId::from_bytes([2; 16]),
+        secret: seat.secret,
     };
     stream.read(0, Command::Attach(attachment(&seat)));
     stream.read(1, Command::Attach(attachment(&participant)));
@@ -376,10 +377,10 @@ async fn a_participant_waits_for_a_seat_on_its_way_to_a_node_that_has_died() {
     let directory = Says::first(unreachable_node(), Location::Nowhere);
     let node = Node::start(&directory);
     let mut stream = stream_of_gateway(&node, &directory).await;
-    let seat = Token::random(Id([1; 16]));
+    let seat = Token::random(RoomId::from_bytes([1; 16]));
     let participant = Token {
-        subject: Id([2; 16]),
-        ..seat
+        subject: TournamentId::from_bytes([2; 16]),
+        secret: seat.secret,
     };
     stream.read(0, Command::Attach(attachment(&seat)));
     stream.search().await;

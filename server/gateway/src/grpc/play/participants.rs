@@ -12,7 +12,7 @@ use super::remote::HANDLES_PER_NODE;
 use crate::grpc::status::ticket_unknown;
 use chefshat_hosting::room::Supersedes;
 use chefshat_hosting::tournaments::{Call, Connection, TournamentHandle};
-use chefshat_room::ids::{Id, Token};
+use chefshat_room::ids::{RoomId, RoomToken, TournamentToken};
 use chefshat_wire::convert;
 
 /// Ids of connections of participants.
@@ -23,12 +23,12 @@ impl Reader {
     pub(super) async fn enter(
         &mut self,
         tournament: Arc<TournamentHandle>,
-        token: Token,
+        secret: &[u8; 32],
         attach: v1::Attach,
         handle: u32,
     ) {
         let request_id = attach.request_id;
-        let Some(participant) = tournament.participant_of(&token.secret) else {
+        let Some(participant) = tournament.participant_of(secret) else {
             return self.refuse(handle, request_id, &ticket_unknown());
         };
         let entered = Update::Entered(v1::Entered {
@@ -61,7 +61,7 @@ impl Reader {
             outbox: Arc::clone(&self.outbox),
             supersedes,
         };
-        let Some(ticket) = Token::parse(&bound.attach.ticket) else {
+        let Some(ticket) = TournamentToken::parse(&bound.attach.ticket) else {
             return;
         };
         let entering =
@@ -93,16 +93,17 @@ impl Reader {
     }
 
     /// Attaches a participant to its seat in the room of one of its games.
-    async fn take_seat(&mut self, participant: u32, room: Id) {
+    async fn take_seat(&mut self, participant: u32, room: RoomId) {
         let Some(bound) = self.participants.get(&participant) else {
             return;
         };
-        let Some(token) = Token::parse(&bound.attach.ticket) else {
+        let Some(token) = TournamentToken::parse(&bound.attach.ticket) else {
             return;
         };
-        let ticket = Token {
+        // The same secret is that of its seat.
+        let ticket = RoomToken {
             subject: room,
-            ..token
+            secret: token.secret,
         };
         let attach = v1::Attach {
             ticket: ticket.to_text(),
@@ -117,7 +118,7 @@ impl Reader {
         let parked = self.parked.iter().flat_map(|it| it.attachments());
         let is_about_to = contested
             .chain(parked)
-            .any(|attach| Token::parse(&attach.ticket).is_some_and(|it| it == ticket));
+            .any(|attach| RoomToken::parse(&attach.ticket).is_some_and(|it| it == ticket));
         let is_newest = (bound.tournament).is_newest(bound.participant, bound.connection);
         if is_there || is_about_to || !is_newest {
             return;

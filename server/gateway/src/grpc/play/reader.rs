@@ -25,7 +25,7 @@ use chefshat_hosting::config::{FIRST_MESSAGE_TIMEOUT, MAX_CALLS_WAITING, MAX_COM
 use chefshat_hosting::room::{Handle, Loss, SeatAction};
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::tournaments::{Call, TournamentHandle, Tournaments};
-use chefshat_room::ids::Token;
+use chefshat_room::ids::RoomToken;
 use chefshat_room::{Answer, ConnectionId};
 use chefshat_wire::convert;
 use chefshat_wire::encoded::Updates;
@@ -90,7 +90,7 @@ impl BoundParticipant {
 pub(super) struct Contested {
     pub(super) attach: v1::Attach,
     /// Its ticket, if the server attaches it.
-    pub(super) assigned_ticket: Option<Token>,
+    pub(super) assigned_ticket: Option<RoomToken>,
     /// The number of the connection that has it.
     pub(super) holder: u64,
     /// Its commands that have been read meanwhile.

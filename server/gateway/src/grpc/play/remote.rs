@@ -33,7 +33,7 @@ use chefshat_admission::access::MAX_INPUTS_PER_MESSAGE;
 use chefshat_base::tasks::{LongTask, named};
 use chefshat_hosting::config::{MAX_PEER_MESSAGE_BYTES, MAX_SEATS_PER_STREAM};
 use chefshat_hosting::room::Loss;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::UnitId;
 use chefshat_wire::encoded::peer::peer_service_client::PeerServiceClient;
 use chefshat_wire::encoded::peer::{HandedOver, PlayInput, PlayRequest, play_input::Input};
 use chefshat_wire::encoded::{Received, Updates};
@@ -75,7 +75,7 @@ struct PeerStream {
 struct Shared {
     seats: Mutex<BTreeMap<u32, RemoteSeat>>,
     /// What the client attached there and lost because the node stops.
-    stopped: Mutex<BTreeSet<Id>>,
+    stopped: Mutex<BTreeSet<UnitId>>,
     /// Whether the stream has ended and its attachments were given back. Changes while `seats` are
     /// locked.
     is_over: AtomicBool,
@@ -88,12 +88,12 @@ impl Shared {
         (self.seats.lock()).expect("nothing panics under this lock")
     }
 
-    fn stopped(&self) -> MutexGuard<'_, BTreeSet<Id>> {
+    fn stopped(&self) -> MutexGuard<'_, BTreeSet<UnitId>> {
         (self.stopped.lock()).expect("nothing panics under this lock")
     }
 
     /// The rooms and tournaments that the client has there, those included that the node stops.
-    fn ids(&self) -> BTreeSet<Id> {
+    fn ids(&self) -> BTreeSet<UnitId> {
         let mut ids = self.stopped().clone();
         ids.extend(self.seats().values().filter_map(|seat| seat.id));
         ids
@@ -135,7 +135,7 @@ impl Shared {
 struct RemoteSeat {
     is_attached: bool,
     /// Its room or tournament, if it was found by that.
-    id: Option<Id>,
+    id: Option<UnitId>,
     /// Its attachment, until it is attached. `None` if the other node attaches it by itself.
     parked: Option<Box<Parked>>,
     /// The last decision request.
@@ -596,7 +596,7 @@ mod tests {
     #[test]
     fn what_ended_at_another_node_leaves_nothing_on_a_long_stream() {
         let receiver = receiver();
-        let room = |number: u32| Id::parse(&format!("{number:032x}"));
+        let room = |number: u32| UnitId::parse(&format!("{number:032x}"));
         for number in 0..10_000 {
             let seat = RemoteSeat {
                 id: room(number),

@@ -12,7 +12,7 @@ use crate::grpc::status::{field, request_id, request_id_used, status, ticket_unk
 use chefshat_admission::access::Caller;
 use chefshat_admission::limits::Key;
 use chefshat_hosting::tournaments::{ByHand, ByHandRefusal, Newcomer, TournamentHandle, Who};
-use chefshat_room::ids::{SecretHash, Token};
+use chefshat_room::ids::{SecretHash, Token, TournamentToken};
 use chefshat_wire::convert;
 
 impl TournamentCalls {
@@ -180,7 +180,10 @@ fn newcomer(
     })
 }
 
-async fn change(handle: &TournamentHandle, what: ByHand) -> Result<Option<Token>, Status> {
+async fn change(
+    handle: &TournamentHandle,
+    what: ByHand,
+) -> Result<Option<TournamentToken>, Status> {
     let changed = handle.change_by_hand(what).await.map_err(stopped)?;
     changed.map_err(|refusal| match refusal {
         ByHandRefusal::Rules(problem) => by_hand_problem(problem),

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use chefshat_proto::v1;
 use chefshat_room::State;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::RoomId;
 use tokio::time::Instant;
 use tracing::{error, info, warn};
 
@@ -174,12 +174,12 @@ impl Room {
 /// The result of a write, unless the room is lost before.
 async fn unless(
     lost: impl Future<Output = ()>,
-    room: Id,
+    room: RoomId,
     written: impl Future<Output = Result<(), StoreError>>,
 ) -> Result<(), StoreError> {
     tokio::select! {
         biased;
         written = written => written,
-        () = lost => Err(StoreError::Fenced(room)),
+        () = lost => Err(StoreError::Fenced(room.unit())),
     }
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use chefshat_record::convert::seat_number;
-use chefshat_room::ids::Token;
+use chefshat_room::ids::{RoomToken, Token};
 use chefshat_room::journal::SeatedParticipant;
 use chefshat_room::{ConnectionId, Core, ExpressError, JoinError, ReportOutcome};
 use tokio::sync::oneshot;
@@ -145,7 +145,7 @@ impl Room {
     fn join_again(
         &self,
         seat: Seat,
-        ticket: Token,
+        ticket: RoomToken,
         request: &JoinRequest,
     ) -> Result<Joined, JoinError> {
         let standing = self.core.standing(seat);

@@ -9,7 +9,7 @@ use chefshat_study::{
 };
 
 use super::table::{Code, Column, Kind, Sheet, Table};
-use chefshat_room::ids::Id;
+use chefshat_room::ids::GameId;
 use chefshat_wire::convert;
 
 /// A time of day.
@@ -507,7 +507,7 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
             text(row.game.placed.seat)
         })
         .with("game_id", Kind::Text, GAME, |row| {
-            text(Id(row.game.placed.game))
+            text(convert::game_of(&row.game.placed))
         })
         .with("outcome", Kind::one_of(outcomes), "how it ended", |row| {
             let outcome = match row.game.ended {
@@ -580,7 +580,7 @@ pub(super) fn games<'s>(settings: &Settings) -> Table<GameRow<'s>> {
 }
 
 /// A game whose record cannot be read, and why.
-pub(super) fn unreadable() -> Table<(Id, String)> {
+pub(super) fn unreadable() -> Table<(GameId, String)> {
     Table::new(
         "unreadable.csv",
         "a game whose record cannot be read",
@@ -590,7 +590,7 @@ pub(super) fn unreadable() -> Table<(Id, String)> {
         "game_id",
         Kind::Text,
         "identifies the game",
-        |(game, _): &(Id, String)| text(game),
+        |(game, _): &(GameId, String)| text(game),
     )
     .with(
         "problem",
@@ -655,7 +655,7 @@ pub(super) struct TraceRow<'s> {
     pub(super) session: u32,
     pub(super) pseudonym: &'s str,
     pub(super) condition: &'s Condition,
-    pub(super) game: Id,
+    pub(super) game: GameId,
     pub(super) trace: &'s v1::StudyTrace,
 }
 

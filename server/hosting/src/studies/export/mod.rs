@@ -20,8 +20,9 @@ use tracing::error;
 use super::handle::StudyHandle;
 use crate::config::STUDY_EXPORT_CHUNK;
 use crate::rooms::Rooms;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, StudyId};
 use chefshat_store::{StoreError, StoredGame};
+use chefshat_wire::convert;
 use columns::{CodebookRow, GameResult, GameRow, GroupRow, ParticipantRow, SessionRow, TraceRow};
 use questionnaires::{AnswerRow, ItemRow};
 use table::{Sheet, Table};
@@ -297,7 +298,7 @@ async fn games(
             if !is_in_data(study, participant, game) {
                 continue;
             }
-            let id = Id(game.placed.game);
+            let id = convert::game_of(&game.placed);
             let lines = match record_of(rooms, handle.id(), id).await {
                 // One game that cannot be read ends no export of the others.
                 Err(StoreError::Unreadable(problem)) => {
@@ -354,7 +355,7 @@ async fn games(
 /// The samples of a game's seats, in files that `chefshat export` finds beside the records.
 async fn samples(
     rooms: &Rooms,
-    game: Id,
+    game: GameId,
     sender: &mpsc::Sender<ExportedFile>,
 ) -> Result<(), ExportError> {
     let failed = |error: io::Error| StoreError::Failed(format!("reading samples failed: {error}"));
@@ -382,8 +383,8 @@ async fn samples(
 /// The record of a game of this study. A record from elsewhere that has the game's id is none.
 pub(super) async fn record_of(
     rooms: &Rooms,
-    study: Id,
-    game: Id,
+    study: StudyId,
+    game: GameId,
 ) -> Result<Option<Vec<v1::RecordLine>>, StoreError> {
     let Some(stored) = rooms.store().finished(game).await? else {
         return Ok(None);
@@ -477,13 +478,16 @@ async fn traces(
     for &(number, participant) in people {
         for game in &participant.games {
             if is_in_data(study, participant, game) {
-                conditions.insert((number, Id(game.placed.game)), game.placed.condition);
+                conditions.insert(
+                    (number, convert::game_of(&game.placed)),
+                    game.placed.condition,
+                );
             }
         }
     }
     let traces = rooms.store().traces(handle.id()).await?;
     let mut file = TableFile::new(columns::traces(settings), sender).await?;
-    let mut earlier: BTreeMap<(u32, Id), &[v1::StudyTrace]> = BTreeMap::new();
+    let mut earlier: BTreeMap<(u32, GameId), &[v1::StudyTrace]> = BTreeMap::new();
     for stored in &traces {
         let Some(condition) = conditions.get(&(stored.number, stored.game)) else {
             continue;

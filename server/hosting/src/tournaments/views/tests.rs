@@ -5,7 +5,7 @@ use chefshat_tournament::{Change, Ended, MAX_PARTICIPANTS, MAX_REPLACEMENTS, Sea
 use prost::Message as _;
 
 use super::*;
-use chefshat_room::ids::Id;
+use chefshat_room::ids::{GameId, Id, RoomId, SeriesId};
 use chefshat_wire::convert::MAX_NAME_CHARS;
 
 /// Default message limit of gRPC clients, bytes.
@@ -238,10 +238,10 @@ fn no_message_exceeds_the_default_limit_of_clients() {
         number: u32::MAX,
         state: v1::TournamentGameState::Counted.into(),
         seats: vec![seat; MAX_SEATS],
-        room_id: Id::random().to_string(),
-        game_id: Id::random().to_string(),
+        room_id: RoomId::random().to_string(),
+        game_id: GameId::random().to_string(),
         calls: u32::MAX,
-        series_id: Id::random().to_string(),
+        series_id: SeriesId::random().to_string(),
         rated: true,
         shifts: u32::MAX,
         physical: true,

@@ -4,6 +4,7 @@ use chefshat_cluster::Load;
 
 use super::fencing::Pair;
 use super::*;
+use chefshat_room::ids::{Id, UnitId};
 
 const FIRST: Epoch = Epoch::FIRST;
 const SECOND: Epoch = Epoch(2);
@@ -17,9 +18,11 @@ async fn create(store: &PostgresStore, rooms: impl IntoIterator<Item = u8>) {
     }
 }
 
-fn at(epoch: Epoch, rooms: impl IntoIterator<Item = u8>) -> Vec<(Id, Epoch)> {
+fn at(epoch: Epoch, rooms: impl IntoIterator<Item = u8>) -> Vec<(UnitId, Epoch)> {
     let rooms = rooms.into_iter();
-    rooms.map(|room| (Id([room; 16]), epoch)).collect()
+    rooms
+        .map(|room| (Id::from_bytes([room; 16]), epoch))
+        .collect()
 }
 
 #[tokio::test]
@@ -28,7 +31,7 @@ async fn several_orphans_are_claimed_together() {
     create(&pair.first, 1..=4).await;
     create(&pair.second, [5]).await;
     pair.stall().await;
-    let claimed = pair.second.claim(Id([2; 16]), FIRST).await;
+    let claimed = pair.second.claim(Id::from_bytes([2; 16]), FIRST).await;
     assert_eq!(claimed, Ok(Some(SECOND)));
     let orphans = at(FIRST, 1..=6);
     let claimed = pair.second.claim_all(orphans).await.expect("it answers");
@@ -93,19 +96,24 @@ async fn a_released_unit_is_offered_to_another_node() {
             .beat(Heartbeat { reached, ..REACHED })
             .await
             .expect("it answers");
-        let released = pair.first.release(Id([room; 16]), FIRST, None);
+        let released = pair.first.release(Id::from_bytes([room; 16]), FIRST, None);
         released.await.expect("released");
     }
-    assert_eq!(pair.second.handed_over().await, (Id([2; 16]), FIRST));
+    assert_eq!(
+        pair.second.handed_over().await,
+        (Id::from_bytes([2; 16]), FIRST)
+    );
 
     // A node that is named has it, whichever other ones there are.
     let other = node(&pair.database).await;
     other.join(info).await.expect("it joins");
     other.beat(REACHED).await.expect("it answers");
     for room in 3..=8 {
-        let released = pair.first.release(Id([room; 16]), FIRST, Some(next));
+        let released = pair
+            .first
+            .release(Id::from_bytes([room; 16]), FIRST, Some(next));
         released.await.expect("released");
-        let unit = (Id([room; 16]), FIRST);
+        let unit = (Id::from_bytes([room; 16]), FIRST);
         assert_eq!(pair.second.handed_over().await, unit);
     }
     other.close().await;

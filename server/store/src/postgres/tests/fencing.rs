@@ -52,7 +52,7 @@ impl Pair {
 #[tokio::test]
 async fn a_room_that_was_taken_over_is_written_by_its_new_owner_alone() {
     let pair = Pair::new().await;
-    let room = Id([1; 16]);
+    let room = Id::from_bytes([1; 16]);
     let created = pair.first.create(durable(1), vec![entry(1)]);
     let mut old = created.await.expect("created");
     append(&mut old, 2).await.expect("committed");
@@ -91,7 +91,11 @@ async fn a_room_that_was_taken_over_is_written_by_its_new_owner_alone() {
     let again = game.journal.finish(Some(summary(1)), None);
     again.await.expect("it is finished already");
     assert_eq!(pair.second.finished_games().await, Ok(1));
-    let stored = pair.first.finished(room).await.expect("readable");
+    let stored = pair
+        .first
+        .finished(durable(1).game_id)
+        .await
+        .expect("readable");
     let Some(StoredGame::Hosted(_, entries, _)) = stored else {
         panic!("{stored:?}");
     };
@@ -129,7 +133,7 @@ async fn an_append_that_is_late_finds_its_place_taken() {
     let old = created.await.expect("created");
     pair.stall().await;
     let late = Late::new(&pair.database, old).await;
-    let room = Id([1; 16]);
+    let room = Id::from_bytes([1; 16]);
     assert_eq!(pair.second.claim(room, FIRST).await, Ok(Some(SECOND)));
     assert_eq!(late.arrive().await, Err(StoreError::Fenced(room)));
     let game = resumed(&pair.second, 1, SECOND).await;
@@ -147,8 +151,8 @@ async fn of_two_rows_for_one_place_in_a_batch_one_is_acknowledged() {
     let number = database.run("SELECT number FROM games");
     let row = |entry_number| {
         let owned = Owned {
-            id: Id([1; 16]),
-            unit: Id([1; 16]),
+            id: Id::from_bytes([1; 16]),
+            unit: Id::from_bytes([1; 16]),
             epoch: FIRST_EPOCH,
         };
         Arc::new(Row {
@@ -161,7 +165,7 @@ async fn of_two_rows_for_one_place_in_a_batch_one_is_acknowledged() {
     let mut connection = connected(&database).await;
     for again in [false, true] {
         let answers = Row::commit(&mut connection, &[row(2), row(3), row(2)], again).await;
-        let fenced = Err(StoreError::Fenced(Id([1; 16])));
+        let fenced = Err(StoreError::Fenced(Id::from_bytes([1; 16])));
         let answers = answers.expect("committed");
         let entries = numbers(&resumed(&store, 1, FIRST).await.entries);
         let expected = match entries[..] {
@@ -184,9 +188,13 @@ async fn an_append_that_is_late_does_not_follow_the_end_of_its_game() {
     let mut game = resumed(&pair.first, 1, FIRST).await;
     let finished = game.journal.finish(Some(summary(1)), None);
     finished.await.expect("committed");
-    let room = Id([1; 16]);
+    let room = Id::from_bytes([1; 16]);
     assert_eq!(late.arrive().await, Err(StoreError::Fenced(room)));
-    let stored = pair.first.finished(room).await.expect("readable");
+    let stored = pair
+        .first
+        .finished(durable(1).game_id)
+        .await
+        .expect("readable");
     let Some(StoredGame::Hosted(_, entries, _)) = stored else {
         panic!("{stored:?}");
     };
@@ -207,7 +215,7 @@ async fn nothing_is_written_over_a_hole() {
         append(&mut journal, 2).await.expect("committed");
         journals.push(journal);
     }
-    let cup_id = Id([9; 16]);
+    let cup_id = Id::from_bytes([9; 16]);
     let created = store.create_tournament(cup(9), begun());
     created.await.expect("created");
     let appended = store.append_tournament(cup_id, 1, begun());
@@ -215,7 +223,7 @@ async fn nothing_is_written_over_a_hole() {
 
     database.run("DELETE FROM journal WHERE position = 1");
     database.run("DELETE FROM tournament_entries WHERE position = 1");
-    let fenced = |room: u8| Err(StoreError::Fenced(Id([room; 16])));
+    let fenced = |room: u8| Err(StoreError::Fenced(Id::from_bytes([room; 16])));
     assert_eq!(append(&mut journals[0], 3).await, fenced(1));
     let finished = journals[1].finish(Some(summary(2)), None).await;
     assert_eq!(finished, fenced(2));
@@ -241,7 +249,7 @@ async fn of_many_claims_one_wins() {
     let pair = Pair::new().await;
     let created = pair.first.create(durable(1), vec![entry(1)]);
     created.await.expect("created");
-    let room = Id([1; 16]);
+    let room = Id::from_bytes([1; 16]);
     let third = node(&pair.database).await;
     pair.first
         .release(room, FIRST, None)
@@ -266,7 +274,7 @@ async fn nodes_that_look_for_a_few_orphans_find_different_ones() {
     for room in 1..=40 {
         let created = pair.first.create(durable(room), vec![entry(1)]);
         created.await.expect("created");
-        let released = pair.first.release(Id([room; 16]), FIRST, None);
+        let released = pair.first.release(Id::from_bytes([room; 16]), FIRST, None);
         released.await.expect("released");
     }
     let first = pair.first.orphans(10).await.expect("it answers");
@@ -280,7 +288,8 @@ async fn nodes_that_look_for_a_few_orphans_find_different_ones() {
 #[tokio::test]
 async fn a_tournament_changes_hands_with_all_its_rooms() {
     let pair = Pair::new().await;
-    let unit = Id([9; 16]);
+    let tournament = cup(9).id;
+    let unit = tournament.unit();
     let created = pair.first.create_tournament(cup(9), begun());
     created.await.expect("created");
     let room = |number| header(number, Some(9), Durability::Durable);
@@ -299,9 +308,12 @@ async fn a_tournament_changes_hands_with_all_its_rooms() {
 
     pair.stall().await;
     assert_eq!(pair.second.orphans(9).await, Ok(vec![(unit, FIRST)]));
-    assert_eq!(pair.second.claim(Id([1; 16]), FIRST).await, Ok(None));
+    assert_eq!(
+        pair.second.claim(Id::from_bytes([1; 16]), FIRST).await,
+        Ok(None)
+    );
     assert_eq!(pair.second.claim(unit, FIRST).await, Ok(Some(SECOND)));
-    let late = pair.first.append_tournament(unit, 1, begun());
+    let late = pair.first.append_tournament(tournament, 1, begun());
     assert_eq!(late.await, Err(fenced.clone()));
     assert_eq!(append(&mut journals[0], 2).await, Err(fenced.clone()));
     let refused = pair.first.create(room(5), vec![entry(1)]).await;
@@ -309,23 +321,30 @@ async fn a_tournament_changes_hands_with_all_its_rooms() {
 
     let found = pair.second.load(unit, SECOND).await.expect("readable");
     let found = found.expect("it is owned");
-    let (kind, stored) = found.stored.expect("a tournament");
-    assert_eq!((kind, stored.rows.len()), (UnitKind::Tournament, 1));
+    let (key, stored) = found.stored.expect("a tournament");
+    assert_eq!(
+        (key, stored.rows.len()),
+        (UnitKey::Tournament(tournament), 1)
+    );
     let games: Vec<_> = (found.games.iter())
         .map(|game| (game.concluded, numbers(&game.entries)))
         .collect();
     assert_eq!(games, [(false, vec![1, 0]), (true, vec![1])]);
-    let appended = pair.second.append_tournament(unit, 1, begun());
+    let appended = pair.second.append_tournament(tournament, 1, begun());
     appended.await.expect("committed");
     assert_eq!(tournament_rows(&pair.first, 9).await, 2);
     let added = pair.second.create(room(6), vec![entry(1)]);
     added
         .await
         .expect("the tournament's new owner creates rooms");
-    let located = pair.first.locate(Id([6; 16])).await.expect("readable");
+    let located = pair
+        .first
+        .locate(Id::from_bytes([6; 16]))
+        .await
+        .expect("readable");
     let located = located.expect("known");
     assert_eq!((located.unit, located.epoch), (unit, SECOND));
-    let gone = pair.first.locate(Id([3; 16])).await;
+    let gone = pair.first.locate(Id::from_bytes([3; 16])).await;
     assert_eq!(gone, Ok(None), "ephemeral rooms die with their node");
     pair.close().await;
 }
@@ -337,28 +356,35 @@ async fn rooms_and_tournaments_are_found_by_id_and_join_code() {
     let mut journal = created.await.expect("created");
     let created = pair.second.create_tournament(cup(9), vec![]);
     created.await.expect("created");
-    for (code, id, kind, node) in [
-        ("ROOM1", 1, Kind::Room, number_of(&pair.first)),
-        ("CUP9", 9, Kind::Tournament, number_of(&pair.second)),
+    let (room, cup) = (durable(1).room_id, cup(9).id);
+    let of_room = Subject::Room(room);
+    let of_cup = Subject::Unit(UnitKey::Tournament(cup));
+    for (code, id, subject, node) in [
+        ("ROOM1", room.unit(), of_room, number_of(&pair.first)),
+        ("CUP9", cup.unit(), of_cup, number_of(&pair.second)),
     ] {
-        let by_id = pair.first.locate(Id([id; 16])).await.expect("readable");
+        let by_id = pair.first.locate(id).await.expect("readable");
         let by_code = pair.first.locate_code(code).await.expect("readable");
         assert_eq!(by_id, by_code);
         let found = by_id.expect("known");
-        assert_eq!((found.kind, found.node), (kind, Some(node)));
+        assert_eq!((found.subject, found.node), (subject, Some(node)));
     }
-    assert_eq!(pair.first.locate(Id([7; 16])).await, Ok(None));
+    assert_eq!(pair.first.locate(Id::from_bytes([7; 16])).await, Ok(None));
     assert_eq!(pair.first.locate_code("NOTHING").await, Ok(None));
     let game = durable(1).game_id;
     let by_game = pair.second.locate_game(game).await.expect("readable");
-    assert_eq!(by_game.expect("it runs").id, Id([1; 16]));
+    assert_eq!(by_game.expect("it runs").subject, of_room);
 
     let finished = journal.finish(Some(summary(1)), None);
     finished.await.expect("committed");
     let found = pair.second.locate_code("ROOM1").await.expect("readable");
     assert!(found.expect("known").over);
     assert_eq!(pair.second.locate_game(game).await, Ok(None));
-    let shown = pair.second.ended_room(Id([1; 16])).await.expect("readable");
+    let shown = pair
+        .second
+        .ended_room(Id::from_bytes([1; 16]))
+        .await
+        .expect("readable");
     assert!(shown.expect("stored").concluded);
     // Another room may have the code from now on.
     let next = GameHeader {
@@ -368,12 +394,18 @@ async fn rooms_and_tournaments_are_found_by_id_and_join_code() {
     let created = pair.second.create(Arc::new(next), vec![entry(1)]);
     created.await.expect("created");
     let found = pair.first.locate_code("ROOM1").await.expect("readable");
-    assert_eq!(found.expect("known").id, Id([2; 16]));
+    assert_eq!(
+        found.expect("known").subject,
+        Subject::Room(durable(2).room_id)
+    );
     // In the end nothing is left of the first room but its record.
     advance(&pair.database, 600_001);
     pair.first.tidy().await.expect("it answers");
-    assert_eq!(pair.first.locate(Id([1; 16])).await, Ok(None));
-    assert!(matches!(pair.first.ended_room(Id([1; 16])).await, Ok(None)));
+    assert_eq!(pair.first.locate(Id::from_bytes([1; 16])).await, Ok(None));
+    assert!(matches!(
+        pair.first.ended_room(Id::from_bytes([1; 16])).await,
+        Ok(None)
+    ));
     assert_eq!(pair.first.finished_games().await, Ok(1));
     pair.close().await;
 }
@@ -392,10 +424,13 @@ async fn no_two_processes_are_the_same_node_even_after_a_backup_was_put_back() {
         Ok(None),
         "it is no node any more"
     );
-    assert_eq!(before.claim(Id([1; 16]), FIRST).await, Ok(None));
+    assert_eq!(before.claim(Id::from_bytes([1; 16]), FIRST).await, Ok(None));
     assert_eq!(before.leave().await, Ok(false));
     let beat = after.beat(REACHED).await.expect("it answers");
-    assert_eq!(beat.expect("it is known").owned, [(Id([1; 16]), FIRST)]);
+    assert_eq!(
+        beat.expect("it is known").owned,
+        [(Id::from_bytes([1; 16]), FIRST)]
+    );
     append(&mut journal, 2).await.expect("committed");
     drop(journal);
     for store in [before, after] {
@@ -436,7 +471,7 @@ async fn a_node_is_listed_drained_and_leaves() {
     let beat = pair.first.beat(REACHED).await.expect("it answers");
     let beat = beat.expect("it is known");
     assert!(beat.drain);
-    assert_eq!(beat.owned, [(Id([1; 16]), FIRST)]);
+    assert_eq!(beat.owned, [(Id::from_bytes([1; 16]), FIRST)]);
     let nodes = pair.second.nodes().await.expect("readable");
     let listed: Vec<_> = (nodes.iter())
         .map(|node| (node.id, node.rooms, node.drain, node.expired))
@@ -454,13 +489,16 @@ async fn a_node_is_listed_drained_and_leaves() {
         "it has just joined"
     );
     assert!(nodes.iter().all(|it| it.reached == (it.id == node)));
-    let released = pair.first.release(Id([1; 16]), FIRST, None);
+    let released = pair.first.release(Id::from_bytes([1; 16]), FIRST, None);
     released.await.expect("released");
     assert_eq!(pair.first.leave().await, Ok(true));
     assert_eq!(pair.first.beat(REACHED).await, Ok(None));
     let refused = pair.first.create(durable(2), vec![entry(1)]).await;
-    assert_eq!(refused.err(), Some(StoreError::Fenced(Id([2; 16]))));
-    let claimed = pair.first.claim(Id([1; 16]), FIRST).await;
+    assert_eq!(
+        refused.err(),
+        Some(StoreError::Fenced(Id::from_bytes([2; 16])))
+    );
+    let claimed = pair.first.claim(Id::from_bytes([1; 16]), FIRST).await;
     assert_eq!(claimed, Ok(None), "it is no node any more");
     pair.close().await;
 }
@@ -514,7 +552,7 @@ async fn broken_connections_lose_and_double_nothing() {
     }
     let all: Vec<u64> = (1..=APPENDS).collect();
     for room in 1..=ROOMS {
-        let stored = store.finished(Id([room; 16])).await;
+        let stored = store.finished(Id::from_bytes([room; 16])).await;
         let Ok(Some(StoredGame::Hosted(_, entries, _))) = stored else {
             panic!("{stored:?}");
         };

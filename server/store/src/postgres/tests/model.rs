@@ -65,14 +65,14 @@ struct Server {
 
 struct Worlds {
     database: Database,
-    tables: Tables<Id, u64>,
+    tables: Tables<UnitId, u64>,
     now_ms: u64,
     servers: Vec<Server>,
     written: u64,
 }
 
-fn id(number: u8) -> Id {
-    Id([number; 16])
+fn id(number: u8) -> UnitId {
+    Id::from_bytes([number; 16])
 }
 
 fn tournament_of(room: u8) -> u8 {
@@ -239,7 +239,7 @@ impl Worlds {
         let present = open.first().and_then(|item| self.tables.epoch(*item));
         let seen = Epoch(present.unwrap_or(Epoch::FIRST).0.saturating_sub(lag));
         // 0 stands for "the server was restarted"; a tournament has no such entry.
-        let restarted = |item: Id| (!TOURNAMENTS.contains(&item.0[0])).then_some(0);
+        let restarted = |item: UnitId| (!TOURNAMENTS.contains(&item.bytes()[0])).then_some(0);
         let expected = (self.tables).claim(id(unit), seen, server.id, self.now_ms, restarted);
         let claimed = server.store.claim(id(unit), seen).await;
         assert_eq!(claimed, Ok(expected));
@@ -247,12 +247,12 @@ impl Worlds {
         let loaded = server.store.load(id(unit), epoch).await.expect("readable");
         let loaded = loaded.expect("it has just been claimed");
         for game in loaded.games {
-            let rows = self.tables.journal(game.header.room_id);
+            let rows = self.tables.journal(game.header.room_id.unit());
             let expected: Vec<u64> = rows.iter().map(|row| row.entries).collect();
             assert_eq!(numbers(&game.entries), expected);
             if !game.concluded {
                 let position = rows.len() as u64;
-                let room = game.header.room_id.0[0];
+                let room = game.header.room_id.bytes()[0];
                 (server.journals).insert(room, (game.journal, epoch, position));
             }
         }

@@ -6,7 +6,7 @@ use super::*;
 async fn prunable(store: &PostgresStore) -> Vec<u8> {
     let found = store.prunable(Keep::default(), 0, 99).await;
     let found = found.expect("readable");
-    found.iter().map(|(_, game)| game.0[0]).collect()
+    found.iter().map(|(_, game)| game.bytes()[0]).collect()
 }
 
 #[tokio::test]
@@ -25,7 +25,7 @@ async fn a_tournament_needs_its_games_at_every_node_until_it_is_over() {
             .finish(Some(summary(room)), None)
             .await;
         finished.expect("committed");
-        let written = first.mark_record_written(Id([room; 16]));
+        let written = first.mark_record_written(Id::from_bytes([room; 16]));
         written.await.expect("committed");
     }
     assert_eq!(prunable(&second).await, [2]);
@@ -34,19 +34,19 @@ async fn a_tournament_needs_its_games_at_every_node_until_it_is_over() {
     advance(&database, 600_001);
     first.beat(REACHED).await.expect("it answers");
     second.tidy().await.expect("it answers");
-    assert_eq!(second.locate(Id([2; 16])).await, Ok(None));
+    assert_eq!(second.locate(Id::from_bytes([2; 16])).await, Ok(None));
     assert_eq!(prunable(&second).await, [2]);
     // Its owner does not read them all when it resumes it.
-    let unit = first.load(Id([9; 16]), Epoch::FIRST).await;
+    let unit = first.load(Id::from_bytes([9; 16]), Epoch::FIRST).await;
     let unit = unit.expect("readable").expect("it is owned");
     assert_eq!(unit.games.len(), 0);
 
     let end = vec![TournamentEntry::Change(TournamentChange::Closed)];
-    let ended = first.append_tournament(Id([9; 16]), 1, end);
+    let ended = first.append_tournament(Id::from_bytes([9; 16]), 1, end);
     ended.await.expect("committed");
     assert_eq!(prunable(&second).await, [1, 2]);
     second.tidy().await.expect("it answers");
-    assert_eq!(second.locate(Id([1; 16])).await, Ok(None));
+    assert_eq!(second.locate(Id::from_bytes([1; 16])).await, Ok(None));
     first.close().await;
     second.close().await;
 }
@@ -136,15 +136,20 @@ async fn games_of_what_cannot_be_read_are_kept() {
             let mut journal = created.expect("created");
             let finished = journal.finish(Some(summary(room)), None).await;
             finished.expect("committed");
-            let written = store.mark_record_written(Id([room; 16])).await;
+            let written = store.mark_record_written(Id::from_bytes([room; 16])).await;
             written.expect("committed");
         }
         let end = vec![TournamentEntry::Change(TournamentChange::Closed)];
-        let ended = store.append_tournament(Id([9; 16]), 1, end).await;
+        let ended = store
+            .append_tournament(Id::from_bytes([9; 16]), 1, end)
+            .await;
         ended.expect("committed");
         run(&mut connected(&database).await, damage).await;
         assert_eq!(prunable(&store).await.is_empty(), kept, "{damage}");
-        store.prune(vec![Id([1; 16])]).await.expect("committed");
+        store
+            .prune(vec![Id::from_bytes([1; 16])])
+            .await
+            .expect("committed");
         assert_eq!(store.finished_games().await, Ok(1 + u64::from(kept)));
         store.close().await;
     }

@@ -92,7 +92,7 @@ async fn what_an_earlier_attempt_still_commits_counts_as_done() {
     let (created, ()) = futures::join!(created, overtake(&line, &mut holder));
     assert_eq!(created, Ok(()));
     run(&mut holder, "SELECT pg_advisory_lock(1)").await;
-    let appended = store.append_tournament(Id([9; 16]), 1, begun());
+    let appended = store.append_tournament(Id::from_bytes([9; 16]), 1, begun());
     let (appended, ()) = futures::join!(appended, overtake(&line, &mut holder));
     assert_eq!(appended, Ok(()));
     assert_eq!(tournament_rows(&store, 9).await, 2);
@@ -208,7 +208,7 @@ async fn what_stands_is_acknowledged_when_the_standby_has_it() {
     };
     let created = store.create_tournament(cup(9), begun());
     created.await.expect("created");
-    let importing = store.import(Id([7; 16]), *summary(7), Arc::from([]));
+    let importing = store.import(Id::from_bytes([7; 16]), *summary(7), Arc::from([]));
     let works: [(_, BoxFuture<'_, Result<(), StoreError>>); 7] = [
         ("a row", append(appending, 2).boxed()),
         ("an end", finishing.finish(Some(summary(2)), None)),
@@ -220,7 +220,7 @@ async fn what_stands_is_acknowledged_when_the_standby_has_it() {
         ("a tournament", store.create_tournament(cup(8), begun())),
         (
             "a tournament's row",
-            store.append_tournament(Id([9; 16]), 1, begun()),
+            store.append_tournament(Id::from_bytes([9; 16]), 1, begun()),
         ),
         (
             "an import",

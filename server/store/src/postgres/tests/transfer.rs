@@ -88,8 +88,10 @@ async fn a_database_of_an_earlier_version_moves_with_everything_in_it() {
         let unit = store.load(id, epoch).await.expect("readable");
         let unit = unit.expect("it is owned");
         resumed.extend(unit.games);
-        let stored = (unit.stored).map(|(_, it)| StoredTournament::decode(id, &it));
-        resumed_tournaments.extend(stored.transpose().expect("readable"));
+        if let Some((UnitKey::Tournament(id), stored)) = unit.stored {
+            let stored = StoredTournament::decode(id, &stored);
+            resumed_tournaments.push(stored.expect("readable"));
+        }
     }
     let by_id = |game: &ResumableGame| game.header.game_id;
     resumed.sort_by_key(by_id);

@@ -9,7 +9,7 @@ use crate::StoreError;
 use crate::sqlite::open::{self, IfGone};
 use crate::sqlite::space::Space;
 use crate::sqlite::writer::{self, Pending, WriteCommand};
-use crate::units::{UnitKind, UnitWrite};
+use crate::units::{UnitKey, UnitWrite};
 use chefshat_base::metrics::StoreMetrics;
 
 /// Longest time that a test waits for a commit.
@@ -32,7 +32,7 @@ async fn committed(reply: Reply) {
 fn imported(number: u8) -> WriteCommand {
     WriteCommand::Import {
         number: i64::from(number),
-        game_id: Id([number; 16]),
+        game_id: Id::from_bytes([number; 16]),
         record: vec![number; 400_000],
         summary: Box::new(v1::RecordSummary {
             state: v1::RoomState::Finished.into(),
@@ -58,7 +58,7 @@ async fn deletions_go_first_while_the_disk_is_full() {
     for game in [1, 2] {
         committed(send(&commands, imported(game)).await).await;
     }
-    let study = UnitKind::Study.id(Id([9; 16]));
+    let study = UnitKey::Study(Id::from_bytes([9; 16]));
     let create = UnitWrite::Create {
         join_code: None,
         header: Vec::new(),
@@ -74,7 +74,7 @@ async fn deletions_go_first_while_the_disk_is_full() {
     let delete = WriteCommand::Unit(study, UnitWrite::Delete);
     committed(send(&commands, delete).await).await;
     assert!(third.try_recv().is_err() && fourth.try_recv().is_err());
-    let games = vec![Id([1; 16]), Id([2; 16])];
+    let games = vec![Id::from_bytes([1; 16]), Id::from_bytes([2; 16])];
     committed(send(&commands, WriteCommand::Prune { games }).await).await;
     committed(third).await;
     committed(fourth).await;
