@@ -2,11 +2,11 @@
 //! each hand. Passes are shown only before a later play: at the end of a pizza everyone has passed.
 
 use chefshat_client::v1;
+use chefshat_record::words::reason;
 
 use super::story::cards;
 use super::text::{BOLD, DIM, GOLD, PLAIN, Piece, WIDTH, clean, columns, seat_style};
 use super::view::GameView;
-use super::words::reason;
 use crate::numbers::ordinal;
 
 /// Columns for the pizza's number.

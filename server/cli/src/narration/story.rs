@@ -2,10 +2,10 @@
 //! begins with, so that its name can be coloured.
 
 use chefshat_client::v1::{self, game_event::Kind};
+use chefshat_record::words;
 
 use super::text::{MAX_NAME, clean};
 use super::view::GameView;
-use super::words;
 use crate::kind::kind_name;
 use crate::numbers::{ordinal, seat_number};
 
