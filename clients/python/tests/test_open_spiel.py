@@ -190,6 +190,40 @@ def test_resampling_draws_what_the_player_cannot_tell_apart(game: Any) -> None:
     assert len(drawn_hands) > 10
 
 
+def test_other_players_know_nothing_of_the_true_deal_in_a_drawn_one() -> None:
+    """Who holds both jokers is asked before the others; where the drawn deal gives it other cards, it was not."""
+    rules = {"players": 3, "faces": 4, "jokers": 2, "shifts": 6}
+    game = pyspiel.load_game("python_chefshat", rules)
+    chance = np.random.default_rng(1)
+    checked = gone = 0
+    with chefshat.VectorEnv(history=1024, all_hands=True, **game.games.options) as env:
+        for deal in range(40):
+            state = game.new_initial_state()
+            state.apply_action(deal)
+            while not state.is_terminal():
+                current = list(state.position.known[state.current_player()])[-1]
+                others = [seat for seat in range(3) if seat != state.current_player()]
+                asked = [seat for seat in others if current in state.position.known.get(seat, {})]
+                # Before the first turn.
+                if asked and state.legal_actions()[0] >= env.turn_actions:
+                    drawn = state.resample_from_infostate(state.current_player(), chance.random)
+                    env.restore([0], [drawn.position.state])
+                    for seat in asked:
+                        known = drawn.position.known.get(seat, {}).get(current)
+                        if known is None:
+                            gone += 1
+                            seen = drawn.position.seen.get(seat, {})
+                            assert any(drawn.observation_tensor(seat)) == bool(seen)
+                            assert current not in seen
+                        else:
+                            # It may have given two cards since.
+                            held = env.batch.all_hands.reshape(3, -1)[seat].astype(int)
+                            assert np.maximum(known.hand.astype(int) - held, 0).sum() <= 2
+                        checked += 1
+                state.apply_action(int(chance.choice(state.legal_actions())))
+    assert checked > gone > 5
+
+
 def test_resampling_is_for_the_player_who_decides(game: Any) -> None:
     state = game.new_initial_state()
     with pytest.raises(ValueError, match="player 0 does not decide here"):

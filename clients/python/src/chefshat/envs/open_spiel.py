@@ -23,7 +23,7 @@ import math
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,8 @@ from chefshat.batch import Batch
 from chefshat.columns import Situations, Sizes
 from chefshat.learn import features
 from chefshat.vector import VectorEnv
+
+_T = TypeVar("_T")
 
 NAME = "python_chefshat"
 _PARAMETERS: dict[str, Any] = {"rules": "paper", "shifts": 1, "deals": 1000, "history": 512}
@@ -108,7 +110,7 @@ class _Position:
         player: who decides; `TERMINAL` after the end.
         legal: the legal actions, ascending.
         points: those of each player; zeros before the end.
-        seen: what each player saw at its last decision: a table, and its row.
+        seen: what each player saw at its last decision of each Shift, by its number: a table, and its row.
         known: what each player knows of each Shift, by its number.
         searched: here, the possible deals of the player who decides, once counted.
     """
@@ -117,7 +119,7 @@ class _Position:
     player: int
     legal: list[int]
     points: list[float]
-    seen: dict[int, tuple[Situations, int]]
+    seen: dict[int, dict[int, tuple[Situations, int]]]
     known: dict[int, dict[int, _Shift]]
     searched: list[search.Position] = field(default_factory=list)
 
@@ -193,11 +195,12 @@ class _Games(threading.local):
             # It also knows what it gave without a choice.
             drawn = self.after(drawn, next(filter(drawn.legal.__contains__, own)) if drawn.player == player else action)
         # Earlier Shifts are not drawn again.
-        earlier = {seat: {**position.known.get(seat, {}), **shifts} for seat, shifts in drawn.known.items()}
-        return replace(drawn, known={**position.known, **earlier}, seen={**position.seen, **drawn.seen})
+        current = list(position.known[player])[-1]
+        return replace(drawn, known=_since(current, position.known, drawn.known), seen=_since(current, position.seen, drawn.seen))
 
     def _found(self, env: VectorEnv, before: _Position) -> _Position:
-        seen, known = dict(before.seen), {player: dict(shifts) for player, shifts in before.known.items()}
+        seen = {player: dict(shifts) for player, shifts in before.seen.items()}
+        known = {player: dict(shifts) for player, shifts in before.known.items()}
         _look(env.batch, seen, known)
         while len(env.batch) == 0 and not env.batch.done:
             _look(env.step(np.zeros(0, np.uint16)), seen, known)
@@ -257,12 +260,19 @@ def _every_deal(sizes: Sizes, opening: int) -> tuple[list[pb.ScriptedShift], lis
     return scripts, [ways / total for _, ways in found]
 
 
-def _look(batch: Batch, seen: dict[int, tuple[Situations, int]], known: dict[int, dict[int, _Shift]]) -> None:
+def _since(current: int, before: dict[int, dict[int, _T]], drawn: dict[int, dict[int, _T]]) -> dict[int, dict[int, _T]]:
+    """Returns what each player has of each Shift: of the current one what was drawn, though a player may have nothing of it."""
+    players = [*before, *(player for player in drawn if player not in before)]
+    earlier = {player: {number: of for number, of in before.get(player, {}).items() if number != current} for player in players}
+    return {player: {**shifts, **drawn.get(player, {})} for player, shifts in earlier.items()}
+
+
+def _look(batch: Batch, seen: dict[int, dict[int, tuple[Situations, int]]], known: dict[int, dict[int, _Shift]]) -> None:
     # The end of a Shift comes before the first decision of the next.
     for situations in (batch.endings, batch):
         for row, player in enumerate(situations.seats.tolist()):
             if situations is batch or batch.done:
-                seen[player] = situations, row
+                seen.setdefault(player, {})[int(situations.observations.shifts[row])] = situations, row
             _learn(known.setdefault(player, {}), situations, row)
 
 
@@ -428,8 +438,8 @@ class ChefsHatObserver:
             shifts = state.position.known.get(player, {}).values()
             for row, shift in zip(self.dict["shifts"], shifts, strict=False):
                 row[:] = shift.tensor(player, self._game.sizes, self._game.history)
-        elif player in state.position.seen:
-            situations, row = state.position.seen[player]
+        elif seen := state.position.seen.get(player):
+            situations, row = list(seen.values())[-1]
             self.tensor[:] = features.table_of(situations)[row]
 
     def string_from(self, state: ChefsHatState, player: int) -> str:
