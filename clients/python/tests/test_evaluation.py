@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 
 from chefshat import Batch, ChefsHatError
 from chefshat.learn import network
-from chefshat.learn.evaluation import compare, evaluate, summed_up
+from chefshat.learn.evaluation import compare, compared, evaluate, summed_up
+
+PLAYERS = ("greedy", "random")
 
 
 def test_shifts_of_one_game_are_not_independent() -> None:
@@ -53,6 +55,31 @@ def test_a_comparison_needs_no_luck_with_the_deals() -> None:
     assert "on 30 deals" in str(found)
     with pytest.raises(ValueError, match="at least 2"):
         compare(trained, first_legal, "greedy", deals=1)
+
+
+def test_evaluations_and_comparisons_mean_the_same() -> None:
+    """Games have different numbers of Shifts: the mean of the games' means would be another number."""
+    rules = {"preset": "paper", "target_points": 9}
+    alone = [[evaluate(player, "random", games=30, seat=seat, seed=5, rules=rules) for seat in (1, 3)] for player in PLAYERS]
+    found = compare(*PLAYERS, "random", deals=30, seats=[1, 3], seed=5, rules=rules)
+    for points, parts in zip(found.points, alone, strict=True):
+        shifts = sum(one.shifts for one in parts)
+        assert points == pytest.approx(sum(one.points * one.shifts for one in parts) / shifts)
+    one_seat = compare(PLAYERS[0], "random", "greedy", deals=30, seats=[1], seed=5, rules=rules)
+    assert one_seat.points[0] == pytest.approx(evaluate(PLAYERS[0], "greedy", games=30, seat=1, seed=5, rules=rules).points)
+
+
+def test_a_comparison_has_the_error_of_its_deals() -> None:
+    """That of the jackknife over deals, which knows no formula for ratios."""
+    points, shifts = np.random.default_rng(2).integers(1, 9, (2, 2, 400)).astype(float)
+
+    def difference(kept: NDArray[np.intp]) -> float:
+        first, second = points[:, kept].sum(axis=1) / shifts[:, kept].sum(axis=1)
+        return float(first - second)
+
+    without = [difference(np.delete(np.arange(400), deal)) for deal in range(400)]
+    expected = (399 * np.var(without)) ** 0.5
+    assert compared(("greedy",), points, shifts).standard_error == pytest.approx(float(expected), rel=0.02)
 
 
 def test_built_in_agents_and_files_are_players() -> None:

@@ -11,7 +11,7 @@ import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +28,8 @@ from chefshat.vector_setup import is_network_file
 # Parallel games.
 SIDE_BY_SIDE = 256
 
+_Floats: TypeAlias = npt.NDArray[np.float64]
+
 Player: TypeAlias = Network | Policy | str | Path
 """Who is evaluated: a network, which takes the legal action with the highest output, or its file; a function that chooses actions;
 or the built-in agent "random", "greedy" or "trained", by `chefshat-native`: "random" draws the same numbers for every seed."""
@@ -41,7 +43,7 @@ class Evaluation:
         opponents: the agents of the other seats.
         games: games played.
         shifts: Shifts played.
-        points: points per Shift of the evaluated seat.
+        points: points per Shift of the evaluated seat: the points of all games over their Shifts.
         standard_error: of `points`; games count as independent, the Shifts of one game do not (roles connect them).
         places: counts of each place, first to last.
     """
@@ -98,9 +100,9 @@ class Comparison:
     Attributes:
         opponents: the agents of the other seats.
         deals: deals played, each by both players from each of the seats.
-        points: points per Shift of the first and of the second player.
+        points: points per Shift of the first and of the second player: as in `Evaluation`, those of all games over their Shifts.
         difference: those of the first minus those of the second.
-        standard_error: of `difference`; deals count as independent, what is played on one deal does not.
+        standard_error: of `difference`; deals count as independent, the games on one deal and their Shifts do not.
     """
 
     opponents: tuple[str, ...]
@@ -138,7 +140,7 @@ def compare(
         first: a player.
         second: the one to compare it with.
         opponents: as for `evaluate`.
-        deals: number of deals, at least 2.
+        deals: number of deals, at least 2: the seeds of games, which by most rules have several Shifts.
         seats: the seats from which each deal is played, from 0; None: all of four.
         seed: seed of the deals; None: random deals, the same for both.
         rules: the rule set.
@@ -155,17 +157,15 @@ def compare(
     seats = range(4) if seats is None else seats
     seed = secrets.randbits(64) if seed is None else seed
     names: tuple[str, ...] = ()
-    by_deal = np.zeros((2, deals))
+    # Of each player and deal, the points and the Shifts.
+    points, shifts = np.zeros((2, 2, deals))
     for number, player in enumerate((first, second)):
         for seat in seats:
             played = _play(player, opponents, deals, seat, seed, rules, address)
-            shifts = np.bincount(played.games, minlength=deals)
-            by_deal[number] += np.bincount(played.games, weights=played.points, minlength=deals) / shifts / len(seats)
+            points[number] += np.bincount(played.games, weights=played.points, minlength=deals)
+            shifts[number] += np.bincount(played.games, minlength=deals)
             names = played.opponents
-    differences = by_deal[0] - by_deal[1]
-    means = by_deal.mean(axis=1)
-    error = float(differences.std(ddof=1) / np.sqrt(deals))
-    return Comparison(names, deals, (float(means[0]), float(means[1])), float(differences.mean()), error)
+    return compared(names, points, shifts)
 
 
 class _Played(NamedTuple):
@@ -267,8 +267,24 @@ def summed_up(
     taken: npt.NDArray[np.intp],
 ) -> Evaluation:
     """Summarises the game index and points of each Shift, and the count of each place."""
-    mean = float(points.mean())
-    # Points above the mean, summed over each game: the games are independent.
-    over = np.bincount(indices, weights=points - mean, minlength=games)
-    error = float(np.sqrt(games / max(games - 1, 1) * np.square(over).sum()) / len(points))
-    return Evaluation(opponents, games, len(points), mean, error, tuple(int(count) for count in taken))
+    by_game = np.bincount(indices, weights=points, minlength=games), np.bincount(indices, minlength=games)
+    mean, over = _means(*by_game)
+    return Evaluation(opponents, games, len(points), float(mean), _error(over), tuple(int(count) for count in taken))
+
+
+def compared(opponents: tuple[str, ...], points: _Floats, shifts: _Floats) -> Comparison:
+    """Summarises the points and Shifts of two players on each deal, (2, D)."""
+    means, over = _means(points, shifts)
+    first, second = means.tolist()
+    return Comparison(opponents, points.shape[1], (first, second), first - second, _error(over[0] - over[1]))
+
+
+def _means(points: _Floats, shifts: npt.NDArray[Any]) -> tuple[_Floats, _Floats]:
+    """Returns the points per Shift over all games, and how much each game (the last axis) moves them."""
+    mean = np.asarray(points.sum(axis=-1) / shifts.sum(axis=-1))
+    return mean, (points - mean[..., np.newaxis] * shifts) / shifts.sum(axis=-1, keepdims=True)
+
+
+def _error(over: _Floats) -> float:
+    """Returns the standard error of a sum over independent games, whose terms sum to 0."""
+    return float(np.sqrt(len(over) / max(len(over) - 1, 1) * np.square(over).sum()))
