@@ -187,7 +187,7 @@ def test_the_built_in_network_is_loaded_by_its_name() -> None:
 
 def test_logits_are_those_of_legal_actions() -> None:
     net = network.load("trained")
-    with VectorEnv(games=8, opponents="greedy", seed=3) as env:
+    with VectorEnv(games=8, client_seats=[0], opponents="greedy", seed=3) as env:
         batch = env.reset()
         for _ in range(20):
             logits = net.logits_of(batch)

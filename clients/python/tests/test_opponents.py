@@ -202,6 +202,8 @@ def test_what_an_opponent_does_wrong_is_named(anywhere: str | None, opponent: An
     ("options", "message"),
     [
         ({"opponents": first}, r"client_seats=\[0\]"),
+        ({"opponents": "greedy"}, r"client_seats=\[0\]"),
+        ({"opponents": [], "client_seats": [0]}, "opponents is empty"),
         ({"opponents": [first, first], "client_seats": [0]}, "one for each of the 3 other seats, or one for all, not 2"),
         ({"opponents": [first, "greedy"], "client_seats": [0]}, "one for each of the 3 other seats, or one for all, not 2"),
         ({"opponents": first, "client_seats": [4]}, r"0\.\.=3, not \[4\]"),

@@ -57,15 +57,20 @@ class Policies:
 
 
 def split(options: VectorOptions) -> tuple[VectorOptions, Policies | None]:
-    """Separates functions among the `opponents` of the options: returns the options of the games inside, and the functions."""
-    given = options.get("opponents")
+    """Separates functions among the `opponents` of the options: returns the options of the games inside, and the functions.
+
+    Raises:
+        ValueError: there are no seats for opponents, since the client plays all.
+    """
+    given, seats = options.get("opponents"), options.get("client_seats")
+    if given is None:
+        return options, None
     listed: Sequence[Any] = given if isinstance(given, Sequence) and not isinstance(given, (str, bytes)) else [given]
+    if seats is None:
+        raise ValueError("opponents play the seats that client_seats leaves: name the client's seats, for example client_seats=[0]")
     functions = tuple(opponent if callable(opponent) else None for opponent in listed)
     if not any(functions):
         return options, None
-    seats = options.get("client_seats")
-    if seats is None:
-        raise ValueError("opponents play the seats that client_seats leaves: name the client's seats, for example client_seats=[0]")
     learner = tuple(seats)
     inside: dict[str, Any] = {name: value for name, value in options.items() if name not in ("client_seats", "opponents")}
     names = [opponent for opponent in listed if not callable(opponent)]

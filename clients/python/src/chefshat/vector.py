@@ -126,6 +126,8 @@ class VectorEnv:
         self._games = _begin(setup, policies, *place)
         try:
             self._set_attributes(self._games.started, setup.games)
+            if not setup.opponents and len(self.client_seats) < self.players:
+                raise ValueError("opponents is empty: give one for each of the other seats, or one for all")
             self.server = self._games.server
             keeps = transitions or reward_function is not None
             self._memory = Memory(setup.games, self.sizes) if keeps else None

@@ -88,7 +88,7 @@ class VectorOptions(GameOptions, total=False):
     """The options of a `VectorEnv`: those of `GameOptions`, and further ones, all optional.
 
     Attributes:
-        client_seats: the seats played by the client; default: all.
+        client_seats: the seats played by the client; default: all, with no `opponents`.
         rewards: "validity", "paper", "paper_intended", "winning" or "points"; default: all rewards are 0.
         invalid: effect of an illegal action: "error" (default): `step` raises ILLEGAL_ACTION and takes none of the actions;
             "ask_again" counts it, rewards it and asks again.

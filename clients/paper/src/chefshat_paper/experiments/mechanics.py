@@ -171,7 +171,7 @@ def play(
         address,
         size.games,
         # Built-in agents would take these decisions themselves.
-        client_seats=None if defaults else [0],
+        client_seats=range(4) if defaults else [0],
         opponents="random",
         decisions="turns" if defaults else "all",
         total_games=size.games,
