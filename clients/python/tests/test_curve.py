@@ -35,6 +35,12 @@ def test_each_evaluation_is_a_point_with_its_interval() -> None:
     assert panel.levels[0].y == 2.25
 
 
+def test_evaluations_of_one_game_have_no_interval() -> None:
+    (panel,) = figure([read(LOG.replace("0.5}]", "null}]"))]).panels
+    assert panel.lines[0].y[1] == 3.0
+    assert np.isnan([panel.lines[0].low, panel.lines[0].high]).all()
+
+
 def test_the_command_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, out = tmp_path / "log.jsonl", tmp_path / "curve.png"
     log.write_text(LOG)

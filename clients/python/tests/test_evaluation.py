@@ -29,6 +29,14 @@ def test_independent_shifts_have_the_usual_error() -> None:
     assert found.standard_error == pytest.approx(float(points.std(ddof=1)) / 400**0.5)
 
 
+def test_one_game_has_no_error() -> None:
+    found = evaluate("greedy", "random", games=1, seed=1)
+    assert (found.games, found.standard_error, found.to_json()["standard_error"]) == (1, float("inf"), None)
+    assert "± inf points" in str(found)
+    with pytest.raises(ValueError, match="opponents is empty"):
+        evaluate("greedy", [], games=1)
+
+
 def test_a_player_takes_any_seat() -> None:
     """The network of the built-in agent, among three of them, plays the same games from every seat: all points are shared out."""
     trained = network.load("trained")
@@ -55,6 +63,9 @@ def test_a_comparison_needs_no_luck_with_the_deals() -> None:
     assert "on 30 deals" in str(found)
     with pytest.raises(ValueError, match="at least 2"):
         compare(trained, first_legal, "greedy", deals=1)
+    for seats in ([], [1, 1]):
+        with pytest.raises(ValueError, match="name at least one seat, and each once"):
+            compare(trained, first_legal, "greedy", deals=2, seats=seats)
 
 
 def test_evaluations_and_comparisons_mean_the_same() -> None:

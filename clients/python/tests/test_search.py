@@ -294,6 +294,15 @@ def test_outcomes_are_what_estimates_are_means_of() -> None:
     assert position.evaluate(deals=1).standard_errors.max() == np.inf
 
 
+def test_large_weights_and_priors_do_not_overflow() -> None:
+    points, actions = np.array([[5.0, 1.0], [3.0, 0.0]]), np.array([7, 9], np.uint16)
+    outcomes = Outcomes(actions, points, np.ones((2, 2)))
+    large = outcomes.estimates([1.5e308, 0.5e308])
+    assert same(large, outcomes.estimates([3, 1]))
+    np.testing.assert_allclose(large.points, [4.5, 0.75])
+    np.testing.assert_array_equal(large.improved([1e308, 1e308]), large.improved([0.5, 0.5]))
+
+
 def test_weights_of_deals() -> None:
     position = busy_position()
     hands, tried = position.sample(40, seed=2), position.outcomes(40, seed=2)

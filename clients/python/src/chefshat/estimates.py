@@ -32,10 +32,9 @@ class Outcomes:
                 what the other seats did, by a model of them. The standard errors count deals by their effective number.
         """
         deals, actions = self.points.shape
-        share = np.ones(deals) if weights is None else np.asarray(weights, np.float64)
-        if share.shape != (deals,) or not np.isfinite(share).all() or share.min() < 0 or share.sum() == 0:
+        share = _shares(np.ones(deals) if weights is None else weights, deals)
+        if share is None:
             raise ValueError(f"weights: give a finite number of 0 or more for each of the {deals} deals, not all 0")
-        share = share / share.sum()
         points, gains = mean_and_error(self.points, share), mean_and_error(self.points - self.points[:, :1], share)
         return Estimates(self.actions, *points, *gains, share @ self.places, np.full(actions, deals, np.uint64))
 
@@ -115,8 +114,17 @@ def scores(points: NDArray[np.float64], prior: NDArray[np.float64], rollouts: in
 
 def checked_prior(prior: ArrayLike, actions: int) -> NDArray[np.float64]:
     """Returns the probabilities of actions, which sum to 1. Raises ValueError if they are none."""
-    given = np.asarray(prior, np.float64)
-    if given.shape != (actions,) or not np.isfinite(given).all() or given.min() < 0 or given.sum() == 0:
+    shares = _shares(prior, actions)
+    if shares is None:
         raise ValueError(f"prior: give the probability of each of the {actions} actions")
-    shares: NDArray[np.float64] = given / given.sum()
     return shares
+
+
+def _shares(given: ArrayLike, count: int) -> NDArray[np.float64] | None:
+    """Returns numbers as shares of their sum; None if they are not `count` finite numbers of 0 or more, or if all are 0."""
+    numbers = np.asarray(given, np.float64)
+    if numbers.shape != (count,) or not np.isfinite(numbers).all() or numbers.min() < 0 or numbers.max() == 0:
+        return None
+    # The sum of large numbers would overflow.
+    numbers = numbers / numbers.max()
+    return np.asarray(numbers / numbers.sum())

@@ -97,7 +97,7 @@ def _line(group: Sequence[Run], number: int, label: str) -> Line:
     shown = [[line["evaluations"][number] for line in run.evaluations] for run in group]
     points = np.array([[one["points"] for one in run] for run in shown])
     if len(group) == 1:
-        errors = Z_95 * np.array([one["standard_error"] for one in shown[0]])
+        errors = Z_95 * np.array([one["standard_error"] for one in shown[0]], np.float64)
         middle, low, high = points[0], points[0] - errors, points[0] + errors
     else:
         middle, low, high = np.transpose([interquartile_mean(column) for column in points.T])

@@ -44,7 +44,8 @@ class Evaluation:
         games: games played.
         shifts: Shifts played.
         points: points per Shift of the evaluated seat: the points of all games over their Shifts.
-        standard_error: of `points`; games count as independent, the Shifts of one game do not (roles connect them).
+        standard_error: of `points`, infinite after one game; games count as independent, the Shifts of one game do not (roles
+            connect them).
         places: counts of each place, first to last.
     """
 
@@ -60,6 +61,11 @@ class Evaluation:
         against = ", ".join(self.opponents)
         points = f"{self.points:.3f} ± {self.standard_error:.3f} points per Shift against {against}"
         return f"{points} ({self.shifts:,} Shifts in {self.games:,} games; places {shares})"
+
+    def to_json(self) -> dict[str, Any]:
+        """Returns the attributes by name, an infinite standard error as None: JSON has no such number."""
+        known = np.isfinite(self.standard_error)
+        return {**dataclasses.asdict(self), "standard_error": self.standard_error if known else None}
 
 
 def evaluate(
@@ -150,11 +156,14 @@ def compare(
         ChefsHatError: the games are refused, the server does not answer, or there is no such agent.
         NetworkFileError: the file of a player is not a network.
         OSError: it cannot be read.
-        ValueError: a network was trained for games of another size, there is no such seat, or fewer than two deals.
+        ValueError: a network was trained for games of another size, there is no such seat, seats are empty or
+            repeated, or deals are fewer than two.
     """
     if deals < 2:
         raise ValueError(f"{deals} deals: play at least 2, so that there is a standard error")
     seats = range(4) if seats is None else seats
+    if not len(seats) or len(set(seats)) < len(seats):
+        raise ValueError(f"seats: name at least one seat, and each once, not {list(seats)}")
     seed = secrets.randbits(64) if seed is None else seed
     names: tuple[str, ...] = ()
     # Of each player and deal, the points and the Shifts.
@@ -255,7 +264,7 @@ def run(options: argparse.Namespace) -> int:
         )
     except (ChefsHatError, NetworkFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)
-    print(json.dumps(dataclasses.asdict(found)) if options.json else found)
+    print(json.dumps(found.to_json()) if options.json else found)
     return 0
 
 
@@ -287,4 +296,5 @@ def _means(points: _Floats, shifts: npt.NDArray[Any]) -> tuple[_Floats, _Floats]
 
 def _error(over: _Floats) -> float:
     """Returns the standard error of a sum over independent games, whose terms sum to 0."""
-    return float(np.sqrt(len(over) / max(len(over) - 1, 1) * np.square(over).sum()))
+    games = len(over)
+    return float(np.sqrt(games / (games - 1) * np.square(over).sum())) if games > 1 else np.inf

@@ -183,7 +183,7 @@ def _evaluate(trainer: Trainer, options: argparse.Namespace, losses: dict[str, f
 
 def _summary(training: Training, evaluations: list[Evaluation]) -> dict[str, Any]:
     progress = dataclasses.asdict(training.progress)
-    return {**progress, "evaluations": [dataclasses.asdict(evaluation) for evaluation in evaluations]}
+    return {**progress, "evaluations": [evaluation.to_json() for evaluation in evaluations]}
 
 
 def _setup(training: Training) -> dict[str, Any]:
