@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from chefshat import Batch, ChefsHatError
 from chefshat.learn import network
-from chefshat.learn.evaluation import compare, compared, evaluate, summed_up
+from chefshat.learn.evaluation import OneOpponent, compare, compared, evaluate, summed_up
 
+FIXTURES = Path(__file__).resolve().parents[3] / "tests" / "fixtures" / "network"
 PLAYERS = ("greedy", "random")
 
 
@@ -93,13 +94,37 @@ def test_a_comparison_has_the_error_of_its_deals() -> None:
     assert compared(("greedy",), points, shifts).standard_error == pytest.approx(float(expected), rel=0.02)
 
 
+@pytest.mark.parametrize("players", [2, 3, 5])
+def test_a_comparison_is_from_every_seat_of_the_game(players: int) -> None:
+    rules = {"preset": "paper", "players": players, "faces": 8, "target_shifts": 2}
+    found = compare(*PLAYERS, "random", deals=6, seed=5, rules=rules)
+    assert found == compare(*PLAYERS, "random", deals=6, seats=range(players), seed=5, rules=rules)
+    assert found.opponents == ("random",) * (players - 1)
+
+
+def test_any_opponent_may_be_the_only_one() -> None:
+    trained = network.load("trained")
+
+    def by_network(batch: Batch) -> NDArray[np.uint16]:
+        return trained.actions_of(batch)
+
+    names: list[tuple[OneOpponent, str]] = [("trained", "trained"), (by_network, "by_network"), (trained, "trained")]
+    found = [evaluate("greedy", opponents, games=4, seed=1) for opponents, _ in names]
+    assert [one.opponents for one in found] == [(name,) * 3 for _, name in names]
+    assert {one.points for one in found} == {found[0].points}
+    file = FIXTURES / "table-actions.safetensors"
+    content = evaluate("greedy", file.read_bytes(), games=4, seed=1)
+    assert evaluate("greedy", file, games=4, seed=1).points == content.points
+    assert evaluate("greedy", [file] * 3, games=4, seed=1).opponents == (str(file),) * 3
+
+
 def test_built_in_agents_and_files_are_players() -> None:
     pytest.importorskip("chefshat_native")
     trained, greedy = (evaluate(player, "random", games=12, seed=3) for player in ("trained", "greedy"))
     assert trained == evaluate(network.load("trained"), "random", games=12, seed=3)
     assert greedy != trained
-    file = Path(__file__).resolve().parents[3] / "tests" / "fixtures" / "network" / "table-actions.safetensors"
-    compared = compare(file, "greedy", "greedy", deals=4, seed=1, seats=[0])
-    assert compared == compare(str(file), "greedy", "greedy", deals=4, seed=1, seats=[0])
+    file = FIXTURES / "table-actions.safetensors"
+    found = compare(file, "greedy", "greedy", deals=4, seed=1, seats=[0])
+    assert found == compare(str(file), "greedy", "greedy", deals=4, seed=1, seats=[0])
     with pytest.raises(ChefsHatError, match="there is no agent"):
         evaluate("clever", "random", games=1)

@@ -10,6 +10,7 @@ import json
 import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -20,10 +21,11 @@ from chefshat import join_options, search
 from chefshat.address import ServerAddress
 from chefshat.errors import ChefsHatError, failed
 from chefshat.learn import network as network_file
+from chefshat.learn import runs
 from chefshat.learn.network import Network, NetworkFileError
 from chefshat.opponents import Policy
 from chefshat.vector import Rules, Seed, VectorEnv
-from chefshat.vector_setup import is_network_file
+from chefshat.vector_setup import Opponent, is_network_file
 
 # Parallel games.
 SIDE_BY_SIDE = 256
@@ -33,6 +35,9 @@ _Floats: TypeAlias = npt.NDArray[np.float64]
 Player: TypeAlias = Network | Policy | str | Path
 """Who is evaluated: a network, which takes the legal action with the highest output, or its file; a function that chooses actions;
 or the built-in agent "random", "greedy" or "trained", by `chefshat-native`: "random" draws the same numbers for every seed."""
+
+OneOpponent: TypeAlias = Opponent | Network | Policy
+"""Who plays another seat: as in a `VectorEnv`, or a network for all actions."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +75,7 @@ class Evaluation:
 
 def evaluate(
     player: Player,
-    opponents: str | Sequence[str | Policy],
+    opponents: OneOpponent | Sequence[OneOpponent],
     *,
     games: int,
     seat: int = 0,
@@ -82,7 +87,7 @@ def evaluate(
 
     Args:
         player: who is evaluated.
-        opponents: built-in agents, network files or functions of the other seats, one for all or one for each.
+        opponents: built-in agents, network files, networks or functions of the other seats, one for all or one for each.
         games: number of games.
         seat: the player's seat, from 0.
         seed: seed of the deals.
@@ -129,7 +134,7 @@ class Comparison:
 def compare(
     first: Player,
     second: Player,
-    opponents: str | Sequence[str | Policy],
+    opponents: OneOpponent | Sequence[OneOpponent],
     *,
     deals: int,
     seats: Sequence[int] | None = None,
@@ -147,7 +152,7 @@ def compare(
         second: the one to compare it with.
         opponents: as for `evaluate`.
         deals: number of deals, at least 2: the seeds of games, which by most rules have several Shifts.
-        seats: the seats from which each deal is played, from 0; None: all of four.
+        seats: the seats from which each deal is played, from 0; None: all.
         seed: seed of the deals; None: random deals, the same for both.
         rules: the rule set.
         address: where the games are played; see `VectorEnv`.
@@ -161,7 +166,8 @@ def compare(
     """
     if deals < 2:
         raise ValueError(f"{deals} deals: play at least 2, so that there is a standard error")
-    seats = range(4) if seats is None else seats
+    if seats is None:
+        seats = range(runs.full_rules(rules, address).players)
     if not len(seats) or len(set(seats)) < len(seats):
         raise ValueError(f"seats: name at least one seat, and each once, not {list(seats)}")
     seed = secrets.randbits(64) if seed is None else seed
@@ -191,7 +197,7 @@ class _Played(NamedTuple):
 
 def _play(
     player: Player,
-    opponents: str | Sequence[str | Policy],
+    opponents: OneOpponent | Sequence[OneOpponent],
     games: int,
     seat: int,
     seed: Seed,
@@ -202,11 +208,12 @@ def _play(
     if isinstance(player, (str, Path)) and is_network_file(player):
         player = network_file.load(player)
     network = player if isinstance(player, Network) else None
+    listed = [opponents] if isinstance(opponents, str | bytes | PathLike | Network) or callable(opponents) else opponents
     with VectorEnv(
         address,
         min(games, SIDE_BY_SIDE),
         client_seats=[seat],
-        opponents=opponents,
+        opponents=[opponent.actions_of if isinstance(opponent, Network) else opponent for opponent in listed],
         episode="shift",
         decisions="turns" if network and network.info.output == "turns" else "all",
         skip_forced=True,
@@ -222,8 +229,7 @@ def _play(
                 f"not with {env.players}, {env.faces} and {env.hand_size}"
             )
         others = env.players - 1
-        given = [opponents] if isinstance(opponents, str) else opponents
-        names = tuple(_name(opponent) for opponent in given) * (others if len(given) == 1 else 1)
+        names = tuple(_name(opponent) for opponent in listed) * (others if len(listed) == 1 else 1)
         batch = env.reset()
         indices: list[npt.NDArray[np.uint64]] = []
         points: list[npt.NDArray[np.uint32]] = []
@@ -246,8 +252,12 @@ def _play(
     return _Played(names, np.concatenate(indices).astype(np.intp), np.concatenate(points), taken)
 
 
-def _name(opponent: str | Policy) -> str:
-    return opponent if isinstance(opponent, str) else getattr(opponent, "__name__", type(opponent).__name__)
+def _name(opponent: OneOpponent) -> str:
+    if isinstance(opponent, str | PathLike):
+        return str(opponent)
+    if isinstance(opponent, Network):
+        return opponent.info.name
+    return getattr(opponent, "__name__", type(opponent).__name__)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -276,8 +286,7 @@ def summed_up(
     taken: npt.NDArray[np.intp],
 ) -> Evaluation:
     """Summarises the game index and points of each Shift, and the count of each place."""
-    by_game = np.bincount(indices, weights=points, minlength=games), np.bincount(indices, minlength=games)
-    mean, over = _means(*by_game)
+    mean, over = _means(np.bincount(indices, weights=points, minlength=games), np.bincount(indices, minlength=games))
     return Evaluation(opponents, games, len(points), float(mean), _error(over), tuple(int(count) for count in taken))
 
 
@@ -288,7 +297,7 @@ def compared(opponents: tuple[str, ...], points: _Floats, shifts: _Floats) -> Co
     return Comparison(opponents, points.shape[1], (first, second), first - second, _error(over[0] - over[1]))
 
 
-def _means(points: _Floats, shifts: npt.NDArray[Any]) -> tuple[_Floats, _Floats]:
+def _means(points: npt.NDArray[Any], shifts: npt.NDArray[Any]) -> tuple[_Floats, _Floats]:
     """Returns the points per Shift over all games, and how much each game (the last axis) moves them."""
     mean = np.asarray(points.sum(axis=-1) / shifts.sum(axis=-1))
     return mean, (points - mean[..., np.newaxis] * shifts) / shifts.sum(axis=-1, keepdims=True)
