@@ -448,3 +448,16 @@ def test_a_prior_shares_the_rollouts() -> None:
 def test_budgets_that_contradict(options: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         busy_position().evaluate(**options)
+
+
+@pytest.mark.parametrize("threads", [-1, 257])
+def test_threads_have_a_limit(threads: int) -> None:
+    position = busy_position()
+    for call in (
+        lambda: position.evaluate(8, threads=threads),
+        lambda: position.evaluate(deals=8, threads=threads),
+        lambda: position.outcomes(8, threads=threads),
+        lambda: search.play_on([], threads=threads),
+    ):
+        with pytest.raises(ValueError, match=rf"threads is 0\.\.=256, not {threads}"):
+            call()

@@ -221,8 +221,11 @@ def test_threads_change_nothing(anywhere: str | None) -> None:
                 env.step(env.sample())
             shown.append(env.batch.observations.hands.tolist())
     assert shown[0] == shown[1] == shown[2]
-    with pytest.raises(ValueError, match="threads is a number of threads"):
-        VectorEnv(threads=-1)
+    for threads in (-1, 257):
+        with pytest.raises(ValueError, match=rf"threads is 0\.\.=256, not {threads}"):
+            VectorEnv(threads=threads)
+    with pytest.raises(TypeError, match=r"threads is a whole number, not 1\.5"):
+        VectorEnv(threads=1.5)  # type: ignore[arg-type]
 
 
 def test_games_in_this_process_are_limited_by_its_memory() -> None:

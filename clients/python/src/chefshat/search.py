@@ -20,7 +20,7 @@ from chefshat.errors import ChefsHatError
 from chefshat.estimates import Estimates, Outcomes, checked_prior, mean_and_error, scores
 from chefshat.opponents import selected
 from chefshat.vector import Batch, VectorEnv
-from chefshat.vector_setup import is_network_file, network_content
+from chefshat.vector_setup import is_network_file, network_content, thread_count
 
 if TYPE_CHECKING:
     import chefshat_native
@@ -80,7 +80,7 @@ def play_on(
     Args:
         states: S states, as `VectorEnv.save` returns them, of games with the same numbers of seats, faces and cards dealt.
         agent: who plays: one for all N seats, or one for each.
-        threads: 0: one for each core. The result does not depend on them.
+        threads: at most 256; 0: one for each core. The result does not depend on them.
         seed: of the agents' random choices; those of each state are others.
 
     Returns:
@@ -91,7 +91,9 @@ def play_on(
     """
     agents = [agent] if isinstance(agent, (str, Path)) else list(agent)
     with _engine() as native:
-        points, places = native.play_states(list(states), [_policy(one) for one in agents], threads=threads, seed=_seed(seed))
+        points, places = native.play_states(
+            list(states), [_policy(one) for one in agents], threads=thread_count(threads), seed=_seed(seed)
+        )
     shape = (len(states), -1 if len(states) else 0)
     return points.reshape(shape), places.reshape(shape)
 
@@ -193,7 +195,7 @@ class Position:
             considered: how many actions a `prior` lets in.
             weights: (deals,) how likely each of the `deals` is, see `Outcomes.estimates`.
             leaf: with `deals`, values the seat's next decision instead of playing on, see `outcomes`.
-            threads: 0: one for each core.
+            threads: at most 256; 0: one for each core.
             seed: of the deals and of the agents' random choices.
         """
         if deals is None and (weights is not None or leaf is not None):
@@ -219,7 +221,7 @@ class Position:
                 rollouts=rollouts or 0,
                 time_ms=time_ms or 0,
                 halving=halving,
-                threads=threads,
+                threads=thread_count(threads),
                 seed=_seed(seed),
             )
         return Estimates(**columns)
@@ -243,7 +245,7 @@ class Position:
             leaf: values the seat's next decision among several actions in the Shift, with what the seat then may know but the
                 history; no deal is played further. (From a position with one action, its next decision.) The agents' random choices
                 are others than without it.
-            threads: 0: one for each core.
+            threads: at most 256; 0: one for each core.
             seed: of the deals and of the agents' random choices.
         """
         chosen = self._chosen(actions)
@@ -266,7 +268,7 @@ class Position:
         """Returns points and places, (deals, A) each, in deals from `first` on."""
         with _engine():
             found = self._native.outcomes(
-                actions.tolist(), _policy(agent), first=first, deals=deals, threads=threads, seed=_seed(seed)
+                actions.tolist(), _policy(agent), first=first, deals=deals, threads=thread_count(threads), seed=_seed(seed)
             )
         points, places = (column.reshape(deals, len(actions)).astype(np.float64) for column in found)
         return points, places

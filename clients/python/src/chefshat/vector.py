@@ -24,7 +24,7 @@ from chefshat.errors import ChefsHatError
 from chefshat.masks import sample_legal
 from chefshat.opponents import Policies, Policy, PolicyGames, split
 from chefshat.transitions import Memory, RewardFunction, Transitions
-from chefshat.vector_setup import GameOptions, Rules, Seed, VectorOptions, put_seed, vector_setup
+from chefshat.vector_setup import GameOptions, Rules, Seed, VectorOptions, put_seed, thread_count, vector_setup
 
 __all__ = [
     "Batch",
@@ -102,13 +102,12 @@ class VectorEnv:
             games: n. Games times client seats is limited by the server (`max_vector_seats`), and in this process by the memory.
             transitions: whether batches have `transitions`. They take some 200 bytes for each seat of each game.
             reward_function: computes rewards from the columns of the transitions, instead of the server's.
-            threads: how many of this process step the games; 0: one for each core. They do not change what is played.
+            threads: how many of this process step the games, at most 256; 0: one for each core. They do not change what is played.
             options: see `VectorOptions` and `GameOptions`.
         """
-        if threads < 0:
-            raise ValueError(f"threads is a number of threads, or 0 for one for each core, not {threads}")
+        place = address, token, ca, thread_count(threads)
         inside, policies = split(options)
-        self._start(vector_setup(games, inside), policies, (address, token, ca, threads), transitions, reward_function)
+        self._start(vector_setup(games, inside), policies, place, transitions, reward_function)
 
     def _start(
         self,

@@ -1,5 +1,6 @@
 """The options of a `VectorEnv`, and the first request of its stream. The stream is in `vector`."""
 
+import operator
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
@@ -26,6 +27,8 @@ NETWORK_SUFFIX = ".safetensors"
 MAX_NETWORK_BYTES = 64 << 20
 _SEED_BYTES = 32
 _MAX_BASE_SEED = 2**64 - 1
+# More would only wait for each other; each takes memory of its own.
+_MAX_THREADS = 256
 
 
 class Seeded(Protocol):
@@ -217,6 +220,22 @@ def put_seed(request: Seeded, seed: Seed) -> None:
         if not isinstance(one, bytes) or len(one) != _SEED_BYTES:
             raise ValueError(f"seed {number} is not {_SEED_BYTES} bytes")
     request.game_seeds.seeds.extend(seed)
+
+
+def thread_count(threads: int) -> int:
+    """Checks a number of threads, 0 for one for each core."""
+    return whole("threads", threads, 0, _MAX_THREADS)
+
+
+def whole(argument: str, value: int, low: int, high: int) -> int:
+    """Returns a whole number as Python's. Raises TypeError if it is none, ValueError if it is not in `low..=high`."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{argument} is a whole number, not {value!r}") from None
+    if not low <= number <= high:
+        raise ValueError(f"{argument} is {low}..={high}, not {number}")
+    return number
 
 
 def choice(argument: str, name: str, enum: Any, prefix: str) -> Any:  # noqa: ANN401 - Enums have no type in common.
