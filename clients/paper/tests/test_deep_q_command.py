@@ -14,7 +14,7 @@ from chefshat import pb
 from chefshat.learn import network, runs
 from waiting import LIMIT_S, wait_until
 
-from chefshat_paper.learn import checkpoint, deep_q
+from chefshat_paper.learn import checkpoint, deep_q, deep_q_command
 from chefshat_paper.learn.__main__ import main, parse
 from chefshat_paper.learn.deep_q import DeepQConfig
 
@@ -117,6 +117,23 @@ def test_contradicting_parameters_are_refused(place: Place, full_rules: pb.RuleS
     place.parameters.write_text(json.dumps({"parameters": {**SMALL, "batch_size": 8}}))
     assert main(place.arguments(5, "--resume")) == 1
     assert "batch size 4, not 8" in capsys.readouterr().err
+
+
+def test_a_second_training_does_not_write_the_files_of_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    training = ["deep-q", "--out", str(tmp_path / "one.safetensors")]
+
+    def train(*_: object) -> None:
+        assert main(training) == 1
+        raise ValueError("started")
+
+    monkeypatch.setattr(deep_q_command, "_train", train)
+    assert main(training) == 1
+    first, second = capsys.readouterr().err.splitlines()
+    assert "one.training exists" in first
+    assert second == "error: started"
+    assert not list(tmp_path.iterdir())
 
 
 def test_resuming_needs_a_checkpoint(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -149,6 +149,8 @@ def test_parameters_are_tuned_and_trained_with(real_address: str, tmp_path: Path
     for trial in again:
         assert trial["parameters"] == tuned["trials"][trial["number"]]["parameters"]
         assert f"{trial['value']:.1%} ({trial['least']:.1%} to {trial['most']:.1%}): trial {trial['number']}" in table
+    assert main(command) == 1
+    assert "tuned.json exists: replace it with --force" in capsys.readouterr().err
     # Everything is seeded: the same command has the same result.
     assert main([*command[:2], str(tmp_path / "again.json"), *command[3:], "--json"]) == 0
     same = json.loads(capsys.readouterr().out)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from chefshat.learn import __main__ as command
-from chefshat.learn import network, ppo_checkpoint
+from chefshat.learn import network, ppo_checkpoint, ppo_command
 from chefshat.learn.evaluation import evaluate
 from chefshat.learn.ppo import Hyperparameters
 from chefshat.learn.ppo_checkpoint import Opponent, Plan
@@ -182,6 +182,23 @@ def test_a_best_response_begins_with_a_network(real_address: str, tmp_path: Path
     assert [layer.bias.shape for layer in network.load(second).layers] == [layer.bias.shape for layer in begun.layers]
     (curves,) = (tmp_path / "curves").iterdir()
     assert all(tag in curves.read_bytes() for tag in (b"losses/entropy", b"points_per_shift/trained"))
+
+
+def test_a_second_training_does_not_write_the_files_of_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    training = ["ppo", "--out", str(tmp_path / "one.safetensors"), "--decisions", "1"]
+
+    def start(_: object) -> None:
+        assert command.main(training) == 1
+        raise ValueError("started")
+
+    monkeypatch.setattr(ppo_command, "_start", start)
+    assert command.main(training) == 1
+    first, second = capsys.readouterr().err.splitlines()
+    assert "one.jsonl exists" in first
+    assert second == "error: started"
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_command_reports_errors(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

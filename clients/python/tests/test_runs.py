@@ -2,6 +2,7 @@
 
 import os
 import signal
+from pathlib import Path
 
 import pytest
 
@@ -26,6 +27,25 @@ def test_a_limited_number_of_commands_is_stored() -> None:
     assert commands.endswith("; command 0998; command 0999")
     assert commands.count("[...]") == 1
     assert len(runs.trained_by("", "x" * 100_000)) <= runs.MAX_TRAINED_BY
+
+
+def test_files_are_reserved_before_the_work(tmp_path: Path) -> None:
+    out, log = tmp_path / "out", tmp_path / "log"
+    with runs.reserved(out, log, replace=False):
+        # Another process would be refused, too.
+        with pytest.raises(FileExistsError, match="continue that training with --resume, replace it with --force"):
+            runs.reserved(out, log, replace=False).__enter__()
+        assert not out.exists()
+    assert not list(tmp_path.iterdir())
+    with runs.reserved(log, replace=False):
+        log.write_text("done")
+    with runs.reserved(log, replace=True):
+        pass
+    assert log.read_text() == "done"
+    with pytest.raises(FileExistsError, match="log exists: replace it"):
+        runs.reserved(log, out, replace=False, can_resume=False).__enter__()
+    with pytest.raises(FileNotFoundError, match="there is no folder"):
+        runs.reserved(tmp_path / "missing" / "out", replace=True).__enter__()
 
 
 def test_the_first_ctrl_c_requests_a_stop_and_the_second_interrupts() -> None:

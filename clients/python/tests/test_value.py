@@ -42,6 +42,24 @@ def test_the_command_learns_points(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "has outputs for points" in capsys.readouterr().err
 
 
+def test_files_are_checked_before_games_are_played(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "points.safetensors"
+
+    def play(*_: object) -> None:
+        # A second command, while the first one plays.
+        assert command.main(["value", "trained", "--out", str(out)]) == 1
+        raise ValueError("played")
+
+    monkeypatch.setattr(value, "play", play)
+    assert command.main(["value", "trained", "--out", str(out)]) == 1
+    assert [line.split(": ")[1] for line in capsys.readouterr().err.splitlines()] == [f"{out} exists", "played"]
+    assert command.main(["value", "trained", "--out", str(tmp_path / "missing" / "points")]) == 1
+    assert "there is no folder" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 def test_samples_follow_from_the_seed() -> None:
     trained = network.load("trained")
     (samples, rules), (again, _) = (value.play(trained, Path("trained"), 1500, 1, "paper", None) for _ in range(2))

@@ -38,6 +38,7 @@ def _tune(command: argparse.ArgumentParser) -> None:
     command.add_argument("--agents", type=count, default=3, help="agents trained in parallel with each set")
     command.add_argument("--shifts", type=count, default=100, help="Shifts that each agent plays; the second half counts")
     _deep_q_games(command)
+    add_force(command)
 
 
 def _deep_q_games(command: argparse.ArgumentParser) -> None:

@@ -42,12 +42,8 @@ def run(options: argparse.Namespace) -> int:
     out: Path = options.out
     state: Path = options.checkpoint or out.with_suffix(".training")
     try:
-        for path in (out, state):
-            if not path.parent.is_dir():
-                raise ValueError(f"there is no folder {path.parent} to write {path.name} to")
-        if not (options.resume or options.force):
-            runs.refuse_to_replace(out, state)
-        played = _train(options, state)
+        with runs.reserved(out, state, replace=options.resume or options.force):
+            played = _train(options, state)
     except Stopped as stopped:
         if options.json:
             print(json.dumps({"event": "interrupted", "file": str(out), "training": str(state), "shifts": stopped.shifts}))

@@ -65,7 +65,10 @@ def run(options: argparse.Namespace) -> int:
     configs: list[DeepQConfig] = []
     again: list[Trial] = []
     try:
-        with tqdm(total=options.trials + 2, unit=" trials", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar:
+        with (
+            runs.reserved(options.out, replace=options.force, can_resume=False),
+            tqdm(total=options.trials + 2, unit=" trials", file=sys.stderr, disable=not sys.stderr.isatty(), leave=False) as bar,
+        ):
             for _ in range(options.trials):
                 asked = study.ask()
                 configs.append(dataclasses.replace(_proposed(asked), mask=options.mask))

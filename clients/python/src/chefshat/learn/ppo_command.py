@@ -41,15 +41,12 @@ def run(options: argparse.Namespace) -> int:
     state: Path = options.checkpoint or out.with_suffix(".training")
     log: Path = options.log or out.with_suffix(".jsonl")
     try:
-        if not out.parent.is_dir():
-            raise ValueError(f"there is no folder {out.parent} to write {out.name} to")
-        if not (options.resume or options.force):
-            runs.refuse_to_replace(out, state, log)
-        training = _resume(state, options) if options.resume else _start(options)
-        with Trainer(training, address=join_options.server_if_any(options)) as trainer, _log_file(log, append=options.resume):
-            LOG.info(json.dumps(_setup(trainer.training)))
-            with Scalars(options.tensorboard) as scalars:
-                evaluations = _train(trainer, options, state, scalars)
+        with runs.reserved(out, state, log, replace=options.resume or options.force):
+            training = _resume(state, options) if options.resume else _start(options)
+            with Trainer(training, address=join_options.server_if_any(options)) as trainer, _log_file(log, append=options.resume):
+                LOG.info(json.dumps(_setup(trainer.training)))
+                with Scalars(options.tensorboard) as scalars:
+                    evaluations = _train(trainer, options, state, scalars)
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)
     if options.json:

@@ -3,9 +3,10 @@
 The file of a training is in `training_file`, the training itself in the modules of the agents.
 """
 
+import contextlib
 import signal
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any, Self
@@ -40,12 +41,40 @@ def existing(training: Path) -> Path:
     return training
 
 
-def refuse_to_replace(*files: Path, can_resume: bool = True) -> None:
-    """Raises FileExistsError, saying what to do, if any of the files that a new training would write exists."""
+@contextlib.contextmanager
+def reserved(*files: Path, replace: bool, can_resume: bool = True) -> Iterator[None]:
+    """Reserves the files that a command writes, before it begins with the work.
+
+    Unless it replaces them, the last one is created, empty, so that another command that would write it is refused. If it is still
+    empty at the end, it is removed.
+
+    Args:
+        files: the files.
+        replace: whether existing ones are replaced or resumed.
+        can_resume: whether the command has --resume.
+
+    Raises:
+        FileNotFoundError: there is no folder for one of them.
+        FileExistsError: one exists, and is not replaced. The message says what to do.
+    """
     resume = "continue that training with --resume, " if can_resume else ""
+    words = f"exists: {resume}replace it with --force, or give another --out"
     for file in files:
-        if file.exists():
-            raise FileExistsError(f"{file} exists: {resume}replace it with --force, or give another --out")
+        if not file.parent.is_dir():
+            raise FileNotFoundError(f"there is no folder {file.parent} to write {file.name} to")
+        if file.exists() and not replace:
+            raise FileExistsError(f"{file} {words}")
+    last = files[-1]
+    if not replace:
+        try:
+            last.touch(exist_ok=False)
+        except FileExistsError:
+            raise FileExistsError(f"{last} {words}") from None
+    try:
+        yield
+    finally:
+        if not replace and last.exists() and last.stat().st_size == 0:
+            last.unlink()
 
 
 def trained_by(before: str, command: str) -> str:

@@ -82,30 +82,35 @@ class Samples:
 def run(options: argparse.Namespace) -> int:
     """Runs the command: plays, learns, writes the network and prints how well it knows. Returns the exit code."""
     try:
-        if not options.force:
-            runs.refuse_to_replace(options.out, can_resume=False)
-        policy = network.load(options.policy)
-        samples, rules = play(
-            policy, options.policy, options.decisions, options.seed, options.rules, join_options.server_if_any(options)
-        )
-        params, found = learn(samples, options.width, options.epochs, options.seed, float(max(rules.points)))
-        info = NetworkInfo(
-            input="table",
-            output="points",
-            output_activation="none",
-            masked=True,
-            players=rules.players,
-            faces=rules.faces,
-            jokers=rules.jokers,
-            rules=MessageToJson(rules, indent=None, sort_keys=True),
-            name=f"value of {policy.info.name or options.policy}"[:64],
-            trained_by=runs.trained_by("", options.trained_by),
-        )
-        network.save(options.out, to_layers(params), info, dtype=np.float16)
+        with runs.reserved(options.out, replace=options.force, can_resume=False):
+            found = _train(options)
     except (ChefsHatError, NetworkFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)
     print(json.dumps(dataclasses.asdict(found)) if options.json else f"{options.out} {found}")
     return 0
+
+
+def _train(options: argparse.Namespace) -> Learned:
+    """Plays, learns and writes the network."""
+    policy = network.load(options.policy)
+    samples, rules = play(
+        policy, options.policy, options.decisions, options.seed, options.rules, join_options.server_if_any(options)
+    )
+    params, found = learn(samples, options.width, options.epochs, options.seed, float(max(rules.points)))
+    info = NetworkInfo(
+        input="table",
+        output="points",
+        output_activation="none",
+        masked=True,
+        players=rules.players,
+        faces=rules.faces,
+        jokers=rules.jokers,
+        rules=MessageToJson(rules, indent=None, sort_keys=True),
+        name=f"value of {policy.info.name or options.policy}"[:64],
+        trained_by=runs.trained_by("", options.trained_by),
+    )
+    network.save(options.out, to_layers(params), info, dtype=np.float16)
+    return found
 
 
 def play(
