@@ -16,6 +16,23 @@ def test_given_options_are_distinguished_from_defaults() -> None:
     assert "steps" not in options.given
 
 
+@pytest.mark.parametrize(
+    ("option", "values", "words"),
+    [
+        ("--gae-lambda", ("7", "-0.1", "nan"), "must be from 0 to 1"),
+        ("--value-learning-rate", ("-1", "nan", "inf"), "must be 0 or more"),
+        ("--entropy-bonus", ("-1", "nan", "inf"), "must be 0 or more"),
+        ("--learning-rate", ("0", "nan", "inf"), "must be above 0"),
+        ("--clip", ("0", "nan", "inf"), "must be above 0"),
+    ],
+)
+def test_impossible_plans_are_refused(option: str, values: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for value in values:
+        with pytest.raises(SystemExit):
+            parse(["ppo", "--out", "o", "--minutes", "1", f"{option}={value}"])
+        assert words in capsys.readouterr().err
+
+
 def test_a_limited_number_of_commands_is_stored() -> None:
     assert runs.trained_by("", "first") == "first"
     assert runs.trained_by("first", "second") == "first; second"

@@ -4,7 +4,19 @@ import argparse
 from pathlib import Path
 
 from chefshat import join_options
-from chefshat.learn.command import Given, Program, above_zero, add_force, add_games, add_rules, count, json_object, natural
+from chefshat.learn.command import (
+    Given,
+    Program,
+    above_zero,
+    add_force,
+    add_games,
+    add_rules,
+    count,
+    json_object,
+    natural,
+    share,
+    zero_or_more,
+)
 
 EXAMPLES = """examples:
   python -m chefshat.learn ppo --out strong.safetensors --minutes 30 --seed 1
@@ -84,10 +96,10 @@ def _ppo(command: argparse.ArgumentParser) -> None:
     )
     plan.add_argument("--learning-rate", type=above_zero, default=5e-4, help="initial learning rate; decays to a twentieth")
     plan.add_argument(
-        "--value-learning-rate", type=float, default=0.0, help="initial learning rate of the value network; 0: the same"
+        "--value-learning-rate", type=zero_or_more, default=0.0, help="initial learning rate of the value network; 0: the same"
     )
-    plan.add_argument("--entropy-bonus", type=float, default=0.01, help="initial weight of the entropy; decays to a tenth")
-    plan.add_argument("--gae-lambda", "--trace", type=float, default=0.95, help="lambda of the advantage estimation")
+    plan.add_argument("--entropy-bonus", type=zero_or_more, default=0.01, help="initial weight of the entropy; decays to a tenth")
+    plan.add_argument("--gae-lambda", "--trace", type=share, default=0.95, help="lambda of the advantage estimation")
     plan.add_argument("--clip", type=above_zero, default=0.2, help="clip range of the probability ratio")
 
 
