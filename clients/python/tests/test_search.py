@@ -1,6 +1,8 @@
 """Search from what a seat knows: deals, estimates, and agents that play by them."""
 
 import importlib.util
+import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -461,3 +463,36 @@ def test_threads_have_a_limit(threads: int) -> None:
     ):
         with pytest.raises(ValueError, match=rf"threads is 0\.\.=256, not {threads}"):
             call()
+
+
+@pytest.mark.parametrize("halving", [False, True])
+def test_a_number_of_rollouts_is_not_exceeded(halving: bool) -> None:
+    position = busy_position()
+    actions = len(position.legal_actions)
+    for budget in (4 * actions, 5 * actions - 1, 400, 2000):
+        found = position.evaluate(budget, halving=halving, threads=1)
+        assert budget - actions < found.rollouts.sum() <= budget
+    # Every action is tried in 4 deals.
+    assert (position.evaluate(1, halving=halving).rollouts == 4).all()
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="pins threads to a core")
+def test_a_budget_in_time_is_time_of_the_processor() -> None:
+    """Not of a clock: another program takes half of the core."""
+
+    def own_ns() -> int:
+        return int(Path("/proc/thread-self/schedstat").read_text().split()[0])
+
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(before)})
+    busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+    try:
+        if not (start := own_ns()):
+            pytest.skip("this system does not count it")
+        busy_position().evaluate(time_ms=400, threads=1)
+        # It is known to a few milliseconds.
+        assert own_ns() - start > 350_000_000
+    finally:
+        busy.kill()
+        busy.wait()
+        os.sched_setaffinity(0, before)

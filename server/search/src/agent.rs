@@ -3,7 +3,6 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Instant;
 
 use chefshat_agents::{AgentMaker, Budget, BuiltInAgent, Following, MonteCarlo, NamedAgent};
 use chefshat_engine::{ActionId, Event, Mask, Observation, RuleSet, Seat};
@@ -173,12 +172,7 @@ impl Choice<'_> {
         pool: Option<&ThreadPool>,
         stopped: impl Fn() -> bool,
     ) -> Result<Vec<Estimate>, KnowledgeError> {
-        let start = Instant::now();
-        let own = OwnTime::start();
-        let used = || match pool {
-            None => own.used(),
-            Some(_) => start.elapsed(),
-        };
+        let time_used = OwnTime::of_search(pool);
         let knowledge = Knowledge::new(self.rules, self.observation, self.history)?;
         let sampler = Sampler::new(knowledge, MAX_STEPS)?;
         let others = self.legal.iter().filter(|action| *action != self.prior);
@@ -190,7 +184,7 @@ impl Choice<'_> {
         let progress = |rollouts: u64| match plays.budget {
             _ if stopped() => 1.0,
             Budget::Rollouts(all) => rollouts as f64 / all as f64,
-            Budget::Time(time) => used().as_secs_f64() / time.as_secs_f64(),
+            Budget::Time(time) => time_used.used().as_secs_f64() / time.as_secs_f64(),
         };
         Ok(evaluate(&sampler, &actions, &method, seed, pool, progress))
     }

@@ -155,6 +155,8 @@ pub struct Evaluation {
     rounds: u32,
     worlds: u64,
     rollouts: u64,
+    /// The most rollouts of all actions.
+    most: Option<u64>,
 }
 
 impl Evaluation {
@@ -170,7 +172,27 @@ impl Evaluation {
             },
             worlds: 0,
             rollouts: 0,
+            most: None,
         }
+    }
+
+    /// Makes batches of deals smaller where they would exceed this number of rollouts, or a round's
+    /// part of it. Each action is still tried in 4 deals.
+    pub fn at_most(self, rollouts: u64) -> Evaluation {
+        Evaluation {
+            most: Some(rollouts),
+            ..self
+        }
+    }
+
+    /// Deals that are left to the round.
+    fn deals_left(&self) -> u64 {
+        let of_round = |most| {
+            let part = u128::from(most) * u128::from(self.round) / u128::from(self.rounds);
+            let part = u64::try_from(part).expect("a round has at most all rollouts");
+            part.saturating_sub(self.rollouts)
+        };
+        self.most.map_or(u64::MAX, of_round) / self.active.len() as u64
     }
 
     /// The estimates so far, in the order of the actions.
@@ -193,7 +215,7 @@ impl Evaluation {
     ) -> bool {
         while self.worlds > 0 {
             let part = f64::from(self.round) / f64::from(self.rounds);
-            if progress(self.rollouts) < part {
+            if progress(self.rollouts) < part && self.deals_left() > 0 {
                 break;
             }
             if self.round >= self.rounds {
@@ -205,8 +227,13 @@ impl Evaluation {
         let tried: Vec<ActionId> = (self.active.iter())
             .map(|&index| self.estimates[index].action)
             .collect();
-        let batch =
-            self.worlds..self.worlds + (self.worlds / 8).clamp(*BATCH.start(), *BATCH.end());
+        let deals = match self.worlds {
+            0 => *BATCH.start(),
+            before => (before / 8)
+                .clamp(*BATCH.start(), *BATCH.end())
+                .min(self.deals_left()),
+        };
+        let batch = self.worlds..self.worlds + deals;
         let in_world = |world| evaluate_in(sampler, &tried, &method.policy, seed, world);
         let merged = |mut all: Vec<Estimate>, more: Vec<Estimate>| {
             all.iter_mut()

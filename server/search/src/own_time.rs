@@ -3,6 +3,8 @@
 
 use std::time::{Duration, Instant};
 
+use rayon::ThreadPool;
+
 /// The scheduler's counters of the calling thread on Linux; the first is its processor time in
 /// nanoseconds.
 const COUNTERS: &str = "/proc/thread-self/schedstat";
@@ -21,6 +23,16 @@ impl OwnTime {
         OwnTime {
             start: Instant::now(),
             own: processor_time(),
+        }
+    }
+
+    /// Starts to measure a search on these threads: with a pool, where others than the caller's
+    /// compute, the time that passes.
+    pub fn of_search(pool: Option<&ThreadPool>) -> OwnTime {
+        let own = OwnTime::start();
+        OwnTime {
+            own: own.own.filter(|_| pool.is_none()),
+            ..own
         }
     }
 
@@ -56,5 +68,16 @@ mod tests {
         std::thread::sleep(Duration::from_millis(300));
         assert!(measured.used() < Duration::from_millis(300));
         assert!(processor_time().is_some_and(|now| now >= before));
+    }
+
+    #[test]
+    fn a_search_on_a_pool_uses_the_time_that_passes() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();
+        let pool = pool.expect("threads start");
+        let on_pool = OwnTime::of_search(Some(&pool));
+        let alone = OwnTime::of_search(None);
+        std::thread::sleep(Duration::from_millis(300));
+        assert!(on_pool.used() >= Duration::from_millis(300));
+        assert_eq!(alone.own.is_some(), processor_time().is_some());
     }
 }

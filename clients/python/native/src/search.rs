@@ -12,8 +12,8 @@ use chefshat_record::convert::{
     FieldProblem, rules_from_proto, rules_to_proto, script_to_proto, situation_from_proto,
 };
 use chefshat_search::{
-    Allocation, Chance, Estimate, Knowledge, KnowledgeError, Method, RolloutPolicy, Sampler,
-    ShiftHistory, Worth, choose, evaluate, likely_hands, outcomes, play_on,
+    Allocation, Chance, Estimate, Evaluation, Knowledge, KnowledgeError, Method, OwnTime,
+    RolloutPolicy, Sampler, ShiftHistory, Worth, choose, likely_hands, outcomes, play_on,
 };
 use chefshat_simulation::vector::SavedGame;
 use chefshat_vector::RequestError;
@@ -163,7 +163,8 @@ impl Position {
         threads: usize,
         seed: u64,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let start = Instant::now();
+        let pool = pool(threads);
+        let time_used = OwnTime::of_search(pool.as_deref());
         let method = Method {
             policy: rollout_policy(policy, self.rule_set()).map_err(|error| refused(py, error))?,
             allocation: match halving {
@@ -172,24 +173,24 @@ impl Position {
             },
         };
         let actions = self.legal(actions).map_err(|error| refused(py, error))?;
-        let pool = pool(threads);
         let interrupts = Interrupts::new();
         let progress = |done: u64| {
             let share = |spent: f64, all: u64| if all == 0 { 0.0 } else { spent / all as f64 };
-            let elapsed = 1000.0 * start.elapsed().as_secs_f64();
+            let elapsed = 1000.0 * time_used.used().as_secs_f64();
             match interrupts.seen() {
                 true => 1.0,
                 false => share(done as f64, rollouts).max(share(elapsed, time_ms)),
             }
         };
-        let found = py.detach(|| {
-            caught(|| {
-                let (sampler, pool) = (&self.sampler, pool.as_deref());
-                evaluate(sampler, &actions, &method, bytes(seed), pool, progress)
-            })
-        })?;
+        let mut evaluation = Evaluation::new(&actions, method.allocation);
+        if rollouts > 0 {
+            evaluation = evaluation.at_most(rollouts);
+        }
+        let (sampler, pool, seed) = (&self.sampler, pool.as_deref(), bytes(seed));
+        let mut step = || evaluation.step(sampler, &method, seed, pool, progress);
+        py.detach(|| caught(|| while !step() {}))?;
         interrupts.result()?;
-        estimates(py, &found)
+        estimates(py, evaluation.estimates())
     }
 
     /// Points and places of the seat for each action in each of `deals` deals from `first` on, which

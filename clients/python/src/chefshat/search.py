@@ -182,9 +182,9 @@ class Position:
         The budget is `rollouts`, `time_ms`, both, or `deals`.
 
         Args:
-            rollouts: the budget in all: the result depends on the seed and not on the threads. Every action that is tried at all is
-                tried in 4 deals at least.
-            time_ms: the budget in milliseconds.
+            rollouts: the budget in all: the result depends on the seed and not on the threads. It is only exceeded because every
+                action that is tried at all is tried in 4 deals at least.
+            time_ms: the budget in milliseconds: with one thread, on Linux, time of the processor, or else the time that passes.
             deals: every action is tried in the deals that `sample(deals, seed)` draws. See `outcomes`, whose means these are.
             agent: who plays all seats in the rollouts: "random", "greedy", "trained", or the path of a network file.
             actions: the A actions to try; gains refer to the first of them. Default: all legal ones.

@@ -268,7 +268,8 @@ impl Analysis {
             self.stage = Stage::Counted(Box::new(Evaluating {
                 likely: LikelyHands::new(&sampler),
                 hands: None,
-                evaluation: Evaluation::new(&actions, self.plan.method.allocation),
+                evaluation: Evaluation::new(&actions, self.plan.method.allocation)
+                    .at_most(self.plan.rollouts),
                 sampler,
             }));
         }

@@ -3,7 +3,7 @@
 use chefshat_agents::{AgentKind, AgentMaker as _, Budget, BuiltInAgent, MonteCarlo};
 use chefshat_engine::{ActionId, BySeat, Cards, RuleSet, RuleSetSpec, Script, Seat};
 use chefshat_search::{
-    Allocation, Chance, Estimate, Method, RolloutPolicy, Sampler, Searchers, evaluate,
+    Allocation, Chance, Estimate, Evaluation, Method, RolloutPolicy, Sampler, Searchers, evaluate,
     likely_hands, outcomes, play_on,
 };
 
@@ -64,6 +64,29 @@ fn a_winning_play_is_worth_the_first_place() {
     );
     assert_eq!(found[0].rollouts, found[1].rollouts);
     assert!((400..=440).contains(&(found[0].rollouts * 2)));
+}
+
+#[test]
+fn a_limit_of_rollouts_is_kept() {
+    let scenario = Scenario::random(rules(6, 4), 3, Some(&[2, 0, 3, 1]));
+    let moment = busiest(&scenario);
+    let sampler = sampler(&scenario, moment);
+    let legal: Vec<ActionId> = scenario.legal(moment).iter().collect();
+    let actions = legal.len() as u64;
+    for allocation in [Allocation::Uniform, Allocation::Halving] {
+        let method = Method {
+            allocation,
+            ..METHOD
+        };
+        for most in [1, 4 * actions, 5 * actions - 1, 400, 2000] {
+            let mut evaluation = Evaluation::new(&legal, allocation).at_most(most);
+            while !evaluation.step(&sampler, &method, [5; 32], None, spend(most)) {}
+            let count = |found: &Estimate| found.rollouts;
+            let all: u64 = evaluation.estimates().iter().map(count).sum();
+            let expected = most.max(4 * actions);
+            assert!(all <= expected && all + actions > expected, "{all} {most}");
+        }
+    }
 }
 
 #[test]
