@@ -2,9 +2,10 @@
 
 import importlib.util
 import os
+import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -496,3 +497,42 @@ def test_a_budget_in_time_is_time_of_the_processor() -> None:
         busy.kill()
         busy.wait()
         os.sched_setaffinity(0, before)
+
+
+def calls_of_signals(call: Callable[[], object]) -> int:
+    """Returns how often Python looked for signals during a call, of those that came every 5 ms."""
+    looked = 0
+
+    def look(*_: object) -> None:
+        nonlocal looked
+        looked += 1
+
+    before = signal.signal(signal.SIGALRM, look)
+    signal.setitimer(signal.ITIMER_REAL, 0.005, 0.005)
+    try:
+        call()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    return looked
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs signals of a timer")
+def test_ctrl_c_interrupts_long_calls() -> None:
+    # The engine itself, without the loops in Python around it.
+    with VectorEnv(history=HISTORY, seed=3) as env:
+        state = env.save()[0]
+    native = search.position(state)._native
+
+    def refused() -> None:
+        with pytest.raises(ChefsHatError, match="not a state of a game"):
+            search.choose([state] * 60_000 + [b"other"])
+
+    for call in (
+        lambda: native.sample(60_000, 1),
+        lambda: native.starts(30_000, 1),
+        lambda: native.expected_hands(300_000, 1),
+        refused,
+    ):
+        # One before the call, and one after it, do not count.
+        assert calls_of_signals(call) > 3

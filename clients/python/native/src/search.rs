@@ -100,16 +100,13 @@ impl Position {
         seed: u64,
     ) -> PyResult<Bound<'py, PyArray1<u8>>> {
         let faces = self.rule_set().faces();
-        let hands = py.detach(|| {
-            caught(|| {
-                let games = (0..deals).map(|deal| self.sampler.game(&mut stream(seed, deal)));
-                games
-                    .flat_map(|game| {
-                        let hands = game.hands().values().copied().collect::<Vec<_>>();
-                        hands.into_iter().flat_map(move |hand| hand.counts(faces))
-                    })
-                    .collect::<Vec<u8>>()
-            })
+        let of_deal = |deal| {
+            let game = self.sampler.game(&mut stream(seed, deal));
+            let hands = game.hands().values().copied().collect::<Vec<_>>();
+            hands.into_iter().flat_map(move |hand| hand.counts(faces))
+        };
+        let hands = in_chunks(py, deals, |part| {
+            part.flat_map(of_deal).collect::<Vec<u8>>()
         })?;
         Ok(PyArray1::from_vec(py, hands))
     }
@@ -132,7 +129,9 @@ impl Position {
             }
             .encode_to_vec()
         };
-        py.detach(|| caught(|| (first..first + deals).map(start).collect()))
+        in_chunks(py, deals, |part| {
+            part.map(|deal| start(first + deal)).collect()
+        })
     }
 
     /// The cards that each seat holds on average over these deals, one seat after the other.
@@ -142,8 +141,13 @@ impl Position {
         deals: u64,
         seed: u64,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let progress = |done: u64| done as f64 / deals as f64;
+        let interrupts = Interrupts::new();
+        let progress = |done: u64| match interrupts.seen() {
+            true => 1.0,
+            false => done as f64 / deals as f64,
+        };
         let hands = py.detach(|| caught(|| likely_hands(&self.sampler, bytes(seed), progress)))?;
+        interrupts.result()?;
         Ok(PyArray1::from_vec(py, hands.concat()))
     }
 
@@ -284,7 +288,7 @@ pub(crate) fn play_states<'py>(
     threads: usize,
     seed: u64,
 ) -> PyResult<Shifts<'py>> {
-    let games = open_games(&states).map_err(|error| refused(py, error))?;
+    let games = open_games(py, &states)?;
     let Some(rules) = games.first().map(|game| *game.rules()) else {
         return Ok(shifts(py, &[]));
     };
@@ -328,7 +332,7 @@ pub(crate) fn choose_actions<'py>(
     policy: Policy,
     seed: u64,
 ) -> PyResult<Bound<'py, PyArray1<u16>>> {
-    let games = open_games(&states).map_err(|error| refused(py, error))?;
+    let games = open_games(py, &states)?;
     let Some(rules) = games.first().map(|game| *game.rules()) else {
         return Ok(PyArray1::from_vec(py, Vec::new()));
     };
@@ -345,23 +349,30 @@ pub(crate) fn choose_actions<'py>(
 }
 
 /// The games of states, in all of which a decision is open, and which have the same size.
-fn open_games(states: &[Bound<'_, PyBytes>]) -> Result<Vec<Game>, RequestError> {
+fn open_games(py: Python<'_>, states: &[Bound<'_, PyBytes>]) -> PyResult<Vec<Game>> {
     let size = |game: &Game| {
         let rules = game.rules();
         (rules.players(), rules.faces(), rules.hand_size())
     };
-    let mut games: Vec<Game> = Vec::with_capacity(states.len());
-    for (number, state) in states.iter().enumerate() {
-        let saved = SavedGame::from_bytes(state.as_bytes())?;
+    let open_game = |number: usize, first: Option<&Game>| {
+        let saved = SavedGame::from_bytes(states[number].as_bytes())?;
         let game = saved.game().filter(|game| game.decision().is_some());
         let words = format!("state {number}: its game is over");
         let game = game.ok_or_else(|| field("states", words))?;
-        if games.first().is_some_and(|first| size(first) != size(game)) {
+        if first.is_some_and(|first| size(first) != size(game)) {
             let words =
                 "give states of games with the same numbers of players, faces and cards dealt";
             return Err(field("states", words));
         }
-        games.push(game.clone());
+        Ok(game.clone())
+    };
+    let mut games: Vec<Game> = Vec::with_capacity(states.len());
+    for number in 0..states.len() {
+        if number % CHUNK as usize == 0 {
+            py.check_signals()?;
+        }
+        let game = open_game(number, games.first()).map_err(|error| refused(py, error))?;
+        games.push(game);
     }
     Ok(games)
 }
