@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 import chefshat
 from chefshat import ChefsHatError, VectorEnv, history, pb, search
 from chefshat.estimates import Estimates, Outcomes
+from chefshat.learn import network
 from chefshat.search import Position
 
 pytest.importorskip("chefshat_native")
@@ -442,10 +444,11 @@ def test_a_prior_shares_the_rollouts() -> None:
     ("options", "words"),
     [
         ({"deals": 4, "rollouts": 4}, "deals is a budget of its own"),
-        ({"deals": 0}, "draw 1"),
+        ({"deals": 0}, r"the number of deals is 1\.\.=100000, not 0"),
+        ({"rollouts": 4, "seed": -1}, r"a seed is 0\.\.="),
         ({"rollouts": 4, "weights": [1, 1]}, "weights and leaf need deals"),
         ({"time_ms": 4, "prior": [1.0]}, "leave out time_ms and halving"),
-        ({"rollouts": 100_001, "prior": [1.0]}, r"a prior needs 1\.\.=100000 rollouts"),
+        ({"rollouts": 100_001, "prior": [1.0]}, r"rollouts with a prior is 1\.\.=100000, not 100001"),
     ],
 )
 def test_budgets_that_contradict(options: dict[str, Any], words: str) -> None:
@@ -536,3 +539,35 @@ def test_ctrl_c_interrupts_long_calls() -> None:
     ):
         # One before the call, and one after it, do not count.
         assert calls_of_signals(call) > 3
+
+
+def test_wrong_arguments_are_named() -> None:
+    position = busy_position()
+    with VectorEnv(games=2, seed=1) as env:
+        states = env.save()
+    calls: list[tuple[str, Callable[[], object]]] = [
+        (f"an agent is .*, not a {kind}", partial(call, agent=agent))
+        for kind, agent in (("NoneType", None), ("ndarray", np.zeros(2)), ("Network", network.load("trained")))
+        for call in (
+            partial(position.evaluate, 8),
+            partial(position.evaluate, deals=8),
+            partial(search.choose, states),
+            partial(search.play_on, states),
+        )
+    ]
+    wrong: Any = None
+    calls += [
+        ("a position is that of an environment.*, not of a NoneType", partial(search.position, wrong)),
+        ("the number of deals is a whole number, not 10.5", partial(position.sample, 10.5)),  # type: ignore[arg-type]
+        ("a seed is a whole number, not 1.5", partial(position.evaluate, 8, seed=1.5)),  # type: ignore[arg-type]
+        ("a seed is a whole number, not 1.5", partial(search.choose, states, seed=1.5)),  # type: ignore[arg-type]
+        ("rollouts", partial(position.evaluate, 8.5)),  # type: ignore[arg-type]
+        ("rollouts with a prior", partial(position.evaluate, 8.5, prior=[1.0] * len(position.legal_actions))),  # type: ignore[arg-type]
+    ]
+    for words, call in calls:
+        with pytest.raises(TypeError, match=words):
+            call()
+    action = int(position.legal_actions[0])
+    for actions in (action, [float(action)], [[action]]):
+        with pytest.raises(ChefsHatError, match="give a list of at least one action"):
+            position.evaluate(8, actions=actions)  # type: ignore[arg-type]

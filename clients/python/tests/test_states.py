@@ -192,6 +192,10 @@ def test_what_cannot_be_restored_is_refused(anywhere: str | None) -> None:
             env.restore([0, 1], states[:1])
         with pytest.raises(ValueError, match="games are integers"):
             env.save([2])
+        with pytest.raises(TypeError, match="state 1 is not bytes, as `save` returns them, but a str"):
+            env.restore([0, 1], [states[0], "x"])  # type: ignore[list-item]
+        # Nothing has changed.
+        assert env.save() == states
         with pytest.raises(ChefsHatError, match="not a state of a game: they are damaged") as refused:
             env.restore([0], [states[0][:-1] + b"?"])
         assert refused.value.reason == "STATES_REFUSED"

@@ -20,7 +20,7 @@ from chefshat.errors import ChefsHatError
 from chefshat.estimates import Estimates, Outcomes, checked_prior, mean_and_error, scores
 from chefshat.opponents import selected
 from chefshat.vector import Batch, VectorEnv
-from chefshat.vector_setup import is_network_file, network_content, thread_count
+from chefshat.vector_setup import is_network_file, network_content, thread_count, whole
 
 if TYPE_CHECKING:
     import chefshat_native
@@ -89,7 +89,7 @@ def play_on(
     Raises:
         ChefsHatError: STATES_REFUSED or ANALYSIS_REFUSED says what is wrong with a state or an agent.
     """
-    agents = [agent] if isinstance(agent, (str, Path)) else list(agent)
+    agents = list(agent) if isinstance(agent, Sequence) and not isinstance(agent, str) else [agent]
     with _engine() as native:
         points, places = native.play_states(
             list(states), [_policy(one) for one in agents], threads=thread_count(threads), seed=_seed(seed)
@@ -210,8 +210,9 @@ class Position:
         if prior is not None:
             if time_ms or halving:
                 raise ValueError("a prior shares rollouts by halving: leave out time_ms and halving")
-            if not rollouts or rollouts > MAX_DEALS or considered < 1:
-                raise ValueError(f"a prior needs 1..={MAX_DEALS} rollouts, and considers 1 action or more")
+            if not rollouts or considered < 1:
+                raise ValueError("a prior needs rollouts, and considers 1 action or more")
+            rollouts = whole("the number of rollouts with a prior", rollouts, 1, MAX_DEALS)
             chosen = self._chosen(actions)
             return self._by_prior(rollouts, chosen, checked_prior(prior, len(chosen)), considered, agent, threads, seed)
         with _engine():
@@ -258,8 +259,8 @@ class Position:
         if actions is None:
             return self.legal_actions
         chosen = np.asarray(actions)
-        if not len(chosen) or not np.isin(chosen, self.legal_actions).all():
-            raise ChefsHatError("ANALYSIS_REFUSED", "actions: give at least one action, and only legal ones")
+        if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iu" or not np.isin(chosen, self.legal_actions).all():
+            raise ChefsHatError("ANALYSIS_REFUSED", "actions: give a list of at least one action, and only legal ones")
         return chosen.astype(np.uint16)
 
     def _shifts(
@@ -381,19 +382,17 @@ def _state(at: VectorEnv | Wrapper | bytes, row: int) -> bytes:
     """Returns the state of the game of a row."""
     if isinstance(at, bytes):
         return at
-    env: VectorEnv = at if isinstance(at, VectorEnv) else at.unwrapped.vector  # type: ignore[attr-defined] # See `Wrapper`.
+    env = at if isinstance(at, VectorEnv) else getattr(getattr(at, "unwrapped", None), "vector", None)
+    if not isinstance(env, VectorEnv):
+        raise TypeError(f"a position is that of an environment, a Decision or a state (bytes), not of a {type(at).__name__}")
     if not 0 <= row < len(env.batch):
         raise ValueError(f"there is no row {row}: the latest batch has {len(env.batch)}")
     return env.save(env.batch.games[row : row + 1])[0]
 
 
 def _checked(deals: int) -> int:
-    if not 1 <= deals <= MAX_DEALS:
-        raise ValueError(f"draw 1..={MAX_DEALS} deals, not {deals}")
-    return int(deals)
+    return whole("the number of deals", deals, 1, MAX_DEALS)
 
 
 def _seed(seed: int) -> int:
-    if not 0 <= seed <= _MAX_SEED:
-        raise ValueError(f"a seed is 0..={_MAX_SEED}, not {seed}")
-    return int(seed)
+    return whole("a seed", seed, 0, _MAX_SEED)

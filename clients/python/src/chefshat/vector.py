@@ -24,7 +24,7 @@ from chefshat.errors import ChefsHatError
 from chefshat.masks import sample_legal
 from chefshat.opponents import Policies, Policy, PolicyGames, split
 from chefshat.transitions import Memory, RewardFunction, Transitions
-from chefshat.vector_setup import GameOptions, Rules, Seed, VectorOptions, put_seed, thread_count, vector_setup
+from chefshat.vector_setup import GameOptions, Rules, Seed, VectorOptions, put_seed, thread_count, vector_setup, whole
 
 __all__ = [
     "Batch",
@@ -216,9 +216,7 @@ class VectorEnv:
             seed: begins a new sequence of draws, 0..2**64-1; None: continues the sequence, which initially is a random one.
         """
         self._check_open()
-        if seed is not None and not 0 <= seed < 2**64:
-            raise ValueError(f"a seed is 0..={2**64 - 1}, not {seed}")
-        chosen, first = (self._sampling_seed, self._drawn) if seed is None else (int(seed), 0)
+        chosen, first = (self._sampling_seed, self._drawn) if seed is None else (whole("a seed", seed, 0, 2**64 - 1), 0)
         actions = self._games.sample(self.batch, chosen, first)
         self._sampling_seed, self._drawn = chosen, first + len(self.batch)
         return actions
@@ -304,6 +302,9 @@ class VectorEnv:
             raise ValueError(f"name each game once and give one state for each: {len(chosen)} games and {len(states)} states")
         if not len(chosen):
             return self.batch
+        for number, state in enumerate(states):
+            if not isinstance(state, bytes):
+                raise TypeError(f"state {number} is not bytes, as `save` returns them, but a {type(state).__name__}")
         largest = max(len(state) for state in states)
         if self.server is not None and largest > MAX_STATES_BYTES:
             raise ValueError(f"a state of {largest} bytes is too large for a server: restore it in this process, without `address`")

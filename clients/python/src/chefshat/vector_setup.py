@@ -155,7 +155,9 @@ def vector_setup(games: int, options: VectorOptions) -> pb.VectorSetup:
 
 
 def is_network_file(agent: str | PathLike[str]) -> bool:
-    """Returns whether this names a network file, and not a built-in agent."""
+    """Returns whether this names a network file, and not a built-in agent. Raises TypeError if it is no name."""
+    if not isinstance(agent, str | PathLike):
+        raise TypeError(f"an agent is the name of a built-in one or the path of a network file, not a {type(agent).__name__}")
     return isinstance(agent, PathLike) or agent.endswith(NETWORK_SUFFIX)
 
 
