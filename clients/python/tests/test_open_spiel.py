@@ -73,6 +73,12 @@ def test_rules_are_parameters() -> None:
         pyspiel.load_game("python_chefshat", {"faces": 3})
 
 
+@pytest.mark.parametrize("history", [0, -5])
+def test_a_tensor_without_actions_is_refused(history: int) -> None:
+    with pytest.raises(Exception, match=f"1 or more, not {history}"):
+        pyspiel.load_game("python_chefshat", {"history": history})
+
+
 def test_clones_are_independent_and_observations_are_those_of_the_player(game: Any) -> None:
     state = game.new_initial_state()
     state.apply_action(3)

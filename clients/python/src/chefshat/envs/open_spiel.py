@@ -9,7 +9,7 @@ and one Shift of a small deck, one of all deals, each as likely as it is. Everyt
 serialized states and clones work as in other games. A clone takes the same time after any number of moves. `VectorEnv` is faster.
 
 `resample_from_infostate` draws from all deals that agree with what the player who decides knows, each equally likely, with
-`chefshat.search`: search by sampled deals, such as OpenSpiel's IS-MCTS, needs nothing else.
+`chefshat.search`: search by sampled deals, such as OpenSpiel's IS-MCTS in Python, needs nothing else.
 
 A player's observation is that of its current or last decision, in the form "table"; zeros before its first.
 
@@ -301,7 +301,7 @@ class ChefsHatGame(pyspiel.Game):  # type: ignore[misc]  # OpenSpiel has no type
 
     Raises:
         ChefsHatError: RULE_SET_REFUSED: there is no such rule set.
-        ValueError: `deals` is negative, or 0 with several Shifts or too many deals.
+        ValueError: `deals` is negative, or 0 with several Shifts or too many deals; or `history` is less than 1.
     """
 
     def __init__(self, params: Mapping[str, Any] | None = None) -> None:
@@ -309,6 +309,10 @@ class ChefsHatGame(pyspiel.Game):  # type: ignore[misc]  # OpenSpiel has no type
         rules = {name: given[name] for name, unset in _RULES.items() if given[name] != unset}
         options: dict[str, Any] = {"games": 1, "rules": {"preset": given["rules"], "target_shifts": given["shifts"], **rules}}
         self.deals, self.shifts, self.history = (int(given[name]) for name in ("deals", "shifts", "history"))
+        if self.history < 1:
+            raise ValueError(
+                f"history is the number of actions in the tensor of an information state, 1 or more, not {self.history}"
+            )
         with VectorEnv(seed=0, **options) as env:
             self.sizes = env.sizes
             points, turns, self.texts = list(env.rules.points), env.rules.max_turns, env.action_texts
