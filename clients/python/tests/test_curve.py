@@ -87,6 +87,34 @@ def test_runs_that_differ_in_their_seed_are_one_line() -> None:
         figure([runs[0], against_random])
 
 
+def test_runs_of_other_experiments_are_other_lines() -> None:
+    def labelled(*logs: str) -> list[str]:
+        return [line.label for line in figure([read(log) for log in logs]).panels[0].lines]
+
+    one, other = a_run(1, 3.0), a_run(2, 3.0)
+    assert labelled(one, other) == ["the policy: interquartile mean of 2 runs"]
+    other_rules = other.replace("[5, 3, 1, 0]", "[3, 2, 1, 0]")
+    assert labelled(one, other_rules) == ["rules points [5, 3, 1, 0]", "rules points [3, 2, 1, 0]"]
+    assert not figure([read(one), read(other_rules)]).panels[0].levels
+    begun = [log.replace('"games": 256', f'"games": 256, "begin_with": "{file}"') for log, file in ((one, ""), (other, "a"))]
+    assert labelled(*begun) == ["begin_with none", "begin_with a"]
+    with pytest.raises(ValueError, match="two runs of the same settings have the seed 1"):
+        labelled(one, other, one)
+
+
+def test_evaluations_of_a_resumed_training_count_once() -> None:
+    (setup, first, last) = a_run(1, 3.0).splitlines()
+    again, stopped = json.dumps(a_look(0, 0.75)), json.dumps({**a_look(5, 0.25), "stopped": True})
+    assert [
+        (line["decisions"], line["evaluations"][0]["points"])
+        for line in read("\n".join([setup, first, stopped, setup, again, last])).evaluations
+    ] == [
+        (0, 0.75),
+        (2_001_000, 3.0),
+    ]
+    assert [line["decisions"] for line in read("\n".join([setup, first, stopped])).evaluations] == [0, 5]
+
+
 def test_interquartile_means() -> None:
     assert interquartile_mean(np.arange(8.0))[0] == 3.5
     assert interquartile_mean(np.array([0.0, 1, 2, 3, 100]))[0] == 2

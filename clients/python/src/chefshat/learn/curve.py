@@ -25,12 +25,14 @@ class Run:
     """A training.
 
     Attributes:
-        plan: its settings by name, without the seed.
-        evaluations: the lines of its evaluations.
+        plan: its settings by name, with those of its rules, without the seed.
+        seed: its seed; None if the log does not say.
+        evaluations: the lines of its evaluations, in order. Those of an interruption are left out if the training was resumed.
         mean: the mean points of all seats; None if the log does not say.
     """
 
     plan: Mapping[str, Any]
+    seed: int | None
     evaluations: Sequence[Mapping[str, Any]]
     mean: float | None
 
@@ -47,24 +49,31 @@ def read(log: str) -> Run:
     setup = next((line for line in lines if line.get("event") == "setup"), {})
     rules, plan = setup.get("rules"), dict(setup.get("plan", {}))
     hyper = plan.pop("hyper", {})
-    return Run({**plan, **hyper}, evaluated, sum(rules["points"]) / rules["players"] if rules else None)
+    settings = {**plan, **hyper, **{f"rules {name}": value for name, value in (rules or {}).items()}}
+    # A training that was resumed may have evaluated twice at the same place.
+    due = [line for line in evaluated if line is evaluated[-1] or not line.get("stopped")]
+    evaluations = list({line["decisions"]: line for line in due}.values())
+    return Run(settings, setup.get("seed"), evaluations, sum(rules["points"]) / rules["players"] if rules else None)
 
 
 def figure(runs: Sequence[Run]) -> Figure:
     """Returns the points per Shift at each evaluation, over the decisions of the training.
 
     A line is one training, with 95% intervals of its evaluations; or the runs with the same settings, with the interquartile mean
-    and its interval over the runs. Raises ValueError if they have not been evaluated alike.
+    and its interval over the runs. Raises ValueError if they have not been evaluated alike, or if two of them are the same run.
     """
     groups: list[list[Run]] = []
     for run in runs:
         group = next((group for group in groups if group[0].plan == run.plan), None)
+        if group is not None and run.seed is not None and run.seed in [other.seed for other in group]:
+            raise ValueError(f"two runs of the same settings have the seed {run.seed}: give each run once, and runs of other seeds")
         groups.append([run]) if group is None else group.append(run)
     opponents = [one["opponents"] for one in runs[0].evaluations[0]["evaluations"]]
     for run in runs:
         if [one["opponents"] for one in run.evaluations[0]["evaluations"]] != opponents:
             raise ValueError("the trainings were evaluated against different opponents: draw them apart")
-    mean = runs[0].mean
+    means = {run.mean for run in runs}
+    mean = runs[0].mean if len(means) == 1 else None
     panels = [
         Panel(
             title=f"Against {len(names)} {names[0]}",
@@ -82,7 +91,7 @@ def _label(group: Sequence[Run], groups: Sequence[Sequence[Run]]) -> str:
     """Names what distinguishes the settings of a group."""
     plan = group[0].plan
     differing = [name for name, value in plan.items() if any(other[0].plan.get(name) != value for other in groups)]
-    label = ", ".join(f"{name} {plan[name]}" for name in differing) or "the policy"
+    label = ", ".join(f"{name} {'none' if plan[name] == '' else plan[name]}" for name in differing) or "the policy"
     return label if len(group) == 1 else f"{label}: interquartile mean of {len(group)} runs"
 
 
