@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from chefshat.learn import __main__ as command
-from chefshat.learn import network, ppo_checkpoint, ppo_command
+from chefshat.learn import curve, network, ppo_checkpoint, ppo_command
 from chefshat.learn.evaluation import evaluate
 from chefshat.learn.ppo import Hyperparameters
 from chefshat.learn.ppo_checkpoint import Opponent, Plan
@@ -137,22 +137,45 @@ def test_the_command_writes_its_files_and_resumes(real_address: str, tmp_path: P
     assert network.load(out).info.trained_by == trained.info.trained_by
 
     options = [*options, "--resume"]
-    for option, given, stored in (("games", 32, 16), ("width", 9, 8), ("seed", 4, 3)):
+    for option, given, stored in (("games", 32, 16), ("width", 9, 8), ("seed", 4, 3), ("evaluations", 3, 2)):
         assert command.main([*options, f"--{option}", str(given), "--decisions", "1024"]) == 1
         assert f"{option} {stored}, not {given}" in json.loads(capsys.readouterr().out)["message"]
     assert command.main([*options, "--rules", "rulebook", "--decisions", "1024"]) == 1
     assert "rules points" in json.loads(capsys.readouterr().out)["message"]
 
-    assert command.main([*options, "--evaluations", "2", "--decisions", "1024"]) == 0
+    assert command.main([*options, "--decisions", "1024"]) == 0
     output = json.loads(capsys.readouterr().out)
     assert (output["decisions"], output["updates"], output["runs"]) == (1024, 4, 2)
     assert [evaluation["games"] for evaluation in output["evaluations"]] == [4, 4]
+    lines = [json.loads(line) for line in (tmp_path / "small.jsonl").read_text().splitlines()]
+    assert [line["decisions"] for line in lines if line["event"] == "evaluation"] == [0, 256, 512, 1024]
     assert network.load(out).info.trained_by.count("python -m chefshat.learn ppo") == 2
     assert any((old.weight != new.weight).any() for old, new in zip(trained.layers, network.load(out).layers, strict=True))
 
     assert command.main(["evaluate", str(out), "--opponents", "greedy", "--games", "3", "--address", real_address, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (found["opponents"], found["games"], sum(found["places"])) == (["greedy"] * 3, 3, found["shifts"])
+
+
+def test_an_interrupted_training_is_evaluated_like_another(
+    real_address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = tmp_path / "small.jsonl"
+    options = ["ppo", "--out", str(log.with_suffix(".safetensors")), "--address", real_address, "--decisions", "1024"]
+    plan = ["--games", "16", "--steps", "16", "--minibatches", "2", "--width", "8", "--evaluations", "2", "--evaluation-games", "2"]
+    update = Trainer.update
+
+    def interrupted(trainer: Trainer, done: float) -> dict[str, float]:
+        if trainer.training.progress.decisions == 256:
+            raise KeyboardInterrupt
+        return update(trainer, done)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Trainer, "update", interrupted)
+        assert command.main([*options, *plan]) == 0
+    assert [line["decisions"] for line in curve.read(log.read_text()).evaluations] == [0, 256]
+    assert command.main([*options, "--resume"]) == 0
+    assert [line["decisions"] for line in curve.read(log.read_text()).evaluations] == [0, 512, 1024]
 
 
 @pytest.mark.slow

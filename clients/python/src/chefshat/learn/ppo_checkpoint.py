@@ -78,6 +78,8 @@ class Plan:
         discount: factor of a reward one decision later, gamma.
         gae_lambda: lambda of the generalised advantage estimation.
         evaluation_games: games against each opponent in an evaluation.
+        evaluations: number of evaluations and checkpoints, besides the one before the first update.
+        begin_with: the file of the initial policy; empty: a new one.
         hyper: the networks and what else is compiled in.
     """
 
@@ -93,6 +95,8 @@ class Plan:
     discount: float = 1.0
     gae_lambda: float = 0.95
     evaluation_games: int = 400
+    evaluations: int = 20
+    begin_with: str = ""
     hyper: Hyperparameters = field(default_factory=Hyperparameters)
 
     def __post_init__(self) -> None:

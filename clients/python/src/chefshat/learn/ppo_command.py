@@ -43,10 +43,11 @@ def run(options: argparse.Namespace) -> int:
     try:
         with runs.reserved(out, state, log, replace=options.resume or options.force):
             training = _resume(state, options) if options.resume else _start(options)
+            evaluated = _evaluated(log) if options.resume else None
             with Trainer(training, address=join_options.server_if_any(options)) as trainer, _log_file(log, append=options.resume):
                 LOG.info(json.dumps(_setup(trainer.training)))
                 with Scalars(options.tensorboard) as scalars:
-                    evaluations = _train(trainer, options, state, scalars)
+                    evaluations = _train(trainer, options, state, scalars, evaluated)
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)
     if options.json:
@@ -76,6 +77,8 @@ def _start(options: argparse.Namespace) -> Training:
         entropy_bonus=options.entropy_bonus,
         gae_lambda=options.gae_lambda,
         evaluation_games=options.evaluation_games,
+        evaluations=options.evaluations,
+        begin_with="" if options.begin_with is None else str(options.begin_with),
         hyper=Hyperparameters(
             policy_widths=widths,
             value_widths=(options.value_width,) * 2,
@@ -114,20 +117,29 @@ def _resume(state: Path, options: argparse.Namespace) -> Training:
     added = next((opponent for opponent in plan.opponents if opponent.arguments), Opponent(""))
     fixed: dict[str, object] = {"opponents": opponents, "opponent_python": added.python, "opponent_arguments": added.arguments}
     fixed |= {"seed": training.seed, "width": hyper.policy_widths[0], "value_width": hyper.value_widths[0]}
-    runs.refuse_contradictions(options.given, {**dataclasses.asdict(plan), **dataclasses.asdict(hyper), **fixed})
+    fixed = {**dataclasses.asdict(plan), **dataclasses.asdict(hyper), **fixed, "begin_with": Path(plan.begin_with)}
+    if not plan.begin_with:
+        # Older checkpoints do not say.
+        del fixed["begin_with"]
+    runs.refuse_contradictions(options.given, fixed)
     if "rules" in options.given:
         runs.refuse_other_rules(runs.full_rules(options.rules, join_options.server_if_any(options)), training.rules)
     return dataclasses.replace(training, trained_by=runs.trained_by(training.trained_by, options.trained_by))
 
 
-def _train(trainer: Trainer, options: argparse.Namespace, state: Path, scalars: Scalars) -> list[Evaluation]:
-    """Trains until the budget is used up, or until Ctrl-C. Returns the last evaluations."""
-    next_evaluation = _share_done(options, trainer.training.progress)
+def _train(trainer: Trainer, options: argparse.Namespace, state: Path, scalars: Scalars, evaluated: int | None) -> list[Evaluation]:
+    """Trains until the budget is used up, or until Ctrl-C. Returns the last evaluations.
+
+    `evaluated`: after how many decisions the last evaluation was; None: there is none.
+    """
+    evaluations = trainer.training.plan.evaluations
+    done = _share_done(options, trainer.training.progress)
+    next_evaluation = _next_evaluation(done, evaluations) if evaluated == trainer.training.progress.decisions else done
     losses: dict[str, float] = {}
     with _bar() as bar, contextlib.suppress(KeyboardInterrupt):
         while (done := _share_done(options, trainer.training.progress)) < 1:
             if done >= next_evaluation:
-                next_evaluation += 1 / options.evaluations
+                next_evaluation = _next_evaluation(done, evaluations)
                 # Saves first: an evaluation may fail.
                 ppo_checkpoint.save(state, trainer.training)
                 _evaluate(trainer, options, losses, scalars)
@@ -139,9 +151,23 @@ def _train(trainer: Trainer, options: argparse.Namespace, state: Path, scalars: 
     ppo_checkpoint.save(state, trainer.training)
     trained = trainer.training.network(options.name)
     network.save(options.out, trained.layers, trained.info, dtype=np.float16)
-    evaluations = _evaluate(trainer, options, losses, scalars)
+    stopped = _share_done(options, trainer.training.progress) < 1
+    last = _evaluate(trainer, options, losses, scalars, stopped=stopped)
     ppo_checkpoint.save(state, trainer.training)
-    return evaluations
+    return last
+
+
+def _next_evaluation(done: float, evaluations: int) -> float:
+    """Returns the share of the budget at the next evaluation, which is the same in a training that was not interrupted."""
+    before = int(done * evaluations)
+    return next(share for share in (number / evaluations for number in range(before, before + 3)) if share > done)
+
+
+def _evaluated(log: Path) -> int | None:
+    """Returns the decisions before the last evaluation of a log; None if there is none."""
+    lines = log.read_text(encoding="utf-8").splitlines() if log.exists() else []
+    found = [json.loads(line) for line in lines if line.startswith('{"event": "evaluation"') and line.endswith("}")]
+    return int(found[-1]["decisions"]) if found else None
 
 
 def _share_done(options: argparse.Namespace, progress: Progress) -> float:
@@ -150,8 +176,10 @@ def _share_done(options: argparse.Namespace, progress: Progress) -> float:
     return float(min(share, 1.0))
 
 
-def _evaluate(trainer: Trainer, options: argparse.Namespace, losses: dict[str, float], scalars: Scalars) -> list[Evaluation]:
-    """Plays against the built-in agents, and logs the results."""
+def _evaluate(
+    trainer: Trainer, options: argparse.Namespace, losses: dict[str, float], scalars: Scalars, *, stopped: bool = False
+) -> list[Evaluation]:
+    """Plays against the built-in agents, and logs the results. `stopped`: since Ctrl-C was pressed, not since it was due."""
     began = time.monotonic()
     training = trainer.training
     current = training.network(options.name)
@@ -174,7 +202,8 @@ def _evaluate(trainer: Trainer, options: argparse.Namespace, losses: dict[str, f
     trainer.training = dataclasses.replace(training, progress=progress)
     points = {",".join(evaluation.opponents): evaluation.points for evaluation in evaluations}
     scalars.add("points_per_shift", points, progress.decisions)
-    LOG.info(json.dumps({"event": "evaluation", **_summary(trainer.training, evaluations), "losses": losses}))
+    line = {"event": "evaluation", **_summary(trainer.training, evaluations), "losses": losses}
+    LOG.info(json.dumps({**line, "stopped": True} if stopped else line))
     return evaluations
 
 
