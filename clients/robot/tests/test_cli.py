@@ -29,6 +29,13 @@ def test_every_subcommand_has_help_with_an_example(name: str, capsys: pytest.Cap
     assert capsys.readouterr().out.count(f"chefshat-robot {name}") > 1
 
 
+@pytest.mark.parametrize("option", ["--mistakes", "--face-down"])
+def test_shares_of_a_rehearsal_are_from_0_to_1(option: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for share in ("7", "-0.1", "nan"):
+        assert cli.main(["rehearse", f"{option}={share}", "--ticket", "none"]) != 0
+        assert f"{option} is from 0 to 1" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"), [([], "required: COMMAND"), (["fly"], "invalid choice: 'fly'"), (["--fly"], "required: COMMAND")]
 )

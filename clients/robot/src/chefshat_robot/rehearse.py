@@ -50,6 +50,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Runs the subcommand. Returns 0 when the game has ended."""
     if not 1 <= arguments.people <= PLAYERS or not 0 <= arguments.open <= PLAYERS - arguments.people:
         raise CommandError(f"a table has {PLAYERS} seats: people at the table and open seats together are at most {PLAYERS}")
+    for option, share in (("--mistakes", arguments.mistakes), ("--face-down", arguments.face_down)):
+        if not 0 <= share <= 1:
+            raise CommandError(f"{option} is from 0 to 1, not {share}")
 
     async def play() -> int:
         async with aio.Client(server_of(arguments)) as client:
