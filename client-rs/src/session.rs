@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use crate::seat::SeatSession;
-use crate::tickets::{News, PARTICIPANT, Tickets, pack};
+use crate::tickets::{PARTICIPANT, TicketEvent, Tickets, pack};
 use crate::v1;
 use crate::{Agent, Outcome, PlayError, PlayOptions};
 
@@ -78,8 +78,8 @@ impl<'a, A: Agent> Session<'a, A> {
     /// Processes a response, then collects the commands of every seat.
     pub(crate) fn receive(&mut self, response: v1::PlayResponse) -> Vec<v1::PlayRequest> {
         for update in response.updates {
-            if let Some((number, news)) = self.tickets.take(update) {
-                self.learn(number, news);
+            if let Some((number, event)) = self.tickets.take(update) {
+                self.take_event(number, event);
             }
         }
         self.progress |= self.tickets.take_progress();
@@ -96,6 +96,9 @@ impl<'a, A: Agent> Session<'a, A> {
     /// Handles the loss of a stream: seats that know the result of their game are settled.
     pub(crate) fn disconnected(&mut self) {
         for number in self.tickets.disconnected() {
+            if number == PARTICIPANT {
+                self.end.get_or_insert(Ok(()));
+            }
             self.settle(number, Ok(()));
         }
     }
@@ -132,11 +135,11 @@ impl<'a, A: Agent> Session<'a, A> {
         Ok(outcomes.filter_map(Result::ok).collect())
     }
 
-    fn learn(&mut self, number: u32, news: News) {
-        match news {
-            News::Entered(_) => {}
-            News::Attached(attached) => self.attached(number, attached),
-            News::Update(update) => {
+    fn take_event(&mut self, number: u32, event: TicketEvent) {
+        match event {
+            TicketEvent::Entered(_) => {}
+            TicketEvent::Attached(attached) => self.attached(number, attached),
+            TicketEvent::Update(update) => {
                 let Some(seat) = self.seats.get_mut(&number) else {
                     return;
                 };
@@ -145,7 +148,7 @@ impl<'a, A: Agent> Session<'a, A> {
                     self.asked.push(number);
                 }
             }
-            News::Over(_, end) => {
+            TicketEvent::Over(_, end) => {
                 if number == PARTICIPANT {
                     self.end.get_or_insert(end.clone());
                 }

@@ -57,6 +57,8 @@ enum State<T> {
     Open {
         stream: Box<Streaming<T>>,
         since: Instant,
+        /// Whether a state has come.
+        has_state: bool,
     },
 }
 
@@ -108,7 +110,11 @@ impl<T: Send + 'static> Reconnecting<T> {
                     match opened.unwrap_or_else(|error| Err(Status::unknown(error.to_string()))) {
                         Ok(stream) => {
                             let (stream, since) = (Box::new(stream), Instant::now());
-                            self.state = State::Open { stream, since };
+                            self.state = State::Open {
+                                stream,
+                                since,
+                                has_state: false,
+                            };
                         }
                         Err(status) => return Err(self.lost(status)),
                     }
@@ -118,6 +124,15 @@ impl<T: Send + 'static> Reconnecting<T> {
                     return message.map_err(|status| self.lost(status));
                 }
             }
+        }
+    }
+
+    /// Ends the outage if this is not the first state of the stream: each stream begins with one.
+    pub(crate) fn received_state(&mut self) {
+        if let State::Open { has_state, .. } = &mut self.state
+            && std::mem::replace(has_state, true)
+        {
+            self.outage.over();
         }
     }
 

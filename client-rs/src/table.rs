@@ -88,6 +88,7 @@ impl TableFollower {
                 // A response without a state is a heartbeat.
                 Ok(response) => {
                     if let Some(state) = response.state {
+                        self.stream.received_state();
                         self.over = state.stage() == v1::TableStage::Over;
                         return Ok(Some(state));
                     }

@@ -9,7 +9,7 @@ use crate::client::Client;
 use crate::error::{Error, PlayError};
 use crate::options::Entropy;
 use crate::run::PlayStream;
-use crate::tickets::{News, PARTICIPANT, Tickets, command, pack};
+use crate::tickets::{PARTICIPANT, TicketEvent, Tickets, command, pack};
 use crate::v1::act_request::Command;
 use crate::v1::{self, seat_command, seat_update::Update};
 
@@ -24,6 +24,7 @@ impl Client {
             stream: PlayStream::new(self.channel(), Backoff::default()),
             tickets,
             ready: VecDeque::new(),
+            detaching: Vec::new(),
             failure: None,
         }
     }
@@ -59,7 +60,7 @@ impl Client {
     }
 }
 
-/// What a [`TicketFollower`] learns. Games are named by their id.
+/// What a [`TicketFollower`] returns. Games are named by their id.
 #[derive(Debug, Clone)]
 pub enum Followed {
     /// The ticket is a participant's, which is in its tournament. Sent again after each connection.
@@ -82,6 +83,8 @@ pub struct TicketFollower {
     /// The ticket, as a participant's, and its seats.
     tickets: Tickets,
     ready: VecDeque<Followed>,
+    /// Commands of the current stream that wait to be sent.
+    detaching: Vec<v1::SeatCommand>,
     /// Why no more updates will come after those in `ready`, unless everything is over.
     failure: Option<PlayError>,
 }
@@ -101,6 +104,11 @@ impl TicketFollower {
     /// See [`PlayError`]. After an error there are no more updates.
     pub async fn next(&mut self) -> Result<Option<Followed>, PlayError> {
         loop {
+            if !self.detaching.is_empty() {
+                // Nothing is sent if this is cancelled.
+                self.stream.send(pack(self.detaching.clone())).await;
+                self.detaching.clear();
+            }
             if let Some(followed) = self.ready.pop_front() {
                 return Ok(Some(followed));
             }
@@ -113,10 +121,11 @@ impl TicketFollower {
             match self.stream.next(|| self.tickets.attach()).await {
                 Ok(response) => {
                     self.take(response);
-                    self.stream.send(pack(self.tickets.detach())).await;
+                    self.detaching.extend(self.tickets.detach());
                 }
                 Err(broken) => {
                     self.tickets.disconnected();
+                    self.detaching.clear();
                     match broken.of_seats() {
                         _ if self.tickets.is_empty() => {}
                         Ok(error) => self.ready.push_back(Followed::Lost(error)),
@@ -142,20 +151,22 @@ impl TicketFollower {
 
     fn take(&mut self, response: v1::PlayResponse) {
         for update in response.updates {
-            let Some((number, news)) = self.tickets.take(update) else {
+            let Some((number, event)) = self.tickets.take(update) else {
                 continue;
             };
             let game = || self.tickets.game_id(number).to_owned();
-            let followed = match news {
-                News::Entered(entered) => Followed::Entered(entered),
-                News::Attached(it) => Followed::Update(game(), Box::new(Update::Attached(it))),
-                News::Update(update) => Followed::Update(game(), Box::new(update)),
-                News::Over(_, Ok(())) => continue,
-                News::Over(_, Err(error)) if number == PARTICIPANT => {
+            let followed = match event {
+                TicketEvent::Entered(entered) => Followed::Entered(entered),
+                TicketEvent::Attached(it) => {
+                    Followed::Update(game(), Box::new(Update::Attached(it)))
+                }
+                TicketEvent::Update(update) => Followed::Update(game(), Box::new(update)),
+                TicketEvent::Over(_, Ok(())) => continue,
+                TicketEvent::Over(_, Err(error)) if number == PARTICIPANT => {
                     self.fail(error);
                     continue;
                 }
-                News::Over(game, Err(error)) => Followed::Gone(game, error),
+                TicketEvent::Over(game, Err(error)) => Followed::Gone(game, error),
             };
             self.ready.push_back(followed);
         }

@@ -46,7 +46,7 @@ struct Ticket {
     clippy::large_enum_variant,
     reason = "each is handled at once and not kept"
 )]
-pub(crate) enum News {
+pub(crate) enum TicketEvent {
     /// The participant is in its tournament.
     Entered(v1::Entered),
     /// The seat is attached: of a ticket that was added, or of a participant's game.
@@ -198,17 +198,17 @@ impl Tickets {
 
     /// Handles an update: the number of its ticket and what is new. `None` for what is known
     /// already, and for handles and numbers of no ticket.
-    pub(crate) fn take(&mut self, update: v1::SeatUpdate) -> Option<(u32, News)> {
+    pub(crate) fn take(&mut self, update: v1::SeatUpdate) -> Option<(u32, TicketEvent)> {
         let handle = update.handle;
         match update.update? {
             Update::Attached(attached) => {
                 let number = self.attached(handle, &attached)?;
-                Some((number, News::Attached(attached)))
+                Some((number, TicketEvent::Attached(attached)))
             }
             Update::Entered(entered) => {
                 self.tickets.get_mut(&PARTICIPANT)?.entered = true;
                 self.assign(handle, PARTICIPANT);
-                Some((PARTICIPANT, News::Entered(entered)))
+                Some((PARTICIPANT, TicketEvent::Entered(entered)))
             }
             Update::Refused(refused) if refused.request_id != 0 => {
                 let number = refused.request_id;
@@ -267,7 +267,7 @@ impl Tickets {
         self.by_handle.insert(handle, number);
     }
 
-    fn seat_update(&mut self, handle: u32, mut update: Update) -> Option<(u32, News)> {
+    fn seat_update(&mut self, handle: u32, mut update: Update) -> Option<(u32, TicketEvent)> {
         if self.ignored.contains_key(&handle) {
             return None;
         }
@@ -306,10 +306,10 @@ impl Tickets {
             }
             _ => {}
         }
-        Some((number, News::Update(update)))
+        Some((number, TicketEvent::Update(update)))
     }
 
-    fn settle(&mut self, number: u32, end: Result<(), PlayError>) -> Option<(u32, News)> {
+    fn settle(&mut self, number: u32, end: Result<(), PlayError>) -> Option<(u32, TicketEvent)> {
         let ticket = self.tickets.remove(&number)?;
         if let Some(handle) = ticket.handle {
             self.by_handle.remove(&handle);
@@ -317,7 +317,7 @@ impl Tickets {
         if ticket.ended {
             self.played.insert(ticket.game_id.clone());
         }
-        Some((number, News::Over(ticket.game_id, end)))
+        Some((number, TicketEvent::Over(ticket.game_id, end)))
     }
 }
 

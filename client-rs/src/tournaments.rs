@@ -294,6 +294,7 @@ impl TournamentFollower {
                 // A report without a tournament is a heartbeat.
                 Ok(report) => {
                     if let Some(tournament) = &report.tournament {
+                        self.stream.received_state();
                         self.over = is_over(tournament);
                         return Ok(Some(report));
                     }
