@@ -16,7 +16,7 @@ use super::listen::{self, Address};
 use super::numbers::duration;
 use super::stops::Stops;
 use super::{CommandError, data_dir, lab, lan, say};
-use chefshat_server::access::{Access, AccessSettings, Mode, Role};
+use chefshat_server::access::{Access, AccessSettings, Mode, Role, TokenFile};
 use chefshat_server::cluster::LeaseTimes;
 use chefshat_server::config::{KeepGames, ServerConfig};
 use chefshat_server::limits::Shares;
@@ -272,8 +272,20 @@ impl Serve {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let settings = self.settings;
         let data_dir = match (settings.no_records, settings.data_dir.clone()) {
-            // No conflict: images and units set the variable of the data directory.
-            (true, _) => None,
+            (true, ignored) => {
+                // Images and units set the variable of the data directory.
+                if let Some(folder) = ignored
+                    && settings.access.is_none()
+                    && TokenFile::of(&folder).read()?.is_some()
+                {
+                    return Err(format!(
+                        "{} has tokens, which --no-records leaves out; leave --no-records out, or say --access open",
+                        folder.display()
+                    )
+                    .into());
+                }
+                None
+            }
             (false, data_dir) if settings.node.database.is_some() => {
                 Some(data_dir::prepare_without_records(data_dir)?)
             }

@@ -78,9 +78,10 @@ impl AtomicFile {
         path: &Path,
         open: impl Fn(&Path) -> io::Result<File>,
     ) -> Result<Self, WriteError> {
-        let path = match path.is_symlink() {
-            true => path.canonicalize().unwrap_or_else(|_| path.to_path_buf()),
-            false => path.to_path_buf(),
+        let path = match std::fs::read_link(path) {
+            // A file that does not exist yet has no canonical path.
+            Ok(target) => (path.canonicalize()).unwrap_or_else(|_| folder_of(path).join(target)),
+            Err(_) => path.to_path_buf(),
         };
         let opened = match std::fs::metadata(&path) {
             Ok(it) if !it.is_file() && !it.is_dir() => {
@@ -138,11 +139,11 @@ impl AtomicFile {
     /// The target exists, or the file system refused.
     pub fn finish_new(self) -> Result<(), WriteError> {
         if let Target::Through(_) = self.file.get_ref() {
+            // Nothing is written that waits to be.
+            let Self { path, file } = self;
+            drop(file.into_parts());
             let source = io::ErrorKind::AlreadyExists.into();
-            return Err(WriteError {
-                path: self.path.clone(),
-                source,
-            });
+            return Err(WriteError { path, source });
         }
         self.finish_by(|file, path| file.persist_noclobber(path))
     }

@@ -186,9 +186,9 @@ impl Tournament {
 /// A name as it looks: without capitals, without what only chooses the form of a symbol, and with one
 /// space for all kinds of them.
 fn looks(name: &str) -> String {
-    let words: Vec<&str> = name.split_whitespace().collect();
-    let letters = words.join(" ").to_lowercase();
-    letters.replace(|letter| matches!(letter, '\u{fe00}'..='\u{fe0f}'), "")
+    let symbols = name.replace(|letter| matches!(letter, '\u{fe00}'..='\u{fe0f}'), "");
+    let words: Vec<&str> = symbols.split_whitespace().collect();
+    words.join(" ").to_lowercase()
 }
 
 /// Name of fillers, before their number.

@@ -61,11 +61,12 @@ impl Folder {
         })
     }
 
-    /// Opens the folder, or creates it. One that has games of something else is refused.
-    /// So is one to which another run adds games.
+    /// Opens the folder, or creates it. One that has games of something else, or to which another run
+    /// adds games, is refused.
     pub(super) fn create(path: &Path, manifest: Manifest) -> Result<Self, CommandError> {
-        fs::create_dir_all(path)
-            .map_err(|error| format!("{}: {error}; name another with --out", path.display()))?;
+        check_agent(path, &manifest.agent)?;
+        let named = |error| format!("{}: {error}; name another with --out", path.display());
+        fs::create_dir_all(path).map_err(named)?;
         let lock = locked(path)?;
         let file = path.join(MANIFEST);
         if file.exists()
@@ -83,7 +84,6 @@ impl Folder {
                 .into());
             }
         }
-        check_agent(path, &manifest.agent)?;
         write_json(&file, &manifest)?;
         let folder = Self::open(path)?;
         Ok(Self {
@@ -235,7 +235,7 @@ fn locked(path: &Path) -> Result<Option<File>, CommandError> {
     if !cfg!(unix) {
         return Ok(None);
     }
-    let folder = File::open(path)?;
+    let folder = File::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
     match folder.try_lock() {
         Err(TryLockError::WouldBlock) => Err(format!(
             "another run adds games to {}; wait for it, or name another with --out",

@@ -105,6 +105,11 @@ fn links_and_pipes_stay_what_they_are() {
     assert!(link.is_symlink());
     assert_eq!(std::fs::read(&file).unwrap(), b"after");
 
+    let (missing, new) = (folder.path().join("missing"), folder.path().join("new"));
+    std::os::unix::fs::symlink("missing", &new).unwrap();
+    AtomicFile::create(&new).unwrap().finish().unwrap();
+    assert!(new.is_symlink() && missing.is_file());
+
     let pipe = folder.path().join("pipe");
     let made = std::process::Command::new("mkfifo").arg(&pipe).status();
     assert!(made.unwrap().success());
@@ -116,7 +121,10 @@ fn links_and_pipes_stay_what_they_are() {
     written.write_all(b"through").unwrap();
     written.finish().unwrap();
     assert_eq!(reading.join().unwrap(), b"through");
-    assert_eq!(names(folder.path()), ["file", "link", "pipe"]);
+    assert_eq!(
+        names(folder.path()),
+        ["file", "link", "missing", "new", "pipe"]
+    );
 }
 
 #[test]

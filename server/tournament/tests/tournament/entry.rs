@@ -102,7 +102,7 @@ fn joining_is_refused_with_a_reason() {
             (|entrant| entrant.name = "agent 1".to_owned()) as fn(&mut Entrant),
         ),
         (JoinProblem::NameTaken, |entrant| {
-            entrant.name = "Agent\u{a0} 1\u{fe0f}".to_owned();
+            entrant.name = "Agent\u{a0}\u{fe0f} 1\u{fe0f}".to_owned();
         }),
         (JoinProblem::NotStateless, |entrant| {
             entrant.stateless = false;
