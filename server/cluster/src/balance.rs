@@ -1,13 +1,12 @@
 //! How full the nodes are: which of them a new room is for, and what a node hands over so that all are equally full. Each node
 //! decides for itself, by what the others have said last.
 
-use std::cmp::Ordering;
+use std::cmp::{Ordering, Reverse};
 
-/// Fewer rooms above its share are no reason for a node to hand any over: each of them stands still for a moment.
-const TOO_FEW_TO_MOVE: u64 = 8;
-/// A node hands rooms over when it has more than this part of its share too many: two nodes at both ends differ by less than a
-/// fifth of it.
-const TENTH: u64 = 10;
+/// Rooms above its share from which a node hands some over: each of them stands still for a moment.
+const MIN_SURPLUS: u64 = 8;
+/// A node hands rooms over if those above its share are more than one in this number of its share.
+const SURPLUS_DIVISOR: u64 = 10;
 
 /// How full a node is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,18 +40,32 @@ pub fn surplus<N: Copy>(own: Load, others: &[(N, Load)]) -> Vec<(N, u64)> {
         u64::try_from(share).unwrap_or(u64::MAX)
     };
     let surplus = own.rooms.saturating_sub(share(own));
-    if surplus < TOO_FEW_TO_MOVE || surplus <= share(own) / TENTH {
+    if surplus < MIN_SURPLUS || surplus <= share(own) / SURPLUS_DIVISOR {
         return Vec::new();
     }
     let lacking = |load: Load| share(load).saturating_sub(load.rooms);
     let all_lacking: u128 = others.iter().map(|(_, it)| u128::from(lacking(*it))).sum();
-    // Other nodes may have a surplus as well: each fills the same part of what is lacking.
-    let given = others.iter().map(|(node, load)| {
-        let part = u128::from(surplus) * u128::from(lacking(*load)) / all_lacking.max(1);
-        let given = u64::try_from(part).unwrap_or(u64::MAX);
-        (*node, given.min(lacking(*load)))
-    });
-    given.filter(|(_, rooms)| *rooms > 0).collect()
+    // Other nodes may have a surplus as well: each fills the same part of what is lacking, and what rounding leaves goes to those
+    // that lack most.
+    let mut given: Vec<(N, u64, u64)> = (others.iter())
+        .map(|(node, load)| {
+            let lacks = lacking(*load);
+            let part = u128::from(surplus) * u128::from(lacks) / all_lacking.max(1);
+            (
+                *node,
+                lacks,
+                u64::try_from(part).unwrap_or(u64::MAX).min(lacks),
+            )
+        })
+        .collect();
+    given.sort_by_key(|(_, lacks, _)| Reverse(*lacks));
+    let mut left = surplus - given.iter().map(|(.., rooms)| rooms).sum::<u64>();
+    for (_, lacks, rooms) in &mut given {
+        let more = u64::from(left > 0 && *rooms < *lacks);
+        (*rooms, left) = (*rooms + more, left - more);
+    }
+    let given = given.into_iter().filter(|(.., rooms)| *rooms > 0);
+    given.map(|(node, _, rooms)| (node, rooms)).collect()
 }
 
 /// The node that a new room is for; `None` if it is this one. A full node has it created by the one that is least full, and one

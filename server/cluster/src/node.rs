@@ -190,6 +190,16 @@ impl<K: Ord + Copy> Node<K> {
         self.owned.iter().map(|(id, epoch)| (*id, *epoch))
     }
 
+    /// How many units it owns or claims.
+    pub fn taken(&self) -> usize {
+        self.owned.len() + self.claiming.len()
+    }
+
+    /// Whether it is about to hand a unit over although it stays.
+    pub fn is_leaving(&self, unit: K) -> bool {
+        self.leaving.contains(&unit)
+    }
+
     /// When it wants to be woken with [`Input::Time`]; `None` if only answers matter. It has nothing
     /// due until then.
     pub fn wakes_at_ms(&self) -> Option<u64> {

@@ -39,6 +39,9 @@ fn nodes_that_hand_over_at_once_end_up_equally_full() {
         &[900, 10, 500, 0, 0][..],
         &[1_000, 1_000, 0],
         &[37, 61, 250, 3],
+        // More nodes than rooms to hand over.
+        &[&[28][..], &[10; 19]].concat(),
+        &[&[20][..], &[8; 12]].concat(),
     ] {
         let after = balanced(loads(rooms));
         assert_eq!(after.iter().sum::<u64>(), rooms.iter().sum::<u64>());

@@ -35,8 +35,10 @@ pub struct NodeInfo {
 pub struct Heartbeat {
     /// Whether it has been reached since it joined.
     pub reached: bool,
-    /// Rooms that wait or play there.
+    /// Rooms that wait or play there, or are about to.
     pub rooms: u64,
+    /// Whether it hands over what it owns, to leave.
+    pub drains: bool,
 }
 
 /// A node that has a lease.

@@ -101,8 +101,9 @@ impl Gateway {
 
     /// The node that was named does not have it, or cannot be reached.
     pub(super) fn forget(&self, elsewhere: &Elsewhere) {
-        if let Some(found_by) = &elsewhere.found_by {
-            self.directory().forget(found_by);
+        match &elsewhere.found_by {
+            Some(found_by) => self.directory().forget(found_by),
+            None => self.directory().avoid(&elsewhere.peer),
         }
     }
 
@@ -251,8 +252,11 @@ impl Gateway {
                 Err(error) => {
                     debug!(peer = %elsewhere.peer.node, %error, "a call could not be forwarded");
                     self.forget(elsewhere);
-                    // Whether it was executed is unknown.
-                    break;
+                    // Whether it was executed is unknown. Something new is found by its request, or
+                    // waits for nobody.
+                    if elsewhere.found_by.is_some() {
+                        break;
+                    }
                 }
             }
             if attempt < ATTEMPTS {

@@ -88,6 +88,9 @@ pub trait Directory: Send + Sync + 'static {
         ready(None).boxed()
     }
 
+    /// This node could not be reached: for some time, nothing new is for it.
+    fn avoid(&self, _node: &Peer) {}
+
     /// The location of a room or tournament that is not in memory, for this caller.
     fn locate<'a>(&'a self, found_by: &'a FoundBy, caller: Key) -> BoxFuture<'a, Location>;
 

@@ -29,6 +29,9 @@ pub(crate) const LOOK_LIMIT: Duration = Duration::from_secs(2);
 /// How long it is known which nodes have a lease.
 const NODES_KNOWN_FOR: Duration = Duration::from_secs(1);
 
+/// How long nothing new is for a node that could not be reached.
+const AVOIDED_FOR: Duration = Duration::from_secs(10);
+
 /// Finds the owners of rooms and tournaments in the database.
 pub struct StoreDirectory {
     store: Arc<dyn ClusterStore>,
@@ -36,6 +39,8 @@ pub struct StoreDirectory {
     /// Owners among the other nodes.
     known: Mutex<BTreeMap<FoundBy, Peer>>,
     looking: Arc<FairSemaphore>,
+    /// Nodes that could not be reached, and until when nothing new is for them.
+    avoided: Mutex<BTreeMap<Peer, Instant>>,
     /// Locked while they are read, so that one request reads them for all.
     nodes: AsyncMutex<Option<Nodes>>,
 }
@@ -64,8 +69,13 @@ impl StoreDirectory {
             lease,
             known: Mutex::default(),
             looking: FairSemaphore::new(LOOKED_FOR_AT_ONCE, shares),
+            avoided: Mutex::default(),
             nodes: AsyncMutex::default(),
         }
+    }
+
+    fn avoided(&self) -> MutexGuard<'_, BTreeMap<Peer, Instant>> {
+        (self.avoided.lock()).expect("nothing panics under this lock")
     }
 
     fn known(&self) -> MutexGuard<'_, BTreeMap<FoundBy, Peer>> {
@@ -196,8 +206,18 @@ impl Directory for StoreDirectory {
         async move {
             let mut alive = self.living().await;
             let own_node = self.lease.node()?;
-            alive.loads.remove(&own_node);
-            let others: Vec<_> = alive.loads.into_iter().collect();
+            let now = Instant::now();
+            let others: Vec<_> = {
+                let mut avoided = self.avoided();
+                avoided.retain(|_, until| now < *until);
+                let is_other = |node: &NodeId| {
+                    let peer = alive.nodes.get(node);
+                    *node != own_node && peer.is_some_and(|peer| !avoided.contains_key(peer))
+                };
+                (alive.loads.into_iter())
+                    .filter(|(node, _)| is_other(node))
+                    .collect()
+            };
             let node = chefshat_cluster::place(own, &others)?;
             // Until it is read again, the node has one more.
             if let Some(Nodes {
@@ -222,6 +242,11 @@ impl Directory for StoreDirectory {
             found.is_ok_and(|found| found.is_some_and(|location| location.over))
         }
         .boxed()
+    }
+
+    fn avoid(&self, node: &Peer) {
+        self.avoided()
+            .insert(node.clone(), Instant::now() + AVOIDED_FOR);
     }
 
     fn forget(&self, found_by: &FoundBy) {

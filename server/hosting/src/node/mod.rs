@@ -44,8 +44,9 @@ const BALANCE_INTERVAL: Duration = Duration::from_secs(5);
 const MOVED_AT_ONCE: usize = 64;
 /// How long a full node leaves orphans to others: longer than any needs to find and claim them.
 const LEFT_TO_OTHERS: Duration = Duration::from_secs(3);
-/// How long a unit that was handed over is left to its next owner, and to others.
-const LEFT_TO_NEXT: Duration = Duration::from_secs(10);
+/// How long a unit that was handed over is left to its next owner, and to others: longer than that one
+/// needs to claim it and to beat.
+const LEFT_TO_NEXT: Duration = Duration::from_secs(5);
 /// Most orphans that are looked for at a time, so that several nodes share them.
 const ORPHANS_AT_ONCE: usize = 64;
 /// Units that are handed over at a time: each is away only from its own last commit on.
@@ -174,8 +175,8 @@ struct Task {
     /// The epochs at which units are resumed here.
     running: BTreeMap<UnitId, Epoch>,
     /// Units that this node leaves to others, and until when: it could not resume them, or has handed
-    /// them over.
-    left_alone: BTreeMap<UnitId, Instant>,
+    /// them over at an epoch.
+    left_alone: BTreeMap<UnitId, (Option<Epoch>, Instant)>,
     /// The next owners of units that are handed over because this node is too full.
     next_owners: BTreeMap<UnitId, NodeId>,
     /// Units that are this node's, at these epochs, and have nothing to run: ephemeral rooms that have
@@ -289,11 +290,11 @@ impl Task {
     /// Takes the answer of the database to something.
     fn answered(&mut self, input: Input<UnitId>) {
         let is_beat = matches!(input, Input::Beat { .. });
-        if let Input::Released(unit, _, true) = input
+        if let Input::Released(unit, epoch, true) = input
             && self.next_owners.remove(&unit).is_some()
         {
             self.units.metrics().handed_over();
-            (self.left_alone).insert(unit, Instant::now() + LEFT_TO_NEXT);
+            self.leave_alone(unit, Some(epoch), LEFT_TO_NEXT);
         }
         self.put_in(input);
         if is_beat && self.node.phase() == Phase::Serving {
@@ -327,7 +328,8 @@ impl Task {
                 let sent_ms = self.now_ms();
                 let heartbeat = Heartbeat {
                     reached: *self.reached.borrow(),
-                    rooms: self.units.fullness().rooms,
+                    rooms: self.load().rooms,
+                    drains: self.node.phase() != Phase::Serving,
                 };
                 // A beat without an answer must not take up the time of the next one, which the
                 // lease may still wait for.
@@ -416,25 +418,30 @@ impl Task {
     /// Takes orphans over. A full node first leaves them to others, and takes those that stay without
     /// an owner: games that are acknowledged come before its limit.
     fn found(&mut self, mut orphans: Vec<(UnitId, Epoch)>) {
-        orphans.retain(|(unit, _)| !self.left_alone.contains_key(unit));
+        orphans.retain(|(unit, seen)| !self.leaves_alone(*unit, *seen));
         let now = Instant::now();
         let earlier = std::mem::take(&mut self.orphans);
         let found = orphans.iter().map(|(unit, _)| *unit);
         self.orphans = found
             .map(|unit| (unit, earlier.get(&unit).copied().unwrap_or(now)))
             .collect();
-        let Load { rooms, capacity } = self.units.fullness();
-        if rooms >= capacity {
-            orphans.retain(|(unit, _)| now - self.orphans[unit] >= LEFT_TO_OTHERS);
-            if !orphans.is_empty() {
-                let units = orphans.len();
-                warn!(
-                    units,
-                    rooms,
-                    capacity,
-                    "nobody else takes these units over; this node does, though it is full"
-                );
-            }
+        let Load { rooms, capacity } = self.load();
+        let mut free = capacity.saturating_sub(rooms);
+        let mut left_by_others = 0;
+        orphans.retain(|(unit, _)| {
+            let is_left = now - self.orphans[unit] >= LEFT_TO_OTHERS;
+            let has_space = free > 0;
+            free = free.saturating_sub(1);
+            left_by_others += usize::from(is_left && !has_space);
+            is_left || has_space
+        });
+        if left_by_others > 0 {
+            warn!(
+                units = left_by_others,
+                rooms,
+                capacity,
+                "no other node takes these units over; this one does, though it is full"
+            );
         }
         self.take_over(orphans);
     }
@@ -443,44 +450,64 @@ impl Task {
         if !*self.reached.borrow() {
             return;
         }
-        orphans.retain(|(unit, _)| !self.left_alone.contains_key(unit));
+        orphans.retain(|(unit, seen)| !self.leaves_alone(*unit, *seen));
         self.put_in(Input::Orphans(orphans));
+    }
+
+    /// How full the node is, with what it is about to run.
+    fn load(&self) -> Load {
+        let Load { rooms, capacity } = self.units.load();
+        let rooms = rooms.max(self.node.taken() as u64);
+        Load { rooms, capacity }
+    }
+
+    fn leave_alone(&mut self, unit: UnitId, epoch: Option<Epoch>, time: Duration) {
+        self.left_alone.insert(unit, (epoch, Instant::now() + time));
+    }
+
+    fn leaves_alone(&self, unit: UnitId, seen: Epoch) -> bool {
+        let left = self.left_alone.get(&unit);
+        left.is_some_and(|(epoch, _)| epoch.is_none_or(|epoch| epoch == seen))
     }
 
     /// Compares how full the nodes are.
     fn balance(&mut self) {
-        let owned: BTreeMap<UnitId, Epoch> = self.node.owned().collect();
-        self.next_owners.retain(|unit, _| owned.contains_key(unit));
-        let may_move = *self.reached.borrow() && self.node.may_claim(self.now_ms());
-        if !may_move || !self.next_owners.is_empty() {
+        if !self.may_hand_over() {
             return;
         }
-        let (store, units, own) = (
-            Arc::clone(&self.store),
-            Arc::clone(&self.units),
-            self.node.id(),
-        );
+        let (store, units) = (Arc::clone(&self.store), Arc::clone(&self.units));
+        let (own, id, build) = (self.load(), self.node.id(), self.info.build.clone());
         let comparing = async move {
             let alive = answer("compare nodes", ANSWER_TIME, store.alive()).await;
-            let others = alive.into_iter().flatten().filter(|node| node.id != own);
+            // Another version may not be able to resume what this one runs.
+            let others = (alive.into_iter().flatten())
+                .filter(|node| node.id != id && node.info.build == build);
             let others: Vec<_> = others
                 .filter_map(|node| Some((node.id, node.load?)))
                 .collect();
-            let moves = surplus(units.fullness(), &others);
-            match moves.is_empty() {
-                true => Event::Nothing,
-                false => Event::TooFull(units.to_hand_over(moves).await),
-            }
+            let moves = surplus(own, &others);
+            let chosen = timeout(ANSWER_TIME, units.to_hand_over(moves, MOVED_AT_ONCE)).await;
+            chosen.map_or(Event::Nothing, Event::TooFull)
         };
         self.spawn(comparing, Event::Nothing);
     }
 
+    /// Whether it may hand units over to others: not before those that have the last ones have said so.
+    fn may_hand_over(&mut self) -> bool {
+        let node = &self.node;
+        self.next_owners.retain(|unit, _| node.is_leaving(*unit));
+        let is_any_new = self.left_alone.values().any(|(epoch, _)| epoch.is_some());
+        self.next_owners.is_empty()
+            && !is_any_new
+            && *self.reached.borrow()
+            && node.may_claim(self.now_ms())
+    }
+
     /// Hands units over to nodes that are less full.
-    fn hand_over(&mut self, mut units: Vec<(UnitId, NodeId)>) {
-        if self.node.phase() != Phase::Serving {
+    fn hand_over(&mut self, units: Vec<(UnitId, NodeId)>) {
+        if units.is_empty() || !self.may_hand_over() {
             return;
         }
-        units.truncate(MOVED_AT_ONCE);
         info!(
             units = units.len(),
             "other nodes are less full; units are handed over to them"
@@ -495,7 +522,7 @@ impl Task {
         let minutes = LEFT_ALONE.as_secs() / 60;
         self.units.metrics().not_resumed();
         error!(%unit, minutes, "nothing of it can be resumed here; for some time it is left to other nodes");
-        self.left_alone.insert(unit, Instant::now() + LEFT_ALONE);
+        self.leave_alone(unit, None, LEFT_ALONE);
         self.running.remove(&unit);
         self.put_in(Input::Released(unit, epoch, true));
     }
@@ -523,13 +550,13 @@ impl Task {
         };
         // Those that it leaves to others are found as well.
         let now = Instant::now();
-        self.left_alone.retain(|_, until| now < *until);
+        self.left_alone.retain(|_, (_, until)| now < *until);
         let count = ORPHANS_AT_ONCE + self.left_alone.len();
         let store = Arc::clone(&self.store);
         let finding = async move {
             let orphans = answer("look for orphans", ANSWER_TIME, store.orphans(count)).await;
             drop(search);
-            Event::Found(orphans.unwrap_or_default())
+            orphans.map_or(Event::Nothing, Event::Found)
         };
         self.spawn(finding, Event::Nothing);
     }

@@ -21,6 +21,9 @@ const RETRY: Duration = Duration::from_secs(1);
 /// Units that are read and replayed at a time, so that many orphans do not slow down what runs.
 pub(super) const LOADS_AT_ONCE: usize = 4;
 
+/// Most rooms that are asked whether their games have begun.
+const ASKED: usize = 256;
+
 /// What became of resuming a unit.
 pub(super) enum Resumed {
     /// It runs here, or is not to run here any more.
@@ -74,26 +77,40 @@ impl Units {
     }
 
     /// How full the node is.
-    pub(super) fn fullness(&self) -> Load {
+    pub(super) fn load(&self) -> Load {
         self.rooms.load()
     }
 
-    /// Units to hand over, each with its next owner, so that these nodes get about these numbers of
-    /// rooms: rooms that nobody plays in first, tournaments and studies last.
-    pub(super) async fn to_hand_over(&self, moves: Vec<(NodeId, u64)>) -> Vec<(UnitId, NodeId)> {
-        let mut units = Vec::new();
-        for (unit, rooms) in self.rooms.durable_units() {
-            let waits = match rooms.as_slice() {
-                [room] if room.id().unit() == unit => Some(room.has_started().await == Ok(false)),
-                _ => None,
-            };
-            units.push((waits, rooms.len() as u64, unit));
+    /// At most `count` units to hand over, each with its next owner, so that these nodes get about
+    /// these numbers of rooms: rooms whose games have not begun first, tournaments and studies last.
+    pub(super) async fn to_hand_over(
+        &self,
+        moves: Vec<(NodeId, u64)>,
+        count: usize,
+    ) -> Vec<(UnitId, NodeId)> {
+        if moves.is_empty() {
+            return Vec::new();
         }
-        units.sort_by_key(|(waits, rooms, _)| (waits.is_none(), waits.map(|it| !it), *rooms));
-        let mut units = units.into_iter().peekable();
+        let (mut waiting, mut playing, mut larger) = (Vec::new(), Vec::new(), Vec::new());
+        for (unit, rooms) in self.rooms.durable_units() {
+            match rooms.as_slice() {
+                [room] if room.id().unit() == unit => {
+                    // Each question wakes a room.
+                    let is_asked = waiting.len() < count && playing.len() < ASKED;
+                    match is_asked && room.has_started().await == Ok(false) {
+                        true => waiting.push((unit, 1)),
+                        false => playing.push((unit, 1)),
+                    }
+                }
+                rooms => larger.push((unit, rooms.len() as u64)),
+            }
+        }
+        larger.sort_by_key(|(_, rooms)| *rooms);
+        let units = waiting.into_iter().chain(playing).chain(larger);
+        let mut units = units.take(count).peekable();
         let mut chosen = Vec::new();
         for (node, mut wanted) in moves {
-            while let Some((_, rooms, unit)) = units.next_if(|(_, rooms, _)| *rooms <= wanted) {
+            while let Some((unit, rooms)) = units.next_if(|(_, rooms)| *rooms <= wanted) {
                 wanted -= rooms;
                 chosen.push((unit, node));
             }
@@ -152,7 +169,7 @@ impl Units {
         self.metrics().taken_over();
         self.stop(unit).await;
         while self.wanted().get(&unit) == Some(&epoch) {
-            match self.load(unit, epoch).await {
+            match self.read(unit, epoch).await {
                 Ok(resumed) => return resumed,
                 Err(error) => {
                     warn!(%unit, %error, "a room or tournament cannot be read; trying again");
@@ -164,7 +181,7 @@ impl Units {
     }
 
     /// Reads and runs a unit.
-    async fn load(&self, unit: UnitId, epoch: Epoch) -> Result<Resumed, StoreError> {
+    async fn read(&self, unit: UnitId, epoch: Epoch) -> Result<Resumed, StoreError> {
         let _permit = self.loads.acquire().await.expect("it is never closed");
         let Some(loaded) = self.store.load(unit, epoch).await? else {
             return Ok(Resumed::Nothing);
@@ -210,7 +227,7 @@ impl Units {
         false
     }
 
-    /// Ends everything of a unit after its next commits, and gives it up, to this node if one is named.
+    /// Ends everything of a unit after its next commits, and gives it up, to `next` if it is set.
     /// Returns whether the database knows.
     pub(super) async fn release(&self, unit: UnitId, epoch: Epoch, next: Option<NodeId>) -> bool {
         self.tournaments.stop_one(unit).await;

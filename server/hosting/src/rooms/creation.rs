@@ -255,7 +255,7 @@ impl Reservation {
                 false => Err(CreateError::RequestIdUsed),
             };
         }
-        if table.in_creation.contains_key(&owner.subject.unit()) {
+        if table.in_creation.contains_key(&owner.subject) {
             return Ok(Claim::InProgress);
         }
         let place = rooms.places.try_take(charged);
@@ -369,10 +369,7 @@ impl Reservation {
 
 impl Drop for Reservation {
     fn drop(&mut self) {
-        self.rooms
-            .lock()
-            .in_creation
-            .remove(&self.owner.subject.unit());
+        (self.rooms.lock().in_creation).remove(&self.owner.subject);
         self.rooms.created.notify_waiters();
     }
 }

@@ -210,7 +210,7 @@ impl Rooms {
 
     /// The room with this id, if it is one.
     pub fn by_unit(&self, id: UnitId) -> Option<Handle> {
-        Some(self.lock().get(id)?.handle.clone())
+        Some(self.lock().by_unit(id)?.handle.clone())
     }
 
     /// The room with this join code.

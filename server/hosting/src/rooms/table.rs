@@ -48,7 +48,7 @@ pub(super) struct Table {
     /// The rooms of games, by the ids of the games.
     games: HashMap<GameId, u64>,
     /// Rooms that are being created, for which space is reserved, with their units.
-    pub(super) in_creation: HashMap<UnitId, UnitId>,
+    pub(super) in_creation: HashMap<RoomId, UnitId>,
     pub(super) shutting_down: bool,
     /// Removed rooms, until the table is unlocked: the last handle of a room may end it, and a room
     /// that ends looks into the table.
@@ -112,12 +112,17 @@ impl Entry {
 }
 
 impl Table {
-    pub(super) fn get(&self, id: impl Into<UnitId>) -> Option<&Entry> {
-        self.by_number.get(&self.number_of(id)?)
+    pub(super) fn get(&self, id: RoomId) -> Option<&Entry> {
+        self.by_unit(id.unit())
     }
 
-    pub(super) fn number_of(&self, id: impl Into<UnitId>) -> Option<u64> {
-        self.numbers.get(&id.into()).copied()
+    /// The room that is this unit, if it is one.
+    pub(super) fn by_unit(&self, unit: UnitId) -> Option<&Entry> {
+        self.by_number.get(self.numbers.get(&unit)?)
+    }
+
+    pub(super) fn number_of(&self, id: RoomId) -> Option<u64> {
+        self.numbers.get(&id.unit()).copied()
     }
 
     /// Reserves space for a room that will be created.
@@ -137,7 +142,7 @@ impl Table {
                 return Err(CreateError::TooMany(max_rooms));
             }
         }
-        self.in_creation.insert(id.unit(), unit);
+        self.in_creation.insert(id, unit);
         Ok(())
     }
 

@@ -15,8 +15,8 @@ impl Rooms {
     /// Whether the room that is this unit runs here, or is being created.
     pub(crate) fn runs(&self, unit: UnitId) -> bool {
         let table = self.lock();
-        table.get(unit).is_some_and(|entry| entry.is_open())
-            || table.in_creation.contains_key(&unit)
+        table.by_unit(unit).is_some_and(|entry| entry.is_open())
+            || table.in_creation.keys().any(|room| room.unit() == unit)
     }
 
     /// How full this server is.
@@ -32,15 +32,15 @@ impl Rooms {
     pub(crate) fn durable_units(&self) -> BTreeMap<UnitId, Vec<Handle>> {
         let table = self.lock();
         let mut units = BTreeMap::<UnitId, Vec<Handle>>::new();
-        let mut lost = BTreeSet::new();
+        let mut ephemeral = BTreeSet::new();
         for entry in table.by_number.values().filter(|entry| entry.is_open()) {
             let unit = entry.header.unit();
             match entry.durable {
                 true => units.entry(unit).or_default().push(entry.handle.clone()),
-                false => drop(lost.insert(unit)),
+                false => _ = ephemeral.insert(unit),
             }
         }
-        units.retain(|unit, _| !lost.contains(unit));
+        units.retain(|unit, _| !ephemeral.contains(unit));
         units
     }
 
@@ -77,7 +77,7 @@ impl Rooms {
             return;
         }
         let plays = |entry: &super::Entry| entry.is_open() && !entry.durable;
-        self.until(|table| !table.get(unit).is_some_and(plays))
+        self.until(|table| !table.by_unit(unit).is_some_and(plays))
             .await;
     }
 

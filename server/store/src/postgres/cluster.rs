@@ -164,12 +164,13 @@ impl ClusterStore for PostgresStore {
                 async move {
                     let mut transaction = connection.begin().await?;
                     let drain: Option<bool> = sqlx::query_scalar(
-                        "UPDATE nodes SET beat_ms = greatest(beat_ms, clock_ms()), reached = $2, rooms = $3
+                        "UPDATE nodes SET beat_ms = greatest(beat_ms, clock_ms()), reached = $2, rooms = $3, drain = drain OR $4
                          WHERE node = $1 RETURNING drain",
                     )
                     .bind(node)
                     .bind(heartbeat.reached)
                     .bind(integer(heartbeat.rooms))
+                    .bind(heartbeat.drains)
                     .fetch_optional(&mut *transaction)
                     .await?;
                     let Some(drain) = drain else {

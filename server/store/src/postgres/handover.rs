@@ -44,7 +44,7 @@ pub(super) async fn release(
          ), next AS (
              SELECT node FROM nodes
              WHERE node <> $3 AND NOT drain AND reached AND capacity > 0 AND beat_ms + $4 > clock_ms()
-             ORDER BY node = coalesce($6, 0) DESC, -ln(1 - random()) / greatest(capacity - coalesce(rooms, 0), 1) LIMIT 1
+             ORDER BY node = coalesce($6, 0) DESC, -ln(1 - random()) / greatest(capacity - coalesce(rooms, capacity), 1) LIMIT 1
          )
          SELECT pg_notify($5, concat_ws(' ', next.node, encode($1, 'hex'), $2)) FROM next
          WHERE EXISTS (SELECT FROM released WHERE NOT over)",

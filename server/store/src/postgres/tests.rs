@@ -32,6 +32,7 @@ use crate::units::UnitKey;
 const REACHED: Heartbeat = Heartbeat {
     reached: true,
     rooms: 0,
+    drains: false,
 };
 
 /// A node that has just joined, whose writes wait for a lock as long as a test wants.

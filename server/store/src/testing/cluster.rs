@@ -735,7 +735,7 @@ impl ClusterStore for FakeStore {
                 id: *id,
                 info: info.clone(),
                 reached: said.reached,
-                load: said.reached.then_some(Load {
+                load: (said.reached && !said.drains).then_some(Load {
                     rooms: said.rooms,
                     capacity: info.capacity,
                 }),

@@ -134,13 +134,25 @@ async fn nodes_say_how_full_they_are() {
         living.expect("it has a lease").load
     };
     for (reached, rooms) in [(true, 3), (true, 4), (false, 4)] {
-        let beat = pair.second.beat(Heartbeat { reached, rooms });
+        let said = Heartbeat {
+            reached,
+            rooms,
+            ..REACHED
+        };
+        let beat = pair.second.beat(said);
         beat.await.expect("it answers");
         let said = Load { rooms, capacity: 9 };
         assert_eq!(load().await, reached.then_some(said));
     }
     pair.second.beat(REACHED).await.expect("it answers");
     assert_eq!(load().await.map(|load| load.rooms), Some(0));
+    let leaves = Heartbeat {
+        drains: true,
+        ..REACHED
+    };
+    pair.second.beat(leaves).await.expect("it answers");
+    assert_eq!(load().await, None, "it takes nothing");
+    pair.database.run("UPDATE nodes SET drain = false");
     pair.first.request_drain(node).await.expect("it answers");
     assert_eq!(load().await, None, "it takes nothing");
     // A node of an earlier version.
