@@ -26,6 +26,8 @@ EXAMPLES = """examples:
   python -m chefshat.learn evaluate strong.safetensors --opponents greedy --games 2000
   python -m chefshat.learn play strong.safetensors --address 127.0.0.1:50051 --code CODE --name Strong
 
+The paper's `deep-q` and `tune` are in the package chefshat-paper: python -m chefshat_paper.learn
+
 Without --address the games are played in this process (chefshat-native), or by a server that the command starts.
 
 exit code: 0 success, 1 failure (the last line gives the reason), 2 wrong arguments, 130 interrupted
