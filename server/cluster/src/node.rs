@@ -190,9 +190,9 @@ impl<K: Ord + Copy> Node<K> {
         self.owned.iter().map(|(id, epoch)| (*id, *epoch))
     }
 
-    /// How many units it owns or claims.
-    pub fn taken(&self) -> usize {
-        self.owned.len() + self.claiming.len()
+    /// How many units it claims.
+    pub fn claiming(&self) -> usize {
+        self.claiming.len()
     }
 
     /// Whether it is about to hand a unit over although it stays.

@@ -457,8 +457,11 @@ impl Task {
     /// How full the node is, with what it is about to run.
     fn load(&self) -> Load {
         let Load { rooms, capacity } = self.units.load();
-        let rooms = rooms.max(self.node.taken() as u64);
-        Load { rooms, capacity }
+        let coming = self.node.claiming() + self.units.resuming();
+        Load {
+            rooms: rooms + coming as u64,
+            capacity,
+        }
     }
 
     fn leave_alone(&mut self, unit: UnitId, epoch: Option<Epoch>, time: Duration) {

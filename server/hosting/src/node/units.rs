@@ -1,6 +1,7 @@
 //! The units that a node runs: resumes, stops and suspends their rooms, tournaments and studies.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 use tracing::{info, warn};
@@ -56,6 +57,8 @@ pub(super) struct Units {
     /// The units that are to run here, with their epochs.
     wanted: Mutex<BTreeMap<UnitId, Epoch>>,
     loads: Semaphore,
+    /// How many units are being resumed.
+    resuming: AtomicUsize,
 }
 
 impl Units {
@@ -73,12 +76,18 @@ impl Units {
             studies,
             wanted: Mutex::default(),
             loads: Semaphore::new(LOADS_AT_ONCE),
+            resuming: AtomicUsize::new(0),
         }
     }
 
     /// How full the node is.
     pub(super) fn load(&self) -> Load {
         self.rooms.load()
+    }
+
+    /// How many units are being resumed.
+    pub(super) fn resuming(&self) -> usize {
+        self.resuming.load(Ordering::Relaxed)
     }
 
     /// At most `count` units to hand over, each with its next owner, so that these nodes get about
@@ -167,6 +176,7 @@ impl Units {
             return Resumed::Runs;
         }
         self.metrics().taken_over();
+        let _resuming = Counted::new(&self.resuming);
         self.stop(unit).await;
         while self.wanted().get(&unit) == Some(&epoch) {
             match self.read(unit, epoch).await {
@@ -240,5 +250,21 @@ impl Units {
                 false
             }
         }
+    }
+}
+
+/// Counted until it is dropped.
+struct Counted<'c>(&'c AtomicUsize);
+
+impl<'c> Counted<'c> {
+    fn new(count: &'c AtomicUsize) -> Self {
+        count.fetch_add(1, Ordering::Relaxed);
+        Self(count)
+    }
+}
+
+impl Drop for Counted<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }
