@@ -4,6 +4,7 @@ A `conftest.py` imports it. Contains no tests.
 """
 
 import os
+import signal
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,7 +18,10 @@ from chefshat.local_server import BINARY
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Shortens JAX's compilations, which take most of the time of the learning tests, and caches them between runs."""
+    """Lets commands be interrupted, and shortens JAX's compilations, most of the time of the learning tests; caches them between runs."""
+    # A shell that runs tests in the background has them, and the commands that they start, ignore interrupts.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     # Not level 0: there, results depend on how many agents are computed together.
     os.environ.setdefault("XLA_FLAGS", "--xla_backend_optimization_level=1 --xla_llvm_disable_expensive_passes=true")
     if config.pluginmanager.hasplugin("cacheprovider"):
