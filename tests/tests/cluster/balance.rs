@@ -9,9 +9,9 @@ use chefshat_tests::BusyRooms;
 use crate::cluster::{Cluster, Leases};
 use crate::measure::{all_play, missed, rooms};
 
-/// Most rooms of a node.
-const MAX_ROOMS: usize = 40;
-/// More than one node takes.
+/// Most rooms of a node; half of them are one client's share.
+const MAX_ROOMS: usize = 80;
+/// More than a client has at one node.
 const WAITING: usize = 60;
 /// Rooms that are played meanwhile.
 const PLAYING: usize = 6;
@@ -30,13 +30,12 @@ async fn rooms_go_to_the_nodes_with_space() {
     }
     let rooms = cluster.rooms_of_nodes();
     assert!(
-        rooms[..2].iter().all(|rooms| *rooms <= MAX_ROOMS),
+        rooms[..2].iter().all(|rooms| *rooms <= MAX_ROOMS / 2),
         "{rooms:?}"
     );
 
     cluster.restart(2).await;
     cluster.balanced().await;
-    assert!(cluster.nodes[2].said().contains("taken over"));
     playing.all_go_on().await;
     assert_eq!(missed(&cluster, playing).await, 0);
 }

@@ -37,10 +37,14 @@ async fn databases_of_earlier_versions_are_upgraded() {
     let database = chefshat_postgres::database();
     migrate(database.url()).await.expect("an empty database");
     for (version, removed) in [
-        (2, "ALTER TABLE nodes DROP COLUMN reached"),
+        (3, "ALTER TABLE nodes DROP COLUMN rooms"),
+        (
+            2,
+            "ALTER TABLE nodes DROP COLUMN rooms, DROP COLUMN reached",
+        ),
         (
             1,
-            "ALTER TABLE nodes DROP COLUMN reached; DROP TABLE studies, study_changes, study_traces;
+            "ALTER TABLE nodes DROP COLUMN rooms, DROP COLUMN reached; DROP TABLE studies, study_changes, study_traces;
              DROP INDEX owned_by_game",
         ),
     ] {
