@@ -18,7 +18,7 @@ from chefshat.local_server import BINARY
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Lets commands be interrupted, and shortens JAX's compilations, most of the time of the learning tests; caches them between runs."""
+    """Lets commands be interrupted. Shortens JAX's compilations, most of the time of the learning tests, and caches them."""
     # A shell that runs tests in the background has them, and the commands that they start, ignore interrupts.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
