@@ -3,10 +3,10 @@
 
 use std::cmp::{Ordering, Reverse};
 
-/// Rooms above its share from which a node hands some over: each of them stands still for a moment.
-const MIN_SURPLUS: u64 = 8;
-/// A node hands rooms over if those above its share are more than one in this number of its share.
-const SURPLUS_DIVISOR: u64 = 10;
+/// Rooms that a node has too many or lacks, from which some are handed over: each of them stands still for a moment.
+const MIN_DIFFERENCE: u64 = 4;
+/// Rooms are handed over if a node has more than one in this number of its share too many, or lacks them.
+const DIFFERENCE_DIVISOR: u64 = 10;
 
 /// How full a node is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,7 +30,7 @@ impl Load {
 }
 
 /// The numbers of rooms that a node hands over to others, so that all use the same part of their capacity. Empty if it has at
-/// most a tenth more than that, or only a few rooms more.
+/// most a tenth or a few rooms more than that, and no other lacks more.
 pub fn surplus<N: Copy>(own: Load, others: &[(N, Load)]) -> Vec<(N, u64)> {
     let all = || others.iter().map(|(_, load)| *load).chain([own]);
     let rooms: u128 = all().map(|load| u128::from(load.rooms)).sum();
@@ -40,10 +40,14 @@ pub fn surplus<N: Copy>(own: Load, others: &[(N, Load)]) -> Vec<(N, u64)> {
         u64::try_from(share).unwrap_or(u64::MAX)
     };
     let surplus = own.rooms.saturating_sub(share(own));
-    if surplus < MIN_SURPLUS || surplus <= share(own) / SURPLUS_DIVISOR {
+    let lacking = |load: Load| share(load).saturating_sub(load.rooms);
+    let is_large = |difference: u64, load: Load| {
+        difference >= MIN_DIFFERENCE && difference > share(load) / DIFFERENCE_DIVISOR
+    };
+    let is_any_empty = others.iter().any(|(_, it)| is_large(lacking(*it), *it));
+    if surplus == 0 || !is_large(surplus, own) && !is_any_empty {
         return Vec::new();
     }
-    let lacking = |load: Load| share(load).saturating_sub(load.rooms);
     let all_lacking: u128 = others.iter().map(|(_, it)| u128::from(lacking(*it))).sum();
     // Other nodes may have a surplus as well: each fills the same part of what is lacking, and what rounding leaves goes to those
     // that lack most.

@@ -10,9 +10,9 @@ use crate::cluster::{Cluster, Leases};
 use crate::measure::{all_play, missed, rooms};
 
 /// Most rooms of a node; half of them are one client's share.
-const MAX_ROOMS: usize = 80;
+const MAX_ROOMS: usize = 120;
 /// More than a client has at one node.
-const WAITING: usize = 60;
+const WAITING: usize = 90;
 /// Rooms that are played meanwhile.
 const PLAYING: usize = 6;
 
