@@ -35,7 +35,7 @@ async fn rooms_go_to_the_nodes_with_space() {
     );
 
     cluster.restart(2).await;
-    cluster.balanced().await;
+    cluster.balanced(50).await;
     playing.all_go_on().await;
     assert_eq!(missed(&cluster, playing).await, 0);
 }

@@ -288,22 +288,20 @@ impl Cluster {
         nodes.map(|node| self.games_of(node).len()).collect()
     }
 
-    /// Waits until the nodes own numbers of rooms that differ by less than a fifth.
-    pub(crate) async fn balanced(&self) {
+    /// Waits until the numbers of rooms that nodes own differ by less than this part of the largest.
+    pub(crate) async fn balanced(&self, percent: usize) {
         let balanced = async {
             loop {
                 let rooms = self.rooms_of_nodes();
                 let (least, most) = (rooms.iter().min(), rooms.iter().max());
-                if least
-                    .zip(most)
-                    .is_some_and(|(least, most)| (most - least) * 5 < *most)
-                {
+                let (least, most) = (least.expect("nodes"), most.expect("nodes"));
+                if (most - least) * 100 < percent * most {
                     return;
                 }
                 tokio::time::sleep(LOOK_AGAIN).await;
             }
         };
-        patiently("nodes that are equally full", balanced).await;
+        patiently("nodes that are about equally full", balanced).await;
     }
 
     /// The node that owns a room or tournament.

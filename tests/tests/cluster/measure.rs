@@ -177,7 +177,7 @@ async fn a_node_joins_full_ones() {
     eprintln!("rooms of the nodes: {:?}", cluster.rooms_of_nodes());
     cluster.restart(NODES).await;
     let joined = Instant::now();
-    cluster.balanced().await;
+    cluster.balanced(20).await;
     let seconds = joined.elapsed().as_secs_f64();
     eprintln!(
         "within a fifth after {seconds:.2} s: {:?}",
