@@ -128,7 +128,7 @@ impl Error {
     }
 }
 
-/// What answers in TLS is no frame of HTTP/2.
+/// A server with TLS answers a connection without TLS by bytes that are not a frame of HTTP/2.
 fn add_scheme_hint(message: &mut String) {
     if message.contains("frame with invalid size") {
         *message += "; a server with TLS has an address with https://";

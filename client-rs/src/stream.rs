@@ -50,7 +50,7 @@ impl Broken {
 
 #[derive(Debug)]
 enum State<T> {
-    /// There is no stream, and no attempt before this time.
+    /// The stream is closed, and opened at this time at the earliest.
     Closed(Instant),
     /// The attempt runs in a task of its own: a cancelled call does not end it.
     Opening(JoinSet<Result<Streaming<T>, Status>>),

@@ -132,7 +132,7 @@ async fn a_refusal_ends_the_watching() {
     assert!(!fake.is_done());
 }
 
-/// A state comes with every connection, and is no sign that the connection holds.
+/// The state that comes with every connection does not show that the connection holds.
 #[tokio::test]
 async fn a_table_whose_streams_all_break_is_given_up() {
     let client = Fake::default().start().await;

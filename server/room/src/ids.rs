@@ -63,7 +63,7 @@ impl IsUnit for Study {}
 /// close(GameId::random());
 /// ```
 ///
-/// Only the id of a room, tournament or study becomes that of a unit. There is no way back: what
+/// Only the id of a room, tournament or study becomes that of a unit, never the other way round: what
 /// finds the unit has its own id.
 ///
 /// ```

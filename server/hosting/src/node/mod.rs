@@ -238,7 +238,10 @@ impl Task {
                     }
                 }
                 () = sleep_until(alarm), if wakes_at.is_some() => self.put_in(Input::Time),
-                orphan = store.handed_over() => self.take_over(vec![orphan]),
+                orphan = store.handed_over() => {
+                    let orphans = self.claimable(vec![orphan]);
+                    self.put_in(Input::Orphans(orphans));
+                }
                 _ = finding.tick() => self.find_orphans(),
                 _ = tidying.tick() => self.tidy(),
                 _ = balancing.tick() => self.balance(),
@@ -417,8 +420,8 @@ impl Task {
 
     /// Takes orphans over. A full node first leaves them to others, and takes those that stay without
     /// an owner: games that are acknowledged come before its limit.
-    fn found(&mut self, mut orphans: Vec<(UnitId, Epoch)>) {
-        orphans.retain(|(unit, seen)| !self.leaves_alone(*unit, *seen));
+    fn found(&mut self, orphans: Vec<(UnitId, Epoch)>) {
+        let mut orphans = self.claimable(orphans);
         let now = Instant::now();
         let earlier = std::mem::take(&mut self.orphans);
         let found = orphans.iter().map(|(unit, _)| *unit);
@@ -443,15 +446,14 @@ impl Task {
                 "no other node takes these units over; this one does, though it is full"
             );
         }
-        self.take_over(orphans);
+        self.put_in(Input::Orphans(orphans));
     }
 
-    fn take_over(&mut self, mut orphans: Vec<(UnitId, Epoch)>) {
-        if !*self.reached.borrow() {
-            return;
-        }
-        orphans.retain(|(unit, seen)| !self.leaves_alone(*unit, *seen));
-        self.put_in(Input::Orphans(orphans));
+    /// Those of these orphans that the node may claim and does not leave to others.
+    fn claimable(&self, mut orphans: Vec<(UnitId, Epoch)>) -> Vec<(UnitId, Epoch)> {
+        let is_reached = *self.reached.borrow();
+        orphans.retain(|(unit, seen)| is_reached && !self.leaves_alone(*unit, *seen));
+        orphans
     }
 
     /// How full the node is, with what it is about to run.
