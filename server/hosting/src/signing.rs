@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use chefshat_proto::v1;
 use chefshat_record::atomic_file::{AtomicFile, WriteError};
+use chefshat_record::outcome::{Gathering, Outcome};
 use chefshat_record::signature::{PublicKey, SigningKey};
 use futures::future::Either;
 use tokio::sync::Semaphore;
@@ -101,6 +102,15 @@ fn create(path: &Path, seed: &[u8; 32]) -> Result<(), WriteError> {
     file.finish()
 }
 
+/// What the record of a game that has ended says.
+#[derive(Debug, Default)]
+pub struct ReadRecord {
+    /// Its signature, if the server signs.
+    pub signature: Option<v1::RecordSignature>,
+    /// The outcome of a finished game of a tournament.
+    pub outcome: Option<Outcome>,
+}
+
 /// Signs games that end, a few at a time. Those that nobody plays wait in the background, so that
 /// they delay the end of no other.
 #[derive(Clone)]
@@ -128,20 +138,20 @@ impl Signer {
         self.key.as_ref().map(|key| key.public())
     }
 
-    /// Signs the record of a game that has ended, in the background if given, charged to a caller;
-    /// `None` without a key.
+    /// Reads the record of a game that has ended, in the background if given, charged to a caller.
     ///
     /// # Errors
     /// The journal cannot be read.
-    pub async fn sign(
+    pub async fn read(
         &self,
         header: Arc<GameHeader>,
         journal: &mut dyn Journal,
         background: Option<(&Background, Key)>,
-    ) -> Result<Option<v1::RecordSignature>, StoreError> {
-        let Some(key) = self.key.clone() else {
-            return Ok(None);
-        };
+    ) -> Result<ReadRecord, StoreError> {
+        let (key, has_outcome) = (self.key.clone(), header.tournament.is_some());
+        if key.is_none() && !has_outcome {
+            return Ok(ReadRecord::default());
+        }
         // Before the journal is read: a long one takes much memory.
         let _right = match background {
             Some((background, charged)) => Either::Left(background.slice(charged).await),
@@ -150,17 +160,36 @@ impl Signer {
         };
         let game = header.game_id;
         let entries = journal.entries().await?;
-        let signing = move || {
-            key.sign_each(|add| convert::each_record_line(&header, &entries, |line| add(&line)))
+        let reading = move || {
+            let mut gathering = Gathering::default();
+            let mut each_line = |sign: &mut dyn FnMut(&v1::RecordLine)| {
+                convert::each_record_line(&header, &entries, |line| {
+                    sign(&line);
+                    if has_outcome {
+                        gathering.add(&line);
+                    }
+                });
+            };
+            let signature = match key {
+                Some(key) => Some(key.sign_each(each_line)),
+                None => {
+                    each_line(&mut |_| {});
+                    None
+                }
+            };
+            ReadRecord {
+                signature,
+                outcome: gathering.outcome().ok(),
+            }
         };
-        let signature = match background {
-            Some((background, _)) => background.run(signing).await,
-            None => tokio::task::spawn_blocking(signing).await.ok(),
+        let read = match background {
+            Some((background, _)) => background.run(reading).await,
+            None => tokio::task::spawn_blocking(reading).await.ok(),
         };
-        if signature.is_none() {
-            error!(%game, "a record could not be signed; it stays unsigned");
+        if read.is_none() {
+            error!(%game, "the record of a game could not be read; it stays unsigned");
         }
-        Ok(signature)
+        Ok(read.unwrap_or_default())
     }
 }
 

@@ -200,45 +200,70 @@ pub enum OutcomeError {
 /// # Errors
 /// The game was not finished, or the lines are inconsistent.
 pub fn outcome(lines: &[v1::RecordLine]) -> Result<Outcome, OutcomeError> {
-    let Some(Line::Header(header)) = lines.first().and_then(|line| line.line.as_ref()) else {
-        return Err(OutcomeError::NoHeader);
-    };
-    let mut gathered = Gathered {
-        seats: header.seats.iter().map(SeatOutcome::of).collect(),
-        shifts: 0,
-        elapsed_ms: 0,
-        standings: None,
-    };
-    for (number, line) in (1..).zip(lines) {
-        gathered
-            .line(line.line.as_ref())
-            .ok_or(OutcomeError::Seat(number))?;
+    let mut gathering = Gathering::default();
+    for line in lines {
+        gathering.add(line);
     }
-    let footer = lines.last().and_then(|line| line.line.as_ref());
-    let finished =
-        matches!(footer, Some(Line::Footer(footer)) if footer.state() == RoomState::Finished);
-    let Some(standings) = gathered.standings.filter(|_| finished) else {
-        return Err(OutcomeError::NotFinished);
-    };
-    let mut seats = gathered.seats;
-    place(&mut seats, standings).ok_or(OutcomeError::Standings)?;
-    for seat in &mut seats {
-        // The sum until now.
-        seat.statistics.performance_score /= f64::from(gathered.shifts.max(1));
+    gathering.outcome()
+}
+
+/// Reads the outcome of a record line by line: the lines of a long game take much memory together.
+#[derive(Debug, Default)]
+pub struct Gathering {
+    lines: usize,
+    gathered: Option<Gathered>,
+    problem: Option<OutcomeError>,
+    /// Whether the last line says that the game was finished.
+    finished: bool,
+}
+
+impl Gathering {
+    /// Adds the next line.
+    pub fn add(&mut self, line: &v1::RecordLine) {
+        let line = line.line.as_ref();
+        self.lines += 1;
+        self.finished =
+            matches!(line, Some(Line::Footer(footer)) if footer.state() == RoomState::Finished);
+        match (&mut self.gathered, line) {
+            (None, Some(Line::Header(header))) if self.lines == 1 => {
+                self.gathered = Some(Gathered::of(header));
+            }
+            (Some(gathered), line) => {
+                if gathered.line(line).is_none() {
+                    self.problem.get_or_insert(OutcomeError::Seat(self.lines));
+                }
+            }
+            (None, _) => {}
+        }
     }
-    Ok(Outcome {
-        game_id: header.game_id.clone(),
-        tournament_id: header.tournament_id.clone(),
-        ended_at_ms: header.created_at_ms.saturating_add(gathered.elapsed_ms),
-        shifts: gathered.shifts,
-        unrated: unrated(header.origin(), &seats).or_else(|| {
-            let mut seats = header.seats.iter();
-            seats
-                .any(|seat| seat.shown_kind() != ParticipantKind::Unspecified)
-                .then_some(Unrated::Wizard)
-        }),
-        seats,
-    })
+
+    /// The outcome, once all lines have been added.
+    ///
+    /// # Errors
+    /// The game was not finished, or the lines are inconsistent.
+    pub fn outcome(self) -> Result<Outcome, OutcomeError> {
+        let mut gathered = self.gathered.ok_or(OutcomeError::NoHeader)?;
+        if let Some(problem) = self.problem {
+            return Err(problem);
+        }
+        let standings = gathered.standings.take().filter(|_| self.finished);
+        let standings = standings.ok_or(OutcomeError::NotFinished)?;
+        let mut seats = gathered.seats;
+        place(&mut seats, &standings).ok_or(OutcomeError::Standings)?;
+        for seat in &mut seats {
+            // The sum until now.
+            seat.statistics.performance_score /= f64::from(gathered.shifts.max(1));
+        }
+        let wizard = gathered.wizard.then_some(Unrated::Wizard);
+        Ok(Outcome {
+            game_id: gathered.game_id,
+            tournament_id: gathered.tournament_id,
+            ended_at_ms: gathered.created_at_ms.saturating_add(gathered.elapsed_ms),
+            shifts: gathered.shifts,
+            unrated: unrated(gathered.origin, &seats).or(wizard),
+            seats,
+        })
+    }
 }
 
 impl SeatOutcome {
@@ -258,17 +283,39 @@ impl SeatOutcome {
     }
 }
 
-/// The totals of the lines so far.
-struct Gathered<'a> {
+/// The header, and the totals of the lines so far.
+#[derive(Debug)]
+struct Gathered {
+    game_id: String,
+    tournament_id: String,
+    created_at_ms: u64,
+    origin: GameOrigin,
+    /// Whether a person played as another kind of participant.
+    wizard: bool,
     seats: Vec<SeatOutcome>,
     shifts: u32,
     elapsed_ms: u64,
-    standings: Option<&'a [v1::Standing]>,
+    standings: Option<Vec<v1::Standing>>,
 }
 
-impl<'a> Gathered<'a> {
+impl Gathered {
+    fn of(header: &v1::RecordHeader) -> Self {
+        let mut seats = header.seats.iter();
+        Self {
+            game_id: header.game_id.clone(),
+            tournament_id: header.tournament_id.clone(),
+            created_at_ms: header.created_at_ms,
+            origin: header.origin(),
+            wizard: seats.any(|seat| seat.shown_kind() != ParticipantKind::Unspecified),
+            seats: header.seats.iter().map(SeatOutcome::of).collect(),
+            shifts: 0,
+            elapsed_ms: 0,
+            standings: None,
+        }
+    }
+
     /// Adds a line; `None` if it does not match the seats.
-    fn line(&mut self, line: Option<&'a Line>) -> Option<()> {
+    fn line(&mut self, line: Option<&Line>) -> Option<()> {
         match line {
             Some(Line::Decision(decision)) => self.decision(decision),
             Some(Line::Event(event)) => {
@@ -278,7 +325,9 @@ impl<'a> Gathered<'a> {
                         self.seat(substituted.seat)?.statistics.substituted = true;
                     }
                     Some(Kind::ShiftEnded(shift)) => self.shift(shift)?,
-                    Some(Kind::GameEnded(ended)) => self.standings = Some(&ended.standings),
+                    Some(Kind::GameEnded(ended)) => {
+                        self.standings = Some(ended.standings.clone());
+                    }
                     _ => {}
                 }
                 Some(())

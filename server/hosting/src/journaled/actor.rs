@@ -41,13 +41,10 @@ async fn run_on<U: Journaled>(
     inbox: &mut mpsc::Receiver<U::Message>,
     stop: Stop,
 ) -> Result<(), StoreError> {
-    let rooms = Arc::clone(&unit.unit().rooms);
+    // No end of a game is missed: one that nobody waits for is kept.
+    let games = Arc::clone(&unit.unit().games);
     let mut messages = Vec::new();
     loop {
-        let changed = rooms.changed();
-        tokio::pin!(changed);
-        // From here on no end of a game is missed.
-        changed.as_mut().enable();
         // What is deleted need not be committed before: on a full disk, the deletion that frees
         // space would wait for space.
         if unit.conclude(inbox).await? {
@@ -74,7 +71,7 @@ async fn run_on<U: Journaled>(
                     unit.receive(message).await?;
                 }
             }
-            () = changed => {}
+            () = games.notified() => {}
             () = alarm, if wake.is_some() => {}
         }
     }

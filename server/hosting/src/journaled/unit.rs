@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use tokio::sync::{mpsc, oneshot, watch};
+use tokio::sync::{Notify, mpsc, oneshot, watch};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
 
@@ -271,6 +271,8 @@ pub struct Unit<U: Journaled> {
     pub(super) pending: Vec<U::Entry>,
     /// What is done after the next commit.
     replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
+    /// Notified when one of its games has ended or a room of it is gone.
+    pub(super) games: Arc<Notify>,
     /// Its place among its creator's units.
     _place: Permit,
 }
@@ -278,6 +280,7 @@ pub struct Unit<U: Journaled> {
 impl<U: Journaled> Unit<U> {
     pub(super) fn new(handle: Arc<Handle<U>>, rooms: Arc<Rooms>, rows: u64, place: Permit) -> Self {
         let state = handle.committed().clone();
+        let games = rooms.wake(handle.id().unit());
         Self {
             handle,
             rooms,
@@ -286,6 +289,7 @@ impl<U: Journaled> Unit<U> {
             has_changed: false,
             pending: Vec::new(),
             replies: Vec::new(),
+            games,
             _place: place,
         }
     }
@@ -337,5 +341,11 @@ impl<U: Journaled> Unit<U> {
 
     pub(super) fn id(&self) -> Id<U::Kind> {
         self.handle.id()
+    }
+}
+
+impl<U: Journaled> Drop for Unit<U> {
+    fn drop(&mut self) {
+        self.rooms.stop_waking(self.id().unit(), &self.games);
     }
 }

@@ -27,4 +27,4 @@ pub use message::{
 };
 pub use subscriber::{MAX_SPECTATOR_LAG, MAX_SPECTATORS};
 pub use table_view::SentState;
-pub use task::{RoomWatcher, TaskContext};
+pub use task::{GameEnd, RoomWatcher, TaskContext};

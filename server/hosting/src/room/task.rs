@@ -17,6 +17,7 @@ use std::time::Duration;
 use chefshat_agents::{Budget, MonteCarlo};
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
+use chefshat_record::outcome::Outcome;
 use chefshat_room::ids::RoomId;
 use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError, ReportOutcome, Searched};
 use futures::future::BoxFuture;
@@ -111,10 +112,20 @@ impl TaskContext {
     }
 }
 
+/// How a game has ended, as its record says.
+#[derive(Debug, Clone)]
+pub struct GameEnd {
+    /// Whether it was finished.
+    pub finished: bool,
+    /// The outcome, if it was finished and is of a tournament. Missing if its record could not be
+    /// read.
+    pub outcome: Option<Arc<Outcome>>,
+}
+
 /// Maintains the list of rooms.
 pub trait RoomWatcher: Send + Sync {
     /// The game of a room has ended; the room is still listed.
-    fn game_over(&self, room: RoomId);
+    fn game_over(&self, room: RoomId, end: GameEnd);
     /// The room is gone.
     fn gone(&self, room: RoomId);
 }

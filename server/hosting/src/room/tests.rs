@@ -18,8 +18,8 @@ use tokio_util::task::TaskTracker;
 
 use super::subscriber::DeliveryOptions;
 use super::{
-    AttachRequest, Handle, JoinRequest, MAX_SPECTATORS, NotAttached, RoomWatcher, SeatAction,
-    SpectateError, SpectateRequest, Supersedes, TaskContext, spawn_room,
+    AttachRequest, GameEnd, Handle, JoinRequest, MAX_SPECTATORS, NotAttached, RoomWatcher,
+    SeatAction, SpectateError, SpectateRequest, Supersedes, TaskContext, spawn_room,
 };
 use crate::cluster::NodeLease;
 use crate::record_writer::RecordWriter;
@@ -40,7 +40,7 @@ use chefshat_wire::outbox::{Outbox, OutboxStream};
 struct NullWatcher;
 
 impl RoomWatcher for NullWatcher {
-    fn game_over(&self, _room: RoomId) {}
+    fn game_over(&self, _room: RoomId, _end: GameEnd) {}
     fn gone(&self, _room: RoomId) {}
 }
 

@@ -349,6 +349,7 @@ impl Reservation {
                 durable,
                 header: Arc::clone(&header),
                 over: false,
+                end: None,
                 suspended: false,
                 listed: true,
                 place: self.place.take(),

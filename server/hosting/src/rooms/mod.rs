@@ -16,13 +16,12 @@ use std::time::Duration;
 use chefshat_record::signature::PublicKey;
 use rayon::ThreadPoolBuildError;
 use tokio::sync::Notify;
-use tokio::sync::futures::Notified;
 use tokio_util::task::TaskTracker;
 
 use crate::cluster::{Directory, NodeLease, SingleServer};
 use crate::config::ServerConfig;
 use crate::record_writer::RecordWriter;
-use crate::room::{Handle, RoomWatcher, TaskContext};
+use crate::room::{GameEnd, Handle, RoomWatcher, TaskContext};
 use crate::signing::Signer;
 use crate::webhooks::Webhooks;
 use chefshat_admission::limits::{Background, FairSemaphore, Key, NotStored, Searches, Shares};
@@ -286,9 +285,29 @@ impl Rooms {
         }
     }
 
-    /// Completes when a game has ended or a room is gone after this call.
-    pub fn changed(&self) -> Notified<'_> {
-        self.changed.notified()
+    /// How the game of a room has ended, if it did so since the server was started.
+    pub(crate) fn end_of(&self, id: RoomId) -> Option<GameEnd> {
+        self.lock().get(id)?.end.clone()
+    }
+
+    /// What is notified when a game of a unit has ended or a room of it is gone, until
+    /// [`Rooms::stop_waking`].
+    pub(crate) fn wake(&self, unit: UnitId) -> Arc<Notify> {
+        let waiting = Arc::default();
+        (self.lock().waiting).insert(unit, Arc::clone(&waiting));
+        waiting
+    }
+
+    /// Ends [`Rooms::wake`], unless another task of the unit waits by now.
+    pub(crate) fn stop_waking(&self, unit: UnitId, waiting: &Arc<Notify>) {
+        let mut table = self.lock();
+        if table
+            .waiting
+            .get(&unit)
+            .is_some_and(|it| Arc::ptr_eq(it, waiting))
+        {
+            table.waiting.remove(&unit);
+        }
     }
 
     /// Number of deletions, of participants' data or of old games: what was computed before shows
@@ -465,14 +484,16 @@ impl std::fmt::Debug for Rooms {
 struct Watcher(Weak<Rooms>);
 
 impl RoomWatcher for Watcher {
-    fn game_over(&self, room: RoomId) {
+    fn game_over(&self, room: RoomId, end: GameEnd) {
         if let Some(rooms) = self.0.upgrade() {
             let mut table = rooms.lock();
             if let Some(number) = table.number_of(room)
                 && let Some(entry) = table.by_number.get_mut(&number)
             {
                 entry.over = true;
+                entry.end = Some(end);
                 entry.place = None;
+                table.wake_unit_of(number);
             }
             drop(table);
             rooms.changed.notify_waiters();
@@ -483,6 +504,7 @@ impl RoomWatcher for Watcher {
         if let Some(rooms) = self.0.upgrade() {
             let mut table = rooms.lock();
             if let Some(number) = table.number_of(room) {
+                table.wake_unit_of(number);
                 match table.by_number.get_mut(&number) {
                     Some(entry) if !entry.over => entry.suspended = true,
                     _ => table.remove(number),

@@ -125,6 +125,7 @@ impl Rooms {
             header,
             durable: true,
             over: game.concluded,
+            end: None,
             suspended: false,
             listed,
             place: None,

@@ -4,7 +4,9 @@ use std::collections::{BTreeMap, HashMap};
 use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, Mutex, MutexGuard};
 
-use crate::room::Handle;
+use tokio::sync::Notify;
+
+use crate::room::{GameEnd, Handle};
 use chefshat_admission::limits::{Permit, Refused};
 use chefshat_room::ids::{GameId, RoomId, UnitId};
 use chefshat_room::journal::GameHeader;
@@ -49,6 +51,8 @@ pub(super) struct Table {
     games: HashMap<GameId, u64>,
     /// Rooms that are being created, for which space is reserved, with their units.
     pub(super) in_creation: HashMap<RoomId, UnitId>,
+    /// What the tasks of units wait on, for their own games.
+    pub(super) waiting: HashMap<UnitId, Arc<Notify>>,
     pub(super) shutting_down: bool,
     /// Removed rooms, until the table is unlocked: the last handle of a room may end it, and a room
     /// that ends looks into the table.
@@ -96,6 +100,8 @@ pub(super) struct Entry {
     pub(super) durable: bool,
     /// The game has ended.
     pub(super) over: bool,
+    /// How it has ended, if it did so since the server was started.
+    pub(super) end: Option<GameEnd>,
     /// The room has ended but its game resumes when the server is restarted. It stays in the table,
     /// so that clients are asked to try again: the room is not unknown.
     pub(super) suspended: bool,
@@ -164,6 +170,14 @@ impl Table {
     pub(super) fn of_game(&self, game: GameId) -> Option<&Entry> {
         let entry = self.by_number.get(self.games.get(&game)?)?;
         (!entry.over).then_some(entry)
+    }
+
+    /// Wakes the task of the unit that a room is of.
+    pub(super) fn wake_unit_of(&self, number: u64) {
+        let entry = self.by_number.get(&number);
+        if let Some(waiting) = entry.and_then(|it| self.waiting.get(&it.header.unit())) {
+            waiting.notify_one();
+        }
     }
 
     /// Removes ended rooms if their space is needed.

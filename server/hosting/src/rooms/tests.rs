@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use futures::FutureExt as _;
+
 use super::*;
 use chefshat_room::ids::{Id, SecretHash, Token};
 use chefshat_room::journal::{
@@ -133,4 +135,35 @@ fn a_room_may_end_with_the_handle_that_the_table_removes() {
         table.remove_over();
     }
     assert!(rooms.header(room).is_none());
+}
+
+#[tokio::test]
+async fn the_end_of_a_game_wakes_only_its_own_unit() {
+    let store = Arc::new(MemoryStore::default());
+    let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
+    let created = async || {
+        rooms
+            .create(NewRoom::for_tests())
+            .await
+            .expect("a room")
+            .handle
+    };
+    let (ending, other) = (created().await, created().await);
+    let woken = rooms.wake(ending.id().unit());
+    let asleep = rooms.wake(other.id().unit());
+    ending.close_without_token().await;
+    // Whenever it waits, also if only now.
+    woken.notified().await;
+    assert!(rooms.end_of(ending.id()).is_some_and(|end| !end.finished));
+    assert!(asleep.notified().now_or_never().is_none());
+    assert!(rooms.end_of(other.id()).is_none());
+
+    // A task that has been replaced takes nothing from the one that waits.
+    let unit = other.id().unit();
+    let next = rooms.wake(unit);
+    rooms.stop_waking(unit, &asleep);
+    other.close_without_token().await;
+    next.notified().await;
+    rooms.stop_waking(unit, &next);
+    assert!(!rooms.lock().waiting.contains_key(&unit));
 }

@@ -1,6 +1,6 @@
 //! The games of participants and their rooms: a due game is assigned a room, which is created once
-//! that is committed, and after its end its outcome is read from the store. The core decides which
-//! game comes next.
+//! that is committed, and its outcome counts: as the room says, or, if the server was restarted in
+//! between, as the store has it. The core decides which game comes next.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -37,8 +37,8 @@ impl StudyTask {
         self.touched.clear();
     }
 
-    /// Reads the outcomes of games that have ended. A game ends for all who play it at once.
-    pub(super) async fn read_ended_games(&mut self) -> Result<(), StoreError> {
+    /// Counts games that have ended. A game ends for all who play it at once.
+    pub(super) async fn count_ended_games(&mut self) -> Result<(), StoreError> {
         let mut games: BTreeMap<[u8; 16], (PlayedGame, Vec<u32>)> = BTreeMap::new();
         for number in &self.playing {
             let participant = self.unit.state.participant(*number);
@@ -91,6 +91,12 @@ impl StudyTask {
 
     /// The outcome of a game whose room is over or gone; `None` if it has no room yet.
     async fn outcome(&self, game: &PlayedGame) -> Result<Option<Outcome>, StoreError> {
+        if let Some(end) = self.unit.rooms.end_of(convert::room_of(&game.placed)) {
+            return Ok(Some(match end.finished {
+                true => Outcome::Finished,
+                false => Outcome::Aborted,
+            }));
+        }
         let id = convert::game_of(&game.placed);
         let stored = match self.unit.rooms.store().finished(id).await {
             Err(StoreError::Unreadable(problem)) => {

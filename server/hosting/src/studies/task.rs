@@ -207,7 +207,7 @@ impl Journaled for StudyTask {
     }
 
     async fn follow(&mut self) -> Result<(), StoreError> {
-        self.read_ended_games().await?;
+        self.count_ended_games().await?;
         let now_ms = (self.now)();
         loop {
             let elapsed_ms = self.elapsed_ms();

@@ -288,21 +288,24 @@ async fn a_game_that_cannot_be_read_back_ends_no_study() {
         study,
     };
     let _present = lab.begin().await;
+    lab.studies.end();
+    lab.study.stopped().await;
+
     failing.games_unreadable.store(true, Ordering::Relaxed);
-    let closing = lab.study.proceed(at(1, 1), lab.studies.rooms()).await;
-    assert_eq!(closing.expect("it runs"), Ok(0));
-    let ended = || {
-        lab.study.read(|it| {
+    let studies = server(&lab.store);
+    assert_eq!(studies.restore().await, Ok(1));
+    let study = studies.get(lab.study.id()).expect("it is resumed");
+    let outcome = || {
+        study.read(|it| {
             let game = it.participants()[&1].games.last().cloned();
             game.and_then(|game| game.ended).map(|(outcome, _)| outcome)
         })
     };
-    while ended().is_none() {
-        lab.settled().await;
-        tokio::time::sleep(Duration::from_millis(10)).await;
+    let mut changes = study.changes();
+    while outcome().is_none() {
+        changes.changed().await.expect("it runs");
     }
-    assert_eq!(ended(), Some(chefshat_study::Outcome::Aborted));
-    lab.settled().await;
+    assert_eq!(outcome(), Some(chefshat_study::Outcome::Aborted));
 }
 
 /// What is in the store twice is run once.

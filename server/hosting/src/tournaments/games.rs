@@ -1,13 +1,12 @@
 //! The games of a tournament and their rooms: a called game is assigned a room, its participants
-//! are notified, and after its end its result is read from the store, so that it counts exactly
-//! once even if the server restarts in between. The core decides when games are called and what
-//! counts.
+//! are notified, and its result counts exactly once: as the room says, or, if the server was
+//! restarted in between, as the store has it. The core decides when games are called and what counts.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
-use chefshat_record::outcome;
+use chefshat_record::outcome::{Gathering, Outcome, OutcomeError};
 use chefshat_tournament::Ended;
 use futures::future::join_all;
 use tokio::time::Instant;
@@ -43,8 +42,8 @@ impl TournamentTask {
         });
     }
 
-    /// Reads the results of games that have ended.
-    pub(super) async fn read_ended_games(&mut self) -> Result<(), StoreError> {
+    /// Counts games that have ended.
+    pub(super) async fn count_ended_games(&mut self) -> Result<(), StoreError> {
         let playing: Vec<usize> = self.unit.state.core.playing().collect();
         for game in playing {
             if self.without_room.contains(&game) {
@@ -84,6 +83,9 @@ impl TournamentTask {
         room: RoomId,
         game_id: GameId,
     ) -> Result<Option<Ended>, StoreError> {
+        if let Some(outcome) = (self.unit.rooms.end_of(room)).and_then(|end| end.outcome) {
+            return Ok(Some(played(&outcome)));
+        }
         // An imported record with this id is not the tournament's game.
         let is_ours = |game: &StoredGame| {
             (game.tournament()).is_some_and(|game| game.tournament == self.unit.handle.id())
@@ -99,18 +101,12 @@ impl TournamentTask {
             stored => stored?,
         };
         if let Some(stored) = stored.filter(is_ours) {
-            let reading = background.run(move || {
-                let lines = stored.lines();
-                (outcome::outcome(&lines), abort_reason(&lines))
-            });
+            let reading = background.run(move || read(&stored));
             let (outcome, reason) = (reading.await)
                 .ok_or_else(|| StoreError::Failed("reading a record failed".into()))?;
             drop(slice);
             return Ok(match (outcome, reason) {
-                (Ok(outcome), _) => Some(Ended::Played {
-                    shifts: outcome.shifts,
-                    seats: outcome.seats.iter().map(|seat| seat.statistics).collect(),
-                }),
+                (Ok(outcome), _) => Some(played(&outcome)),
                 (Err(_), Some(v1::AbortReason::Shutdown)) => None,
                 (Err(problem), _) => {
                     warn!(%game_id, %problem, "a game of a tournament has no result");
@@ -314,15 +310,24 @@ fn retry() -> Instant {
     Instant::now() + TOURNAMENT_RETRY
 }
 
-/// Why the game of a record was aborted, if it was.
-fn abort_reason(lines: &[v1::RecordLine]) -> Option<v1::AbortReason> {
-    use v1::game_event::Kind;
-    use v1::record_line::Line;
-    lines.iter().rev().find_map(|line| match &line.line {
-        Some(Line::Event(event)) => match &event.kind {
-            Some(Kind::GameAborted(aborted)) => Some(aborted.reason()),
-            _ => None,
-        },
-        _ => None,
-    })
+/// The end of a game with a result.
+fn played(outcome: &Outcome) -> Ended {
+    Ended::Played {
+        shifts: outcome.shifts,
+        seats: outcome.seats.iter().map(|seat| seat.statistics).collect(),
+    }
+}
+
+/// The outcome of a game that has ended, and why it was aborted, if it was.
+fn read(stored: &StoredGame) -> (Result<Outcome, OutcomeError>, Option<v1::AbortReason>) {
+    let (mut gathering, mut reason) = (Gathering::default(), None);
+    stored.each_line(|line| {
+        gathering.add(&line);
+        if let Some(v1::record_line::Line::Event(event)) = &line.line
+            && let Some(v1::game_event::Kind::GameAborted(aborted)) = &event.kind
+        {
+            reason = Some(aborted.reason());
+        }
+    });
+    (gathering.outcome(), reason)
 }

@@ -206,7 +206,7 @@ impl Journaled for TournamentTask {
 
     async fn follow(&mut self) -> Result<(), StoreError> {
         self.expire();
-        self.read_ended_games().await?;
+        self.count_ended_games().await?;
         self.advance().await
     }
 

@@ -294,10 +294,8 @@ async fn it_starts_by_itself_at_its_time_if_enough_have_joined() {
     }
 }
 
-#[tokio::test]
-async fn a_game_that_cannot_be_read_back_ends_no_tournament() {
-    let store = FailingStore::after(u64::MAX);
-    store.games_unreadable.store(true, Ordering::Relaxed);
+/// How many games are counted, and how many are given up, of a tournament on this store.
+async fn counted_and_void(store: FailingStore) -> (usize, usize) {
     let store: Arc<dyn Store> = Arc::new(store);
     let rooms = Rooms::new(&ServerConfig::default(), store, TaskTracker::new()).expect("threads");
     let tournaments = Tournaments::new(rooms, TaskTracker::new());
@@ -310,11 +308,32 @@ async fn a_game_that_cannot_be_read_back_ends_no_tournament() {
     let created = tournaments.create("Coppa", plan, None, Key::Local).await;
     let (handle, _) = created.expect("made");
     until(&handle, |core| core.state() == State::Finished).await;
-    let void = handle.read(|core| {
-        let games = core.games().iter();
-        games.filter(|game| game.state == GameState::Void).count()
-    });
-    assert!(void > 0);
+    handle.read(|core| {
+        let of = |wanted: fn(&GameState) -> bool| {
+            let games = core.games().iter();
+            games.filter(|game| wanted(&game.state)).count()
+        };
+        (
+            of(|it| matches!(it, GameState::Counted(_))),
+            of(|it| *it == GameState::Void),
+        )
+    })
+}
+
+#[tokio::test]
+async fn games_count_without_being_read_from_the_store() {
+    let store = FailingStore::after(u64::MAX);
+    store.games_unreadable.store(true, Ordering::Relaxed);
+    assert_eq!(counted_and_void(store).await, (1, 0));
+}
+
+#[tokio::test]
+async fn a_game_that_cannot_be_read_back_ends_no_tournament() {
+    let store = FailingStore::after(u64::MAX);
+    store.games_unreadable.store(true, Ordering::Relaxed);
+    store.journals_unreadable.store(true, Ordering::Relaxed);
+    let (counted, void) = counted_and_void(store).await;
+    assert!(counted == 0 && void > 0);
 }
 
 #[tokio::test(start_paused = true)]

@@ -32,6 +32,8 @@ pub struct FailingStore {
     pub unreadable: Mutex<BTreeSet<UnitId>>,
     /// Whether finished games cannot be read, but for their summaries.
     pub games_unreadable: AtomicBool,
+    /// Whether journals of games cannot be read.
+    pub journals_unreadable: Arc<AtomicBool>,
 }
 
 impl FailingStore {
@@ -45,6 +47,7 @@ impl FailingStore {
             tournament_commits: Arc::new(Semaphore::new(Semaphore::MAX_PERMITS)),
             unreadable: Mutex::default(),
             games_unreadable: AtomicBool::new(false),
+            journals_unreadable: Arc::default(),
         }
     }
 }
@@ -91,12 +94,14 @@ impl Store for FailingStore {
     ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
         let appends_left = Arc::clone(&self.appends_left);
         let has_failed = self.has_failed.clone();
+        let unreadable = Arc::clone(&self.journals_unreadable);
         let inner = self.inner.create(header, entries);
         async move {
             let journal: Box<dyn Journal> = Box::new(FailingJournal {
                 inner: inner.await?,
                 appends_left,
                 has_failed,
+                unreadable,
             });
             Ok(journal)
         }
@@ -238,6 +243,7 @@ struct FailingJournal {
     inner: Box<dyn Journal>,
     appends_left: Arc<AtomicU64>,
     has_failed: watch::Sender<bool>,
+    unreadable: Arc<AtomicBool>,
 }
 
 impl Journal for FailingJournal {
@@ -259,7 +265,10 @@ impl Journal for FailingJournal {
     }
 
     fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
-        self.inner.entries()
+        match self.unreadable.load(Ordering::Relaxed) {
+            true => ready(Err(injected_failure())).boxed(),
+            false => self.inner.entries(),
+        }
     }
 
     fn finish(

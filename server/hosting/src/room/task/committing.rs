@@ -4,13 +4,13 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use chefshat_proto::v1;
 use chefshat_room::State;
 use chefshat_room::ids::RoomId;
 use tokio::time::Instant;
 use tracing::{error, info, warn};
 
-use super::Room;
+use super::{GameEnd, Room};
+use crate::signing::ReadRecord;
 use chefshat_store::StoreError;
 use chefshat_wire::convert;
 use chefshat_wire::outbox::StreamEnd;
@@ -42,17 +42,21 @@ impl Room {
             self.now = self.clock.now();
         }
         let ends = self.core.state().is_over() && self.over_since.is_none();
-        if ends && !self.conclude().await {
-            return false;
-        }
+        let end = match ends {
+            true => match self.conclude().await {
+                Some(end) => Some(end),
+                None => return false,
+            },
+            false => None,
+        };
         if !self.wait_for_lease().await {
             return false;
         }
         self.publish();
-        if ends {
+        if let Some(end) = end {
             // A shutdown that waits for games to end may close streams at once: everything has been
             // queued.
-            self.context.watcher.game_over(self.core.header().room_id);
+            (self.context.watcher).game_over(self.core.header().room_id, end);
         }
         true
     }
@@ -70,8 +74,9 @@ impl Room {
         true
     }
 
-    /// Handles the end of the game: finishes the journal and writes the record.
-    async fn conclude(&mut self) -> bool {
+    /// Handles the end of the game: finishes the journal and writes the record. Returns `None` when
+    /// the room must stop.
+    async fn conclude(&mut self) -> Option<GameEnd> {
         self.over_since = Some(self.now);
         let header = Arc::clone(self.core.header());
         // A game without a deal has no record.
@@ -79,12 +84,12 @@ impl Room {
         let has_record = summary.is_some();
         let announced = summary.clone().filter(|_| self.context.webhooks.is_on());
         (self.context.metrics).game_ended(self.core.state() == State::Finished);
-        let signature = match has_record {
-            true => self.sign().await,
-            false => Ok(None),
+        let read = match has_record {
+            true => self.read_record().await,
+            false => Ok(ReadRecord::default()),
         };
-        let finished = match signature {
-            Ok(signature) => {
+        let finished = match read {
+            Ok(ReadRecord { signature, outcome }) => {
                 let finished = self.journal.finish(summary.map(Box::new), signature);
                 // A node that has a lease learns from its beat that the game is over, maybe before
                 // it learns the outcome: it is fenced then, and not lost.
@@ -94,15 +99,18 @@ impl Room {
                         lease.lapsed().await;
                     }
                 };
-                unless(lost, header.room_id, finished).await
+                (unless(lost, header.room_id, finished).await).map(|()| outcome)
             }
             Err(error) => Err(error),
         };
-        if let Err(error) = finished {
-            self.over_since = None;
-            self.fail(&error);
-            return false;
-        }
+        let outcome = match finished {
+            Ok(outcome) => outcome,
+            Err(error) => {
+                self.over_since = None;
+                self.fail(&error);
+                return None;
+            }
+        };
         (self.context.webhooks).game_ended(&header, announced.as_ref());
         info!(
             room = %header.room_id,
@@ -117,15 +125,18 @@ impl Room {
                 .record_writer
                 .write_record(header.game_id, owner);
         }
-        true
+        Some(GameEnd {
+            finished: self.core.state() == State::Finished,
+            outcome: outcome.map(Arc::new),
+        })
     }
 
-    /// Signs the record of the game. If its journal cannot be read, the record stays unsigned; a
-    /// node, whose database may be away, tries again before.
+    /// Reads the record of the game to sign it. If its journal cannot be read, the record stays
+    /// unsigned; a node, whose database may be away, tries again before.
     ///
     /// # Errors
     /// The room was fenced meanwhile.
-    async fn sign(&mut self) -> Result<Option<v1::RecordSignature>, StoreError> {
+    async fn read_record(&mut self) -> Result<ReadRecord, StoreError> {
         let background = self.core.is_built_in_only();
         let background = background.then_some((&*self.context.background, self.context.owner));
         let header = self.core.header();
@@ -138,14 +149,14 @@ impl Room {
         loop {
             let header = Arc::clone(self.core.header());
             let journal = &mut *self.journal;
-            let signing = self.context.signer.sign(header, journal, background);
-            let error = match signing.await {
-                Ok(signature) => return Ok(signature),
+            let reading = self.context.signer.read(header, journal, background);
+            let error = match reading.await {
+                Ok(read) => return Ok(read),
                 Err(error) => error,
             };
             if began.elapsed() >= limit {
                 error!(%game, %error, "a record could not be signed; it stays unsigned");
-                return Ok(None);
+                return Ok(ReadRecord::default());
             }
             tokio::select! {
                 () = self.fence.cancelled() => return Err(StoreError::Fenced(unit)),
