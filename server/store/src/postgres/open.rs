@@ -5,12 +5,12 @@
 use std::str::FromStr as _;
 use std::time::Duration;
 
-use sqlx::migrate::{Migration, MigrationType, Migrator};
+use sqlx::migrate::{MigrateError, Migration, MigrationType, Migrator};
 use sqlx::postgres::{PgConnectOptions, PgConnection};
 use sqlx::{ConnectOptions as _, Connection as _, SqlSafeStr as _};
-use tokio::time::timeout;
+use tokio::time::{sleep, timeout};
 
-use super::errors::explain;
+use super::errors::{explain, is_locked};
 use crate::StoreError;
 
 /// The migrations, oldest first. They never change: sqlx refuses a database in which one ran with
@@ -25,6 +25,11 @@ const MIGRATIONS: [(i64, &str, &str); 4] = [
 const SCHEMA_LOCK: i64 = 0x6368_6566_7368_6174;
 /// How long connecting may take.
 const CONNECT_LIMIT: Duration = Duration::from_secs(5);
+/// How long a migration may wait for a lock, and with it every node that comes after it; the pause
+/// before it tries again, and how often it does. A backup holds locks of all tables as long as it runs.
+const MIGRATION_LOCK_LIMIT: Duration = Duration::from_secs(1);
+const MIGRATION_PAUSE: Duration = Duration::from_secs(2);
+const MIGRATION_TRIES: u32 = 20;
 /// The settings of each session. Work that depends on nothing but `READ COMMITTED` and takes short;
 /// a server that stops in the middle of a transaction must not keep its locks for long.
 const SESSION: [(&str, &str); 6] = [
@@ -64,6 +69,11 @@ pub enum DatabaseError {
         "the tables of the database are of a later version that this one cannot use; nothing was changed: use the later version"
     )]
     Newer,
+    /// Other sessions hold locks of the tables.
+    #[error(
+        "another session uses the tables that are to be upgraded, for example a backup; `chefshat migrate` waited a minute, and can be run again: see pg_locks"
+    )]
+    InUse,
     /// Any other error.
     #[error("{0}")]
     Other(String),
@@ -264,14 +274,27 @@ pub async fn migrate(url: &str) -> Result<(i64, i64), DatabaseError> {
     Ok((before, NEWEST))
 }
 
-/// Runs what is missing, each migration in a transaction. The caller has the lock.
+/// Runs what is missing, each migration in a transaction. The caller has the lock. While it waits
+/// for tables that others use, nobody else gets them, and no node its lease: so it waits for short,
+/// and often.
 async fn migrations(connection: &mut PgConnection) -> Result<(), DatabaseError> {
     let all = MIGRATIONS.iter().map(|(version, name, sql)| {
         let sql = (*sql).into_sql_str();
         Migration::new(*version, (*name).into(), MigrationType::Simple, sql, false)
     });
-    Migrator::with_migrations(all.collect())
-        .run(connection)
-        .await
-        .map_err(|error| DatabaseError::Other(format!("creating the tables failed: {error}")))
+    let migrator = Migrator::with_migrations(all.collect());
+    set_lock_limit(connection, MIGRATION_LOCK_LIMIT).await?;
+    for _ in 0..MIGRATION_TRIES {
+        match migrator.run(&mut *connection).await {
+            Ok(()) => return Ok(()),
+            Err(MigrateError::Execute(error) | MigrateError::ExecuteMigration(error, _))
+                if is_locked(&error) => {}
+            Err(error) => {
+                let problem = format!("creating the tables failed: {error}");
+                return Err(DatabaseError::Other(problem));
+            }
+        }
+        sleep(MIGRATION_PAUSE).await;
+    }
+    Err(DatabaseError::InUse)
 }

@@ -1,6 +1,8 @@
 //! Opening a database: unusable ones are refused and left unchanged.
 
 use chefshat_postgres::Server;
+use sqlx::postgres::PgConnection;
+use sqlx::{Connection as _, Executor as _};
 
 use super::retrying::Line;
 use super::*;
@@ -30,6 +32,34 @@ async fn only_an_empty_database_gets_tables_without_being_asked() {
     node(&database).await.close().await;
     node(&database).await.close().await;
     assert_eq!(migrate(database.url()).await.ok(), Some((NEWEST, NEWEST)));
+}
+
+#[tokio::test]
+async fn an_upgrade_that_waits_for_a_backup_stops_no_node() {
+    let database = chefshat_postgres::database();
+    migrate(database.url()).await.expect("an empty database");
+    database.run("ALTER TABLE nodes DROP COLUMN rooms");
+    database.run("DELETE FROM _sqlx_migrations WHERE version > 3");
+    let mut backup = PgConnection::connect(database.url())
+        .await
+        .expect("it answers");
+    for statement in ["BEGIN", "LOCK TABLE nodes IN ACCESS SHARE MODE"] {
+        backup.execute(statement).await.expect("locked");
+    }
+
+    let url = database.url().to_owned();
+    let upgrade = std::thread::spawn(move || {
+        let runtime = tokio::runtime::Runtime::new().expect("threads");
+        runtime.block_on(migrate(&url)).ok()
+    });
+    let waiting = "SELECT count(*) FROM pg_stat_activity
+                   WHERE wait_event_type = 'Lock' AND datname = current_database()";
+    while database.run(waiting).trim() == "0" {}
+    database.run("SET statement_timeout = '30s'; UPDATE nodes SET beat_ms = clock_ms()");
+    assert!(!upgrade.is_finished());
+
+    backup.execute("COMMIT").await.expect("committed");
+    assert_eq!(upgrade.join().expect("no panic"), Some((3, NEWEST)));
 }
 
 #[tokio::test]
