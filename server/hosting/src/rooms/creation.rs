@@ -280,6 +280,7 @@ impl Reservation {
         let room_id = owner.subject;
         // Before the commit, which takes time: the room's clock starts at `created_at_ms`.
         let clock = RoomClock::of_age(Duration::ZERO, &rooms.context.process_clock);
+        let created_at_ms = since_epoch_ms();
         let mut header = Arc::new(GameHeader {
             room_id,
             game_id: seating.map_or_else(GameId::random, |seating| seating.game_id),
@@ -301,7 +302,7 @@ impl Reservation {
                     nonce: random_bytes(),
                 },
             },
-            created_at_ms: since_epoch_ms(),
+            created_at_ms,
             join_code: join_code(),
             owner: owner.hash(),
             tournament: seating.and_then(|seating| seating.part_of.tournament()),
