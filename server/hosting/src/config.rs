@@ -119,8 +119,6 @@ pub const MAX_START_AHEAD: Duration = Duration::from_secs(366 * 24 * 3_600);
 pub const MAX_EARLY_WITHDRAWALS_OF_CALLER: u32 = 20;
 /// How long a tournament stays paused.
 pub const TOURNAMENT_PAUSE: Duration = Duration::from_secs(7 * 24 * 3_600);
-/// Pause before rooms for games of a tournament are tried again after a failure.
-pub const TOURNAMENT_RETRY: Duration = Duration::from_secs(1);
 /// Most streams that follow tournaments.
 pub const MAX_FOLLOWERS: usize = 1_024;
 /// Shortest time between two updates of a followed tournament.

@@ -1,5 +1,5 @@
 //! The log of a room: every public event, in order. The number of an event is its position plus
-//! one. `convert::event` in the server redacts events for a viewer.
+//! one. `convert::event` in `chefshat-wire` redacts events for a viewer.
 
 use std::collections::VecDeque;
 use std::time::Duration;

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use chefshat_agents::RecordedPlayer;
 use chefshat_engine::{RULES_VERSION, RuleSet, Seat, SeedPlan};
+use tokio::time::Instant;
 
 use super::table::{CreateError, Entry};
 use super::{CODES_TRIED, Rooms};
@@ -28,6 +29,8 @@ use chefshat_store::StoreError;
 
 /// When it is worth trying again to create a room.
 const RETRY_ROOMS: Duration = Duration::from_secs(30);
+/// When a tournament or study tries again to create rooms.
+const CREATION_RETRY: Duration = Duration::from_secs(1);
 
 /// The settings of a new room.
 #[derive(Debug)]
@@ -85,6 +88,11 @@ impl NewRoom {
             creator: None,
         }
     }
+}
+
+/// The time of its next attempt.
+pub(crate) fn retry_at() -> Instant {
+    Instant::now() + CREATION_RETRY
 }
 
 /// The part of a room's settings that a tournament or study decides.

@@ -1,5 +1,5 @@
-//! The rooms of a unit, which change hands together in a cluster: a room without a tournament, or
-//! those of a tournament.
+//! The rooms of a unit, which change hands together in a cluster: a room alone, or those of a
+//! tournament or study.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::future::Future;

@@ -12,8 +12,7 @@ use tokio::time::Instant;
 use tracing::{error, warn};
 
 use super::task::StudyTask;
-use crate::config::TOURNAMENT_RETRY;
-use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
+use crate::rooms::{CreateError, NewRoom, PartOf, Seating, retry_at};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{GameId, RoomId};
 use chefshat_room::journal::{Change, Fill, GameStart, SeatedParticipant, StudyGame, StudyMember};
@@ -151,9 +150,9 @@ impl StudyTask {
                 }
                 Err(CreateError::Store(error)) => return Err(error),
                 // When the server is restarted, the game gets its room.
-                Err(CreateError::ShuttingDown) => self.retry = Some(retry()),
+                Err(CreateError::ShuttingDown) => self.retry = Some(retry_at()),
                 Err(error) => {
-                    if self.retry.replace(retry()).is_none() {
+                    if self.retry.replace(retry_at()).is_none() {
                         warn!(study = %self.unit.handle.id(), %error, "games of a study wait for rooms");
                     }
                 }
@@ -295,8 +294,4 @@ impl StudyTask {
             }),
         })
     }
-}
-
-fn retry() -> Instant {
-    Instant::now() + TOURNAMENT_RETRY
 }

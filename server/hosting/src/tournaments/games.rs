@@ -14,8 +14,7 @@ use tracing::{error, warn};
 
 use super::message::Call;
 use super::task::TournamentTask;
-use crate::config::TOURNAMENT_RETRY;
-use crate::rooms::{CreateError, NewRoom, PartOf, Seating, Withheld};
+use crate::rooms::{CreateError, NewRoom, PartOf, Seating, Withheld, retry_at};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{GameId, Id, RoomId};
 use chefshat_room::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
@@ -172,9 +171,9 @@ impl TournamentTask {
                 }
                 Err(CreateError::Store(error)) => return Err(error),
                 // When the server is restarted, the game is assigned a new room.
-                Err(CreateError::ShuttingDown) => self.retry = Some(retry()),
+                Err(CreateError::ShuttingDown) => self.retry = Some(retry_at()),
                 Err(error) => {
-                    if self.retry.replace(retry()).is_none() && !has_waited {
+                    if self.retry.replace(retry_at()).is_none() && !has_waited {
                         warn!(tournament = %self.unit.handle.id(), %error, "games of a tournament wait for rooms");
                     }
                 }
@@ -304,10 +303,6 @@ impl TournamentTask {
             }),
         }
     }
-}
-
-fn retry() -> Instant {
-    Instant::now() + TOURNAMENT_RETRY
 }
 
 /// The end of a game with a result.
