@@ -30,7 +30,7 @@ Info = dict[str, Any]
 
 def room(address: str, seats: list[str | None], **options: Any) -> str:
     with chefshat.Client(address) as client:
-        return client.create_room("club", seats=seats, **options).join_code
+        return client.rooms.create("club", seats=seats, **options).join_code
 
 
 def command(address: str, code: str, player: str, *options: str) -> list[str]:
@@ -48,13 +48,13 @@ def one_line(capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
 def play_four(address: str, players: list[AgentSpec]) -> dict[str, chefshat.SeatResult]:
     """Plays a game with these players, and random agents in the other seats. Returns the results by name."""
     with chefshat.Client(address) as client, contextlib.ExitStack() as stack:
-        code = client.create_room("club").join_code
+        code = client.rooms.create("club").join_code
         agents: dict[str, chefshat.Agent] = {}
         names = {}
         for number in range(4):
             spec = players[number] if number < len(players) else None
             name = spec.name if spec else f"random {number}"
-            ticket = client.join_room(code, name).ticket
+            ticket = client.rooms.join(code, name).ticket
             names[ticket] = name
             agents[ticket] = PlayersClubAgent(stack.enter_context(AgentProcess(spec))) if spec else RandomAgent(seed=number)
         results = client.play_many(agents)
@@ -202,12 +202,12 @@ def test_an_interrupted_command_leaves_no_process(
     real_address: str, tmp_path: Path, processes: list["subprocess.Popen[str]"]
 ) -> None:
     with chefshat.Client(real_address) as client:
-        made = client.create_room("club", seats=[None, None, "random", "random"])
+        made = client.rooms.create("club", seats=[None, None, "random", "random"])
         given = json.dumps({"file": str(tmp_path / "pid")})
         options = command(real_address, made.join_code, "Present", "--arguments", given)
         process = subprocess.Popen([*COMMAND, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         processes.append(process)
-        wait_until(lambda: client.get_room(made.room.room_id).seats[0].connected, "the player is there", process)
+        wait_until(lambda: client.rooms.get(made.room.room_id).seats[0].connected, "the player is there", process)
     process.send_signal(signal.SIGINT)
     _, outcome = process.communicate(timeout=LIMIT_S)
     assert outcome.endswith("interrupted; a substitute plays until the ticket is used again\n")
@@ -282,7 +282,7 @@ def cup(client: chefshat.Client, rules: pb.RuleSet) -> pb.CreateTournamentRespon
         built_in_agents=["random"] * (rules.players - 1),
         start_when_joined=rules.players,
     )
-    return client.create_tournament(settings)
+    return client.tournaments.create(settings)
 
 
 def in_cup(address: str, code: str, player: str, *options: str) -> list[str]:
@@ -299,8 +299,8 @@ def test_a_player_plays_a_tournament_with_two_processes(
         made = cup(client, pb.RuleSet(players=4, target_shifts=2))
         assert main(in_cup(real_address, made.join_code, "Scribe", "--games", "2", "--arguments", given)) == 0
         outcome = one_line(capsys)
-        games = list(client.tournament_games(made.tournament.tournament_id))
-        results = client.tournament_results(made.tournament.tournament_id)
+        games = list(client.tournaments.games(made.tournament.tournament_id))
+        results = client.tournaments.results(made.tournament.tournament_id)
     assert (outcome["event"], outcome["tournament_id"]) == ("finished", made.tournament.tournament_id)
     assert (outcome["failures"], outcome["replaced"], outcome["restarts"]) == (0, 0, 0)
     assert results.tournament.participants[outcome["participant"]].max_games == 2
@@ -317,7 +317,7 @@ def test_a_resumed_command_has_as_many_processes_as_declared(
 ) -> None:
     with chefshat.Client(real_address) as client:
         made = cup(client, pb.RuleSet(players=4, target_shifts=2))
-        joined = client.join_tournament(made.join_code, "Ada", max_games=2)
+        joined = client.tournaments.join(made.join_code, "Ada", max_games=2)
     # Not with --games.
     monkeypatch.setenv(TICKET, joined.ticket)
     given = json.dumps({"log_file": str(tmp_path / "log.{process}")})
@@ -335,7 +335,7 @@ def test_a_tournament_with_unsupported_rules_is_refused(real_address: str, capsy
     with chefshat.Client(real_address) as client:
         made = cup(client, pb.RuleSet(players=3))
         assert main(in_cup(real_address, made.join_code, "Largest")) == 1
-        client.close_tournament(made.tournament.tournament_id, made.owner_token)
+        client.tournaments.close(made.tournament.tournament_id, made.owner_token)
     outcome = one_line(capsys)
     assert "this one has 3, 11 and 2; the tournament will be played without it" in outcome["message"]
 
@@ -370,7 +370,7 @@ def test_a_killed_command_resumes(
         assert main(again) == 0
         outcome = one_line(capsys)
         games = outcome.get("games", [outcome])
-        records = [list(client.record(game["game_id"])) for game in games]
+        records = [list(client.records.read(game["game_id"])) for game in games]
     assert not ticket.exists()
     assert (outcome["failures"], outcome["replaced"]) == (0, 0)
     assert len(games) == (1 if where == "room" else 6)

@@ -51,10 +51,10 @@ def positions(count: int, seed: int) -> list[search.Position]:
 
 def recorded(client: chefshat.Client, count: int) -> Iterator[pb.RecordedMoment]:
     """Plays a game of greedy agents on the server and returns decisions of it with a choice."""
-    room = client.create_room("benchmark", seats=[None, "greedy", "greedy", "greedy"])
-    client.play(chefshat.RandomAgent(1), client.join_room(room.join_code, "Random").ticket)
+    room = client.rooms.create("benchmark", seats=[None, "greedy", "greedy", "greedy"])
+    client.play(chefshat.RandomAgent(1), client.rooms.join(room.join_code, "Random").ticket)
     game = room.room.game_id
-    lines = [line.decision for line in client.record(game) if line.HasField("decision")]
+    lines = [line.decision for line in client.records.read(game) if line.HasField("decision")]
     choices = [number for number, taken in enumerate(lines) if sum(map(int.bit_count, taken.action_mask)) > 1]
     return (pb.RecordedMoment(game_id=game, decisions=choices[place % len(choices)]) for place in range(count))
 

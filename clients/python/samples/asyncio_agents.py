@@ -26,8 +26,8 @@ async def play(address: str) -> None:
     async with aio.Client(address) as client:
         tickets = []
         for number in range(GAMES):
-            room = await client.create_room(f"table {number}", seats=[None, "greedy", "greedy", "random"])
-            tickets.append((await client.join_room(room.join_code, "Slow")).ticket)
+            room = await client.rooms.create(f"table {number}", seats=[None, "greedy", "greedy", "random"])
+            tickets.append((await client.rooms.join(room.join_code, "Slow")).ticket)
         results = await client.play_many({ticket: Slow() for ticket in tickets})
     for number, result in enumerate(results.values()):
         result.raise_for_error()

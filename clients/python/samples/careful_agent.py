@@ -50,8 +50,8 @@ def main(address: str = "127.0.0.1:50051") -> None:
     """Plays a game against three built-in agents."""
     with chefshat.Client(address) as client:
         agent = Careful(list(client.action_table().texts))
-        room = client.create_room("a careful lunch", seats=[None, "random", "random", "greedy"])
-        result = client.play(agent, client.join_room(room.join_code, "Careful").ticket)
+        room = client.rooms.create("a careful lunch", seats=[None, "random", "random", "greedy"])
+        result = client.play(agent, client.rooms.join(room.join_code, "Careful").ticket)
     print(f"place {result.place} with {result.points} points after {agent.shifts} Shifts")
 
 

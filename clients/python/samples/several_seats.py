@@ -11,8 +11,8 @@ import chefshat
 def main(address: str = "127.0.0.1:50051") -> None:
     """Plays the game and prints a line for each seat."""
     with chefshat.Client(address) as client:
-        room = client.create_room("self-play")
-        tickets = [client.join_room(room.join_code, f"player {number}").ticket for number in range(4)]
+        room = client.rooms.create("self-play")
+        tickets = [client.rooms.join(room.join_code, f"player {number}").ticket for number in range(4)]
         results = client.play_many({ticket: chefshat.RandomAgent(seed) for seed, ticket in enumerate(tickets)})
     for result in results.values():
         result.raise_for_error()

@@ -31,12 +31,12 @@ def main(address: str = "127.0.0.1:50051", room_id: str = "") -> None:
     with chefshat.Client(address) as client:
         player = None
         if not room_id:
-            room = client.create_room("open kitchen", seats=[None, "greedy", "greedy", "random"])
+            room = client.rooms.create("open kitchen", seats=[None, "greedy", "greedy", "random"])
             room_id = room.room.room_id
-            ticket = client.join_room(room.join_code, "Ada").ticket
+            ticket = client.rooms.join(room.join_code, "Ada").ticket
             player = threading.Thread(target=client.play, args=(chefshat.RandomAgent(seed=1), ticket))
             player.start()
-        for event in client.watch(room_id):
+        for event in client.rooms.watch(room_id):
             if (line := describe(event)) is not None:
                 print(line)
         if player is not None:

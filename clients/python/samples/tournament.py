@@ -31,11 +31,11 @@ def main(address: str = "127.0.0.1:50051") -> None:
         start_when_joined=4,
     )
     with chefshat.Client(address) as client:
-        cup = client.create_tournament(settings)
-        joined = client.join_tournament(cup.join_code, "Hoarder", max_games=2)
+        cup = client.tournaments.create(settings)
+        joined = client.tournaments.join(cup.join_code, "Hoarder", max_games=2)
         played = client.play_tournament(joined.ticket, Hoarder)
         print(f"places in {len(played)} games: {[result.place for result in played]}")
-        results = client.tournament_results(cup.tournament.tournament_id)
+        results = client.tournaments.results(cup.tournament.tournament_id)
     for line in results.standings:
         print(f"{line.place}. {results.tournament.participants[line.participant].name}: {line.score} points")
 

@@ -34,15 +34,15 @@ def guarded() -> Iterator[FakeServer]:
 
 def play_blocking(server: str | ServerAddress, agent: chefshat.Agent) -> SeatResult:
     with chefshat.Client(server) as client:
-        room = client.create_room("tea", seats=SEATS, policy=POLICY)
-        return client.play(agent, client.join_room(room.join_code, "Ada").ticket)
+        room = client.rooms.create("tea", seats=SEATS, policy=POLICY)
+        return client.play(agent, client.rooms.join(room.join_code, "Ada").ticket)
 
 
 def play_asyncio(server: str | ServerAddress, agent: chefshat.Agent) -> SeatResult:
     async def run() -> SeatResult:
         async with aio.Client(server) as client:
-            room = await client.create_room("tea", seats=SEATS, policy=POLICY)
-            joined = await client.join_room(room.join_code, "Ada")
+            room = await client.rooms.create("tea", seats=SEATS, policy=POLICY)
+            joined = await client.rooms.join(room.join_code, "Ada")
             return await client.play(agent, joined.ticket)
 
     return asyncio.run(run())
@@ -78,33 +78,33 @@ def test_the_real_server_with_tls_and_tokens(real_binary: Path, tmp_path: Path, 
 def test_what_is_private_is_shown_with_a_secret_of_it(real_address: str) -> None:
     rules = pb.RuleSet(target_shifts=1)
     with chefshat.Client(real_address) as stranger:
-        created = stranger.create_room(rules=rules, seats=["random"] * 4, visibility=pb.VISIBILITY_PRIVATE)
+        created = stranger.rooms.create(rules=rules, seats=["random"] * 4, visibility=pb.VISIBILITY_PRIVATE)
         room = created.room
         assert room.policy.visibility == pb.VISIBILITY_PRIVATE
         settings = pb.TournamentSettings(name="cup", format=pb.TOURNAMENT_FORMAT_KNOCKOUT, rules=rules)
-        cup = stranger.create_tournament(settings, visibility=pb.VISIBILITY_PRIVATE)
+        cup = stranger.tournaments.create(settings, visibility=pb.VISIBILITY_PRIVATE)
         assert not settings.HasField("policy")
         tournament_id = cup.tournament.tournament_id
         for unknown in (
-            lambda: stranger.get_room(room.room_id),
-            lambda: list(stranger.watch(room.room_id)),
-            lambda: list(stranger.record(room.game_id)),
-            lambda: stranger.get_tournament(tournament_id),
+            lambda: stranger.rooms.get(room.room_id),
+            lambda: list(stranger.rooms.watch(room.room_id)),
+            lambda: list(stranger.records.read(room.game_id)),
+            lambda: stranger.tournaments.get(tournament_id),
         ):
             with pytest.raises(ChefsHatError, match="_UNKNOWN"):
                 unknown()
-        assert room.room_id not in [listed.room_id for listed in stranger.list_rooms()]
+        assert room.room_id not in [listed.room_id for listed in stranger.rooms.list()]
     secrets = [created.owner_token, cup.owner_token]
     with chefshat.Client(real_address, secrets=secrets) as owner:
-        assert list(owner.watch(room.room_id))
-        assert list(owner.record(room.game_id))
-        assert room.game_id in [listed.game_id for listed in owner.records()]
-        assert owner.get_tournament(tournament_id).tournament_id == tournament_id
-        owner.close_tournament(tournament_id, cup.owner_token)
+        assert list(owner.rooms.watch(room.room_id))
+        assert list(owner.records.read(room.game_id))
+        assert room.game_id in [listed.game_id for listed in owner.records.list()]
+        assert owner.tournaments.get(tournament_id).tournament_id == tournament_id
+        owner.tournaments.close(tournament_id, cup.owner_token)
 
     async def run() -> None:
         async with aio.Client(ServerAddress(real_address, secrets=(created.owner_token,))) as owner:
-            assert (await owner.get_room(room.room_id)).game_id == room.game_id
+            assert (await owner.rooms.get(room.room_id)).game_id == room.game_id
 
     asyncio.run(run())
 
@@ -121,7 +121,7 @@ def test_token_and_authorities_come_from_the_environment(
 
 def test_arguments_of_clients_and_environments(guarded: FakeServer) -> None:
     with chefshat.Client(guarded.address, token=SECRET, ca=AUTHORITY) as client:
-        room = client.create_room("tea", seats=SEATS)
+        room = client.rooms.create("tea", seats=SEATS)
     result = chefshat.play(
         chefshat.RandomAgent(1), guarded.address, join_code=room.join_code, name="Ada", token=SECRET, ca=AUTHORITY
     )
@@ -135,7 +135,7 @@ def test_the_command_takes_a_token_and_authorities(
     guarded: FakeServer, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with chefshat.Client(guarded.address, token=SECRET, ca=AUTHORITY) as client:
-        code = client.create_room("tea", seats=SEATS).join_code
+        code = client.rooms.create("tea", seats=SEATS).join_code
     arguments = ["--address", guarded.address, "--ca", str(AUTHORITY), "--code", code, "--name", "Ada", "--json"]
     assert command.main(arguments) == 1
     assert json.loads(capsys.readouterr().out)["reason"] == "TOKEN_MISSING"
@@ -164,7 +164,7 @@ def test_a_refused_token_is_not_sent_again(guarded: FakeServer, play: Player, to
 def test_a_token_is_never_shown(guarded: FakeServer) -> None:
     server = ServerAddress(guarded.address, SECRET, AUTHORITY)
     with chefshat.Client(server) as client, pytest.raises(ChefsHatError) as caught:
-        client.get_room("nowhere")
+        client.rooms.get("nowhere")
     opened = channel(server)
     shown = [server, str(server), client, vars(client), opened, opened.unary_unary("/a/b"), caught.value, caught.value.__cause__]
     opened.close()

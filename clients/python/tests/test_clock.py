@@ -42,7 +42,7 @@ def test_the_offset_is_known_to_half_the_round_trip(fake: FakeServer) -> None:
         assert clock.room_offset is None
         with pytest.raises(ValueError, match="without a room"):
             clock.local(0)
-        room = client.create_room("clock").room
+        room = client.rooms.create("clock").room
         clock = client.clock(room.room_id)
         assert clock.room_offset is not None
         assert abs(clock.room_offset) <= clock.error + 2e-6
@@ -57,9 +57,9 @@ def test_events_are_placed_between_what_came_before_and_after(real_address: str)
     async def joined() -> None:
         async with aio.Client(real_address) as client:
             before = time.monotonic()
-            created = await client.create_room("clock")
+            created = await client.rooms.create("clock")
             joined = time.monotonic()
-            await client.join_room(created.join_code, "agent")
+            await client.rooms.join(created.join_code, "agent")
             after = time.monotonic()
             clock = await client.clock(created.room.room_id, local=time.monotonic)
             assert clock.game_id == created.room.game_id
@@ -67,7 +67,7 @@ def test_events_are_placed_between_what_came_before_and_after(real_address: str)
             # The time of an event is rounded to a millisecond.
             error = clock.error + 1e-3
             assert before - error <= clock.local(0) <= joined + error
-            async for event in client.watch(created.room.room_id):
+            async for event in client.rooms.watch(created.room.room_id):
                 assert joined - error <= clock.local(event.elapsed_ms) <= after + error
                 break
 

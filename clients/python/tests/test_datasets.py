@@ -105,7 +105,7 @@ class Talkative(RandomAgent):
             chunk = pb.SampleChunk(
                 stream="affect", channels=["valence", "arousal"], elapsed_us=[1, 2], values=[0.5, -0.5, 0.25, np.nan]
             )
-            self.client.add_samples(self.ticket, chunk)
+            self.client.rooms.add_samples(self.ticket, chunk)
             public = pb.Expression(label="joy", valence=0.5, source=pb.EXPRESSION_SOURCE_SELF_REPORT)
             self.client.express(self.ticket, public)
         if request.decision_id % 7 == 3:
@@ -171,13 +171,13 @@ def hosted(binary: Path, tmp_path_factory: pytest.TempPathFactory) -> Dataset:
     rules = pb.RuleSet(target_shifts=2)
     with RealServer(binary, data_dir) as server, chefshat.Client(server.address) as client:
         seats = [None, "random", "greedy", "random"]
-        room = client.create_room("talk", rules=rules, policy=pb.RoomPolicy(hints=True), seats=seats)
-        ticket = client.join_room(room.join_code, "Talkative").ticket
-        client.add_marker(room.room.room_id, room.owner_token, "EEG on")
+        room = client.rooms.create("talk", rules=rules, policy=pb.RoomPolicy(hints=True), seats=seats)
+        ticket = client.rooms.join(room.join_code, "Talkative").ticket
+        client.rooms.add_marker(room.room.room_id, room.owner_token, "EEG on")
         client.play(Talkative(client, ticket), ticket)
         policy = pb.RoomPolicy(max_invalid_attempts=3)
-        room = client.create_room("stubborn", rules=rules, policy=policy, seats=seats)
-        client.play(Stubborn(), client.join_room(room.join_code, "Stubborn").ticket)
+        room = client.rooms.create("stubborn", rules=rules, policy=policy, seats=seats)
+        client.play(Stubborn(), client.rooms.join(room.join_code, "Stubborn").ticket)
         wait_until(lambda: len(list(records.glob("*.jsonl"))) >= 2, "the records of two finished games are there")
     folder = tmp_path_factory.mktemp("hosted")
     export(binary, records, folder)

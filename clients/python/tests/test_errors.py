@@ -20,7 +20,7 @@ from chefshat.errors import exit_code
 
 def test_a_refusal_has_reason_metadata_and_code(fake: FakeServer) -> None:
     with chefshat.Client(fake.address) as client, pytest.raises(ChefsHatError) as caught:
-        client.join_room("WRONG", "Ada")
+        client.rooms.join("WRONG", "Ada")
     error = caught.value
     assert error.reason == "JOIN_CODE_WRONG"
     assert error.message == "no room has this join code"
@@ -33,7 +33,7 @@ def test_a_refusal_has_reason_metadata_and_code(fake: FakeServer) -> None:
 async def async_refusal(address: str) -> ChefsHatError:
     async with aio.Client(address) as client:
         with pytest.raises(ChefsHatError) as caught:
-            await client.get_room("nowhere")
+            await client.rooms.get("nowhere")
     return caught.value
 
 
@@ -45,9 +45,9 @@ def test_a_refusal_is_the_same_under_asyncio(fake: FakeServer) -> None:
 def test_a_refused_stream_raises(fake: FakeServer) -> None:
     with chefshat.Client(fake.address) as client:
         with pytest.raises(ChefsHatError, match="GAME_UNKNOWN"):
-            list(client.record("nothing"))
+            list(client.records.read("nothing"))
         with pytest.raises(ChefsHatError, match="ROOM_UNKNOWN"):
-            list(client.watch("nothing"))
+            list(client.rooms.watch("nothing"))
 
 
 def test_without_details_the_code_is_the_reason() -> None:
@@ -77,10 +77,10 @@ def silent() -> Iterator[str]:
 def test_a_call_without_an_answer_ends(silent: str) -> None:
     async def asynchronous() -> None:
         async with aio.Client(silent, timeout=0.2) as client:
-            await client.create_room()
+            await client.rooms.create()
 
     with chefshat.Client(silent, timeout=0.2) as client, pytest.raises(ChefsHatError, match="longer timeout=") as caught:
-        client.create_room()
+        client.rooms.create()
     assert caught.value.reason == "DEADLINE_EXCEEDED"
     with pytest.raises(ChefsHatError, match="DEADLINE_EXCEEDED"):
         asyncio.run(asynchronous())
@@ -89,7 +89,11 @@ def test_a_call_without_an_answer_ends(silent: str) -> None:
 def test_a_closed_client_says_so_in_every_thread(fake: FakeServer, silent: str) -> None:
     client = chefshat.Client(fake.address)
     client.close()
-    for call in (client.server_info, lambda: client.play(chefshat.RandomAgent(), "ticket"), lambda: list(client.record("game"))):
+    for call in (
+        client.server_info,
+        lambda: client.play(chefshat.RandomAgent(), "ticket"),
+        lambda: list(client.records.read("game")),
+    ):
         with pytest.raises(ChefsHatError, match="CLIENT_CLOSED"):
             call()
     waiting = chefshat.Client(silent, timeout=None)
@@ -97,7 +101,7 @@ def test_a_closed_client_says_so_in_every_thread(fake: FakeServer, silent: str) 
 
     def wait() -> None:
         with pytest.raises(ChefsHatError) as caught:
-            waiting.create_room()
+            waiting.rooms.create()
         errors.append(caught.value)
 
     thread = threading.Thread(target=wait)
@@ -111,14 +115,14 @@ def test_a_closed_client_says_so_in_every_thread(fake: FakeServer, silent: str) 
 def test_a_client_of_asyncio_that_is_closed_during_a_call_says_so(silent: str) -> None:
     async def close_during_a_call() -> None:
         client = aio.Client(silent, timeout=None)
-        call = asyncio.create_task(client.create_room())
+        call = asyncio.create_task(client.rooms.create())
         await asyncio.sleep(0)
         await client.close()
         await call
 
     async def cancel() -> None:
         async with aio.Client(silent, timeout=None) as client, asyncio.timeout(0.1):
-            await client.create_room()
+            await client.rooms.create()
 
     with pytest.raises(ChefsHatError, match="CLIENT_CLOSED"):
         asyncio.run(close_during_a_call())

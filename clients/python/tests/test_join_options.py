@@ -30,7 +30,7 @@ Processes = list["subprocess.Popen[str]"]
 
 
 def new_room(client: chefshat.Client) -> pb.CreateRoomResponse:
-    return client.create_room(seats=["random", None, "random", "random"], policy=PATIENT)
+    return client.rooms.create(seats=["random", None, "random", "random"], policy=PATIENT)
 
 
 def new_cup(client: chefshat.Client) -> pb.CreateTournamentResponse:
@@ -44,7 +44,7 @@ def new_cup(client: chefshat.Client) -> pb.CreateTournamentResponse:
         built_in_agents=["random", "random", "random"],
         start_when_joined=4,
     )
-    return client.create_tournament(settings)
+    return client.tournaments.create(settings)
 
 
 def start(processes: Processes, *arguments: str, ticket: str = "") -> "subprocess.Popen[str]":
@@ -110,7 +110,7 @@ def test_a_killed_command_resumes_its_seat(
         room = new_room(client)
         way = ["--code", room.join_code, "--name", "Ada"]
         outcome = kill_and_resume(address, way, processes, tmp_path / "ticket" if in_file else None)
-        lines = list(client.record(room.room.game_id))
+        lines = list(client.records.read(room.room.game_id))
     assert (outcome["event"], outcome["game_id"], outcome["seat"]) == ("finished", room.room.game_id, 1)
     decisions = [line.decision for line in lines if line.HasField("decision") and line.decision.seat == 1]
     # The two decisions before the kill are not among its own. Records of the fake server have no decisions.
@@ -125,8 +125,8 @@ def test_a_killed_command_resumes_its_tournament(address: str, in_file: bool, tm
         tournament_id = cup.tournament.tournament_id
         way = ["--tournament", cup.join_code, "--name", "Ada", "--games", "2"]
         outcome = kill_and_resume(address, way, processes, tmp_path / "ticket" if in_file else None)
-        games = {game.game_id: game for game in client.tournament_games(tournament_id)}
-        results = client.tournament_results(tournament_id)
+        games = {game.game_id: game for game in client.tournaments.games(tournament_id)}
+        results = client.tournaments.results(tournament_id)
     assert (outcome["event"], outcome["tournament_id"]) == ("finished", tournament_id)
     assert results.tournament.participants[outcome["participant"]].name == "Ada"
     assert len(games) == GAMES
@@ -175,7 +175,7 @@ def test_without_a_place_for_the_ticket_no_seat_is_taken(
         assert "is a folder: name a file in it" in capsys.readouterr().err
         assert command.main([*joining, str(tmp_path / "no such folder" / "ticket")]) == 1
         assert "no such folder" in capsys.readouterr().err
-        assert client.get_room(room.room.room_id).seats[1].name == ""
+        assert client.rooms.get(room.room.room_id).seats[1].name == ""
     assert command.main(["--address", fake.address, "--ticket-file", str(tmp_path / "none")]) == 1
     assert "there is no ticket in" in capsys.readouterr().err
     joining[joining.index(room.join_code)] = "WRONG"
@@ -208,7 +208,7 @@ def test_an_undeletable_ticket_file_is_a_warning(
 ) -> None:
     file = tmp_path / "ticket"
     with chefshat.Client(fake.address) as client:
-        file.write_text(client.join_room(new_room(client).join_code, "Ada").ticket)
+        file.write_text(client.rooms.join(new_room(client).join_code, "Ada").ticket)
 
     def refuse(path: Path, missing_ok: bool = False) -> None:
         raise PermissionError(errno.EACCES, "Permission denied", str(path))
@@ -260,10 +260,10 @@ def test_ctrl_c_exits_with_130_and_reports_the_substitute(fake: FakeServer, proc
 
 def test_a_seat_ticket_is_not_a_participant_ticket(address: str) -> None:
     with chefshat.Client(address) as client:
-        seat = client.join_room(new_room(client).join_code, "Ada")
+        seat = client.rooms.join(new_room(client).join_code, "Ada")
         (result,) = client.play_tournament(seat.ticket, lambda info: RandomAgent(info.seat))
         assert (result.seat, result.finished) == (seat.seat, True)
-        participant = client.join_tournament(new_cup(client).join_code, "Ada")
+        participant = client.tournaments.join(new_cup(client).join_code, "Ada")
         with pytest.raises(ChefsHatError, match="TICKET_OF_PARTICIPANT"):
             client.play(RandomAgent(), participant.ticket)
 
@@ -308,9 +308,9 @@ def test_a_name_keeps_its_key(real_address: str, tmp_path: Path, capsys: pytest.
     joining = ["--address", real_address, "--name", "Ada"]
     with chefshat.Client(real_address) as client:
         for file in (key, key, tmp_path / "other.key"):
-            made = client.create_room(seats=["random", None, "random", "random"], rules=pb.RuleSet(target_shifts=1))
+            made = client.rooms.create(seats=["random", None, "random", "random"], rules=pb.RuleSet(target_shifts=1))
             assert command.main([*joining, "--code", made.join_code, "--name-key", str(file)]) == 0
-            fingerprints.append(client.get_room(made.room.room_id).seats[1].name_fingerprint)
+            fingerprints.append(client.rooms.get(made.room.room_id).seats[1].name_fingerprint)
     first, again, other = fingerprints
     assert re.fullmatch("[0-9a-f]{16}", first)
     assert first == again != other

@@ -78,8 +78,8 @@ def played_live(address: str, rules: Mapping[str, Any], seed: bytes, players: in
     """Plays a game with all its seats; returns what each saw."""
     agents = [Live() for _ in range(players)]
     with Client(address) as client:
-        room = client.create_room("live", rules=pb.RuleSet(**rules), seats=[None] * players, game_seed=seed)
-        tickets = [client.join_room(room.join_code, f"seat {seat}", seat=seat).ticket for seat in range(players)]
+        room = client.rooms.create("live", rules=pb.RuleSet(**rules), seats=[None] * players, game_seed=seed)
+        tickets = [client.rooms.join(room.join_code, f"seat {seat}", seat=seat).ticket for seat in range(players)]
         client.play_many(dict(zip(tickets, agents, strict=True)))
     return [agent.seen for agent in agents]
 
@@ -118,8 +118,8 @@ def expected() -> list[tuple[Any, ...]]:
 def ticket_of(client: Client) -> str:
     """Creates a room with the same game and joins it; returns the ticket of seat 0."""
     rules, policy = pb.RuleSet(**AGAINST_GREEDY), pb.RoomPolicy(pace_ms=0)
-    room = client.create_room("live", rules=rules, seats=[None, *["greedy"] * 3], game_seed=SEED, policy=policy)
-    return client.join_room(room.join_code, "live", seat=0).ticket
+    room = client.rooms.create("live", rules=rules, seats=[None, *["greedy"] * 3], game_seed=SEED, policy=policy)
+    return client.rooms.join(room.join_code, "live", seat=0).ticket
 
 
 @pytest.mark.server

@@ -57,9 +57,9 @@ from grpc._channel import _MultiThreadedRendezvous
 env = chefshat.make(address="local")
 env.reset()
 client = chefshat.Client(env.unwrapped.vector.server)
-events = client.watch(client.create_room(seats=["random"] * 4).room.room_id)
+events = client.rooms.watch(client.rooms.create(seats=["random"] * 4).room.room_id)
 next(events)
-waiting = client.watch(client.create_room().room.room_id)
+waiting = client.rooms.watch(client.rooms.create().room.room_id)
 threading.Thread(target=next, args=(waiting,), daemon=True).start()
 show("open:", 3)
 """

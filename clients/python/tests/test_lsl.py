@@ -65,8 +65,8 @@ def received(stream: Any) -> Iterator[tuple[dict[str, Any], float]]:
 
 def seated(client: chefshat.Client) -> tuple[pb.Room, list[str], str]:
     """A room with four seats that are taken, their tickets, and the join code."""
-    created = client.create_room("markers", rules=ONE_SHIFT)
-    tickets = [client.join_room(created.join_code, f"agent {seat}").ticket for seat in range(4)]
+    created = client.rooms.create("markers", rules=ONE_SHIFT)
+    tickets = [client.rooms.join(created.join_code, f"agent {seat}").ticket for seat in range(4)]
     return created.room, tickets, created.join_code
 
 
@@ -79,7 +79,7 @@ def check_times(client: chefshat.Client, room: pb.Room, markers: list[tuple[dict
     """Compares the times of markers with those of the record, whose clock the stream knows to `error`."""
     clock = client.clock(room.room_id, local=pylsl.local_clock)
     ahead = time_of_day()
-    header, *_ = list(client.record(room.game_id))
+    header, *_ = list(client.records.read(room.game_id))
     for marker, at in markers:
         elapsed_ms = int(marker.get("elapsedMs", 0))
         assert abs(at - clock.local(elapsed_ms)) <= error + clock.error + ROUNDING_S
@@ -96,7 +96,7 @@ def test_each_event_of_the_record_is_one_marker_with_its_time(real_address: str)
         playing = threads.submit(client.play_many, {ticket: RandomAgent(seat) for seat, ticket in enumerate(tickets)})
 
         def watch() -> None:
-            for event in client.watch(room.room_id):
+            for event in client.rooms.watch(room.room_id):
                 markers.push(event)
                 markers.push(event)  # A repetition is not sent.
 
@@ -105,7 +105,7 @@ def test_each_event_of_the_record_is_one_marker_with_its_time(real_address: str)
         playing.result()
         watching.result()
         assert all(result.finished for result in playing.result().values())
-        recorded = [line.event for line in client.record(room.game_id) if line.HasField("event")]
+        recorded = [line.event for line in client.records.read(room.game_id) if line.HasField("event")]
         assert [int(marker["sequence"]) for marker, _ in sent] == [event.sequence for event in recorded]
         camel = {name: field.json_name for name, field in pb.GameEvent.DESCRIPTOR.fields_by_name.items()}
         for (marker, _), event in zip(sent, recorded, strict=True):
@@ -125,7 +125,7 @@ def test_each_event_of_the_record_is_one_marker_with_its_time(real_address: str)
 
 def test_the_clock_is_read_again_and_keeps_the_better_reading(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
-        room = client.create_room("clock").room
+        room = client.rooms.create("clock").room
         with RoomClock(client, room.room_id, local=pylsl.local_clock, interval_s=0.01) as clock:
             first = clock.reading
             until = time.monotonic() + WAIT_S
@@ -146,7 +146,7 @@ def test_a_seat_sends_what_it_sees(real_address: str) -> None:
         stream = inlet(f"chefshat {room.game_id} seat 0")
         sent = list(received(stream))
         assert all(result.finished for result in playing.result().values())
-        events = [line.event for line in client.record(room.game_id) if line.HasField("event")]
+        events = [line.event for line in client.records.read(room.game_id) if line.HasField("event")]
         assert [int(marker["sequence"]) for marker, _ in sent] == [event.sequence for event in events]
         (hands,) = [marker["shiftStarted"]["hands"] for marker, _ in sent if "shiftStarted" in marker]
         assert [hand.get("seat", 0) for hand in hands] == [0]
@@ -203,7 +203,11 @@ class Participant:
 @pytest.mark.parametrize("state", ["COMPLETED", "WITHDRAWN", "REMOVED", "SCREENED_OUT"])
 def test_a_participation_that_is_over_has_no_more_games(state: str) -> None:
     class Followed:
-        def follow_study(self, study_id: str, owner_token: str) -> Iterator[pb.StudyParticipant]:
+        @property
+        def studies(self) -> "Followed":
+            return self
+
+        def follow(self, study_id: str, owner_token: str) -> Iterator[pb.StudyParticipant]:
             assert (study_id, owner_token) == ("study", "owner")
             yield pb.StudyParticipant(number=3, state=pb.StudyParticipantState.Value(f"STUDY_PARTICIPANT_STATE_{state}"))
             raise AssertionError("it goes on")
@@ -244,7 +248,7 @@ def test_the_command_sends_all_games_of_a_participant_of_a_study(
             sent = list(received(stream))
             person.go_on()
             with chefshat.Client(real_address, secrets=[made.owner_token]) as owner:
-                events = [line.event for line in owner.record(game.game_id) if line.HasField("event")]
+                events = [line.event for line in owner.records.read(game.game_id) if line.HasField("event")]
                 assert [int(marker["sequence"]) for marker, _ in sent] == [event.sequence for event in events]
                 room = pb.Room(room_id=game.room_id, game_id=game.game_id)
                 clock = owner.clock(game.room_id, local=pylsl.local_clock)

@@ -75,7 +75,7 @@ async def plays_a_game(client: Client, address: str, *, by_handle: bool) -> None
     """Joins a room, plays its game, and reads what is to be read then."""
     table = Table(client)
     async with chefshat.aio.Client(address) as host:
-        room = await host.create_room("models", seats=SEATS, policy=POLICY)
+        room = await host.rooms.create("models", seats=SEATS, policy=POLICY)
         assert "models: waiting, 1 of 4 seats free" in await table.say("list_rooms")
         joined = await table.say("join_room", join_code=room.join_code, name="Ada")
         handle = joined.splitlines()[0].removeprefix("table ")
@@ -90,7 +90,7 @@ async def plays_a_game(client: Client, address: str, *, by_handle: bool) -> None
             assert isinstance(contents, types.TextResourceContents)
             assert contents.text
             assert ("why not" in contents.text) == ("records" in uri)
-        assert (await host.get_room(room.room.room_id)).state == pb.ROOM_STATE_FINISHED
+        assert (await host.rooms.get(room.room.room_id)).state == pb.ROOM_STATE_FINISHED
         assert [prompt.name for prompt in (await client.list_prompts()).prompts] == ["play"]
         assert await table.say("leave") == "You have left the table."
 

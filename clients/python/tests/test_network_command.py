@@ -18,8 +18,8 @@ def test_a_network_plays_in_a_room_and_in_a_tournament(
     real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with chefshat.Client(real_address) as client:
-        room = client.create_room("network", rules=pb.RuleSet(target_shifts=2))
-        tickets = {client.join_room(room.join_code, f"random {seat}").ticket: RandomAgent(seat) for seat in range(3)}
+        room = client.rooms.create("network", rules=pb.RuleSet(target_shifts=2))
+        tickets = {client.rooms.join(room.join_code, f"random {seat}").ticket: RandomAgent(seat) for seat in range(3)}
         others = threading.Thread(target=client.play_many, args=[tickets])
         others.start()
         ticket = tmp_path / "ticket"
@@ -38,7 +38,7 @@ def test_a_network_plays_in_a_room_and_in_a_tournament(
             built_in_agents=["random"] * 3,
             start_when_joined=4,
         )
-        made = client.create_tournament(cup)
+        made = client.tournaments.create(cup)
         assert main([*play, "--tournament", made.join_code, "--games", "2"]) == 0
     output = json.loads(capsys.readouterr().out)
     assert [(game["event"], game["invalid"], game["late"]) for game in output["games"]] == [("finished", 0, 0)] * 2
@@ -48,14 +48,14 @@ def test_a_network_plays_in_a_room_and_in_a_tournament(
 @pytest.mark.server
 def test_a_network_for_other_decks_does_not_play(real_address: str, capsys: pytest.CaptureFixture[str]) -> None:
     with chefshat.Client(real_address) as client:
-        room = client.create_room("small", rules=pb.RuleSet(faces=7))
-        tickets = {client.join_room(room.join_code, f"random {seat}").ticket: RandomAgent(seat) for seat in range(3)}
+        room = client.rooms.create("small", rules=pb.RuleSet(faces=7))
+        tickets = {client.rooms.join(room.join_code, f"random {seat}").ticket: RandomAgent(seat) for seat in range(3)}
         others = threading.Thread(target=client.play_many, args=[tickets], daemon=True)
         others.start()
         code = main(["play", NETWORK, "--address", real_address, "--code", room.join_code, "--name", "Deep"])
         # The seat was not attached, so no game was disturbed.
-        assert client.get_room(room.room.room_id).state == pb.ROOM_STATE_WAITING
-        client.close_room(room.room.room_id, room.owner_token)
+        assert client.rooms.get(room.room.room_id).state == pb.ROOM_STATE_WAITING
+        client.rooms.close(room.room.room_id, room.owner_token)
         others.join()
     assert code == 1
     assert "plays with 4 players, 11 faces and hands of 17 cards; this game has 4, 7 and 7" in capsys.readouterr().err

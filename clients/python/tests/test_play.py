@@ -64,8 +64,8 @@ def seats(server: FakeServer, *, games: int = 1, played: int = 4) -> list[str]:
     tickets = []
     with chefshat.Client(server.address) as client:
         for _ in range(games):
-            room = client.create_room(seats=[None] * played + ["random"] * (4 - played))
-            tickets += [client.join_room(room.join_code, f"player {seat}").ticket for seat in range(played)]
+            room = client.rooms.create(seats=[None] * played + ["random"] * (4 - played))
+            tickets += [client.rooms.join(room.join_code, f"player {seat}").ticket for seat in range(played)]
     return tickets
 
 
@@ -213,8 +213,9 @@ class Offline(aio.Client):
     def __init__(self, address: str) -> None:
         super().__init__(address)
         self.offline = asyncio.Event()
+        self._connection.wait = self._stay_offline  # type: ignore[method-assign]
 
-    async def _wait(self, failures: int, error: ChefsHatError) -> None:
+    async def _stay_offline(self, failures: int, error: ChefsHatError) -> None:
         self.offline.set()
         await asyncio.Event().wait()
 
@@ -283,13 +284,13 @@ def test_the_newest_connection_takes_the_seat(fake: FakeServer, play: Player) ->
 
 def test_a_closed_room_is_an_aborted_game(fake: FakeServer, play: Player) -> None:
     with chefshat.Client(fake.address) as client:
-        room = client.create_room(seats=[None, None, "random", "random"])
-        ticket = client.join_room(room.join_code, "Ada").ticket
-        client.join_room(room.join_code, "nobody who ever attaches")
+        room = client.rooms.create(seats=[None, None, "random", "random"])
+        ticket = client.rooms.join(room.join_code, "Ada").ticket
+        client.rooms.join(room.join_code, "nobody who ever attaches")
         over: list[SeatResult] = []
         thread = threading.Thread(target=lambda: over.append(play(fake.address, {ticket: RandomAgent()})[ticket]))
         thread.start()
-        client.close_room(room.room.room_id, room.owner_token)
+        client.rooms.close(room.room.room_id, room.owner_token)
         thread.join(60)
     (result,) = over
     assert not result.finished
@@ -299,55 +300,55 @@ def test_a_closed_room_is_an_aborted_game(fake: FakeServer, play: Player) -> Non
 
 def test_the_rest_of_the_blocking_client(fake: FakeServer) -> None:
     with chefshat.Client(fake.address) as client:
-        made = [client.create_room(f"room {number}").room.room_id for number in range(5)]
-        assert [room.room_id for room in client.list_rooms()] == made[::-1]
-        assert client.get_room(made[2]).name == "room 2"
+        made = [client.rooms.create(f"room {number}").room.room_id for number in range(5)]
+        assert [room.room_id for room in client.rooms.list()] == made[::-1]
+        assert client.rooms.get(made[2]).name == "room 2"
         assert client.server_info().server_version == "fake"
         assert client.action_table().action_space.size == 214
-        room = client.create_room(seats=[None, "random", "random", "random"])
-        joined = client.join_room(room.join_code, "Ada")
+        room = client.rooms.create(seats=[None, "random", "random", "random"])
+        joined = client.rooms.join(room.join_code, "Ada")
         client.express(joined.ticket, pb.Expression(label="joy"))
         assert client.play(RandomAgent(1), joined.ticket).place == 1
-        watched = [event.sequence for event in client.watch(room.room.room_id)]
+        watched = [event.sequence for event in client.rooms.watch(room.room.room_id)]
         assert watched == list(range(1, len(watched) + 1))
-        assert [event.sequence for event in client.watch(room.room.room_id, from_sequence=4)] == watched[3:]
+        assert [event.sequence for event in client.rooms.watch(room.room.room_id, from_sequence=4)] == watched[3:]
         fake.gone = 2
-        assert [event.sequence for event in client.watch(room.room.room_id)] == watched[2:]
+        assert [event.sequence for event in client.rooms.watch(room.room.room_id)] == watched[2:]
         assert fake.watched_from[-2:] == [0, 3]
-        lines = list(client.record(room.room.game_id))
+        lines = list(client.records.read(room.room.game_id))
         assert len(lines) == len(watched) + 2
         assert lines[1].event.HasField("expression_shown")
-        names = [summary.room_name for summary in client.records()]
+        names = [summary.room_name for summary in client.records.list()]
         assert names == [f"room {number}" for number in range(5)] + [""]
-        assert [summary.room_name for summary in client.records(newest_first=True)] == names[::-1]
-        (summary,) = client.records(pb.RecordFilter(room_name="room 3"))
-        assert summary.game_id == client.get_room(made[3]).game_id
+        assert [summary.room_name for summary in client.records.list(newest_first=True)] == names[::-1]
+        (summary,) = client.records.list(pb.RecordFilter(room_name="room 3"))
+        assert summary.game_id == client.rooms.get(made[3]).game_id
 
 
 def test_the_rest_of_the_asyncio_client(fake: FakeServer) -> None:
     async def run() -> None:
         async with aio.Client(fake.address) as client:
-            made = [(await client.create_room(f"room {number}")).room.room_id for number in range(5)]
-            assert [room.room_id async for room in client.list_rooms()] == made[::-1]
-            assert (await client.get_room(made[2])).name == "room 2"
+            made = [(await client.rooms.create(f"room {number}")).room.room_id for number in range(5)]
+            assert [room.room_id async for room in client.rooms.list()] == made[::-1]
+            assert (await client.rooms.get(made[2])).name == "room 2"
             assert (await client.server_info()).server_version == "fake"
             assert (await client.action_table()).action_space.size == 214
-            room = await client.create_room(seats=[None, "random", "random", "random"])
-            joined = await client.join_room(room.join_code, "Ada")
+            room = await client.rooms.create(seats=[None, "random", "random", "random"])
+            joined = await client.rooms.join(room.join_code, "Ada")
             await client.express(joined.ticket, pb.Expression(label="joy"))
             assert (await client.play(RandomAgent(1), joined.ticket)).place == 1
-            watched = [event.sequence async for event in client.watch(room.room.room_id)]
+            watched = [event.sequence async for event in client.rooms.watch(room.room.room_id)]
             assert watched == list(range(1, len(watched) + 1))
-            assert [event.sequence async for event in client.watch(room.room.room_id, from_sequence=4)] == watched[3:]
+            assert [event.sequence async for event in client.rooms.watch(room.room.room_id, from_sequence=4)] == watched[3:]
             fake.gone = 2
-            assert [event.sequence async for event in client.watch(room.room.room_id)] == watched[2:]
+            assert [event.sequence async for event in client.rooms.watch(room.room.room_id)] == watched[2:]
             assert fake.watched_from[-2:] == [0, 3]
-            assert len([line async for line in client.record(room.room.game_id)]) == len(watched) + 2
-            names = [summary.room_name async for summary in client.records()]
+            assert len([line async for line in client.records.read(room.room.game_id)]) == len(watched) + 2
+            names = [summary.room_name async for summary in client.records.list()]
             assert names == [f"room {number}" for number in range(5)] + [""]
-            assert [summary.room_name async for summary in client.records(newest_first=True)] == names[::-1]
+            assert [summary.room_name async for summary in client.records.list(newest_first=True)] == names[::-1]
             wanted = pb.RecordFilter(room_name="room 3")
-            assert [summary.room_name async for summary in client.records(wanted)] == ["room 3"]
+            assert [summary.room_name async for summary in client.records.list(wanted)] == ["room 3"]
 
     asyncio.run(run())
 
@@ -360,17 +361,17 @@ PLAYER = pb.RecordedPlayer(game_id="0f" * 16, seat=2)
 def test_the_start_of_a_game_is_sent_to_the_server(fake: FakeServer) -> None:
     slow = pb.RoomPolicy(pace_ms=500)
     with chefshat.Client(fake.address) as client:
-        client.create_room(seats=[PLAYER, "greedy", None, None], branch=POINT)
-        client.create_room(hands=HANDS, durability=pb.DURABILITY_EPHEMERAL)
-        client.create_room(policy=slow, durability=pb.DURABILITY_EPHEMERAL)
-        client.create_room(policy=slow, visibility=pb.VISIBILITY_PRIVATE)
-        client.create_room(policy=slow)
+        client.rooms.create(seats=[PLAYER, "greedy", None, None], branch=POINT)
+        client.rooms.create(hands=HANDS, durability=pb.DURABILITY_EPHEMERAL)
+        client.rooms.create(policy=slow, durability=pb.DURABILITY_EPHEMERAL)
+        client.rooms.create(policy=slow, visibility=pb.VISIBILITY_PRIVATE)
+        client.rooms.create(policy=slow)
         with pytest.raises(ValueError, match="not both"):
-            client.create_room(branch=POINT, hands=HANDS)
+            client.rooms.create(branch=POINT, hands=HANDS)
 
     async def run() -> None:
         async with aio.Client(fake.address) as client:
-            await client.create_room(seats=[PLAYER, "greedy", None, None], branch=POINT)
+            await client.rooms.create(seats=[PLAYER, "greedy", None, None], branch=POINT)
 
     asyncio.run(run())
     branched, scripted, slow_ephemeral, private, plain, branched_too = fake.created

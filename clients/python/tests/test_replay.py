@@ -299,8 +299,8 @@ def test_all_formats_of_a_dataset_give_the_same(binary: str, tmp_path: Path) -> 
 @pytest.mark.server
 def test_games_of_a_server(real_address: str, binary: str) -> None:
     with chefshat.Client(real_address) as client:
-        room = client.create_room("replayed", seats=[None, "greedy", "random", "random"], rules=pb.RuleSet(target_shifts=2))
-        client.play(chefshat.RandomAgent(seed=1), client.join_room(room.join_code, "Ada").ticket)
+        room = client.rooms.create("replayed", seats=[None, "greedy", "random", "random"], rules=pb.RuleSet(target_shifts=2))
+        client.play(chefshat.RandomAgent(seed=1), client.rooms.join(room.join_code, "Ada").ticket)
     made = replay.from_server(real_address, pb.RecordFilter(room_name="replayed"), rewards="points")
     assert sorted(np.unique(made.seats).tolist()) == [0, 1, 2, 3]
     assert made.ended.sum() == 8

@@ -93,8 +93,8 @@ def test_agents_play_on_through_restarts(play: Player, tmp_path: Path) -> None:
     # A separate address, so that no outgoing connection takes the server's port while it is down.
     with RealServer(Path(binary), tmp_path, host="127.0.0.2") as server:
         with chefshat.Client(server.address) as client:
-            room = client.create_room(rules=pb.RuleSet(target_shifts=2))
-            tickets = [client.join_room(room.join_code, f"player {seat}", seat=seat).ticket for seat in range(4)]
+            room = client.rooms.create(rules=pb.RuleSet(target_shifts=2))
+            tickets = [client.rooms.join(room.join_code, f"player {seat}", seat=seat).ticket for seat in range(4)]
         agents = {ticket: Noting(seat, ledger, seat) for seat, ticket in enumerate(tickets)}
         playing = threading.Thread(target=lambda: results.update(play(server.address, dict(agents))))
         playing.start()
@@ -106,7 +106,7 @@ def test_agents_play_on_through_restarts(play: Player, tmp_path: Path) -> None:
         playing.join(WAIT_S)
         assert not playing.is_alive()
         with chefshat.Client(server.address) as client:
-            lines = list(client.record(room.room.game_id))
+            lines = list(client.records.read(room.room.game_id))
     restarts = sum(line.event.HasField("server_restarted") for line in lines if line.HasField("event"))
     assert restarts == len(KILLS)
     decisions = [line.decision for line in lines if line.HasField("decision")]
@@ -151,9 +151,9 @@ def test_a_tournament_survives_restarts(tmp_path: Path) -> None:
     )
     with RealServer(Path(binary), tmp_path, host="127.0.0.3") as server, ThreadPoolExecutor(2) as pool:
         with chefshat.Client(server.address) as client:
-            made = client.create_tournament(settings)
+            made = client.tournaments.create(settings)
             names = ("Ada", "Bob")
-            tickets = [client.join_tournament(made.join_code, name, max_games=2).ticket for name in names]
+            tickets = [client.tournaments.join(made.join_code, name, max_games=2).ticket for name in names]
         playing = [pool.submit(play, ticket) for ticket in tickets]
         for count in KILLS:
             assert ledger.reached[count].wait(WAIT_S)
@@ -162,11 +162,11 @@ def test_a_tournament_survives_restarts(tmp_path: Path) -> None:
             server.start()
         played = [results.result(WAIT_S) for results in playing]
         with chefshat.Client(server.address) as client:
-            games = list(client.tournament_games(made.tournament.tournament_id))
+            games = list(client.tournaments.games(made.tournament.tournament_id))
             recorded = {
                 ((game.game_id, line.decision.seat), line.decision.decision_id): line.decision.action
                 for game in games
-                for line in client.record(game.game_id)
+                for line in client.records.read(game.game_id)
                 if line.HasField("decision")
             }
     assert [game.state for game in games] == [pb.TOURNAMENT_GAME_STATE_COUNTED] * 4
@@ -192,13 +192,13 @@ def test_reports_about_a_table_wait_for_the_server(tmp_path: Path) -> None:
         chefshat.Client(server.address, backoff=PATIENT) as client,
         ThreadPoolExecutor(1) as pool,
     ):
-        ticket = client.create_room("real", seats=seats, physical=True).table_ticket
-        first = client.report(ticket, opening, report_id="first")
+        ticket = client.rooms.create("real", seats=seats, physical=True).table_ticket
+        first = client.tables.report(ticket, opening, report_id="first")
         server.kill()
-        waiting = pool.submit(client.report, ticket, answer)
+        waiting = pool.submit(client.tables.report, ticket, answer)
         server.start()
         second = waiting.result(WAIT_S)
-        assert client.report(ticket, opening, report_id="first").report == first.report
-        state = next(client.watch_table(ticket))
+        assert client.tables.report(ticket, opening, report_id="first").report == first.report
+        state = next(client.tables.watch(ticket))
     assert first.verdict == second.verdict == pb.REPORT_VERDICT_ACCEPTED
     assert [report.report for report in state.reports] == [first.report, second.report]

@@ -78,7 +78,7 @@ def test_sample(name: str, address: str) -> None:
 @pytest.mark.parametrize("agent", ["random", "samples.careful_agent:Careful"])
 def test_command_prints_one_line_of_json(address: str, agent: str) -> None:
     with chefshat.Client(address) as client:
-        code = client.create_room(seats=[None, "random", "random", "random"]).join_code
+        code = client.rooms.create(seats=[None, "random", "random", "random"]).join_code
     printed = run_python("-m", "chefshat.agent", "--address", address, "--code", code, "--name", "Ada", "--agent", agent, "--json")
     outcome = json.loads(printed)
     assert printed.count("\n") == 1
@@ -91,7 +91,7 @@ def test_command_prints_one_line_of_json(address: str, agent: str) -> None:
 
 def test_command_prints_a_table(fake: FakeServer, capsys: pytest.CaptureFixture[str]) -> None:
     with chefshat.Client(fake.address) as client:
-        code = client.create_room(seats=[None, "random", "random", "random"]).join_code
+        code = client.rooms.create(seats=[None, "random", "random", "random"]).join_code
     assert command.main(["--address", fake.address, "--code", code, "--name", "Ada", "--seed", "3"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].split() == ["place", "seat", "points"]

@@ -19,8 +19,8 @@ NEVER_S = 3_600.0
 
 def seated(client: chefshat.Client) -> tuple[str, str]:
     """A room, and the ticket of a seat in it."""
-    created = client.create_room("samples")
-    return created.room.room_id, client.join_room(created.join_code, "Ada").ticket
+    created = client.rooms.create("samples")
+    return created.room.room_id, client.rooms.join(created.join_code, "Ada").ticket
 
 
 def test_samples_are_sent_with_times_of_the_room(fake: FakeServer) -> None:

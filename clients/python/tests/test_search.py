@@ -244,9 +244,9 @@ class Searcher(chefshat.Agent):
 @pytest.mark.server
 def test_live_decisions(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
-        room = client.create_room("search", rules=pb.RuleSet(target_shifts=4), seats=[None, "greedy", "greedy", "random"])
+        room = client.rooms.create("search", rules=pb.RuleSet(target_shifts=4), seats=[None, "greedy", "greedy", "random"])
         agent = Searcher(client)
-        client.play(agent, client.join_room(room.join_code, "Searcher").ticket).raise_for_error()
+        client.play(agent, client.rooms.join(room.join_code, "Searcher").ticket).raise_for_error()
     assert agent.decisions > 20
     assert agent.compared > 1
 

@@ -77,26 +77,26 @@ def check(agents: dict[str, Checking], results: dict[str, chefshat.SeatResult]) 
 
 def test_a_game_over_one_blocking_stream(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
-        room = client.create_room("blocking")
-        agents = {client.join_room(room.join_code, f"player {number}").ticket: Checking(number) for number in range(4)}
+        room = client.rooms.create("blocking")
+        agents = {client.rooms.join(room.join_code, f"player {number}").ticket: Checking(number) for number in range(4)}
         results = client.play_many(agents)
         check(agents, results)
-        assert client.get_room(room.room.room_id).state == pb.ROOM_STATE_FINISHED
+        assert client.rooms.get(room.room.room_id).state == pb.ROOM_STATE_FINISHED
         # There are no built-in agents, so the record has the decisions of these four.
-        lines = list(client.record(room.room.game_id))
+        lines = list(client.records.read(room.room.game_id))
         assert lines[0].header.game_id == room.room.game_id
         assert lines[-1].footer.decisions == sum(result.decisions for result in results.values())
-        watched = [event.sequence for event in client.watch(room.room.room_id)]
+        watched = [event.sequence for event in client.rooms.watch(room.room.room_id)]
         assert watched == next(iter(agents.values())).sequences
 
 
 def test_a_game_over_one_asyncio_stream(real_address: str) -> None:
     async def run() -> None:
         async with aio.Client(real_address) as client:
-            room = await client.create_room("asyncio")
+            room = await client.rooms.create("asyncio")
             agents = {}
             for number in range(4):
-                agents[(await client.join_room(room.join_code, f"player {number}")).ticket] = Checking(number)
+                agents[(await client.rooms.join(room.join_code, f"player {number}")).ticket] = Checking(number)
             check(agents, await client.play_many(agents))
 
     asyncio.run(run())
@@ -105,10 +105,10 @@ def test_a_game_over_one_asyncio_stream(real_address: str) -> None:
 def test_a_game_of_four_asyncio_streams(real_address: str) -> None:
     async def run() -> None:
         async with aio.Client(real_address) as client:
-            room = await client.create_room("four streams", rules=pb.RuleSet(target_shifts=2))
+            room = await client.rooms.create("four streams", rules=pb.RuleSet(target_shifts=2))
             agents = {}
             for number in range(4):
-                agents[(await client.join_room(room.join_code, f"player {number}")).ticket] = Checking(number)
+                agents[(await client.rooms.join(room.join_code, f"player {number}")).ticket] = Checking(number)
             games = [client.play_many({ticket: agent}) for ticket, agent in agents.items()]
             results: dict[str, chefshat.SeatResult] = {}
             for result in await asyncio.gather(*games):
@@ -120,7 +120,7 @@ def test_a_game_of_four_asyncio_streams(real_address: str) -> None:
 
 def test_a_game_of_four_processes(real_address: str, processes: list[subprocess.Popen[str]]) -> None:
     with chefshat.Client(real_address) as client:
-        code = client.create_room("four processes").join_code
+        code = client.rooms.create("four processes").join_code
     for number in range(4):
         arguments = ["--address", real_address, "--code", code, "--name", f"player {number}", "--seed", str(number), "--json"]
         # If a process hangs, its output has the tracebacks of its threads.
@@ -172,12 +172,12 @@ def test_reconnections_miss_no_event(
     with chefshat.Client(real_address) as client, Proxy(real_address) as proxy:
         # Long time limits: the test is about lost decisions, not speed.
         policy = pb.RoomPolicy(decision_time_ms=60_000)
-        room = client.create_room("cut", rules=pb.RuleSet(target_shifts=2), policy=policy)
+        room = client.rooms.create("cut", rules=pb.RuleSet(target_shifts=2), policy=policy)
         agents: dict[str, Checking] = {}
         for number in range(4):
-            agents[client.join_room(room.join_code, f"player {number}").ticket] = Cutter(number, proxy)
+            agents[client.rooms.join(room.join_code, f"player {number}").ticket] = Cutter(number, proxy)
         results = play(proxy.address, agents)
-        lines = list(client.record(room.room.game_id))
+        lines = list(client.records.read(room.room.game_id))
         assert proxy.cuts > 4
         assert all(0 < result.reconnects <= proxy.cuts for result in results.values())
         for ticket, agent in agents.items():
@@ -206,9 +206,9 @@ def test_a_stubborn_agent_reaches_the_limit_of_attempts(real_address: str) -> No
     with chefshat.Client(real_address) as client:
         policy = pb.RoomPolicy(max_invalid_attempts=3)
         rules = pb.RuleSet(target_shifts=1)
-        room = client.create_room("stubborn", rules=rules, policy=policy, seats=[None, "random", "random", "random"])
+        room = client.rooms.create("stubborn", rules=rules, policy=policy, seats=[None, "random", "random", "random"])
         agent = Stubborn()
-        result = client.play(agent, client.join_room(room.join_code, "Stubborn").ticket)
+        result = client.play(agent, client.rooms.join(room.join_code, "Stubborn").ticket)
     assert result.finished
     assert result.decisions == 0
     assert result.invalid == agent.asked > 0
@@ -222,11 +222,11 @@ def test_annotations_and_expressions_are_recorded(real_address: str) -> None:
             return super().decide(request)
 
     with chefshat.Client(real_address) as client:
-        room = client.create_room("talk", rules=pb.RuleSet(target_shifts=1), seats=[None, "random", "random", "random"])
-        ticket = client.join_room(room.join_code, "Talkative").ticket
+        room = client.rooms.create("talk", rules=pb.RuleSet(target_shifts=1), seats=[None, "random", "random", "random"])
+        ticket = client.rooms.join(room.join_code, "Talkative").ticket
         client.express(ticket, pb.Expression(label="joy", valence=0.5))
         result = client.play(Talkative(1), ticket)
-        lines = list(client.record(room.room.game_id))
+        lines = list(client.records.read(room.room.game_id))
     assert any(line.HasField("event") and line.event.expression_shown.expression.label == "joy" for line in lines)
     noted = [
         line.decision for line in lines if line.HasField("decision") and line.decision.annotations.extra.get("why") == "chance"
@@ -238,30 +238,30 @@ def test_annotations_and_expressions_are_recorded(real_address: str) -> None:
 def test_refusals(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
         with pytest.raises(chefshat.ChefsHatError) as caught:
-            client.create_room(rules=pb.RuleSet(players=9))
+            client.rooms.create(rules=pb.RuleSet(players=9))
         assert caught.value.reason == "RULE_SET_REFUSED"
         with pytest.raises(chefshat.ChefsHatError, match="JOIN_CODE_WRONG"):
-            client.join_room("NOSUCHCODE", "Ada")
+            client.rooms.join("NOSUCHCODE", "Ada")
         with pytest.raises(chefshat.ChefsHatError, match="TICKET_UNKNOWN"):
             client.play(RandomAgent(), "nonsense")
         with pytest.raises(chefshat.ChefsHatError, match="ROOM_UNKNOWN"):
-            client.get_room("0" * 32)
+            client.rooms.get("0" * 32)
 
 
 def test_a_recorded_game_is_branched_and_replayed(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
 
         def ended(room: pb.Room) -> list[tuple[int, int]]:
-            for _ in client.watch(room.room_id):
+            for _ in client.rooms.watch(room.room_id):
                 pass
-            lines = client.record(room.game_id)
+            lines = client.records.read(room.game_id)
             return [(line.decision.seat, line.decision.action) for line in lines if line.HasField("decision")]
 
         rules, seats = pb.RuleSet(target_shifts=2), ["greedy", "random", "random", "random"]
-        first = client.create_room("to branch from", rules=rules, seats=seats).room
+        first = client.rooms.create("to branch from", rules=rules, seats=seats).room
         course = ended(first)
         players = [pb.RecordedPlayer(game_id=first.game_id, seat=seat) for seat in range(4)]
-        again = client.create_room(
+        again = client.rooms.create(
             "again",
             seats=players,
             branch=pb.BranchPoint(game_id=first.game_id, decisions=30, same_deals=True),
@@ -271,31 +271,31 @@ def test_a_recorded_game_is_branched_and_replayed(real_address: str) -> None:
         assert again.policy.durability == pb.DURABILITY_EPHEMERAL
         assert [seat.replay for seat in again.seats] == players
         assert ended(again) == course
-        listed = {summary.game_id: summary for summary in client.records(pb.RecordFilter(origin=pb.GAME_ORIGIN_BRANCHED))}
+        listed = {summary.game_id: summary for summary in client.records.list(pb.RecordFilter(origin=pb.GAME_ORIGIN_BRANCHED))}
         assert listed[again.game_id].decisions == len(course)
         assert first.game_id not in listed
 
         # The hands of its second Shift start another game.
-        starts = [line.event.shift_started for line in client.record(first.game_id) if line.event.HasField("shift_started")]
+        starts = [line.event.shift_started for line in client.records.read(first.game_id) if line.event.HasField("shift_started")]
         hands = pb.ScriptedShift(hands=starts[1].hands)
-        scripted = client.create_room("given", rules=pb.RuleSet(target_shifts=1), seats=["greedy"] * 4, hands=hands).room
+        scripted = client.rooms.create("given", rules=pb.RuleSet(target_shifts=1), seats=["greedy"] * 4, hands=hands).room
         ended(scripted)
-        events = (line.event for line in client.record(scripted.game_id))
+        events = (line.event for line in client.records.read(scripted.game_id))
         (dealt,) = (event.shift_started for event in events if event.HasField("shift_started"))
         assert dealt.hands == starts[1].hands
 
         with pytest.raises(chefshat.ChefsHatError, match="BRANCH_REFUSED"):
-            client.create_room(branch=pb.BranchPoint(game_id=first.game_id, decisions=len(course)))
+            client.rooms.create(branch=pb.BranchPoint(game_id=first.game_id, decisions=len(course)))
 
 
 def test_a_seat_that_was_given_up_is_free(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
-        room = client.create_room(seats=[None, "random", "random", "random"])
-        left = client.join_room(room.join_code, "Ada").ticket
-        assert client.leave_room(left).seats[0].name == ""
+        room = client.rooms.create(seats=[None, "random", "random", "random"])
+        left = client.rooms.join(room.join_code, "Ada").ticket
+        assert client.rooms.leave(left).seats[0].name == ""
         with pytest.raises(chefshat.ChefsHatError, match="TICKET_UNKNOWN"):
-            client.leave_room(left)
-        assert client.join_room(room.join_code, "Ben").seat == 0
+            client.rooms.leave(left)
+        assert client.rooms.join(room.join_code, "Ben").seat == 0
 
 
 class Undecided(Agent):
@@ -316,9 +316,9 @@ class Undecided(Agent):
 def test_a_seat_whose_decisions_are_left_open_stays_with_the_substitute(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
         policy = pb.RoomPolicy(decision_time_ms=20, bank_ms=0, pace_ms=0, abort=pb.ABORT_POLICY_NEVER, max_timeouts=2)
-        room = client.create_room("undecided", rules=pb.RuleSet(target_shifts=1), policy=policy, seats=[None, *["random"] * 3])
+        room = client.rooms.create("undecided", rules=pb.RuleSet(target_shifts=1), policy=policy, seats=[None, *["random"] * 3])
         agent = Undecided()
-        result = client.play(agent, client.join_room(room.join_code, "Undecided").ticket)
+        result = client.play(agent, client.rooms.join(room.join_code, "Undecided").ticket)
     assert result.finished
     assert result.decisions == 0
     assert agent.asked >= 2

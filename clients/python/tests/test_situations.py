@@ -53,8 +53,8 @@ def test_the_same_function_plays_live_and_on_a_vector_environment(real_address: 
     live = Live()
     with Client(real_address) as client:
         seats = [None, "greedy", "greedy", "greedy"]
-        room = client.create_room("live", seats=seats, game_seed=SEED, policy=pb.RoomPolicy(pace_ms=0))
-        client.play(live, client.join_room(room.join_code, "live").ticket)
+        room = client.rooms.create("live", seats=seats, game_seed=SEED, policy=pb.RoomPolicy(pace_ms=0))
+        client.play(live, client.rooms.join(room.join_code, "live").ticket)
     seen = []
     with VectorEnv(real_address, client_seats=[0], opponents="greedy", seed=[SEED], total_games=1) as env:
         while not env.batch.done:
@@ -85,8 +85,8 @@ def test_a_network_plays_live_as_on_a_vector_environment(real_address: str, name
     live, rules = LiveNetwork(net), pb.RuleSet(target_shifts=40)
     with Client(real_address) as client:
         seats = [None, "greedy", "greedy", "greedy"]
-        room = client.create_room("live", seats=seats, rules=rules, game_seed=SEED, policy=pb.RoomPolicy(pace_ms=0))
-        client.play(live, client.join_room(room.join_code, "live").ticket)
+        room = client.rooms.create("live", seats=seats, rules=rules, game_seed=SEED, policy=pb.RoomPolicy(pace_ms=0))
+        client.play(live, client.rooms.join(room.join_code, "live").ticket)
     decisions: Literal["all", "turns"] = "turns" if net.info.output == "turns" else "all"
     seen = []
     with VectorEnv(

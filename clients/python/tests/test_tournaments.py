@@ -88,7 +88,7 @@ def settings(*built_in: str, start_when_joined: int = 4) -> pb.TournamentSetting
 
 def compare(client: chefshat.Client, tournament_id: str, played: list[list[SeatResult]]) -> None:
     """Compares the participants' results with the server's counts."""
-    games = list(client.tournament_games(tournament_id))
+    games = list(client.tournaments.games(tournament_id))
     assert len(games) == GAMES
     for game in games:
         assert game.state == pb.TOURNAMENT_GAME_STATE_COUNTED
@@ -101,20 +101,20 @@ def compare(client: chefshat.Client, tournament_id: str, played: list[list[SeatR
 
 def test_four_participants_play_a_tournament_to_its_end(address: str, play: Player) -> None:
     with chefshat.Client(address) as client:
-        made = client.create_tournament(settings())
+        made = client.tournaments.create(settings())
         tournament_id = made.tournament.tournament_id
-        joined = [client.join_tournament(made.join_code, f"player {number}", max_games=2) for number in range(4)]
+        joined = [client.tournaments.join(made.join_code, f"player {number}", max_games=2) for number in range(4)]
         assert [entry.participant for entry in joined] == [0, 1, 2, 3]
         with ThreadPoolExecutor(4) as pool:
             playing = [pool.submit(play, address, entry.ticket, Checking) for entry in joined]
-            *_, last = client.follow_tournament(tournament_id)
+            *_, last = client.tournaments.follow(tournament_id)
             played = [results.result(LIMIT_S) for results in playing]
         assert (last.tournament.state, last.tournament.games_over) == (pb.TOURNAMENT_STATE_FINISHED, GAMES)
         compare(client, tournament_id, played)
-        results = client.tournament_results(tournament_id)
+        results = client.tournaments.results(tournament_id)
         assert sorted(line.place for line in results.standings) == [1, 2, 3, 4]
         assert [line.games for line in results.standings] == [GAMES] * 4
-        assert len(client.leaderboard().rated) >= 4
+        assert len(client.tournaments.leaderboard().rated) >= 4
 
 
 @pytest.mark.parametrize("moment", ["before", "after"])
@@ -130,8 +130,8 @@ def test_a_broken_stream_is_restored(fake: FakeServer, play: Player, moment: str
 
     fake.fault = fault
     with chefshat.Client(fake.address) as client:
-        made = client.create_tournament(settings("random", "random", "random"))
-        joined = client.join_tournament(made.join_code, "Ada", max_games=2)
+        made = client.tournaments.create(settings("random", "random", "random"))
+        joined = client.tournaments.join(made.join_code, "Ada", max_games=2)
         played = play(fake.address, joined.ticket, Checking)
         assert len(broken) == 3 * GAMES
         assert fake.streams > len(broken)
@@ -161,14 +161,14 @@ def test_a_cut_connection_is_restored_with_the_real_server(real_address: str, pl
             agents.append(Cutter(seat, proxy))
             return agents[-1]
 
-        made = client.create_tournament(settings("greedy", "random", "random"))
+        made = client.tournaments.create(settings("greedy", "random", "random"))
         built_in = 3
-        joined = client.join_tournament(made.join_code, "Ada", max_games=2)
+        joined = client.tournaments.join(made.join_code, "Ada", max_games=2)
         assert joined.participant == built_in
         played = play(proxy.address, joined.ticket, make)
         assert proxy.cuts > GAMES
         assert len(agents) == len(played) == GAMES
-        games = {game.game_id: game for game in client.tournament_games(made.tournament.tournament_id)}
+        games = {game.game_id: game for game in client.tournaments.games(made.tournament.tournament_id)}
         assert sorted(games) == sorted(result.game_id for result in played)
         for result in played:
             line = games[result.game_id].seats[result.seat]
@@ -192,8 +192,8 @@ def test_the_newest_connection_plays(address: str, play: Player) -> None:
     Waiting.reached.clear()
     Waiting.go_on.clear()
     with chefshat.Client(address) as client, ThreadPoolExecutor(1) as pool:
-        made = client.create_tournament(settings("random", "random", "random"))
-        ticket = client.join_tournament(made.join_code, "Ada").ticket
+        made = client.tournaments.create(settings("random", "random", "random"))
+        ticket = client.tournaments.join(made.join_code, "Ada").ticket
         older = pool.submit(play, address, ticket, lambda seat: Waiting())
         assert Waiting.reached.wait(LIMIT_S)
         newer = play_blocking(address, ticket, Checking)
@@ -207,20 +207,20 @@ def test_closing_a_tournament_ends_it_for_its_participants(address: str, play: P
     Waiting.reached.clear()
     Waiting.go_on.clear()
     with chefshat.Client(address) as client, ThreadPoolExecutor(1) as pool:
-        made = client.create_tournament(settings("random", "random", "random", start_when_joined=0))
+        made = client.tournaments.create(settings("random", "random", "random", start_when_joined=0))
         tournament_id = made.tournament.tournament_id
-        ticket = client.join_tournament(made.join_code, "Ada").ticket
+        ticket = client.tournaments.join(made.join_code, "Ada").ticket
         playing = pool.submit(play, address, ticket, lambda seat: Waiting())
         with pytest.raises(ChefsHatError, match="OWNER_TOKEN_WRONG"):
-            client.start_tournament(tournament_id, "not it")
-        assert client.start_tournament(tournament_id, made.owner_token).state == pb.TOURNAMENT_STATE_PLAYING
+            client.tournaments.start(tournament_id, "not it")
+        assert client.tournaments.start(tournament_id, made.owner_token).state == pb.TOURNAMENT_STATE_PLAYING
         assert Waiting.reached.wait(LIMIT_S)
-        closed = client.close_tournament(tournament_id, made.owner_token)
+        closed = client.tournaments.close(tournament_id, made.owner_token)
         assert closed.state == pb.TOURNAMENT_STATE_CLOSED
         Waiting.go_on.set()
         (result,) = playing.result(LIMIT_S)
         assert (result.finished, result.abort_reason) == (False, "CLOSED")
-        assert client.get_tournament(tournament_id).state == pb.TOURNAMENT_STATE_CLOSED
+        assert client.tournaments.get(tournament_id).state == pb.TOURNAMENT_STATE_CLOSED
         # A late participant has no games.
         assert play(address, ticket, Checking) == []
 
@@ -230,27 +230,27 @@ def test_the_organiser_has_the_ticket_of_a_physical_table(real_address: str) -> 
     with chefshat.Client(real_address) as client:
         wanted = settings("random", "random", "random", start_when_joined=0)
         wanted.physical_tables = 1
-        made = client.create_tournament(wanted)
+        made = client.tournaments.create(wanted)
         tournament_id, owner = made.tournament.tournament_id, made.owner_token
-        added = client.add_table_participant(tournament_id, owner, "Pepper", kind=pb.PARTICIPANT_KIND_ROBOT)
+        added = client.tournaments.add_table_participant(tournament_id, owner, "Pepper", kind=pb.PARTICIPANT_KIND_ROBOT)
         robot = added.tournament.participants[added.participant]
         assert (robot.name, robot.kind, robot.at_table) == ("Pepper", pb.PARTICIPANT_KIND_ROBOT, True)
-        client.start_tournament(tournament_id, owner)
-        for _ in client.follow_tournament(tournament_id):
+        client.tournaments.start(tournament_id, owner)
+        for _ in client.tournaments.follow(tournament_id):
             try:
-                table = client.physical_table(tournament_id, owner, 0)
+                table = client.tournaments.physical_table(tournament_id, owner, 0)
                 break
             except ChefsHatError as refused:
                 # Another report follows when the game has a room.
                 if refused.reason != "GAME_NOT_STARTED":
                     raise
-        state = next(iter(client.watch_table(table.table_ticket)))
+        state = next(iter(client.tables.watch(table.table_ticket)))
         assert state.room.room_id == table.room_id
         assert "Pepper" in [seat.name for seat in state.room.seats]
         with pytest.raises(ChefsHatError, match="OWNER_TOKEN_WRONG"):
-            client.physical_table(tournament_id, "not it", 0)
-        client.close_room(table.room_id, table.owner_token)
-        client.close_tournament(tournament_id, owner)
+            client.tournaments.physical_table(tournament_id, "not it", 0)
+        client.rooms.close(table.room_id, table.owner_token)
+        client.tournaments.close(tournament_id, owner)
 
 
 def test_an_unknown_ticket_is_refused(address: str, play: Player) -> None:
@@ -263,31 +263,31 @@ def test_exceptions_of_make_agent_propagate(fake: FakeServer, play: Player) -> N
         raise LookupError(f"no agent for seat {seat.seat}")
 
     with chefshat.Client(fake.address) as client:
-        made = client.create_tournament(settings("random", "random", "random"))
-        ticket = client.join_tournament(made.join_code, "Ada").ticket
+        made = client.tournaments.create(settings("random", "random", "random"))
+        ticket = client.tournaments.join(made.join_code, "Ada").ticket
         with pytest.raises(LookupError, match="no agent for seat 0"):
             play(fake.address, ticket, make)
 
 
 def test_the_calls_of_the_blocking_client(fake: FakeServer) -> None:
     with chefshat.Client(fake.address) as client:
-        made = [client.create_tournament(settings()).tournament.tournament_id for _ in range(3)]
-        assert [tournament.tournament_id for tournament in client.list_tournaments()] == made[::-1]
-        assert len(list(client.list_tournaments(pb.TOURNAMENT_STATE_OPEN))) == 3
-        assert not list(client.list_tournaments(pb.TOURNAMENT_STATE_CLOSED))
-        assert client.get_tournament(made[1]).settings.name == "Coppa"
-        joined = client.join_tournament("CUP2", "Ada", max_games=3, stateless=True, kind=pb.PARTICIPANT_KIND_ROBOT)
+        made = [client.tournaments.create(settings()).tournament.tournament_id for _ in range(3)]
+        assert [tournament.tournament_id for tournament in client.tournaments.list()] == made[::-1]
+        assert len(list(client.tournaments.list(pb.TOURNAMENT_STATE_OPEN))) == 3
+        assert not list(client.tournaments.list(pb.TOURNAMENT_STATE_CLOSED))
+        assert client.tournaments.get(made[1]).settings.name == "Coppa"
+        joined = client.tournaments.join("CUP2", "Ada", max_games=3, stateless=True, kind=pb.PARTICIPANT_KIND_ROBOT)
         assert joined.tournament.tournament_id == made[1]
         (asked,) = fake.tournaments.joins
         assert (asked.name, asked.max_games, asked.stateless, asked.kind) == ("Ada", 3, True, pb.PARTICIPANT_KIND_ROBOT)
         with pytest.raises(ChefsHatError, match="JOIN_CODE_WRONG"):
-            client.join_tournament("WRONG", "Ada")
+            client.tournaments.join("WRONG", "Ada")
         with pytest.raises(ChefsHatError, match="TOURNAMENT_UNKNOWN"):
-            list(client.follow_tournament("nowhere"))
+            list(client.tournaments.follow("nowhere"))
         with pytest.raises(ValueError, match="max_games"):
-            client.join_tournament("CUP2", "Ada", max_games=0)
+            client.tournaments.join("CUP2", "Ada", max_games=0)
         with pytest.raises(ChefsHatError, match="NO_PHYSICAL_TABLES"):
-            client.add_table_participant(made[0], "owner", "Ada")
+            client.tournaments.add_table_participant(made[0], "owner", "Ada")
 
 
 def test_the_calls_of_the_asyncio_client(fake: FakeServer) -> None:
@@ -297,26 +297,26 @@ def test_the_calls_of_the_asyncio_client(fake: FakeServer) -> None:
     async def run() -> None:
         async with aio.Client(fake.address, backoff=QUICK) as client:
             ids = [
-                (await client.create_tournament(settings("random", "random", "random"))).tournament.tournament_id for _ in range(3)
+                (await client.tournaments.create(settings("random", "random", "random"))).tournament.tournament_id for _ in range(3)
             ]
-            assert [tournament.tournament_id for tournament in await listed(client.list_tournaments())] == ids[::-1]
-            assert not await listed(client.list_tournaments(pb.TOURNAMENT_STATE_CLOSED))
-            joined = await client.join_tournament("CUP1", "Ada")
-            following = asyncio.create_task(listed(client.follow_tournament(ids[0])))
+            assert [tournament.tournament_id for tournament in await listed(client.tournaments.list())] == ids[::-1]
+            assert not await listed(client.tournaments.list(pb.TOURNAMENT_STATE_CLOSED))
+            joined = await client.tournaments.join("CUP1", "Ada")
+            following = asyncio.create_task(listed(client.tournaments.follow(ids[0])))
             played = await client.play_tournament(joined.ticket, Checking)
             reports = await following
             assert reports[-1].tournament.state == pb.TOURNAMENT_STATE_FINISHED
-            games = await listed(client.tournament_games(ids[0]))
+            games = await listed(client.tournaments.games(ids[0]))
             assert [game.game_id for game in games] == [result.game_id for result in played]
-            assert len((await client.tournament_results(ids[0])).standings) == 4
-            assert (await client.leaderboard()).games == 4
-            assert (await client.start_tournament(ids[1], "owner")).state == pb.TOURNAMENT_STATE_PLAYING
-            assert (await client.close_tournament(ids[1], "owner")).state == pb.TOURNAMENT_STATE_CLOSED
-            assert (await client.get_tournament(ids[1])).state == pb.TOURNAMENT_STATE_CLOSED
+            assert len((await client.tournaments.results(ids[0])).standings) == 4
+            assert (await client.tournaments.leaderboard()).games == 4
+            assert (await client.tournaments.start(ids[1], "owner")).state == pb.TOURNAMENT_STATE_PLAYING
+            assert (await client.tournaments.close(ids[1], "owner")).state == pb.TOURNAMENT_STATE_CLOSED
+            assert (await client.tournaments.get(ids[1])).state == pb.TOURNAMENT_STATE_CLOSED
             with pytest.raises(ChefsHatError, match="TOURNAMENT_UNKNOWN"):
-                await listed(client.follow_tournament("nowhere"))
+                await listed(client.tournaments.follow("nowhere"))
             with pytest.raises(ChefsHatError, match="GAME_NOT_PHYSICAL"):
-                await client.physical_table(ids[0], "owner", 0)
+                await client.tournaments.physical_table(ids[0], "owner", 0)
 
     asyncio.run(run())
 
@@ -324,14 +324,14 @@ def test_the_calls_of_the_asyncio_client(fake: FakeServer) -> None:
 @pytest.mark.parametrize("more", [["--seed", "3"], ["--agent", "samples.careful_agent:Careful"]])
 def test_the_command_takes_part(address: str, more: list[str]) -> None:
     with chefshat.Client(address) as client:
-        made = client.create_tournament(settings("random", "random", "random"))
+        made = client.tournaments.create(settings("random", "random", "random"))
         arguments = ["--address", address, "--tournament", made.join_code, "--name", "Ada", "--games", "2", "--json", *more]
         done = subprocess.run(
             [sys.executable, "-m", "chefshat.agent", *arguments], capture_output=True, text=True, timeout=LIMIT_S, cwd=PACKAGE
         )
         assert done.returncode == 0, done.stderr
         outcome = json.loads(done.stdout)
-        results = client.tournament_results(made.tournament.tournament_id)
+        results = client.tournaments.results(made.tournament.tournament_id)
     assert (outcome["event"], outcome["tournament_id"]) == ("finished", made.tournament.tournament_id)
     assert [game["event"] for game in outcome["games"]] == ["finished"] * GAMES
     assert [line["participant"] for line in outcome["standings"]] == [line.participant for line in results.standings]
@@ -340,7 +340,7 @@ def test_the_command_takes_part(address: str, more: list[str]) -> None:
 
 def test_the_command_prints_a_table(fake: FakeServer, capsys: pytest.CaptureFixture[str]) -> None:
     with chefshat.Client(fake.address) as client:
-        made = client.create_tournament(settings("random", "random", "random"))
+        made = client.tournaments.create(settings("random", "random", "random"))
     assert command.main(["--address", fake.address, "--tournament", made.join_code, "--name", "Ada"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].split() == ["place", "score", "points", "games", "name"]

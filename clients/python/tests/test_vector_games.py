@@ -145,9 +145,9 @@ def test_other_rules_have_other_widths(anywhere: str | None) -> None:
 @pytest.mark.server
 def test_games_continue_from_a_record(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
-        room = client.create_room("to branch from", seats=[None, "greedy", "random", "random"])
-        client.play(chefshat.RandomAgent(seed=1), client.join_room(room.join_code, "Ada").ticket)
-        decisions = [line.decision for line in client.record(room.room.game_id) if line.HasField("decision")]
+        room = client.rooms.create("to branch from", seats=[None, "greedy", "random", "random"])
+        client.play(chefshat.RandomAgent(seed=1), client.rooms.join(room.join_code, "Ada").ticket)
+        decisions = [line.decision for line in client.records.read(room.room.game_id) if line.HasField("decision")]
     branch = pb.BranchPoint(game_id=room.room.game_id, decisions=30)
     with VectorEnv(real_address, 3, branch=branch) as env:
         following = decisions[30]

@@ -74,8 +74,8 @@ def on_a_server() -> None:
     rng = np.random.default_rng(1)
     with chefshat.LocalServer() as server:
         with attempt("a game on the server"), chefshat.Client(server.address) as client:
-            room = client.create_room("first", seats=[None, "greedy", "greedy", "random"])
-            result = client.play(chefshat.RandomAgent(seed=1), client.join_room(room.join_code, "Ada").ticket)
+            room = client.rooms.create("first", seats=[None, "greedy", "greedy", "random"])
+            result = client.play(chefshat.RandomAgent(seed=1), client.rooms.join(room.join_code, "Ada").ticket)
             result.raise_for_error()
             assert result.place in (1, 2, 3, 4)
         with attempt("games in batches on the server"), chefshat.VectorEnv(server.address, games=16, seed=1) as env:

@@ -109,13 +109,13 @@ async def play_game(server: Server, seed: int, tally: Tally) -> None:
     async with aio.Client(server.address) as client:
         people = [pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name=name) for name in PEOPLE]
         rules = pb.RuleSet(target_shifts=1)
-        made = await client.create_room("soak", seats=[*people, None, "greedy"], rules=rules, physical=True)
+        made = await client.rooms.create("soak", seats=[*people, None, "greedy"], rules=rules, physical=True)
         ticket = made.table_ticket
-        remote = await client.join_room(made.join_code, "remote", seat=REMOTE)
+        remote = await client.rooms.join(made.join_code, "remote", seat=REMOTE)
         table = SyntheticTable([], DIFFICULTIES[chance.choice(["easy", "medium"])], seed=seed)
-        rehearsal = Rehearsal(table, client, ticket, seed=seed, mistakes=0.1, face_down=0.1, answers=False)
+        rehearsal = Rehearsal(table, client.tables, ticket, seed=seed, mistakes=0.1, face_down=0.1, answers=False)
         eye = Eye(rehearsal.frames())
-        bridge = Bridge(client, ticket, Perception(table.camera, deck=0))
+        bridge = Bridge(client.tables, ticket, Perception(table.camera, deck=0))
         over = asyncio.Event()
 
         async def after(frame: Frame) -> None:
@@ -138,14 +138,14 @@ async def play_game(server: Server, seed: int, tally: Tally) -> None:
                         task.cancel()
                     await asyncio.gather(running, ended, return_exceptions=True)
                 again.clear()
-                bridge = Bridge(client, ticket, Perception(table.camera, deck=0))
+                bridge = Bridge(client.tables, ticket, Perception(table.camera, deck=0))
 
         async def answer() -> None:
             """Somebody on the page, who answers when it suits them."""
             answered: set[str] = set()
             while not over.is_set():
                 with contextlib.suppress(ChefsHatError):
-                    async for state in client.watch_table(ticket):
+                    async for state in client.tables.watch(ticket):
                         for question in state.questions:
                             if question.question_id in answered:
                                 continue
@@ -155,7 +155,7 @@ async def play_game(server: Server, seed: int, tally: Tally) -> None:
                             option = rehearsal.right_option(state, question)
                             given = pb.QuestionAnswered(question_id=question.question_id, option=option)
                             with contextlib.suppress(ChefsHatError):
-                                await client.report(ticket, pb.TableReport(source=pb.REPORT_SOURCE_ATTENDANT, answer=given))
+                                await client.tables.report(ticket, pb.TableReport(source=pb.REPORT_SOURCE_ATTENDANT, answer=given))
                 await asyncio.sleep(0.2)
 
         async def trouble() -> None:
@@ -185,7 +185,7 @@ async def play_game(server: Server, seed: int, tally: Tally) -> None:
             for task in (*beside, playing):
                 task.cancel()
             await asyncio.gather(*beside, playing, return_exceptions=True)
-        record = [line async for line in client.record(result.game_id)]
+        record = [line async for line in client.records.read(result.game_id)]
     tally.games += 1
     tally.mistakes += rehearsal.violations
     recorded = [

@@ -59,7 +59,7 @@ class Table:
         verdict = self.verdicts.pop(0) if self.verdicts else pb.REPORT_VERDICT_ACCEPTED
         return pb.ReportResponse(report=len(self.reports), verdict=verdict, state=self.state)
 
-    async def watch_table(self, table_ticket: str) -> AsyncIterator[pb.TableState]:
+    async def watch(self, table_ticket: str) -> AsyncIterator[pb.TableState]:
         yield self.state
         await asyncio.Event().wait()
 

@@ -226,8 +226,8 @@ def test_a_game_with_a_robot_that_leaves_in_the_middle_and_comes_back(server_add
     async def test() -> list[dict[str, Any]]:
         async with robot() as peer, aio.Client(server_address) as client:
             serving = asyncio.create_task(serve(peer, leave_after=6))
-            made = await client.create_room("lines", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=1))
-            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+            made = await client.rooms.create("lines", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=1))
+            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
             driver = JsonLinesDriver(port=peer.port)
             result = await play_seat(client, seat.ticket, RandomAgent(7), driver, words=Words("en"), notify=notices.append)
             assert result.finished

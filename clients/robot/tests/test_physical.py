@@ -44,12 +44,12 @@ class Attendant:
 
     async def attend(self) -> None:
         done = 0
-        async for state in self._client.watch_table(self._ticket):
+        async for state in self._client.tables.watch(self._ticket):
             if state.version <= done:
                 continue  # A report has returned a later one.
             while (report := self._next(state)) is not None:
                 try:
-                    response = await self._client.report(self._ticket, report)
+                    response = await self._client.tables.report(self._ticket, report)
                 except ChefsHatError as error:
                     if error.reason != "GAME_OVER":
                         raise
@@ -95,15 +95,15 @@ def test_a_robot_plays_a_shift_at_a_physical_table(server_address: str, caplog: 
             dan = pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name="Dan")
             policy = pb.RoomPolicy(pace_ms=0)
             seats = [None, "greedy", "random", dan]
-            made = await client.create_room("real", seats=seats, rules=rules, policy=policy, physical=True)
-            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
+            made = await client.rooms.create("real", seats=seats, rules=rules, policy=policy, physical=True)
+            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
             attendant = Attendant(client, made.table_ticket)
             attending = asyncio.create_task(attendant.attend())
             result = await play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), table_ticket=made.table_ticket)
             assert result.finished
             await attending
             assert attendant.refused == []
-            return [line async for line in client.record(result.game_id)]
+            return [line async for line in client.records.read(result.game_id)]
 
     record = run(test())
     assert "did not accept" not in caplog.text
@@ -148,29 +148,29 @@ def test_a_robot_says_violations_and_asks_the_tables_questions(server_address: s
         async with aio.Client(server_address) as client:
             rules = pb.RuleSet(target_shifts=1)
             dan = pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name="Dan")
-            made = await client.create_room("doubt", seats=[None, dan, dan, dan], rules=rules, physical=True)
-            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
+            made = await client.rooms.create("doubt", seats=[None, dan, dan, dan], rules=rules, physical=True)
+            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
             ticket = made.table_ticket
             playing = asyncio.create_task(
                 play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("it"), table_ticket=ticket, referee=True)
             )
             await until(lambda: robot.seen)
             hand = pb.SeenCards(cards=[2, 2, 5, 7, 9, 9, 9, 10, 10, 10, 11, 11, 11, 11, 11, 12, 12], golden=False)
-            assert (await client.report(ticket, pb.TableReport(hand=pb.HandSeen(seat=ROBOT, cards=hand)))).verdict == 1
+            assert (await client.tables.report(ticket, pb.TableReport(hand=pb.HandSeen(seat=ROBOT, cards=hand)))).verdict == 1
             # Nobody may open a Shift with a 3.
             wrong = pb.TableReport(laid=pb.CardsLaid(seat=1, cards=pb.SeenCards(cards=[3], golden=False)))
-            violation = await client.report(ticket, wrong)
+            violation = await client.tables.report(ticket, wrong)
             assert violation.verdict == pb.REPORT_VERDICT_VIOLATION
             await until(lambda: said(violation.detail))
 
-            await client.report(ticket, pb.TableReport(question=question))
+            await client.tables.report(ticket, pb.TableReport(question=question))
             await until(lambda: said("7 or 9 at place 4?"))
             for heard in (Heard("seven or nine?"), Heard("nine", 0.2), Heard("It is a nine.", 0.9)):
                 robot.report(heard)
-            async for state in client.watch_table(ticket):
+            async for state in client.tables.watch(ticket):
                 if not state.questions:
                     break
-            await client.close_room(made.room.room_id, made.owner_token)
+            await client.rooms.close(made.room.room_id, made.owner_token)
             assert (await playing).abort_reason == "CLOSED"
 
     run(test())

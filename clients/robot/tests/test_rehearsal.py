@@ -30,13 +30,13 @@ LIMIT_S = 900.0
 
 async def _page(client: aio.Client, ticket: str, answered: list[str], rehearsal: Rehearsal) -> None:
     """Somebody on the page who sees the table and answers its questions."""
-    async for state in client.watch_table(ticket):
+    async for state in client.tables.watch(ticket):
         for question in state.questions:
             if question.question_id not in answered:
                 answered.append(question.question_id)
                 option = rehearsal.right_option(state, question)
                 answer = pb.QuestionAnswered(question_id=question.question_id, option=option)
-                await client.report(ticket, pb.TableReport(source=pb.REPORT_SOURCE_ATTENDANT, answer=answer))
+                await client.tables.report(ticket, pb.TableReport(source=pb.REPORT_SOURCE_ATTENDANT, answer=answer))
 
 
 @pytest.mark.server
@@ -48,13 +48,13 @@ def test_people_a_robot_and_a_remote_agent_play_a_game_at_a_synthetic_table(serv
     async def test() -> tuple[Rehearsal, list[pb.RecordLine]]:
         async with aio.Client(server_address) as client:
             people = [pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name=name) for name in PEOPLE]
-            made = await client.create_room("whole", seats=[*people, None, None], rules=pb.RuleSet(target_shifts=1), physical=True)
+            made = await client.rooms.create("whole", seats=[*people, None, None], rules=pb.RuleSet(target_shifts=1), physical=True)
             ticket = made.table_ticket
-            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
-            other = await client.join_room(made.join_code, "remote", seat=REMOTE)
+            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT, seat=ROBOT)
+            other = await client.rooms.join(made.join_code, "remote", seat=REMOTE)
             table = SyntheticTable([], DIFFICULTIES["easy"], seed=2)
-            rehearsal = Rehearsal(table, client, ticket, seed=2, mistakes=0.25, face_down=0.5, answers=False)
-            bridge = Bridge(client, ticket, Perception(table.camera, deck=0))
+            rehearsal = Rehearsal(table, client.tables, ticket, seed=2, mistakes=0.25, face_down=0.5, answers=False)
+            bridge = Bridge(client.tables, ticket, Perception(table.camera, deck=0))
 
             async def after(frame: Frame) -> None:
                 if bridge.state is not None:
@@ -69,7 +69,7 @@ def test_people_a_robot_and_a_remote_agent_play_a_game_at_a_synthetic_table(serv
                 await remote
             page.cancel()
             assert result.finished
-            return rehearsal, [line async for line in client.record(result.game_id)]
+            return rehearsal, [line async for line in client.records.read(result.game_id)]
 
     rehearsal, record = asyncio.run(test())
     events = [line.event for line in record if line.HasField("event")]

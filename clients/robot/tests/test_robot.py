@@ -25,14 +25,14 @@ ONE_SHIFT = pb.RuleSet(target_shifts=1)
 
 async def room(client: aio.Client) -> str:
     """Creates a room with built-in agents and a free seat, and returns its join code."""
-    made = await client.create_room("robots", seats=[None, "greedy", "random", "greedy"], rules=ONE_SHIFT)
+    made = await client.rooms.create("robots", seats=[None, "greedy", "random", "greedy"], rules=ONE_SHIFT)
     return made.join_code
 
 
 async def own_turns(client: aio.Client, game_id: str, seat: int) -> list[Turn]:
     """The turns of a seat by the record."""
     turns = []
-    async for line in client.record(game_id):
+    async for line in client.records.read(game_id):
         event = line.event
         if line.HasField("event") and event.HasField("play") and event.play.seat == seat:
             turns.append(Turn(event.play.face if event.play.quantity else 0, event.play.quantity, event.play.jokers))
@@ -49,12 +49,12 @@ def test_a_robot_plays_a_game_and_lays_just_what_it_played(server_address: str, 
 
     async def test() -> tuple[list[Turn], list[pb.RecordLine]]:
         async with aio.Client(server_address) as client:
-            seat = await client.join_room(await room(client), "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+            seat = await client.rooms.join(await room(client), "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
             result = await play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), notify=notices.append)
             assert result.finished
             assert (result.late, result.invalid) == (0, 0)
             turns = await own_turns(client, result.game_id, result.seat)
-            return turns, [line async for line in client.record(result.game_id)]
+            return turns, [line async for line in client.records.read(result.game_id)]
 
     turns, record = run(test())
     assert turns
@@ -85,11 +85,11 @@ def test_a_robot_plays_a_game_and_lays_just_what_it_played(server_address: str, 
 def test_what_a_robot_reads_in_faces_becomes_expressions_of_their_seats(server_address: str) -> None:
     async def test() -> list[pb.Expression]:
         async with aio.Client(server_address) as client:
-            made = await client.create_room(
+            made = await client.rooms.create(
                 "faces", seats=[None, None, "random", "greedy"], rules=ONE_SHIFT, policy=pb.RoomPolicy(pace_ms=0)
             )
-            person = await client.join_room(made.join_code, "Ada", kind=pb.PARTICIPANT_KIND_HUMAN)
-            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+            person = await client.rooms.join(made.join_code, "Ada", kind=pb.PARTICIPANT_KIND_HUMAN)
+            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
             robot = ScriptedRobot()
             for affect in (Affect("joy", 0.5, seat=0, source="face"), Affect("sadness", seat=3)):
                 robot.report(affect)
@@ -97,7 +97,7 @@ def test_what_a_robot_reads_in_faces_becomes_expressions_of_their_seats(server_a
             playing = asyncio.create_task(client.play(RandomAgent(1), person.ticket))
             result = await play_seat(client, seat.ticket, RandomAgent(7), robot, words=Words("en"), people=people)
             await playing
-            lines = [line async for line in client.record(result.game_id)]
+            lines = [line async for line in client.records.read(result.game_id)]
             return [line.event.expression_shown.expression for line in lines if line.event.expression_shown.seat == person.seat]
 
     shown = [expression for expression in run(test()) if expression.label]
@@ -114,13 +114,13 @@ def test_a_robot_that_never_answers_costs_no_decision(server_address: str) -> No
         async with aio.Client(server_address) as client:
             # The bank is only for a slow machine: the player does not use it.
             policy = pb.RoomPolicy(decision_time_ms=1200, bank_ms=3_600_000)
-            made = await client.create_room("deaf", seats=[None, "greedy", "greedy", "greedy"], rules=ONE_SHIFT, policy=policy)
-            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+            made = await client.rooms.create("deaf", seats=[None, "greedy", "greedy", "greedy"], rules=ONE_SHIFT, policy=policy)
+            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
             async with Body(robot, Words("en"), finish_s=0) as body:
                 result = await client.play(RobotPlayer(RandomAgent(7), body), seat.ticket)
             assert result.finished
             assert (result.late, result.invalid) == (0, 0)
-            return [line async for line in client.record(result.game_id)]
+            return [line async for line in client.records.read(result.game_id)]
 
     record = run(test())
     turns = [line.event.play for line in record if line.event.HasField("play") and line.event.play.seat == 0]
@@ -137,10 +137,10 @@ def test_a_robot_gives_just_what_the_exchange_says(server_address: str) -> None:
 
     async def test() -> tuple[int, list[pb.RecordLine]]:
         async with aio.Client(server_address) as client:
-            made = await client.create_room("gifts", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=6))
-            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+            made = await client.rooms.create("gifts", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=6))
+            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
             result = await play_seat(client, seat.ticket, RandomAgent(5), robot, words=Words("en"))
-            return result.seat, [line async for line in client.record(result.game_id)]
+            return result.seat, [line async for line in client.records.read(result.game_id)]
 
     seat, record = run(test())
     exchanges = [line.event.cards_exchanged for line in record if line.event.HasField("cards_exchanged")]
@@ -165,7 +165,9 @@ def test_the_command_plays_and_draws_a_game(server_address: str, tmp_path: Path,
     async def fingerprints() -> list[str]:
         async with aio.Client(server_address) as client:
             wanted = pb.RecordFilter(participant="Keyed")
-            return [seat.name_fingerprint async for game in client.records(wanted) for seat in game.seats if seat.name == "Keyed"]
+            return [
+                seat.name_fingerprint async for game in client.records.list(wanted) for seat in game.seats if seat.name == "Keyed"
+            ]
 
     key = ["--name", "Keyed", "--name-key", str(tmp_path / "robot.key")]
     arguments = ["--address", server_address, "--room", run(code()), "--seed", "3", "--json", "--language", "it", *key]

@@ -48,9 +48,9 @@ class Game:
         self.ticket = self.room_id = self.game_id = ""
 
     async def __aenter__(self) -> Game:
-        made = await self.client.create_room("streams", seats=[None, "greedy", "random", "greedy"], rules=ONE_SHIFT)
+        made = await self.client.rooms.create("streams", seats=[None, "greedy", "random", "greedy"], rules=ONE_SHIFT)
         self.room_id, self.game_id = made.room.room_id, made.room.game_id
-        self.ticket = (await self.client.join_room(made.join_code, "Ada")).ticket
+        self.ticket = (await self.client.rooms.join(made.join_code, "Ada")).ticket
         options = chefshat.PlayOptions(delivery=pb.EVENT_DELIVERY_AT_ONCE)
         self.playing = asyncio.create_task(self.client.play(self.agent, self.ticket, options=options))
         await self.agent.attached.wait()
@@ -86,7 +86,7 @@ def test_lines_of_an_analyser_become_expressions_of_the_seat(server_address: str
                 assert "`valence` is -3" in answers[3]
                 writer.close()
                 serving.cancel()
-            return [line async for line in client.record(game.game_id)]
+            return [line async for line in client.records.read(game.game_id)]
 
     record = run(test())
     assert [line.event.expression_shown.expression.label for line in record if line.event.HasField("expression_shown")] == ["joy"]

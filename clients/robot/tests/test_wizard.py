@@ -42,9 +42,9 @@ def test_the_robot_says_lays_and_shows_what_the_wizard_sends(server_address: str
 
     async def test() -> list[pb.RecordLine]:
         async with aio.Client(server_address) as client:
-            made = await client.create_room("oz", seats=[None, "greedy", "random", "greedy"], rules=ONE_SHIFT)
+            made = await client.rooms.create("oz", seats=[None, "greedy", "random", "greedy"], rules=ONE_SHIFT)
             wizard = Wizard(client)
-            seat = await client.join_room(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
+            seat = await client.rooms.join(made.join_code, "Pepe", kind=pb.PARTICIPANT_KIND_ROBOT)
             wizard.ticket = seat.ticket
             room = made.room.room_id
             playing = asyncio.create_task(client.play(wizard, seat.ticket))
@@ -53,7 +53,7 @@ def test_the_robot_says_lays_and_shows_what_the_wizard_sends(server_address: str
             wizard.start.set()
             result = await playing
             await following
-            return [line async for line in client.record(result.game_id)]
+            return [line async for line in client.records.read(result.game_id)]
 
     record = run(test())
     said = [act.text for act in robot.acts if isinstance(act, Say)]
@@ -76,14 +76,14 @@ def test_a_built_in_agent_has_a_body_and_the_past_is_not_performed(server_addres
 
     async def test() -> int:
         async with aio.Client(server_address) as client:
-            made = await client.create_room("past", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=2))
+            made = await client.rooms.create("past", seats=[None, "greedy", "random", "greedy"], rules=pb.RuleSet(target_shifts=2))
             person = Wizard(client)
             person.said = True
-            seat = await client.join_room(made.join_code, "Ada")
+            seat = await client.rooms.join(made.join_code, "Ada")
             playing = asyncio.create_task(client.play(person, seat.ticket))
             room = made.room.room_id
             past: list[pb.GameEvent] = []
-            async for event in client.watch(room):
+            async for event in client.rooms.watch(room):
                 past.append(event)
                 if event.HasField("shift_started"):
                     break

@@ -38,11 +38,11 @@ def play(server: GuardedServer, url: str, at: dict[int, Callable[[], object]]) -
     # Long time limits: the test is about lost decisions, not speed.
     policy = pb.RoomPolicy(decision_time_ms=60_000)
     with server.client("host", url) as host:
-        room = host.create_room("deployed", rules=pb.RuleSet(target_shifts=3), policy=policy)
+        room = host.rooms.create("deployed", rules=pb.RuleSet(target_shifts=3), policy=policy)
     # The clients are closed first, which ends the thread if the test fails.
     with ThreadPoolExecutor(1) as thread, server.client("player", url) as player, server.client("spectator", url) as spectator:
-        ticket = player.join_room(room.join_code, "in-process").ticket
-        watched = thread.submit(lambda: list(spectator.watch(room.room.room_id)))
+        ticket = player.rooms.join(room.join_code, "in-process").ticket
+        watched = thread.submit(lambda: list(spectator.rooms.watch(room.room.room_id)))
         rust = [os.environ["CHEFSHAT_BIN"], "agent", "greedy", "--server", url, "--name", "rust"]
         python = [sys.executable, "-m", "chefshat.agent", "--address", url, "--name", "python"]
         javascript = ["node", "agent.js", "--address", url, "--name", "javascript"]
@@ -68,7 +68,7 @@ def play(server: GuardedServer, url: str, at: dict[int, Callable[[], object]]) -
         assert [process.returncode for process in processes] == [0, 0, 0], outputs
         assert result.finished
         assert not at, "not all interruptions happened"
-        record = list(spectator.record(room.room.game_id))
+        record = list(spectator.records.read(room.room.game_id))
         assert [event.sequence for event in watched.result(PATIENCE_S)] == [
             line.event.sequence for line in record if line.HasField("event")
         ]

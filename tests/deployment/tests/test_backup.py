@@ -38,20 +38,20 @@ class Disaster(RandomAgent):
 def test_a_game_resumes_from_a_backup_and_is_signed_by_the_same_key(server: GuardedServer, tmp_path: Path) -> None:
     data, backup = server.data, tmp_path / "backup"
     with server.client("host") as client:
-        over = client.create_room("over", rules=SHORT, seats=["greedy"] * 4).room
-        list(client.watch(over.room_id))
+        over = client.rooms.create("over", rules=SHORT, seats=["greedy"] * 4).room
+        list(client.rooms.watch(over.room_id))
         # Its file is written after the game.
         deadline = time.monotonic() + 300
         while not (data / "records" / f"{over.game_id}.jsonl").exists():
             assert time.monotonic() < deadline, "the record of a finished game is never written"
             time.sleep(0.05)
         policy = pb.RoomPolicy(decision_time_ms=60_000)
-        room = client.create_room("resumes", rules=SHORT, policy=policy, seats=[None, "greedy", "greedy", "greedy"])
+        room = client.rooms.create("resumes", rules=SHORT, policy=policy, seats=[None, "greedy", "greedy", "greedy"])
         (data / "any-other-file").write_text("its content")
         agent = Disaster(server, backup)
-        result = client.play(agent, client.join_room(room.join_code, "Ada").ticket)
+        result = client.play(agent, client.rooms.join(room.join_code, "Ada").ticket)
         assert result.finished
-        record = list(client.record(room.room.game_id))
+        record = list(client.records.read(room.room.game_id))
     assert agent.copied == {"backup": str(backup), "finished_games": 1, "unfinished_games": 1, "records": 1}
     answered = [line.decision for line in record if line.HasField("decision") and line.decision.seat == result.seat]
     assert all(decision.source == pb.DECISION_SOURCE_AGENT for decision in answered)

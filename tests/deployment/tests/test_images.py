@@ -110,8 +110,8 @@ def play(address: str, token: str, agent: Container) -> str:
     """Plays a game from outside, with an agent in a container. Returns the game's id."""
     with chefshat.Client(address, token=token) as client:
         seats = [None, None, "greedy", "random"]
-        room = client.create_room("images", rules=pb.RuleSet(target_shifts=1), seats=seats)
-        ticket = client.join_room(room.join_code, "outside").ticket
+        room = client.rooms.create("images", rules=pb.RuleSet(target_shifts=1), seats=seats)
+        ticket = client.rooms.join(room.join_code, "outside").ticket
         process = agent.start("--address", address, "--code", room.join_code, environment={"CHEFSHAT_TOKEN": token})
         result = client.play(RandomAgent(1), ticket)
         output, _ = process.communicate()

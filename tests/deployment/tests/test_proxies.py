@@ -60,7 +60,7 @@ def test_roles_hold_behind_a_proxy(server: GuardedServer, tmp_path: Path, role: 
         chefshat.Client(proxy.url, token=token) as client,
         pytest.raises(chefshat.ChefsHatError, match=reason),
     ):
-        client.create_room("mine")
+        client.rooms.create("mine")
 
 
 def test_the_page_and_grpc_web_pass_over_http_1(proxy: Proxy, server: GuardedServer) -> None:
@@ -107,8 +107,8 @@ def test_idle_streams_keep_their_seats(server: GuardedServer, tmp_path: Path) ->
         with kind(server.address, folder) as proxy, server.client("host", proxy.url) as client:
             policy = pb.RoomPolicy(decision_time_ms=3_600_000)
             seats = [None, "greedy", "greedy", "greedy"]
-            room = client.create_room(seats=seats, rules=pb.RuleSet(target_shifts=1), policy=policy)
-            ticket = client.join_room(room.join_code, "slow").ticket
+            room = client.rooms.create(seats=seats, rules=pb.RuleSet(target_shifts=1), policy=policy)
+            ticket = client.rooms.join(room.join_code, "slow").ticket
             # Nobody else can act while this seat thinks, so its stream is silent.
             return client.play(Interrupting({2: lambda: time.sleep(IDLE_S)}), ticket)
 

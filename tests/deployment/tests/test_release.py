@@ -284,6 +284,6 @@ def play(address: str) -> None:
     """Plays a Shift on a server, from outside."""
     with chefshat.Client(address) as client:
         rules = chefshat.pb.RuleSet(target_shifts=1)
-        room = client.create_room("a release", rules=rules, seats=[None, "greedy", "random", "trained"])
-        ticket = client.join_room(room.join_code, "outside").ticket
+        room = client.rooms.create("a release", rules=rules, seats=[None, "greedy", "random", "trained"])
+        ticket = client.rooms.join(room.join_code, "outside").ticket
         assert client.play(RandomAgent(1), ticket).finished

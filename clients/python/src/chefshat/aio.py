@@ -1,6 +1,6 @@
 """The asyncio client: the methods of the blocking `chefshat.Client`, awaited. Agents may decide in coroutines.
 
-Its calls are in `_async.calls`; here is how it plays: the connection, its loss, and the tasks of agents that are deciding. The
+Its calls are in `_async`; here is how it plays: the connection, its loss, and the tasks of agents that are deciding. The
 protocol of playing is in `session`.
 """
 
@@ -24,6 +24,8 @@ PlayCall: TypeAlias = "grpc.aio.StreamStreamCall[pb.PlayRequest, pb.PlayResponse
 class Client(AsyncCalls):
     """A connection to a server, opened on first use. Close it, or use it as an asynchronous context manager.
 
+    The calls are methods, and in groups: `rooms`, `tournaments`, `tables`, `records` and `studies`; see `AsyncCalls`.
+
     Create it where the event loop runs. Every method raises `ChefsHatError`: with the server's reason if the server refuses, with
     "UNAVAILABLE" if it cannot be reached.
     """
@@ -43,7 +45,7 @@ class Client(AsyncCalls):
                         break
                     failures = 1 if session.progress > before else failures + 1
                     try:
-                        await self._wait(failures, error)
+                        await self._connection.wait(failures, error)
                     except ChefsHatError as final:
                         session.give_up(final)
                 run.end()

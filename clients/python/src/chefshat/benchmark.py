@@ -89,5 +89,5 @@ def _game(line: str) -> tuple[str, str, str]:
 
 
 async def _play_one(client: Client, agent: Agent, code: str, name: str) -> None:
-    joined = await client.join_room(code, name)
+    joined = await client.rooms.join(code, name)
     await client.play(agent, joined.ticket)

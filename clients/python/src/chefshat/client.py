@@ -1,4 +1,4 @@
-"""The blocking client. Its calls are in `_sync.calls`; here is how it plays: the connection, its loss, and the threads.
+"""The blocking client. Its calls are in `_sync`; here is how it plays: the connection, its loss, and the threads.
 
 The protocol of playing is in `session`.
 """
@@ -32,6 +32,8 @@ PlayCall: TypeAlias = "grpc._CallIterator[pb.PlayResponse]"
 class Client(Calls):
     """A blocking connection to a server, opened on first use. Close it, or use it as a context manager. Threads may share it.
 
+    The calls are methods, and in groups: `rooms`, `tournaments`, `tables`, `records` and `studies`; see `Calls`.
+
     Every method raises `ChefsHatError`: with the server's reason if the server refuses, with "UNAVAILABLE" if it cannot be reached.
     """
 
@@ -45,7 +47,7 @@ class Client(Calls):
                 break
             failures = 1 if session.progress > before else failures + 1
             try:
-                self._wait(failures, error)
+                self._connection.wait(failures, error)
             except ChefsHatError as final:
                 session.give_up(final)
 
@@ -190,4 +192,4 @@ def play(
         ChefsHatError: the room or the seat was refused, another connection took the seat, or the server stayed unreachable.
     """
     with Client(address, token=token, ca=ca) as client:
-        return client.play(agent, client.join_room(join_code, name, seat=seat).ticket)
+        return client.play(agent, client.rooms.join(join_code, name, seat=seat).ticket)

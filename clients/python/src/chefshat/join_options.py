@@ -267,7 +267,7 @@ def _play(client: Client, way: JoinOptions, ticket: str, make_agent: MakeAgent, 
         if prepare is None or prepared:
             return
         try:
-            participants = client.get_tournament(place.tournament_id).participants
+            participants = client.tournaments.get(place.tournament_id).participants
         except ChefsHatError as error:
             if not error.retryable:
                 raise
@@ -295,7 +295,7 @@ def _play(client: Client, way: JoinOptions, ticket: str, make_agent: MakeAgent, 
         games[0].raise_for_error()
         return Played(games)
     last = entered[-1]
-    return Played(games, client.tournament_results(last.tournament_id), last.participant)
+    return Played(games, client.tournaments.results(last.tournament_id), last.participant)
 
 
 def _stored(way: JoinOptions, file: TicketFile | None) -> str | None:
@@ -313,14 +313,14 @@ def _stored(way: JoinOptions, file: TicketFile | None) -> str | None:
 def _join(client: Client, way: JoinOptions, file: TicketFile | None, check_rules: Callable[[pb.RuleSet], None]) -> str:
     """Joins, and stores or prints the ticket, so that it survives this process."""
     if way.tournament is not None:
-        entrant = client.join_tournament(
+        entrant = client.tournaments.join(
             way.tournament, way.name, max_games=way.games, stateless=way.stateless, name_key=way.name_key
         )
         ticket, rules = entrant.ticket, entrant.tournament.settings.rules
         what = "the tournament"
         left = "the tournament will be played without it"
     else:
-        joined = client.join_room(way.code or "", way.name, seat=way.seat, name_key=way.name_key)
+        joined = client.rooms.join(way.code or "", way.name, seat=way.seat, name_key=way.name_key)
         ticket, rules = joined.ticket, joined.room.rules
         what = "the game"
         # An unattached seat does not start a game.

@@ -271,11 +271,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def watch(client: Client, room: str, name: str, wait_s: float) -> int:
     """Sends the events of a room as a spectator sees them. Returns the exit code."""
     is_id = len(room) == 32
-    room_id = client.get_room(room if is_id else "", join_code="" if is_id else room).room_id
+    room_id = client.rooms.get(room if is_id else "", join_code="" if is_id else room).room_id
     markers = MarkerStream(client, room_id, name=name)
     say(markers)
     markers.wait_for_recorder(wait_s)
-    for event in client.watch(room_id):
+    for event in client.rooms.watch(room_id):
         markers.push(event)
     markers.close(LINGER_S)
     print("the game is over", file=sys.stderr)
@@ -304,7 +304,7 @@ def watch_participant(client: Client, study_id: str, owner_token: str, number: i
                 known.discard(game.room_id)
                 time.sleep(ROOM_INTERVAL_S)
             continue
-        for event in client.watch(game.room_id):
+        for event in client.rooms.watch(game.room_id):
             markers.push(event)
         games += 1
         print(f"game {games} of participant {number} is over", file=sys.stderr, flush=True)
@@ -328,7 +328,7 @@ def next_game(client: Client, study_id: str, owner_token: str, number: int, know
     )
     is_first = not known
     print(f"waiting for a game of participant {number}", file=sys.stderr, flush=True)
-    for participant in client.follow_study(study_id, owner_token):
+    for participant in client.studies.follow(study_id, owner_token):
         if participant.number != number:
             continue
         for game in participant.games:

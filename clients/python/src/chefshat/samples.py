@@ -104,7 +104,7 @@ class SampleStream:
         """
         with self._sending:
             while (chunk := self._first()) is not None:
-                self._client.add_samples(self._seat, chunk)
+                self._client.rooms.add_samples(self._seat, chunk)
                 with self._lock:
                     del self._waiting.elapsed_us[: len(chunk.elapsed_us)]
                     del self._waiting.values[: len(chunk.values)]

@@ -45,12 +45,12 @@ _COUNTS = (pb.REPORT_VERDICT_ACCEPTED, pb.REPORT_VERDICT_KNOWN, pb.REPORT_VERDIC
 
 
 class Table(Protocol):
-    """The calls that a bridge makes, as `chefshat.aio.Client` has them."""
+    """The calls that a bridge makes, as `chefshat.aio.Client.tables` has them."""
 
     async def report(self, table_ticket: str, report: pb.TableReport, *, report_id: str = "") -> pb.ReportResponse:
         """Reports something that happened."""
 
-    def watch_table(self, table_ticket: str) -> AsyncIterator[pb.TableState]:
+    def watch(self, table_ticket: str) -> AsyncIterator[pb.TableState]:
         """Iterates over the states of the table."""
 
 
@@ -101,7 +101,7 @@ class Bridge:
     """Joins perception and a physical table.
 
     Args:
-        table: The connection to the server.
+        table: The calls about tables of the connection to the server.
         ticket: The ticket of the table.
         perception: What watches the field.
         on_report: Called with each report and its response, for a display or a log.
@@ -466,7 +466,7 @@ class Bridge:
         return response
 
     async def _watch(self) -> None:
-        async with aclosing(self.table.watch_table(self.ticket)) as states:  # type: ignore[type-var]
+        async with aclosing(self.table.watch(self.ticket)) as states:  # type: ignore[type-var]
             async for state in states:
                 self._newer(state)
 

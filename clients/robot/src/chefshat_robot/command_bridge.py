@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
             async def watch() -> int:
                 async with aio.Client(server_of(arguments)) as client:
                     perception = Perception(camera, arguments.deck, recorder)
-                    bridge = Bridge(client, arguments.ticket, perception, on_report=report_printer(arguments.json))
+                    bridge = Bridge(client.tables, arguments.ticket, perception, on_report=report_printer(arguments.json))
                     readers = [(seat, HandReader(deck=arguments.deck), source) for seat, source in hands]
                     try:
                         async with asyncio.TaskGroup() as group:

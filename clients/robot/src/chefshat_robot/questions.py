@@ -41,7 +41,7 @@ class Questions:
     async def follow(self) -> None:
         """Asks what is to be asked, until the game is over."""
         try:
-            async for state in self._client.watch_table(self._ticket):
+            async for state in self._client.tables.watch(self._ticket):
                 self._open = list(state.questions)
                 for question in self._open:
                     if question.question_id not in self._asked:
@@ -61,7 +61,7 @@ class Questions:
         answer = pb.QuestionAnswered(question_id=question.question_id, option=option)
         report = pb.TableReport(source=pb.REPORT_SOURCE_ROBOT, answer=answer)
         try:
-            await self._client.report(self._ticket, report)
+            await self._client.tables.report(self._ticket, report)
             LOG.info("heard the answer %r to %r", question.options[option], question.text)
         except ChefsHatError as error:
             LOG.warning("an answer was not reported: %s", error)

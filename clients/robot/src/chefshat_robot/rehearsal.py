@@ -32,7 +32,7 @@ MAX_PLACES = 11
 
 
 class Attendant(Protocol):
-    """How the people at the table report what no camera sees, as `chefshat.aio.Client` does."""
+    """How the people at the table report what no camera sees, as `chefshat.aio.Client.tables` does."""
 
     async def report(self, table_ticket: str, report: pb.TableReport, *, report_id: str = "") -> pb.ReportResponse:
         """Reports something that happened."""
@@ -46,7 +46,7 @@ class Rehearsal:
 
     Args:
         table: The synthetic table; its frames are taken by `frames`.
-        attendant: The connection to the server.
+        attendant: The calls about tables of the connection to the server.
         ticket: The ticket of the table.
         players: Number of seats, 2..4.
         deck_number: The deck on the table.

@@ -60,14 +60,14 @@ def run(arguments: argparse.Namespace) -> int:
             table = SyntheticTable([], DIFFICULTIES[arguments.difficulty], seed=arguments.seed)
             rehearsal = Rehearsal(
                 table,
-                client,
+                client.tables,
                 ticket,
                 seed=arguments.seed,
                 mistakes=arguments.mistakes,
                 face_down=arguments.face_down,
                 answers=not arguments.no_answers,
             )
-            bridge = Bridge(client, ticket, Perception(table.camera, deck=0), on_report=report_printer(arguments.json))
+            bridge = Bridge(client.tables, ticket, Perception(table.camera, deck=0), on_report=report_printer(arguments.json))
 
             async def after(frame: Frame) -> None:
                 if bridge.state is not None:
@@ -84,7 +84,7 @@ async def _create(client: aio.Client, arguments: argparse.Namespace) -> str:
     """Creates a physical room, prints how to join it, and returns the ticket of its table."""
     people = [pb.SeatConfig(at_table=pb.PARTICIPANT_KIND_HUMAN, name=name) for name in PEOPLE[: arguments.people]]
     others = [arguments.agent] * (PLAYERS - arguments.people - arguments.open)
-    created = await client.create_room(
+    created = await client.rooms.create(
         "Rehearsal",
         rules=pb.RuleSet(target_shifts=arguments.shifts),
         seats=[*people, *[None] * arguments.open, *others],

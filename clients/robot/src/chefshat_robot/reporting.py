@@ -28,7 +28,7 @@ class Reporter(Sender[pb.TableReport]):
 
     async def _deliver(self, item: pb.TableReport) -> None:
         try:
-            response = await self._client.report(self._ticket, item)
+            response = await self._client.tables.report(self._ticket, item)
             if response.verdict not in (pb.REPORT_VERDICT_ACCEPTED, pb.REPORT_VERDICT_KNOWN):
                 LOG.warning("the referee did not accept what the robot did: %s", response.detail)
         except ChefsHatError as error:

@@ -248,7 +248,7 @@ async def _join(client: aio.Client, arguments: argparse.Namespace) -> str:
         key = name_key(arguments.name_key)
     except (OSError, ValueError) as error:
         raise CommandError(f"--name-key: {error}") from error
-    joined = await client.join_room(
+    joined = await client.rooms.join(
         arguments.room, arguments.name, kind=pb.PARTICIPANT_KIND_ROBOT, seat=arguments.seat, name_key=key
     )
     print(f"if this process ends before the game, resume with --ticket {joined.ticket}", file=sys.stderr)

@@ -93,7 +93,7 @@ async def live_from(client: aio.Client, room_id: str) -> int:
     Raises:
         ChefsHatError: there is no such room, or it admits no spectators.
     """
-    call = client._spectators.Watch(pb.SpectatorServiceWatchRequest(room_id=room_id, snapshot=True))
+    call = client.rooms._spectators.Watch(pb.SpectatorServiceWatchRequest(room_id=room_id, snapshot=True))
     try:
         async for response in call:
             return response.snapshot.next_sequence

@@ -68,7 +68,7 @@ async def follow_seat(
     body = Body(driver, words, notify=notify, times=times, handles_cards=handles_cards, small_talk=small_talk, announces=announces)
     async with body:
         body.seat_at(seat, live)
-        async for event in client.watch(room_id):
+        async for event in client.rooms.watch(room_id):
             body.on_event(event)
             if event.HasField("expression_shown") and event.expression_shown.seat == seat and event.sequence >= live:
                 show(body, event.expression_shown.expression)

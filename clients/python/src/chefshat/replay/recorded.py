@@ -112,8 +112,8 @@ def from_server(address: str | ServerAddress, wanted: pb.RecordFilter | None = N
 
     with tempfile.TemporaryDirectory() as folder, Client(address) as client:
         count = 0
-        for summary in client.records(wanted):
-            save_record(client.record(summary.game_id), Path(folder) / f"{summary.game_id}.jsonl")
+        for summary in client.records.list(wanted):
+            save_record(client.records.read(summary.game_id), Path(folder) / f"{summary.game_id}.jsonl")
             count += 1
         if count == 0:
             raise ChefsHatError("NO_RECORDS", f"the server at {address} has no such records")
@@ -121,7 +121,7 @@ def from_server(address: str | ServerAddress, wanted: pb.RecordFilter | None = N
 
 
 def save_record(lines: Iterable[pb.RecordLine], path: Path | str) -> None:
-    """Writes a record, for example from `Client.record`, to a file atomically, in the server's format."""
+    """Writes a record, for example from `Client.records.read`, to a file atomically, in the server's format."""
     write_record(path, lines)
 
 

@@ -1,0 +1,65 @@
+"""The calls of TableService. See `calls`."""
+
+import secrets
+from collections.abc import Iterator
+
+from chefshat import pb
+from chefshat._gen.chefshat.v1.table_service_pb2_grpc import TableServiceStub
+from chefshat._sync.connection import Connection
+from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
+from chefshat.network import grpc
+from chefshat.requests import called
+
+
+class Tables:
+    """Reports what happens at physical tables, where real cards are played, and follows their state."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._table = TableServiceStub(connection.channel)
+
+    def report(self, table_ticket: str, report: pb.TableReport, *, report_id: str = "") -> pb.ReportResponse:
+        """Reports something that happened at a physical table.
+
+        Args:
+            table_ticket: the ticket of the table, from `rooms.create`.
+            report: what happened.
+            report_id: identifies the report, 1..=64 characters, so that it can be repeated safely; empty: a random one.
+
+        Returns:
+            The verdict of the referee, and the state of the table afterwards. A report that the rules or the cards do not allow is
+            no error: see `verdict` and `detail`. Repeats the report while the server cannot be reached.
+        """
+        request = pb.ReportRequest(table_ticket=table_ticket, report_id=report_id or secrets.token_hex(16), report=report)
+        failures = 0
+        while True:
+            try:
+                return called(self._table.Report, request)
+            except ChefsHatError as error:
+                failures += 1
+                self._connection.wait(failures, error)
+
+    def watch(self, table_ticket: str) -> Iterator[pb.TableState]:
+        """Iterates over the state of a physical table: now, and after every change, until its game is over. Reconnects.
+
+        Args:
+            table_ticket: the ticket of the table, from `rooms.create`.
+        """
+        failures = 0
+        while True:
+            call = self._table.Watch(pb.TableServiceWatchRequest(table_ticket=table_ticket))
+            error = connection_lost("the server ended the stream before the game was over")
+            try:
+                for response in call:
+                    failures = 0
+                    if not response.HasField("state"):
+                        continue  # A heartbeat.
+                    yield response.state
+                    if response.state.stage == pb.TABLE_STAGE_OVER:
+                        return
+            except grpc.RpcError as failure:
+                error = from_rpc_error(failure)
+            finally:
+                call.cancel()
+            failures += 1
+            self._connection.wait(failures, error)
