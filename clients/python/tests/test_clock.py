@@ -29,26 +29,26 @@ def test_the_reading_with_the_shortest_round_trip_is_returned(fake: FakeServer) 
     # The local clock says when each of three requests was sent and answered: two, one and three seconds.
     times = itertools.chain([0.0, 2.0, 5.0, 6.0, 7.0, 10.0])
     with chefshat.Client(fake.address) as client:
-        clock = client.clock(local=lambda: next(times), readings=3)
+        clock = client.read_clock(local=lambda: next(times), readings=3)
     assert clock.round_trip == 1.0
     assert next(times, None) is None
 
 
 def test_the_offset_is_known_to_half_the_round_trip(fake: FakeServer) -> None:
     with chefshat.Client(fake.address) as client:
-        clock = client.clock()
+        clock = client.read_clock()
         # In microseconds, and as precise as numbers of this size are.
         assert abs(clock.offset - CLOCK_AHEAD_S) <= clock.error + 2e-6
         assert clock.room_offset is None
         with pytest.raises(ValueError, match="without a room"):
             clock.local(0)
         room = client.rooms.create("clock").room
-        clock = client.clock(room.room_id)
+        clock = client.read_clock(room.room_id)
         assert clock.room_offset is not None
         assert abs(clock.room_offset) <= clock.error + 2e-6
         assert clock.game_id == room.game_id
         with pytest.raises(ChefsHatError) as caught:
-            client.clock("nobody's")
+            client.read_clock("nobody's")
         assert caught.value.reason == "ROOM_UNKNOWN"
 
 
@@ -61,7 +61,7 @@ def test_events_are_placed_between_what_came_before_and_after(real_address: str)
             joined = time.monotonic()
             await client.rooms.join(created.join_code, "agent")
             after = time.monotonic()
-            clock = await client.clock(created.room.room_id, local=time.monotonic)
+            clock = await client.read_clock(created.room.room_id, local=time.monotonic)
             assert clock.game_id == created.room.game_id
             assert clock.created_at_ms == created.room.created_at_ms
             # The time of an event is rounded to a millisecond.

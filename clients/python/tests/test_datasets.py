@@ -107,12 +107,12 @@ class Talkative(RandomAgent):
             )
             self.client.rooms.add_samples(self.ticket, chunk)
             public = pb.Expression(label="joy", valence=0.5, source=pb.EXPRESSION_SOURCE_SELF_REPORT)
-            self.client.express(self.ticket, public)
+            self.client.send_expression(self.ticket, public)
         if request.decision_id % 7 == 3:
             private = pb.Expression(label="doubt", confidence=0.25, media="clip", record_only=True)
-            self.client.express(self.ticket, private)
+            self.client.send_expression(self.ticket, private)
         if request.decision_id == 3:
-            hint = self.client.hint(self.ticket, request.decision_id)
+            hint = self.client.get_hint(self.ticket, request.decision_id)
             assert request.mask[hint.action]
             assert {estimate.action for estimate in hint.actions} <= set(request.legal_actions)
         return super().decide(request)

@@ -77,7 +77,7 @@ def time_of_day() -> float:
 
 def check_times(client: chefshat.Client, room: pb.Room, markers: list[tuple[dict[str, Any], float]], error: float) -> None:
     """Compares the times of markers with those of the record, whose clock the stream knows to `error`."""
-    clock = client.clock(room.room_id, local=pylsl.local_clock)
+    clock = client.read_clock(room.room_id, local=pylsl.local_clock)
     ahead = time_of_day()
     header, *_ = list(client.records.read(room.game_id))
     for marker, at in markers:
@@ -150,7 +150,7 @@ def test_a_seat_sends_what_it_sees(real_address: str) -> None:
         assert [int(marker["sequence"]) for marker, _ in sent] == [event.sequence for event in events]
         (hands,) = [marker["shiftStarted"]["hands"] for marker, _ in sent if "shiftStarted" in marker]
         assert [hand.get("seat", 0) for hand in hands] == [0]
-        clock = client.clock(room.room_id, local=pylsl.local_clock)
+        clock = client.read_clock(room.room_id, local=pylsl.local_clock)
         check_times(client, room, sent, max(clock.error, WANTED_ERROR_S))
         marked.close()
 
@@ -251,7 +251,7 @@ def test_the_command_sends_all_games_of_a_participant_of_a_study(
                 events = [line.event for line in owner.records.read(game.game_id) if line.HasField("event")]
                 assert [int(marker["sequence"]) for marker, _ in sent] == [event.sequence for event in events]
                 room = pb.Room(room_id=game.room_id, game_id=game.game_id)
-                clock = owner.clock(game.room_id, local=pylsl.local_clock)
+                clock = owner.read_clock(game.room_id, local=pylsl.local_clock)
                 check_times(owner, room, sent, max(clock.error, WANTED_ERROR_S))
         studies.CloseStudy(pb.CloseStudyRequest(study_id=study_id, owner_token=owner_token))
         _, said = processes[-1].communicate(timeout=WAIT_S)

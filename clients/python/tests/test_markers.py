@@ -34,7 +34,7 @@ def test_a_marker_without_a_moment_marks_now(real_address: str) -> None:
     async def mark() -> None:
         async with aio.Client(real_address) as client:
             created = await client.rooms.create("markers")
-            clock = await client.clock(created.room.room_id)
+            clock = await client.read_clock(created.room.room_id)
             before = clock.room_offset
             assert before is not None
             sent = chefshat.clock.TIME_OF_DAY()

@@ -307,7 +307,7 @@ def test_the_rest_of_the_blocking_client(fake: FakeServer) -> None:
         assert client.action_table().action_space.size == 214
         room = client.rooms.create(seats=[None, "random", "random", "random"])
         joined = client.rooms.join(room.join_code, "Ada")
-        client.express(joined.ticket, pb.Expression(label="joy"))
+        client.send_expression(joined.ticket, pb.Expression(label="joy"))
         assert client.play(RandomAgent(1), joined.ticket).place == 1
         watched = [event.sequence for event in client.rooms.watch(room.room.room_id)]
         assert watched == list(range(1, len(watched) + 1))
@@ -335,7 +335,7 @@ def test_the_rest_of_the_asyncio_client(fake: FakeServer) -> None:
             assert (await client.action_table()).action_space.size == 214
             room = await client.rooms.create(seats=[None, "random", "random", "random"])
             joined = await client.rooms.join(room.join_code, "Ada")
-            await client.express(joined.ticket, pb.Expression(label="joy"))
+            await client.send_expression(joined.ticket, pb.Expression(label="joy"))
             assert (await client.play(RandomAgent(1), joined.ticket)).place == 1
             watched = [event.sequence async for event in client.rooms.watch(room.room.room_id)]
             assert watched == list(range(1, len(watched) + 1))

@@ -224,7 +224,7 @@ def test_annotations_and_expressions_are_recorded(real_address: str) -> None:
     with chefshat.Client(real_address) as client:
         room = client.rooms.create("talk", rules=pb.RuleSet(target_shifts=1), seats=[None, "random", "random", "random"])
         ticket = client.rooms.join(room.join_code, "Talkative").ticket
-        client.express(ticket, pb.Expression(label="joy", valence=0.5))
+        client.send_expression(ticket, pb.Expression(label="joy", valence=0.5))
         result = client.play(Talkative(1), ticket)
         lines = list(client.records.read(room.room.game_id))
     assert any(line.HasField("event") and line.event.expression_shown.expression.label == "joy" for line in lines)

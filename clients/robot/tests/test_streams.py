@@ -136,7 +136,7 @@ def test_readings_that_follow_too_soon_are_dropped() -> None:
         def __init__(self) -> None:
             self.got: list[tuple[str, str]] = []
 
-        async def express(self, ticket: str, expression: pb.Expression) -> None:
+        async def send_expression(self, ticket: str, expression: pb.Expression) -> None:
             self.got.append((ticket, expression.label))
 
     async def test() -> None:

@@ -31,8 +31,8 @@ class Wizard(chefshat.Agent):
         await self.start.wait()
         if not self.said:
             self.said = True
-            await self.client.express(self.ticket, speech.line("Che bella pizza!", by_person=True))
-            await self.client.express(self.ticket, pb.Expression(label="joy", valence=0.75, arousal=0.5))
+            await self.client.send_expression(self.ticket, speech.line("Che bella pizza!", by_person=True))
+            await self.client.send_expression(self.ticket, pb.Expression(label="joy", valence=0.75, arousal=0.5))
         return int(request.legal_actions[0])
 
 

@@ -1,6 +1,6 @@
 """A server's clocks in terms of a clock of this machine.
 
-`Client.clock` returns a `ClockReading`; `RoomClock` follows the clock of a room.
+`Client.read_clock` returns a `ClockReading`; `RoomClock` follows the clock of a room.
 """
 
 import threading
@@ -63,7 +63,7 @@ class ClockReading:
     def local(self, elapsed_ms: float) -> float:
         """The local time of something that happened in the room, `elapsed_ms` (of an event or record) after its creation."""
         if self.room_offset is None:
-            raise ValueError("this clock was read without a room: client.clock(room_id)")
+            raise ValueError("this clock was read without a room: client.read_clock(room_id)")
         return elapsed_ms / 1e3 - self.room_offset
 
     @classmethod
@@ -156,7 +156,7 @@ class RoomClock:
         self._thread.join()
 
     def _read(self) -> tuple[ClockReading, float]:
-        return self._client.clock(self._room_id, local=self._local), self._local()
+        return self._client.read_clock(self._room_id, local=self._local), self._local()
 
     def _follow(self) -> None:
         while not self._closed.wait(self._interval_s):

@@ -3,7 +3,7 @@
 `python -m chefshat.lsl --address HOST:PORT --room CODE` opens a stream of markers and sends every event of a room, with
 `--study ID --participant N` every event of all games of a participant. `MarkerStream` does the same from a program, and
 `MarkedAgent` from an agent, with what its seat sees. A marker has the time at which the event happened at the server, on LSL's
-clock (`Client.clock`), not the time at which it arrived. docs/instruments.md describes the stream.
+clock (`Client.read_clock`), not the time at which it arrived. docs/instruments.md describes the stream.
 """
 
 import argparse

@@ -81,7 +81,7 @@ class Forwarder:
         if last is not None and now - last < self._interval_s:
             return
         self._last[affect.seat] = now
-        await self._client.express(ticket, expression_of(affect, record_only=self._record_only))
+        await self._client.send_expression(ticket, expression_of(affect, record_only=self._record_only))
 
 
 def expression_of(affect: Affect, *, record_only: bool = False) -> pb.Expression:

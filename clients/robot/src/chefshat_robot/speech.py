@@ -54,6 +54,6 @@ class Outbox(Sender[pb.Expression]):
 
     async def _deliver(self, item: pb.Expression) -> None:
         try:
-            await self._client.express(self._ticket, item)
+            await self._client.send_expression(self._ticket, item)
         except ChefsHatError as error:
             LOG.info("an expression was not sent: %s", error)

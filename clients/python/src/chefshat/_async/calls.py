@@ -100,7 +100,7 @@ class AsyncCalls(ABC):
         """Returns the text of every action for decks of `faces` faces (0: the default, 11)."""
         return await awaited(self._server.GetActionTable, pb.GetActionTableRequest(faces=faces))
 
-    async def clock(self, room_id: str = "", *, local: LocalClock = TIME_OF_DAY, readings: int = READINGS) -> ClockReading:
+    async def read_clock(self, room_id: str = "", *, local: LocalClock = TIME_OF_DAY, readings: int = READINGS) -> ClockReading:
         """Reads the server's clocks several times and returns the reading with the shortest round trip.
 
         Args:
@@ -185,11 +185,11 @@ class AsyncCalls(ABC):
         await self._play_session(session)
         return session.played()
 
-    async def express(self, ticket: str, expression: pb.Expression) -> None:
+    async def send_expression(self, ticket: str, expression: pb.Expression) -> None:
         """Sends an expression of affect for the seat of the ticket. Allowed at any time."""
         await awaited(self._play.Act, pb.ActRequest(ticket=ticket, express=expression))
 
-    async def hint(self, ticket: str, decision_id: int) -> pb.Hint:
+    async def get_hint(self, ticket: str, decision_id: int) -> pb.Hint:
         """Asks for a hint for the open decision of the ticket's seat, where the room's policy allows hints.
 
         It takes about half a second of the seat's time, and the record says that it was given. Raises an error with the reason

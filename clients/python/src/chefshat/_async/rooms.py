@@ -124,7 +124,7 @@ class AsyncRooms:
             room_id: the room.
             owner_token: its creator's token, or that of the study whose game it is.
             label: what the marker says, 1..=128 characters.
-            elapsed_us: the marked moment on the room's clock, microseconds since the room was created (see `clock` of the client);
+            elapsed_us: the marked moment on the room's clock, microseconds since the room was created (see `Client.read_clock`);
                 None: when the server reads the request.
         """
         request = pb.AddMarkerRequest(room_id=room_id, owner_token=owner_token, label=label, elapsed_us=elapsed_us)

@@ -100,7 +100,7 @@ class Calls(ABC):
         """Returns the text of every action for decks of `faces` faces (0: the default, 11)."""
         return called(self._server.GetActionTable, pb.GetActionTableRequest(faces=faces))
 
-    def clock(self, room_id: str = "", *, local: LocalClock = TIME_OF_DAY, readings: int = READINGS) -> ClockReading:
+    def read_clock(self, room_id: str = "", *, local: LocalClock = TIME_OF_DAY, readings: int = READINGS) -> ClockReading:
         """Reads the server's clocks several times and returns the reading with the shortest round trip.
 
         Args:
@@ -185,11 +185,11 @@ class Calls(ABC):
         self._play_session(session)
         return session.played()
 
-    def express(self, ticket: str, expression: pb.Expression) -> None:
+    def send_expression(self, ticket: str, expression: pb.Expression) -> None:
         """Sends an expression of affect for the seat of the ticket. Allowed at any time."""
         called(self._play.Act, pb.ActRequest(ticket=ticket, express=expression))
 
-    def hint(self, ticket: str, decision_id: int) -> pb.Hint:
+    def get_hint(self, ticket: str, decision_id: int) -> pb.Hint:
         """Asks for a hint for the open decision of the ticket's seat, where the room's policy allows hints.
 
         It takes about half a second of the seat's time, and the record says that it was given. Raises an error with the reason
