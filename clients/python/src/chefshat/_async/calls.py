@@ -1,8 +1,8 @@
-"""The calls of a client: here those to the server as a whole and those that play, in one file each the groups of all others.
+"""The calls of a client: those that play, those about the server or a decision, and the groups of the others.
 
-A group has the calls of one service of the protocol, or of several small ones about the same thing. The asyncio form in `_async` is
-the source; `tools/generate.py` generates the blocking form in `_sync` from it. How a stream of decisions is played differs between
-the two and is in `chefshat.aio` and `chefshat.client`.
+A group is a file, and has the calls of a service of the protocol, or of several about the same thing. The asyncio form in `_async`
+is the source; `tools/generate.py` generates the blocking form in `_sync` from it. How a stream of decisions is played differs
+between the two and is in `chefshat.aio` and `chefshat.client`.
 """
 
 from abc import ABC, abstractmethod
