@@ -181,8 +181,10 @@ pub(crate) fn documents(places: &Places, steps: &mut Steps) -> Result<(), Failur
         "hadolint",
         tool(places, "hadolint").arg("docker/Dockerfile"),
     )?;
-    let format = ["--dry-run", "--Werror", "clients/cpp/agent.cpp"];
-    steps.program("clang-format", tool(places, "clang-format").args(format))
+    let sources = ["clients/cpp/agent.cpp", "clients/cpp/player.h"];
+    let mut format = tool(places, "clang-format");
+    format.args(["--dry-run", "--Werror"]).args(sources);
+    steps.program("clang-format", &mut format)
 }
 
 /// The licences and sources of what is built with, which change with Cargo.lock alone. The tool is
