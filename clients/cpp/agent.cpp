@@ -74,8 +74,9 @@ Options parse(int count, char** arguments) {
 }
 
 uint32_t number(const Options& options, const std::string& option) {
+  std::istringstream text(options.at(option));
   uint32_t value = 0;
-  if (std::istringstream(options.at(option)) >> value) return value;
+  if (text >> value && text.eof()) return value;
   throw Failure(option + " must be a number");
 }
 
