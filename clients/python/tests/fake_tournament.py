@@ -58,6 +58,9 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
     def __init__(self, make_game: Callable[[list[str]], FakeGame]) -> None:
         self._make_game = make_game
         self._lock = threading.RLock()
+        self.breaks = False
+        # How often a tournament was followed.
+        self.followed = 0
         self._all: list[FakeTournament] = []
         self.joins: list[pb.JoinTournamentRequest] = []
 
@@ -135,8 +138,12 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
         refuse_change_by_hand(context)
 
     def FollowTournament(self, request: pb.FollowTournamentRequest, context: Context) -> Iterator[pb.FollowTournamentResponse]:
-        """Reports every 20 ms, with a heartbeat before each report."""
+        """Reports every 20 ms, with a heartbeat before each report; with `breaks`, each stream breaks after its first report."""
         tournament = self._find(request.tournament_id, context)
+        self.followed += 1
+        if self.breaks:
+            yield pb.FollowTournamentResponse(tournament=tournament.shown)
+            context.abort(grpc.StatusCode.UNAVAILABLE, "the connection is lost")
         while context.is_active():
             yield pb.FollowTournamentResponse()
             over = tournament.over

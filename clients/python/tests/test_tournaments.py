@@ -290,10 +290,29 @@ def test_the_calls_of_the_blocking_client(fake: FakeServer) -> None:
             client.tournaments.add_table_participant(made[0], "owner", "Ada")
 
 
-def test_the_calls_of_the_asyncio_client(fake: FakeServer) -> None:
-    async def listed(items: AsyncIterator[Item]) -> list[Item]:
-        return [item async for item in items]
+async def listed(items: AsyncIterator[Item]) -> list[Item]:
+    return [item async for item in items]
 
+
+def test_a_server_whose_every_stream_breaks_is_given_up(fake: FakeServer) -> None:
+    fake.tournaments.breaks = True
+    few = Backoff(first_s=0.001, max_s=0.002, attempts=3)
+
+    async def follow(tournament_id: str) -> int:
+        async with aio.Client(fake.address, backoff=few) as client:
+            with pytest.raises(ChefsHatError, match="the connection is lost"):
+                await listed(client.tournaments.follow(tournament_id))
+        return fake.tournaments.followed
+
+    with chefshat.Client(fake.address, backoff=few) as client:
+        tournament_id = client.tournaments.create(settings()).tournament.tournament_id
+        with pytest.raises(ChefsHatError, match="the connection is lost"):
+            list(client.tournaments.follow(tournament_id))
+        assert fake.tournaments.followed == 1 + few.attempts
+    assert asyncio.run(follow(tournament_id)) == 2 * (1 + few.attempts)
+
+
+def test_the_calls_of_the_asyncio_client(fake: FakeServer) -> None:
     async def run() -> None:
         async with aio.Client(fake.address, backoff=QUICK) as client:
             ids = [

@@ -3,7 +3,7 @@
 import asyncio
 import secrets
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Iterator, Sequence
+from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Generator, Iterable, Iterator, Sequence
 from typing import Protocol, TypeAlias, TypeVar
 
 from chefshat import pb
@@ -84,6 +84,10 @@ class AsyncStreamed(Protocol[Streaming]):
     def cancel(self) -> object:
         """Ends the call."""
 
+
+# The messages of a stream, which whoever does not read all of them closes.
+Messages: TypeAlias = Generator[Item, None, None]
+AsyncMessages: TypeAlias = AsyncGenerator[Item, None]
 
 SeatSpec: TypeAlias = "pb.SeatConfig | pb.RecordedPlayer | pb.ParticipantKind.ValueType | str | None"
 """How to fill a seat: a built-in agent's name, a recorded player to imitate, the kind it is reserved for, None (open to all), or

@@ -1,12 +1,15 @@
-"""What the groups of calls share: the channel, and the delays between attempts to reconnect."""
+"""What the groups of calls share: the channel, streams that are opened again when they break, and the delays before that."""
 
 import asyncio
 import random
+from collections.abc import Callable
 
 from chefshat.address import ServerAddress
 from chefshat.backoff import Backoff
 from chefshat.channels import async_channel
-from chefshat.errors import ChefsHatError
+from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
+from chefshat.network import grpc
+from chefshat.requests import Answered, AsyncMessages, AsyncStreamed
 
 
 class AsyncConnection:
@@ -22,3 +25,31 @@ class AsyncConnection:
         if not error.retryable or failures > self._backoff.attempts:
             raise error
         await asyncio.sleep(self._backoff.delay_s(failures, self._rng))
+
+    async def messages(self, begin: Callable[[], AsyncStreamed[Answered]], unfinished: str = "") -> AsyncMessages[Answered]:
+        """Iterates over the messages of a stream, which is opened again when it breaks.
+
+        A stream begins with a state, so only what follows its first message counts as progress: a server whose every stream breaks
+        is given up.
+
+        Args:
+            begin: opens the stream, from where it is to go on.
+            unfinished: what is said if the server ends the stream, which then counts as broken; empty: the messages end there.
+        """
+        failures = 0
+        while True:
+            call, progress = begin(), False
+            try:
+                async for message in call:
+                    failures = 0 if progress else failures
+                    progress = True
+                    yield message
+                if not unfinished:
+                    return
+                error = connection_lost(unfinished)
+            except grpc.RpcError as failure:
+                error = from_rpc_error(failure)
+            finally:
+                call.cancel()
+            failures += 1
+            await self.wait(failures, error)

@@ -1,12 +1,11 @@
 """The calls of StudyService. See `calls`."""
 
 from collections.abc import AsyncIterator
+from contextlib import aclosing
 
 from chefshat import pb
 from chefshat._async.connection import AsyncConnection
 from chefshat._gen.chefshat.v1.study_service_pb2_grpc import StudyServiceStub
-from chefshat.errors import from_rpc_error
-from chefshat.network import grpc
 
 
 class AsyncStudies:
@@ -23,17 +22,8 @@ class AsyncStudies:
             study_id: the study.
             owner_token: its owner's token.
         """
-        failures = 0
-        while True:
-            call = self._studies.FollowStudy(pb.FollowStudyRequest(study_id=study_id, owner_token=owner_token))
-            try:
-                async for response in call:
-                    failures = 0
-                    for participant in response.participants:
-                        yield participant
-                return
-            except grpc.RpcError as error:
-                failures += 1
-                await self._connection.wait(failures, from_rpc_error(error))
-            finally:
-                call.cancel()
+        request = pb.FollowStudyRequest(study_id=study_id, owner_token=owner_token)
+        async with aclosing(self._connection.messages(lambda: self._studies.FollowStudy(request))) as messages:
+            async for message in messages:
+                for participant in message.participants:
+                    yield participant

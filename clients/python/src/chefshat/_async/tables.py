@@ -2,12 +2,12 @@
 
 import secrets
 from collections.abc import AsyncIterator
+from contextlib import aclosing
 
 from chefshat import pb
 from chefshat._async.connection import AsyncConnection
 from chefshat._gen.chefshat.v1.table_service_pb2_grpc import TableServiceStub
-from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
-from chefshat.network import grpc
+from chefshat.errors import ChefsHatError
 from chefshat.requests import awaited
 
 
@@ -45,21 +45,12 @@ class AsyncTables:
         Args:
             table_ticket: the ticket of the table, from `rooms.create`.
         """
-        failures = 0
-        while True:
-            call = self._table.Watch(pb.TableServiceWatchRequest(table_ticket=table_ticket))
-            error = connection_lost("the server ended the stream before the game was over")
-            try:
-                async for response in call:
-                    failures = 0
-                    if not response.HasField("state"):
-                        continue  # A heartbeat.
-                    yield response.state
-                    if response.state.stage == pb.TABLE_STAGE_OVER:
+        request = pb.TableServiceWatchRequest(table_ticket=table_ticket)
+        unfinished = "the server ended the stream before the game was over"
+        messages = self._connection.messages(lambda: self._table.Watch(request), unfinished)
+        async with aclosing(messages):
+            async for message in messages:
+                if message.HasField("state"):  # Others are heartbeats.
+                    yield message.state
+                    if message.state.stage == pb.TABLE_STAGE_OVER:
                         return
-            except grpc.RpcError as failure:
-                error = from_rpc_error(failure)
-            finally:
-                call.cancel()
-            failures += 1
-            await self._connection.wait(failures, error)

@@ -1,15 +1,14 @@
 """The calls of RoomService, SpectatorService and InstrumentService. See `calls`."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 
 from chefshat import pb, requests
 from chefshat._gen.chefshat.v1.instrument_service_pb2_grpc import InstrumentServiceStub
 from chefshat._gen.chefshat.v1.room_service_pb2_grpc import RoomServiceStub
 from chefshat._gen.chefshat.v1.spectator_service_pb2_grpc import SpectatorServiceStub
 from chefshat._sync.connection import Connection
-from chefshat.errors import from_rpc_error
-from chefshat.network import grpc
-from chefshat.requests import called, pages
+from chefshat.requests import Streamed, called, pages
 
 
 class Rooms:
@@ -99,23 +98,17 @@ class Rooms:
             from_sequence: number of the first event wanted; 0: all.
         """
         last = max(from_sequence - 1, 0)
-        failures = 0
-        while True:
-            call = self._spectators.Watch(requests.watch_request(room_id, last))
-            try:
-                for response in call:
-                    if response.HasField("snapshot"):
-                        last = max(last, response.snapshot.next_sequence - 1)
-                    for event in response.events:
-                        last = event.sequence
-                        failures = 0
-                        yield event
-                return
-            except grpc.RpcError as error:
-                failures += 1
-                self._connection.wait(failures, from_rpc_error(error))
-            finally:
-                call.cancel()
+
+        def begin() -> Streamed[pb.SpectatorServiceWatchResponse]:
+            return self._spectators.Watch(requests.watch_request(room_id, last))
+
+        with closing(self._connection.messages(begin)) as messages:
+            for message in messages:
+                if message.HasField("snapshot"):
+                    last = max(last, message.snapshot.next_sequence - 1)
+                for event in message.events:
+                    last = event.sequence
+                    yield event
 
     def add_marker(self, room_id: str, owner_token: str, label: str, *, elapsed_us: int | None = None) -> pb.Marker:
         """Puts a marker into the record of a room. Nobody but the owner of the room learns of it.
@@ -139,22 +132,16 @@ class Rooms:
             from_number: number of the first marker wanted; 0: all.
         """
         last = max(from_number - 1, 0)
-        failures = 0
-        while True:
+
+        def begin() -> Streamed[pb.FollowMarkersResponse]:
             request = pb.FollowMarkersRequest(room_id=room_id, owner_token=owner_token, from_number=last + 1)
-            call = self._instruments.FollowMarkers(request)
-            try:
-                for response in call:
-                    failures = 0
-                    for marker in response.markers:
-                        last = marker.number
-                        yield marker
-                return
-            except grpc.RpcError as error:
-                failures += 1
-                self._connection.wait(failures, from_rpc_error(error))
-            finally:
-                call.cancel()
+            return self._instruments.FollowMarkers(request)
+
+        with closing(self._connection.messages(begin)) as messages:
+            for message in messages:
+                for marker in message.markers:
+                    last = marker.number
+                    yield marker
 
     def add_samples(self, ticket: str | pb.OwnedSeat, chunk: pb.SampleChunk) -> int:
         """Records samples of a seat beside its game. See `chefshat.samples.SampleStream`.

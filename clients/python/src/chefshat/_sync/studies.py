@@ -1,12 +1,11 @@
 """The calls of StudyService. See `calls`."""
 
 from collections.abc import Iterator
+from contextlib import closing
 
 from chefshat import pb
 from chefshat._gen.chefshat.v1.study_service_pb2_grpc import StudyServiceStub
 from chefshat._sync.connection import Connection
-from chefshat.errors import from_rpc_error
-from chefshat.network import grpc
 
 
 class Studies:
@@ -23,17 +22,8 @@ class Studies:
             study_id: the study.
             owner_token: its owner's token.
         """
-        failures = 0
-        while True:
-            call = self._studies.FollowStudy(pb.FollowStudyRequest(study_id=study_id, owner_token=owner_token))
-            try:
-                for response in call:
-                    failures = 0
-                    for participant in response.participants:
-                        yield participant
-                return
-            except grpc.RpcError as error:
-                failures += 1
-                self._connection.wait(failures, from_rpc_error(error))
-            finally:
-                call.cancel()
+        request = pb.FollowStudyRequest(study_id=study_id, owner_token=owner_token)
+        with closing(self._connection.messages(lambda: self._studies.FollowStudy(request))) as messages:
+            for message in messages:
+                for participant in message.participants:
+                    yield participant

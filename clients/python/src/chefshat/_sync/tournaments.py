@@ -1,12 +1,11 @@
 """The calls of TournamentService. See `calls`."""
 
 from collections.abc import Iterator
+from contextlib import closing
 
 from chefshat import pb, requests
 from chefshat._gen.chefshat.v1.tournament_service_pb2_grpc import TournamentServiceStub
 from chefshat._sync.connection import Connection
-from chefshat.errors import connection_lost, from_rpc_error
-from chefshat.network import grpc
 from chefshat.requests import called, pages
 
 # The final states of a tournament.
@@ -78,24 +77,15 @@ class Tournaments:
 
     def follow(self, tournament_id: str) -> Iterator[pb.FollowTournamentResponse]:
         """Iterates over the state of a tournament: now, and after every change, until it is over. Reconnects."""
-        failures = 0
-        while True:
-            call = self._tournaments.FollowTournament(pb.FollowTournamentRequest(tournament_id=tournament_id))
-            error = connection_lost("the server ended the stream before the tournament was over")
-            try:
-                for report in call:
-                    failures = 0
-                    if not report.HasField("tournament"):
-                        continue  # A heartbeat.
+        request = pb.FollowTournamentRequest(tournament_id=tournament_id)
+        unfinished = "the server ended the stream before the tournament was over"
+        messages = self._connection.messages(lambda: self._tournaments.FollowTournament(request), unfinished)
+        with closing(messages):
+            for report in messages:
+                if report.HasField("tournament"):  # Others are heartbeats.
                     yield report
                     if report.tournament.state in OVER:
                         return
-            except grpc.RpcError as failure:
-                error = from_rpc_error(failure)
-            finally:
-                call.cancel()
-            failures += 1
-            self._connection.wait(failures, error)
 
     def results(self, tournament_id: str) -> pb.GetTournamentResultsResponse:
         """Returns standings, ratings and the certainty of the order; final once the tournament is over."""
