@@ -6,10 +6,9 @@
 
 use std::time::Duration;
 
+use async_trait::async_trait;
 use chefshat_cluster::LeaseTimes;
 pub use chefshat_cluster::{Epoch, Load, NodeId};
-use futures::future::BoxFuture;
-use futures::{FutureExt as _, TryFutureExt as _};
 
 use super::units::{StoredUnit, UnitKey};
 use super::{ResumableGame, Store, StoreError};
@@ -137,93 +136,84 @@ pub struct LoadedUnit {
 /// node that has joined through the same value.
 ///
 /// Times are those of the database's clock.
+#[async_trait]
 pub trait ClusterStore: Store {
     /// The times of all leases.
     fn lease(&self) -> LeaseTimes;
 
     /// Adds this server as a node, whose lease begins now. Called again, for example after the node
     /// was removed because it was away for long, it becomes a new node.
-    fn join(&self, info: NodeInfo) -> BoxFuture<'_, Result<NodeId, StoreError>>;
+    async fn join(&self, info: NodeInfo) -> Result<NodeId, StoreError>;
 
     /// Renews the lease of this node, even if it has expired, notes what it says, and returns what it
     /// owns at the same moment. `None`: the node is not known (any more).
-    fn beat(&self, heartbeat: Heartbeat) -> BoxFuture<'_, Result<Option<Beat>, StoreError>>;
+    async fn beat(&self, heartbeat: Heartbeat) -> Result<Option<Beat>, StoreError>;
 
     /// At most `count` units that nobody owns or whose owner's lease has expired, with their
     /// epochs, in an order of this node's own, so that several nodes share them; only such that this
     /// version of the program can resume.
-    fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(UnitId, Epoch)>, StoreError>>;
+    async fn orphans(&self, count: usize) -> Result<Vec<(UnitId, Epoch)>, StoreError>;
 
     /// Waits until another node releases a unit and names this one as its next owner; returns the
     /// unit and its epoch. Some are missed: they are found as orphans.
-    fn handed_over(&self) -> BoxFuture<'_, (UnitId, Epoch)>;
+    async fn handed_over(&self) -> (UnitId, Epoch);
 
     /// Removes what has been over for long, and the ephemeral rooms of nodes whose leases have
     /// expired.
-    fn tidy(&self) -> BoxFuture<'_, Result<(), StoreError>>;
+    async fn tidy(&self) -> Result<(), StoreError>;
 
     /// Takes orphans over that still have the epochs that were seen: raises the epoch and adds "the
     /// server was restarted" to the journal of each room that is not over, in one commit for each
     /// unit or for several. Returns their new epochs, in the same order; `None` for a unit that is
     /// not an orphan any more, or not at this epoch, or that this version cannot resume.
-    fn claim_all(
+    async fn claim_all(
         &self,
         orphans: Vec<(UnitId, Epoch)>,
-    ) -> BoxFuture<'_, Result<Vec<Option<Epoch>>, StoreError>>;
+    ) -> Result<Vec<Option<Epoch>>, StoreError>;
 
     /// Takes one orphan over. See [`ClusterStore::claim_all`].
-    fn claim(&self, unit: UnitId, seen: Epoch) -> BoxFuture<'_, Result<Option<Epoch>, StoreError>> {
-        let claimed = self.claim_all(vec![(unit, seen)]);
-        claimed
-            .map_ok(|mut claimed| claimed.pop().flatten())
-            .boxed()
+    async fn claim(&self, unit: UnitId, seen: Epoch) -> Result<Option<Epoch>, StoreError> {
+        Ok(self.claim_all(vec![(unit, seen)]).await?.pop().flatten())
     }
 
     /// Reads a unit that this node owns at this epoch, with journals that write at this epoch;
     /// `None` if it does not (any more). From here on, what is written for its tournament is
     /// written at this epoch, so what ran before at another one must have ended.
-    fn load(
-        &self,
-        unit: UnitId,
-        epoch: Epoch,
-    ) -> BoxFuture<'_, Result<Option<LoadedUnit>, StoreError>>;
+    async fn load(&self, unit: UnitId, epoch: Epoch) -> Result<Option<LoadedUnit>, StoreError>;
 
     /// Gives up a unit that this node owns at this epoch, so that others may claim it at once, and
     /// names one that is to: `next` if it takes rooms, otherwise any, an emptier one more often. The
     /// last append to each of its journals must have been answered.
-    fn release(
+    async fn release(
         &self,
         unit: UnitId,
         epoch: Epoch,
         next: Option<NodeId>,
-    ) -> BoxFuture<'_, Result<(), StoreError>>;
+    ) -> Result<(), StoreError>;
 
     /// Removes this node if it owns nothing. Returns whether it is removed.
-    fn leave(&self) -> BoxFuture<'_, Result<bool, StoreError>>;
+    async fn leave(&self) -> Result<bool, StoreError>;
 
     /// Where a room or tournament is; `None` if there is none with this id.
-    fn locate(&self, id: UnitId) -> BoxFuture<'_, Result<Option<Location>, StoreError>>;
+    async fn locate(&self, id: UnitId) -> Result<Option<Location>, StoreError>;
 
     /// Where the room or tournament with this join code, in its normal form, is.
-    fn locate_code<'a>(
-        &'a self,
-        join_code: &'a str,
-    ) -> BoxFuture<'a, Result<Option<Location>, StoreError>>;
+    async fn locate_code(&self, join_code: &str) -> Result<Option<Location>, StoreError>;
 
     /// Where the room of a game is that is not over.
-    fn locate_game(&self, game: GameId) -> BoxFuture<'_, Result<Option<Location>, StoreError>>;
+    async fn locate_game(&self, game: GameId) -> Result<Option<Location>, StoreError>;
 
     /// The room of a durable game that is over, to show its end, if it has not been removed yet.
-    fn ended_room(&self, room: RoomId) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>>;
+    async fn ended_room(&self, room: RoomId) -> Result<Option<ResumableGame>, StoreError>;
 
     /// The nodes that have a lease.
-    fn alive(&self) -> BoxFuture<'_, Result<Vec<LivingNode>, StoreError>>;
+    async fn alive(&self) -> Result<Vec<LivingNode>, StoreError>;
 
     /// All nodes, in the order in which they joined. Counts what they own, so it takes longer than
     /// [`ClusterStore::alive`].
-    fn nodes(&self) -> BoxFuture<'_, Result<Vec<NodeStatus>, StoreError>>;
+    async fn nodes(&self) -> Result<Vec<NodeStatus>, StoreError>;
 
     /// Asks a node to hand over what it owns; it learns of it with its next beat. Returns whether
     /// the node is known.
-    fn request_drain(&self, node: NodeId) -> BoxFuture<'_, Result<bool, StoreError>>;
+    async fn request_drain(&self, node: NodeId) -> Result<bool, StoreError>;
 }

@@ -7,9 +7,8 @@ use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard};
 
+use async_trait::async_trait;
 use chefshat_proto::v1;
-use futures::FutureExt as _;
-use futures::future::BoxFuture;
 use tokio::sync::Semaphore;
 use tokio::task::spawn_blocking;
 use tracing::{error, warn};
@@ -59,13 +58,13 @@ impl Drop for Reserved {
 pub(super) trait StoreFinished: Send + Sync + 'static {
     /// Stores its header and encoded entries. A game without a summary has no record; only that it
     /// is over counts.
-    fn store_finished<'a>(
-        &'a self,
-        header: &'a GameHeader,
+    fn store_finished(
+        &self,
+        header: &GameHeader,
         entries: Vec<u8>,
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<Vec<u8>>,
-    ) -> BoxFuture<'a, Result<(), StoreError>>;
+    ) -> impl Future<Output = Result<(), StoreError>> + Send;
 }
 
 /// Where long games keep their entries until they end: one file without a name for all of them, in
@@ -274,6 +273,7 @@ fn failed(problem: impl std::fmt::Display) -> StoreError {
     StoreError::Failed(format!("the file of an unfinished game: {problem}"))
 }
 
+#[async_trait]
 impl<W: StoreFinished> Journal for EphemeralJournal<W> {
     fn append_now(&mut self, entries: &mut Vec<Entry>) -> bool {
         let has_room = self.encoded.len() < self.most_in_memory;
@@ -283,60 +283,48 @@ impl<W: StoreFinished> Journal for EphemeralJournal<W> {
         has_room
     }
 
-    fn append<'a>(
-        &'a mut self,
-        entries: &'a mut Vec<Entry>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
+    async fn append(&mut self, entries: &mut Vec<Entry>) -> Result<(), StoreError> {
         form::put_entries(entries, &mut self.encoded);
-        async move {
-            if self.encoded.len() >= self.most_in_memory {
-                self.file_entries().await?;
-            }
-            Ok(())
+        if self.encoded.len() >= self.most_in_memory {
+            self.file_entries().await?;
         }
-        .boxed()
+        Ok(())
     }
 
-    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
+    async fn entries(&mut self) -> Result<Vec<Entry>, StoreError> {
         let decode = |encoded: Vec<u8>| {
             let mut entries = Vec::new();
             form::read_entries(&encoded, &mut entries).map(|()| entries)
         };
-        async move {
-            let (filed, encoded) = (Arc::clone(&self.filed), self.encoded.clone());
-            let decoded = with_all(filed, encoded, decode).await?;
-            decoded.map_err(|problem| StoreError::Failed(problem.to_string()))
-        }
-        .boxed()
+        let (filed, encoded) = (Arc::clone(&self.filed), self.encoded.clone());
+        let decoded = with_all(filed, encoded, decode).await?;
+        decoded.map_err(|problem| StoreError::Failed(problem.to_string()))
     }
 
-    fn finish(
+    async fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
+    ) -> Result<(), StoreError> {
         let scratch = self.filed.scratch.clone();
         let filed = std::mem::replace(&mut self.filed, Filed::none(scratch.clone()));
         let encoded = std::mem::take(&mut self.encoded);
         let signature = signature.as_ref().map(form::signature_to_bytes);
-        async move {
-            let is_long = !filed.blocks().is_empty();
-            let _loaded = if is_long {
-                Some(scratch.0.loaded.acquire().await.map_err(failed)?)
-            } else {
-                None
-            };
-            let entries = with_all(filed, encoded, |all| all).await?;
-            let stored = (self.whole).store_finished(&self.header, entries, summary, signature);
-            match stored.await {
-                // The game was played anyway; the record that was stored first stays.
-                Err(StoreError::Taken(game)) => {
-                    error!(%game, "another record has the id of this game; the game is not stored");
-                    Ok(())
-                }
-                stored => stored,
+        let is_long = !filed.blocks().is_empty();
+        let _loaded = if is_long {
+            Some(scratch.0.loaded.acquire().await.map_err(failed)?)
+        } else {
+            None
+        };
+        let entries = with_all(filed, encoded, |all| all).await?;
+        let stored = (self.whole).store_finished(&self.header, entries, summary, signature);
+        match stored.await {
+            // The game was played anyway; the record that was stored first stays.
+            Err(StoreError::Taken(game)) => {
+                error!(%game, "another record has the id of this game; the game is not stored");
+                Ok(())
             }
+            stored => stored,
         }
-        .boxed()
     }
 }

@@ -22,10 +22,9 @@ pub mod units;
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use async_trait::async_trait;
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::pseudonym::{Pseudonym, Redactions};
-use futures::FutureExt as _;
-use futures::future::{BoxFuture, ready};
 use prost::Message as _;
 
 pub use decode_pool::MAX_CONCURRENT_RECORDS;
@@ -226,7 +225,8 @@ pub enum ForgetError {
     Store(#[from] StoreError),
 }
 
-/// Stores games.
+/// Stores games. No call does anything before its future is polled.
+#[async_trait]
 pub trait Store: Send + Sync + 'static {
     /// Whether unfinished games survive the end of the server, a crash included.
     fn outlives_server(&self) -> bool;
@@ -235,8 +235,8 @@ pub trait Store: Send + Sync + 'static {
         true
     }
     /// Waits until `has_space` is true; `false` if the server stops first.
-    fn wait_for_space(&self) -> BoxFuture<'_, bool> {
-        ready(true).boxed()
+    async fn wait_for_space(&self) -> bool {
+        true
     }
     /// The server stops: what waits for space on the disk fails.
     fn stop_waiting(&self) {}
@@ -249,99 +249,91 @@ pub trait Store: Send + Sync + 'static {
         0
     }
     /// Creates a game with its first entries, in one commit. Returns its journal.
-    fn create(
+    async fn create(
         &self,
         header: Arc<GameHeader>,
         entries: Vec<Entry>,
-    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>>;
+    ) -> Result<Box<dyn Journal>, StoreError>;
     /// The unfinished games, and those that have ended since a time (milliseconds since the Unix
     /// epoch), whose clients may have missed the end; oldest first. A game that cannot be read is
     /// logged and left unchanged.
-    fn resumable_games(
-        &self,
-        ended_since_ms: u64,
-    ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>>;
+    async fn resumable_games(&self, ended_since_ms: u64) -> Result<Vec<ResumableGame>, StoreError>;
     /// The summary of a finished game, or `None`. Reads little, whatever the length of the game: it
     /// is read before anything else, to find out who may read the rest.
-    fn summary(&self, game: GameId)
-    -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>>;
+    async fn summary(&self, game: GameId) -> Result<Option<v1::RecordSummary>, StoreError>;
     /// A finished game, or `None`.
-    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>>;
+    async fn finished(&self, game: GameId) -> Result<Option<StoredGame>, StoreError>;
     /// At most `count` finished games of a part of the list that match a filter, in its order, with
     /// their numbers. One whose summary cannot be read is named in its place.
-    fn list<'a>(
-        &'a self,
-        filter: &'a v1::RecordFilter,
+    async fn list(
+        &self,
+        filter: &v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>>;
+    ) -> Result<Vec<Listed>, StoreError>;
     /// Stores the record of a game played elsewhere. Returns `false` if the id is taken.
-    fn import(
+    async fn import(
         &self,
         game: GameId,
         summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
-    ) -> BoxFuture<'_, Result<bool, StoreError>>;
+    ) -> Result<bool, StoreError>;
     /// Its disk; `None` if it has none, or if the system does not say.
     fn disk(&self) -> Option<DiskUsage> {
         None
     }
     /// Number of finished games.
-    fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>>;
+    async fn finished_games(&self) -> Result<u64, StoreError>;
     /// At most `count` finished games that need not be kept, by a number that orders them, after a
     /// number. Never the newest game, one whose record is still to be written (unless it waits for
     /// space), one of a study, one of a tournament that is not over or cannot be read, or one that
     /// does not say of which it is.
     /// A store that keeps everything returns none.
-    fn prunable(
+    async fn prunable(
         &self,
         _keep: Keep,
         _after: u64,
         _count: usize,
-    ) -> BoxFuture<'_, Result<Vec<(u64, GameId)>, StoreError>> {
-        ready(Ok(Vec::new())).boxed()
+    ) -> Result<Vec<(u64, GameId)>, StoreError> {
+        Ok(Vec::new())
     }
     /// Deletes those of these games that a tournament or study does not need, as `prunable` says,
     /// and gives their space back. Returns those that it no longer has: only their files may be
     /// deleted.
-    fn prune(&self, _games: Vec<GameId>) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
-        ready(Ok(Vec::new())).boxed()
+    async fn prune(&self, _games: Vec<GameId>) -> Result<Vec<GameId>, StoreError> {
+        Ok(Vec::new())
     }
     /// Deletes finished games, whatever needs them, and gives their space back.
-    fn delete(&self, _games: Vec<GameId>) -> BoxFuture<'_, Result<(), StoreError>> {
-        ready(Ok(())).boxed()
+    async fn delete(&self, _games: Vec<GameId>) -> Result<(), StoreError> {
+        Ok(())
     }
     /// Replaces the name of a participant in all games and tournaments by a pseudonym, and deletes
     /// its expressions and annotations, in one commit. Changed records lose their signature and
     /// count as not written to files. What contains the name and is not over refuses it. A store
     /// that cannot forget fails.
-    fn forget<'a>(&'a self, _who: &'a Pseudonym) -> BoxFuture<'a, Result<Forgotten, ForgetError>> {
+    async fn forget(&self, _who: &Pseudonym) -> Result<Forgotten, ForgetError> {
         let failure = StoreError::Failed("this store cannot remove participants".to_owned());
-        ready(Err(failure.into())).boxed()
+        Err(failure.into())
     }
     /// Finished games whose record is not yet written to a file.
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>>;
+    async fn without_record_file(&self) -> Result<Vec<GameId>, StoreError>;
     /// Marks the record of a game as written to a file.
-    fn mark_record_written(&self, game: GameId) -> BoxFuture<'_, Result<(), StoreError>>;
+    async fn mark_record_written(&self, game: GameId) -> Result<(), StoreError>;
     /// Writes something for a tournament or study, in one commit. What is added to one that was
     /// deleted has no effect.
-    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>>;
+    async fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> Result<(), StoreError>;
     /// A tournament or study, or `None`.
-    fn unit(&self, unit: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>>;
+    async fn unit(&self, unit: UnitKey) -> Result<Option<StoredUnit>, StoreError>;
     /// The tournaments or studies that are not over, and of the `newest_over` newest ones
     /// that are; oldest first.
-    fn units(
-        &self,
-        kind: UnitKind,
-        newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>>;
+    async fn units(&self, kind: UnitKind, newest_over: usize) -> Result<Vec<UnitKey>, StoreError>;
     /// The interface traces of a study, in the order in which they were added. One that cannot be
     /// read is logged and left out.
-    fn traces(&self, study: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>>;
+    async fn traces(&self, study: StudyId) -> Result<Vec<StoredTraces>, StoreError>;
     /// Waits until the store fails for good.
-    fn failed(&self) -> BoxFuture<'static, StoreError>;
+    async fn failed(&self) -> StoreError;
     /// Closes the store; it must not be used afterwards.
-    fn close(&self) -> BoxFuture<'_, ()>;
+    async fn close(&self);
 }
 
 impl std::fmt::Debug for dyn Store {
@@ -362,7 +354,8 @@ pub async fn units_of<K: StoredKind>(
     Ok(units.into_iter().filter_map(K::id_of).collect())
 }
 
-/// The journal of a running game.
+/// The journal of a running game. As with [`Store`], only polled futures do anything.
+#[async_trait]
 pub trait Journal: Send + 'static {
     /// Commits entries and leaves `entries` empty, if this takes no time. Otherwise returns `false`
     /// and changes nothing.
@@ -371,18 +364,15 @@ pub trait Journal: Send + 'static {
     }
     /// Commits entries and leaves `entries` empty. After an error it is unknown whether they were
     /// committed.
-    fn append<'a>(
-        &'a mut self,
-        entries: &'a mut Vec<Entry>,
-    ) -> BoxFuture<'a, Result<(), StoreError>>;
+    async fn append(&mut self, entries: &mut Vec<Entry>) -> Result<(), StoreError>;
     /// Reads back all committed entries.
-    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>>;
+    async fn entries(&mut self) -> Result<Vec<Entry>, StoreError>;
     /// Marks the game as over; nothing can be added afterwards. Without a summary it has no record.
-    fn finish(
+    async fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
-    ) -> BoxFuture<'_, Result<(), StoreError>>;
+    ) -> Result<(), StoreError>;
 }
 
 /// The identity of a seat's participant: that of a built-in agent is its agent, not its display

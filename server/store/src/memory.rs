@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
 
+use async_trait::async_trait;
 use chefshat_proto::v1;
 use chefshat_record::pseudonym::{Pseudonym, Redactions};
-use futures::FutureExt as _;
-use futures::future::{BoxFuture, pending, ready};
+use futures::future::pending;
 
 use super::ephemeral::{Reservations, Reserved};
 use super::forget::forget_stored;
@@ -164,21 +164,22 @@ impl Finished {
     }
 }
 
+#[async_trait]
 impl Store for MemoryStore {
     fn outlives_server(&self) -> bool {
         self.outlives_server
     }
 
-    fn create(
+    async fn create(
         &self,
         header: Arc<GameHeader>,
         entries: Vec<Entry>,
-    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
+    ) -> Result<Box<dyn Journal>, StoreError> {
         let game = header.game_id;
         let reserved = self.reserved.take(game);
         let is_known = lock(&self.finished).get(game).is_some();
         let Some(reserved) = reserved.filter(|_| !is_known) else {
-            return ready(Err(StoreError::Taken(game.to_string()))).boxed();
+            return Err(StoreError::Taken(game.to_string()));
         };
         let journal = MemoryJournal {
             _reserved: reserved,
@@ -186,53 +187,49 @@ impl Store for MemoryStore {
             entries,
             finished: Arc::clone(&self.finished),
         };
-        ready(Ok(Box::new(journal) as Box<dyn Journal>)).boxed()
+        Ok(Box::new(journal))
     }
 
-    fn resumable_games(
+    async fn resumable_games(
         &self,
         _ended_since_ms: u64,
-    ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>> {
-        ready(Ok(Vec::new())).boxed()
+    ) -> Result<Vec<ResumableGame>, StoreError> {
+        Ok(Vec::new())
     }
 
-    fn summary(
+    async fn summary(&self, game: GameId) -> Result<Option<v1::RecordSummary>, StoreError> {
+        let finished = lock(&self.finished);
+        Ok(finished.get(game).map(|game| game.summary.clone()))
+    }
+
+    async fn finished(&self, game: GameId) -> Result<Option<StoredGame>, StoreError> {
+        let finished = lock(&self.finished);
+        Ok(finished.get(game).map(|game| game.stored.clone()))
+    }
+
+    async fn list(
         &self,
-        game: GameId,
-    ) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
-        let finished = lock(&self.finished);
-        ready(Ok(finished.get(game).map(|game| game.summary.clone()))).boxed()
-    }
-
-    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
-        let finished = lock(&self.finished);
-        ready(Ok(finished.get(game).map(|game| game.stored.clone()))).boxed()
-    }
-
-    fn list<'a>(
-        &'a self,
-        filter: &'a v1::RecordFilter,
+        filter: &v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>> {
+    ) -> Result<Vec<Listed>, StoreError> {
         let finished = lock(&self.finished);
         let games = &finished.games;
-        let listed = match part {
+        Ok(match part {
             Part::After(number) => listed(games.range(number.saturating_add(1)..), filter, count),
             Part::Before(number) => listed(games.range(..number).rev(), filter, count),
-        };
-        ready(Ok(listed)).boxed()
+        })
     }
 
-    fn import(
+    async fn import(
         &self,
         game: GameId,
         mut summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
-    ) -> BoxFuture<'_, Result<bool, StoreError>> {
+    ) -> Result<bool, StoreError> {
         summary.added = true;
         let Some(_reserved) = self.reserved.take(game) else {
-            return ready(Ok(false)).boxed();
+            return Ok(false);
         };
         let mut finished = lock(&self.finished);
         let new = finished.get(game).is_none();
@@ -244,19 +241,19 @@ impl Store for MemoryStore {
                 stored: StoredGame::Imported(lines),
             });
         }
-        ready(Ok(new)).boxed()
+        Ok(new)
     }
 
-    fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
-        ready(Ok(lock(&self.finished).games.len() as u64)).boxed()
+    async fn finished_games(&self) -> Result<u64, StoreError> {
+        Ok(lock(&self.finished).games.len() as u64)
     }
 
-    fn prunable(
+    async fn prunable(
         &self,
         keep: Keep,
         after: u64,
         count: usize,
-    ) -> BoxFuture<'_, Result<Vec<(u64, GameId)>, StoreError>> {
+    ) -> Result<Vec<(u64, GameId)>, StoreError> {
         let finished = lock(&self.finished);
         let newest = usize::try_from(keep.newest.unwrap_or(1)).unwrap_or(usize::MAX);
         let old = finished.games.len().saturating_sub(newest.max(1));
@@ -270,10 +267,10 @@ impl Store for MemoryStore {
             .take(count)
             .map(|(number, game)| (*number, game.id))
             .collect();
-        ready(Ok(found)).boxed()
+        Ok(found)
     }
 
-    fn prune(&self, mut games: Vec<GameId>) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
+    async fn prune(&self, mut games: Vec<GameId>) -> Result<Vec<GameId>, StoreError> {
         let mut finished = lock(&self.finished);
         games.retain(|game| {
             let is_free = |it: &FinishedGame| !self.is_needed(&it.stored);
@@ -282,18 +279,18 @@ impl Store for MemoryStore {
         for game in &games {
             finished.remove(*game);
         }
-        ready(Ok(games)).boxed()
+        Ok(games)
     }
 
-    fn delete(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<(), StoreError>> {
+    async fn delete(&self, games: Vec<GameId>) -> Result<(), StoreError> {
         let mut finished = lock(&self.finished);
         for game in games {
             finished.remove(game);
         }
-        ready(Ok(())).boxed()
+        Ok(())
     }
 
-    fn forget<'a>(&'a self, who: &'a Pseudonym) -> BoxFuture<'a, Result<Forgotten, ForgetError>> {
+    async fn forget(&self, who: &Pseudonym) -> Result<Forgotten, ForgetError> {
         let mut forgotten = Forgotten::default();
         for game in lock(&self.finished).games.values_mut() {
             let redactions = forget_stored(&mut game.stored, &mut game.summary, who);
@@ -301,53 +298,46 @@ impl Store for MemoryStore {
                 forgotten.add(game.id, false, redactions);
             }
         }
-        ready(Ok(forgotten)).boxed()
+        Ok(forgotten)
     }
 
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
-        ready(Ok(Vec::new())).boxed()
+    async fn without_record_file(&self) -> Result<Vec<GameId>, StoreError> {
+        Ok(Vec::new())
     }
 
-    fn mark_record_written(&self, _game: GameId) -> BoxFuture<'_, Result<(), StoreError>> {
-        ready(Ok(())).boxed()
+    async fn mark_record_written(&self, _game: GameId) -> Result<(), StoreError> {
+        Ok(())
     }
 
-    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
-        let written = write_in(&mut lock(&self.units), unit, write);
-        ready(written).boxed()
+    async fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> Result<(), StoreError> {
+        write_in(&mut lock(&self.units), unit, write)
     }
 
-    fn unit(&self, unit: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+    async fn unit(&self, unit: UnitKey) -> Result<Option<StoredUnit>, StoreError> {
         let units = lock(&self.units);
         let stored = units.get(&unit).and_then(|it| it.stored.clone());
-        ready(Ok(stored)).boxed()
+        Ok(stored)
     }
 
     /// Studies alone.
-    fn units(
-        &self,
-        kind: UnitKind,
-        _newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>> {
+    async fn units(&self, kind: UnitKind, _newest_over: usize) -> Result<Vec<UnitKey>, StoreError> {
         let units = lock(&self.units);
         let stored = units.iter().filter(|(_, it)| it.stored.is_some());
         let ids = stored.filter(|(unit, _)| unit.kind() == kind);
-        ready(Ok(ids.map(|(unit, _)| *unit).collect())).boxed()
+        Ok(ids.map(|(unit, _)| *unit).collect())
     }
 
-    fn traces(&self, study: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
+    async fn traces(&self, study: StudyId) -> Result<Vec<StoredTraces>, StoreError> {
         let units = lock(&self.units);
         let study = units.get(&UnitKey::Study(study));
-        ready(Ok(study.map_or_else(Vec::new, |it| it.traces.clone()))).boxed()
+        Ok(study.map_or_else(Vec::new, |it| it.traces.clone()))
     }
 
-    fn failed(&self) -> BoxFuture<'static, StoreError> {
-        pending().boxed()
+    async fn failed(&self) -> StoreError {
+        pending().await
     }
 
-    fn close(&self) -> BoxFuture<'_, ()> {
-        ready(()).boxed()
-    }
+    async fn close(&self) {}
 }
 
 struct MemoryJournal {
@@ -357,29 +347,27 @@ struct MemoryJournal {
     finished: Arc<Mutex<Finished>>,
 }
 
+#[async_trait]
 impl Journal for MemoryJournal {
     fn append_now(&mut self, entries: &mut Vec<Entry>) -> bool {
         self.entries.append(entries);
         true
     }
 
-    fn append<'a>(
-        &'a mut self,
-        entries: &'a mut Vec<Entry>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
+    async fn append(&mut self, entries: &mut Vec<Entry>) -> Result<(), StoreError> {
         self.append_now(entries);
-        ready(Ok(())).boxed()
+        Ok(())
     }
 
-    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
-        ready(Ok(self.entries.clone())).boxed()
+    async fn entries(&mut self) -> Result<Vec<Entry>, StoreError> {
+        Ok(self.entries.clone())
     }
 
-    fn finish(
+    async fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
+    ) -> Result<(), StoreError> {
         let entries = std::mem::take(&mut self.entries).into();
         if let Some(summary) = summary {
             lock(&self.finished).insert(FinishedGame {
@@ -393,7 +381,7 @@ impl Journal for MemoryJournal {
                 ),
             });
         }
-        ready(Ok(())).boxed()
+        Ok(())
     }
 }
 

@@ -5,6 +5,7 @@ mod failing;
 
 use std::sync::Arc;
 
+use async_trait::async_trait;
 use chefshat_engine::{RULES_VERSION, RuleSetSpec, SeedPlan};
 use chefshat_proto::v1;
 use chefshat_room::ids::{Id, SecretHash, StudyId, TournamentId};
@@ -13,8 +14,6 @@ use chefshat_room::policy::{Durability, Policy};
 use chefshat_study::Change;
 use chefshat_tournament::Tournament;
 use chefshat_wire::convert::tournament_plan;
-use futures::FutureExt as _;
-use futures::future::BoxFuture;
 
 pub use cluster::{Database, FakeStore};
 pub use failing::{FailingStore, Read};
@@ -24,108 +23,104 @@ use crate::tournaments::{StoredTournament, TournamentEntry, TournamentHeader};
 use crate::units::{StoredTraces, UnitKey, UnitRow, UnitWrite};
 use crate::{Store, StoreError, units_of};
 
-type Written<'s> = BoxFuture<'s, Result<(), StoreError>>;
+type Written = Result<(), StoreError>;
 
 /// Tournaments and studies by their types, as tests write and read them.
+#[async_trait]
 pub trait TypedUnits: Store {
     /// Creates a tournament with these entries as its first row.
-    fn create_tournament(
+    async fn create_tournament(
         &self,
         header: Arc<TournamentHeader>,
         entries: Vec<TournamentEntry>,
-    ) -> Written<'_> {
+    ) -> Written {
         let create = UnitWrite::Create {
             join_code: Some(header.join_code.clone()),
             header: header.to_bytes(),
             first: Some(tournament_row(0, &entries)),
         };
         self.write_unit(UnitKey::Tournament(header.id), create)
+            .await
     }
 
     /// Adds a row to a tournament.
-    fn append_tournament(
+    async fn append_tournament(
         &self,
         tournament: TournamentId,
         row: u64,
         entries: Vec<TournamentEntry>,
-    ) -> Written<'_> {
+    ) -> Written {
         let append = UnitWrite::Append(tournament_row(row, &entries));
         self.write_unit(UnitKey::Tournament(tournament), append)
+            .await
     }
 
     /// The tournaments that are not over, and the newest ones that are.
-    fn tournaments(
-        &self,
-        newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<StoredTournament>, StoreError>> {
-        async move {
-            let mut found = Vec::new();
-            for id in units_of(self, newest_over).await? {
-                let stored = self.unit(UnitKey::Tournament(id)).await?;
-                found.push(StoredTournament::decode(id, &stored.expect("it is there"))?);
-            }
-            Ok(found)
+    async fn tournaments(&self, newest_over: usize) -> Result<Vec<StoredTournament>, StoreError> {
+        let mut found = Vec::new();
+        for id in units_of(self, newest_over).await? {
+            let stored = self.unit(UnitKey::Tournament(id)).await?;
+            found.push(StoredTournament::decode(id, &stored.expect("it is there"))?);
         }
-        .boxed()
+        Ok(found)
     }
 
     /// Creates a study.
-    fn create_study(&self, header: Arc<StudyHeader>) -> Written<'_> {
+    async fn create_study(&self, header: Arc<StudyHeader>) -> Written {
         let create = UnitWrite::Create {
             join_code: None,
             header: header.to_bytes(),
             first: None,
         };
-        self.write_unit(UnitKey::Study(header.id), create)
+        self.write_unit(UnitKey::Study(header.id), create).await
     }
 
     /// Adds a row to a study.
-    fn append_study(&self, study: StudyId, row: u64, changes: Vec<Change>) -> Written<'_> {
+    async fn append_study(&self, study: StudyId, row: u64, changes: Vec<Change>) -> Written {
         let append = UnitWrite::Append(UnitRow {
             position: row,
             entries: changes_to_bytes(&changes),
             over: false,
         });
-        self.write_unit(UnitKey::Study(study), append)
+        self.write_unit(UnitKey::Study(study), append).await
     }
 
     /// Replaces the rows of a study, and deletes traces of participants.
-    fn rewrite_study(
+    async fn rewrite_study(
         &self,
         study: StudyId,
         changes: Vec<Change>,
         forgotten: Vec<u32>,
-    ) -> Written<'_> {
+    ) -> Written {
         let rewrite = UnitWrite::Rewrite {
             entries: changes_to_bytes(&changes),
             forgotten,
         };
-        self.write_unit(UnitKey::Study(study), rewrite)
+        self.write_unit(UnitKey::Study(study), rewrite).await
     }
 
     /// Deletes a study.
-    fn delete_study(&self, study: StudyId) -> Written<'_> {
+    async fn delete_study(&self, study: StudyId) -> Written {
         self.write_unit(UnitKey::Study(study), UnitWrite::Delete)
+            .await
     }
 
     /// Adds interface traces to a study.
-    fn append_traces(&self, study: StudyId, traces: StoredTraces) -> Written<'_> {
+    async fn append_traces(&self, study: StudyId, traces: StoredTraces) -> Written {
         self.write_unit(UnitKey::Study(study), UnitWrite::Traces(traces))
+            .await
     }
 
     /// A study.
-    fn study(&self, study: StudyId) -> BoxFuture<'_, Result<Option<StoredStudy>, StoreError>> {
-        async move {
-            let unit = self.unit(UnitKey::Study(study)).await?;
-            unit.map(|unit| StoredStudy::decode(study, &unit))
-                .transpose()
-        }
-        .boxed()
+    async fn study(&self, study: StudyId) -> Result<Option<StoredStudy>, StoreError> {
+        let unit = self.unit(UnitKey::Study(study)).await?;
+        unit.map(|unit| StoredStudy::decode(study, &unit))
+            .transpose()
     }
 
     /// The ids of all studies.
-    fn studies(&self) -> BoxFuture<'_, Result<Vec<StudyId>, StoreError>> {
-        units_of(self, usize::MAX).boxed()
+    async fn studies(&self) -> Result<Vec<StudyId>, StoreError> {
+        units_of(self, usize::MAX).await
     }
 }
 

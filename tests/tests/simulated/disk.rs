@@ -12,8 +12,6 @@ use chefshat_server::store::units::{StoredTraces, StoredUnit, UnitKey, UnitKind,
 use chefshat_server::store::{
     Journal, Listed, MemoryStore, Part, ResumableGame, Store, StoreError, StoredGame,
 };
-use futures::FutureExt as _;
-use futures::future::BoxFuture;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -91,36 +89,34 @@ impl DiskStore {
     }
 }
 
+#[tonic::async_trait]
 impl Store for DiskStore {
     fn outlives_server(&self) -> bool {
         true
     }
 
-    fn create(
+    async fn create(
         &self,
         header: Arc<GameHeader>,
         entries: Vec<Entry>,
-    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
-        async move {
-            let game = header.game_id;
-            let on_disk = OnDisk {
-                header,
-                entries,
-                finished: false,
-                summary: None,
-            };
-            self.disk
-                .commit(|games| drop(games.insert(game, on_disk)))
-                .await;
-            Ok(self.journal(game))
-        }
-        .boxed()
+    ) -> Result<Box<dyn Journal>, StoreError> {
+        let game = header.game_id;
+        let on_disk = OnDisk {
+            header,
+            entries,
+            finished: false,
+            summary: None,
+        };
+        self.disk
+            .commit(|games| drop(games.insert(game, on_disk)))
+            .await;
+        Ok(self.journal(game))
     }
 
-    fn resumable_games(
+    async fn resumable_games(
         &self,
         _ended_since_ms: u64,
-    ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>> {
+    ) -> Result<Vec<ResumableGame>, StoreError> {
         let games = self.disk.games();
         let resumable = games.values().map(|game| ResumableGame {
             header: GameHeader {
@@ -133,83 +129,74 @@ impl Store for DiskStore {
             journal: self.journal(game.header.game_id),
             concluded: game.finished,
         });
-        let resumable = resumable.collect();
-        async move { Ok(resumable) }.boxed()
+        Ok(resumable.collect())
     }
 
-    fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
-        let finished = self.disk.finished().len() as u64;
-        async move { Ok(finished) }.boxed()
+    async fn finished_games(&self) -> Result<u64, StoreError> {
+        Ok(self.disk.finished().len() as u64)
     }
 
-    fn summary(
-        &self,
-        game: GameId,
-    ) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
-        let summary = (self.disk.games().get(&game)).and_then(|game| game.summary.clone());
-        async move { Ok(summary) }.boxed()
-    }
-
-    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
+    async fn summary(&self, game: GameId) -> Result<Option<v1::RecordSummary>, StoreError> {
         let games = self.disk.games();
-        let stored = (games.get(&game).filter(|game| game.finished)).map(|game| {
-            StoredGame::Hosted(Arc::clone(&game.header), game.entries.clone().into(), None)
-        });
-        async move { Ok(stored) }.boxed()
+        Ok(games.get(&game).and_then(|game| game.summary.clone()))
     }
 
-    fn list<'a>(
-        &'a self,
-        filter: &'a v1::RecordFilter,
+    async fn finished(&self, game: GameId) -> Result<Option<StoredGame>, StoreError> {
+        let games = self.disk.games();
+        let game = games.get(&game).filter(|game| game.finished);
+        Ok(game.map(|game| {
+            StoredGame::Hosted(Arc::clone(&game.header), game.entries.clone().into(), None)
+        }))
+    }
+
+    async fn list(
+        &self,
+        filter: &v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>> {
-        self.rest.list(filter, part, count)
+    ) -> Result<Vec<Listed>, StoreError> {
+        self.rest.list(filter, part, count).await
     }
 
-    fn import(
+    async fn import(
         &self,
         game: GameId,
         summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
-    ) -> BoxFuture<'_, Result<bool, StoreError>> {
-        self.rest.import(game, summary, lines)
+    ) -> Result<bool, StoreError> {
+        self.rest.import(game, summary, lines).await
     }
 
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
-        self.rest.without_record_file()
+    async fn without_record_file(&self) -> Result<Vec<GameId>, StoreError> {
+        self.rest.without_record_file().await
     }
 
-    fn mark_record_written(&self, game: GameId) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.rest.mark_record_written(game)
+    async fn mark_record_written(&self, game: GameId) -> Result<(), StoreError> {
+        self.rest.mark_record_written(game).await
     }
 
-    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.rest.write_unit(unit, write)
+    async fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> Result<(), StoreError> {
+        self.rest.write_unit(unit, write).await
     }
 
-    fn unit(&self, unit: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
-        self.rest.unit(unit)
+    async fn unit(&self, unit: UnitKey) -> Result<Option<StoredUnit>, StoreError> {
+        self.rest.unit(unit).await
     }
 
-    fn units(
-        &self,
-        kind: UnitKind,
-        newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>> {
-        self.rest.units(kind, newest_over)
+    async fn units(&self, kind: UnitKind, newest_over: usize) -> Result<Vec<UnitKey>, StoreError> {
+        self.rest.units(kind, newest_over).await
     }
 
-    fn traces(&self, study: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
-        self.rest.traces(study)
+    async fn traces(&self, study: StudyId) -> Result<Vec<StoredTraces>, StoreError> {
+        self.rest.traces(study).await
     }
 
-    fn failed(&self) -> BoxFuture<'static, StoreError> {
-        self.rest.failed()
+    async fn failed(&self) -> StoreError {
+        self.rest.failed().await
     }
 
-    fn close(&self) -> BoxFuture<'_, ()> {
-        self.rest.close()
+    async fn close(&self) {
+        self.rest.close().await
     }
 }
 
@@ -218,33 +205,27 @@ struct DiskJournal {
     game: GameId,
 }
 
+#[tonic::async_trait]
 impl Journal for DiskJournal {
-    fn append<'a>(
-        &'a mut self,
-        entries: &'a mut Vec<Entry>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
-        async move {
-            let new = std::mem::take(entries);
-            let append = |games: &mut BTreeMap<GameId, OnDisk>| {
-                let game = games.get_mut(&self.game).expect("created before");
-                game.entries.extend(new);
-            };
-            self.disk.commit(append).await;
-            Ok(())
-        }
-        .boxed()
+    async fn append(&mut self, entries: &mut Vec<Entry>) -> Result<(), StoreError> {
+        let new = std::mem::take(entries);
+        let append = |games: &mut BTreeMap<GameId, OnDisk>| {
+            let game = games.get_mut(&self.game).expect("created before");
+            game.entries.extend(new);
+        };
+        self.disk.commit(append).await;
+        Ok(())
     }
 
-    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
-        let entries = self.disk.games()[&self.game].entries.clone();
-        async move { Ok(entries) }.boxed()
+    async fn entries(&mut self) -> Result<Vec<Entry>, StoreError> {
+        Ok(self.disk.games()[&self.game].entries.clone())
     }
 
-    fn finish(
+    async fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
         _signature: Option<v1::RecordSignature>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
+    ) -> Result<(), StoreError> {
         let (id, aborted) = (self.game, summary.is_none());
         let finish = move |games: &mut BTreeMap<GameId, OnDisk>| {
             let game = games.get_mut(&id).expect("created before");
@@ -254,10 +235,8 @@ impl Journal for DiskJournal {
             game.finished = true;
             game.summary = summary.map(|summary| *summary);
         };
-        async move {
-            self.disk.commit(finish).await;
-            Ok(())
-        }
-        .boxed()
+
+        self.disk.commit(finish).await;
+        Ok(())
     }
 }

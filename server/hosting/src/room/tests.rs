@@ -5,13 +5,13 @@ use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
+use async_trait::async_trait;
 use chefshat_engine::SeedPlan;
 use chefshat_engine::{RULES_VERSION, RuleSetSpec, Seat, Stop};
 use chefshat_proto::v1::{self, seat_update::Update};
 use chefshat_record::signature::SigningKey;
 use futures::FutureExt as _;
 use futures::StreamExt as _;
-use futures::future::{BoxFuture, ready};
 use prost::Message as _;
 use tokio::time::Instant;
 use tokio_util::task::TaskTracker;
@@ -636,6 +636,7 @@ impl PanicsAfter {
     }
 }
 
+#[async_trait]
 impl Journal for PanicsAfter {
     fn append_now(&mut self, entries: &mut Vec<Entry>) -> bool {
         if self.at_once {
@@ -645,24 +646,21 @@ impl Journal for PanicsAfter {
         self.at_once
     }
 
-    fn append<'a>(
-        &'a mut self,
-        entries: &'a mut Vec<Entry>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
+    async fn append(&mut self, entries: &mut Vec<Entry>) -> Result<(), StoreError> {
         self.count();
-        self.journal.append(entries)
+        self.journal.append(entries).await
     }
 
-    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
-        self.journal.entries()
+    async fn entries(&mut self) -> Result<Vec<Entry>, StoreError> {
+        self.journal.entries().await
     }
 
-    fn finish(
+    async fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.journal.finish(summary, signature)
+    ) -> Result<(), StoreError> {
+        self.journal.finish(summary, signature).await
     }
 }
 
@@ -758,31 +756,29 @@ struct Observed {
     journal: Box<dyn Journal>,
 }
 
+#[async_trait]
 impl Journal for Observed {
-    fn append<'a>(
-        &'a mut self,
-        entries: &'a mut Vec<Entry>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
-        self.journal.append(entries)
+    async fn append(&mut self, entries: &mut Vec<Entry>) -> Result<(), StoreError> {
+        self.journal.append(entries).await
     }
 
-    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
+    async fn entries(&mut self) -> Result<Vec<Entry>, StoreError> {
         match self.failures.checked_sub(1) {
-            None => self.journal.entries(),
+            None => self.journal.entries().await,
             Some(left) => {
                 self.failures = left;
-                ready(Err(StoreError::Failed("no reader is free".into()))).boxed()
+                Err(StoreError::Failed("no reader is free".into()))
             }
         }
     }
 
-    fn finish(
+    async fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
+    ) -> Result<(), StoreError> {
         self.signed.set(signature.is_some()).expect("one end");
-        self.journal.finish(summary, signature)
+        self.journal.finish(summary, signature).await
     }
 }
 

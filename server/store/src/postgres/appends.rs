@@ -7,8 +7,6 @@
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use futures::FutureExt as _;
-use futures::future::BoxFuture;
 use sqlx::SqlSafeStr as _;
 use sqlx::postgres::PgConnection;
 use tracing::error;
@@ -32,12 +30,12 @@ impl Work for Row {
     type Answer = ();
     const MOST: usize = 1_024;
 
-    fn commit<'a>(
-        connection: &'a mut PgConnection,
-        rows: &'a [Arc<Self>],
+    async fn commit(
+        connection: &mut PgConnection,
+        rows: &[Arc<Self>],
         _again: bool,
-    ) -> BoxFuture<'a, sqlx::Result<Answers<Self>>> {
-        append(connection, rows).boxed()
+    ) -> sqlx::Result<Answers<Self>> {
+        append(connection, rows).await
     }
 }
 

@@ -4,10 +4,11 @@ use std::ops::Range;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use async_trait::async_trait;
 use chefshat_cluster::{LeaseTimes, Load};
 use chefshat_engine::RULES_VERSION;
 use futures::FutureExt as _;
-use futures::future::{BoxFuture, pending};
+use futures::future::pending;
 use sqlx::postgres::{PgConnection, PgRow};
 use sqlx::{Connection as _, Row as _};
 
@@ -124,361 +125,314 @@ enum LocatedBy {
     Code(String),
 }
 
+#[async_trait]
 impl ClusterStore for PostgresStore {
     fn lease(&self) -> LeaseTimes {
         self.options.lease
     }
 
-    fn join(&self, info: NodeInfo) -> BoxFuture<'_, Result<NodeId, StoreError>> {
-        async move {
-            let node: i64 = (self.control.read(|connection| {
-                sqlx::query_scalar(
-                    "WITH forgotten AS (
-                         DELETE FROM nodes WHERE beat_ms < clock_ms() - $6
-                           AND NOT EXISTS (SELECT FROM owned WHERE owned.node = nodes.node AND NOT over)
-                     )
-                     INSERT INTO nodes (node, name, peer_endpoint, client_endpoint, build, capacity, beat_ms, reached)
-                     OVERRIDING SYSTEM VALUE VALUES ($7, $1, $2, $3, $4, $5, clock_ms(), false) RETURNING node",
-                )
-                .bind(text(&info.name).into_owned())
-                .bind(text(&info.peer_endpoint).into_owned())
-                .bind(text(&info.client_endpoint).into_owned())
-                .bind(text(&info.build).into_owned())
-                .bind(integer(info.capacity))
-                .bind(FORGET_NODES_AFTER_MS)
-                .bind(rand::random_range(NODE_NUMBERS))
-                .fetch_one(connection)
-                .boxed()
-            }))
-            .await?;
-            self.node.store(node, Ordering::Release);
-            Ok(NodeId(node.cast_unsigned()))
-        }
-        .boxed()
+    async fn join(&self, info: NodeInfo) -> Result<NodeId, StoreError> {
+        let node: i64 = (self.control.read(|connection| {
+            sqlx::query_scalar(
+                "WITH forgotten AS (
+                     DELETE FROM nodes WHERE beat_ms < clock_ms() - $6
+                       AND NOT EXISTS (SELECT FROM owned WHERE owned.node = nodes.node AND NOT over)
+                 )
+                 INSERT INTO nodes (node, name, peer_endpoint, client_endpoint, build, capacity, beat_ms, reached)
+                 OVERRIDING SYSTEM VALUE VALUES ($7, $1, $2, $3, $4, $5, clock_ms(), false) RETURNING node",
+            )
+            .bind(text(&info.name).into_owned())
+            .bind(text(&info.peer_endpoint).into_owned())
+            .bind(text(&info.client_endpoint).into_owned())
+            .bind(text(&info.build).into_owned())
+            .bind(integer(info.capacity))
+            .bind(FORGET_NODES_AFTER_MS)
+            .bind(rand::random_range(NODE_NUMBERS))
+            .fetch_one(connection)
+            .boxed()
+        }))
+        .await?;
+        self.node.store(node, Ordering::Release);
+        Ok(NodeId(node.cast_unsigned()))
     }
 
-    fn beat(&self, heartbeat: Heartbeat) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
-        async move {
-            let node = self.node()?;
-            let beat = self.beats.read(move |connection| {
-                async move {
-                    let mut transaction = connection.begin().await?;
-                    let drain: Option<bool> = sqlx::query_scalar(
-                        "UPDATE nodes SET beat_ms = greatest(beat_ms, clock_ms()), reached = $2, rooms = $3, drain = drain OR $4
-                         WHERE node = $1 RETURNING drain",
-                    )
-                    .bind(node)
-                    .bind(heartbeat.reached)
-                    .bind(integer(heartbeat.rooms))
-                    .bind(heartbeat.drains)
-                    .fetch_optional(&mut *transaction)
-                    .await?;
-                    let Some(drain) = drain else {
-                        return Ok(None);
-                    };
-                    // A statement of its own: a claim that the beat waited for is visible.
-                    let units = sqlx::query(
-                        "SELECT DISTINCT unit, epoch FROM owned WHERE node = $1 AND NOT over",
-                    )
-                    .bind(node)
-                    .fetch_all(&mut *transaction)
-                    .await?;
-                    transaction.commit().await?;
-                    let owned = units.iter().filter_map(unit_at).collect();
-                    Ok(Some(Beat { owned, drain }))
-                }
-                .boxed()
-            });
-            beat.await
-        }
-        .boxed()
-    }
-
-    fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(UnitId, Epoch)>, StoreError>> {
-        async move {
-            let expire_after = self.expire_after();
-            let node = self.node()?;
-            let units = self.control.read(move |connection| {
-                sqlx::query(
-                    // Each part has an index: usually there are none. All rows of a unit have the
-                    // same node.
-                    "WITH free AS (
-                         SELECT unit, epoch, durable, form, rules_version FROM owned
-                         WHERE NOT over AND node IS NULL
-                         UNION ALL
-                         SELECT unit, epoch, durable, form, rules_version FROM owned
-                         WHERE NOT over
-                           AND node = ANY (ARRAY (SELECT node FROM nodes WHERE beat_ms + $1 <= clock_ms()))
-                     )
-                     SELECT unit, epoch FROM free GROUP BY unit, epoch
-                     HAVING bool_or(durable)
-                        AND bool_and(form <= $2 AND coalesce(rules_version, $3) = $3)
-                     ORDER BY hashtextextended(encode(unit, 'hex'), $5), unit LIMIT $4",
+    async fn beat(&self, heartbeat: Heartbeat) -> Result<Option<Beat>, StoreError> {
+        let node = self.node()?;
+        let beat = self.beats.read(move |connection| {
+            async move {
+                let mut transaction = connection.begin().await?;
+                let drain: Option<bool> = sqlx::query_scalar(
+                    "UPDATE nodes SET beat_ms = greatest(beat_ms, clock_ms()), reached = $2, rooms = $3, drain = drain OR $4
+                     WHERE node = $1 RETURNING drain",
                 )
-                .bind(expire_after)
-                .bind(FORM)
-                .bind(i64::from(RULES_VERSION))
-                .bind(integer(count as u64))
                 .bind(node)
-                .fetch_all(connection)
-                .boxed()
-            });
-            Ok(units.await?.iter().filter_map(unit_at).collect())
-        }
-        .boxed()
-    }
-
-    fn handed_over(&self) -> BoxFuture<'_, (UnitId, Epoch)> {
-        async move {
-            let mut handed = self.handed.lock().await;
-            let listen = || Handed::listen(self.sessions.clone(), self.closing.clone());
-            let handed = handed.get_or_insert_with(listen);
-            while let Some((node, unit, epoch)) = handed.next().await {
-                if self.node() == Ok(node) {
-                    return (unit, epoch);
-                }
+                .bind(heartbeat.reached)
+                .bind(integer(heartbeat.rooms))
+                .bind(heartbeat.drains)
+                .fetch_optional(&mut *transaction)
+                .await?;
+                let Some(drain) = drain else {
+                    return Ok(None);
+                };
+                // A statement of its own: a claim that the beat waited for is visible.
+                let units = sqlx::query(
+                    "SELECT DISTINCT unit, epoch FROM owned WHERE node = $1 AND NOT over",
+                )
+                .bind(node)
+                .fetch_all(&mut *transaction)
+                .await?;
+                transaction.commit().await?;
+                let owned = units.iter().filter_map(unit_at).collect();
+                Ok(Some(Beat { owned, drain }))
             }
-            pending().await
-        }
-        .boxed()
+            .boxed()
+        });
+        beat.await
     }
 
-    fn tidy(&self) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            let expire_after = self.expire_after();
-            let retention = millis(self.options.retention);
-            let tidied = self
-                .control
-                .read(move |connection| tidy(connection, expire_after, retention).boxed());
-            tidied.await
-        }
-        .boxed()
+    async fn orphans(&self, count: usize) -> Result<Vec<(UnitId, Epoch)>, StoreError> {
+        let expire_after = self.expire_after();
+        let node = self.node()?;
+        let units = self.control.read(move |connection| {
+            sqlx::query(
+                // Each part has an index: usually there are none. All rows of a unit have the
+                // same node.
+                "WITH free AS (
+                     SELECT unit, epoch, durable, form, rules_version FROM owned
+                     WHERE NOT over AND node IS NULL
+                     UNION ALL
+                     SELECT unit, epoch, durable, form, rules_version FROM owned
+                     WHERE NOT over
+                       AND node = ANY (ARRAY (SELECT node FROM nodes WHERE beat_ms + $1 <= clock_ms()))
+                 )
+                 SELECT unit, epoch FROM free GROUP BY unit, epoch
+                 HAVING bool_or(durable)
+                    AND bool_and(form <= $2 AND coalesce(rules_version, $3) = $3)
+                 ORDER BY hashtextextended(encode(unit, 'hex'), $5), unit LIMIT $4",
+            )
+            .bind(expire_after)
+            .bind(FORM)
+            .bind(i64::from(RULES_VERSION))
+            .bind(integer(count as u64))
+            .bind(node)
+            .fetch_all(connection)
+            .boxed()
+        });
+        Ok(units.await?.iter().filter_map(unit_at).collect())
     }
 
-    fn claim_all(
+    async fn handed_over(&self) -> (UnitId, Epoch) {
+        let mut handed = self.handed.lock().await;
+        let listen = || Handed::listen(self.sessions.clone(), self.closing.clone());
+        let handed = handed.get_or_insert_with(listen);
+        while let Some((node, unit, epoch)) = handed.next().await {
+            if self.node() == Ok(node) {
+                return (unit, epoch);
+            }
+        }
+        pending().await
+    }
+
+    async fn tidy(&self) -> Result<(), StoreError> {
+        let expire_after = self.expire_after();
+        let retention = millis(self.options.retention);
+        self.control
+            .read(move |connection| tidy(connection, expire_after, retention).boxed())
+            .await
+    }
+
+    async fn claim_all(
         &self,
         orphans: Vec<(UnitId, Epoch)>,
-    ) -> BoxFuture<'_, Result<Vec<Option<Epoch>>, StoreError>> {
-        async move {
-            if orphans.len() > 1
-                && let Claims::Made(claimed) = self.try_claim(&orphans).await?
-            {
-                return Ok(claimed);
-            }
-            let mut claimed = Vec::with_capacity(orphans.len());
-            for orphan in orphans {
-                claimed.push(self.claim_one(orphan).await?);
-            }
-            Ok(claimed)
+    ) -> Result<Vec<Option<Epoch>>, StoreError> {
+        if orphans.len() > 1
+            && let Claims::Made(claimed) = self.try_claim(&orphans).await?
+        {
+            return Ok(claimed);
         }
-        .boxed()
+        let mut claimed = Vec::with_capacity(orphans.len());
+        for orphan in orphans {
+            claimed.push(self.claim_one(orphan).await?);
+        }
+        Ok(claimed)
     }
 
-    fn load(
-        &self,
-        unit: UnitId,
-        epoch: Epoch,
-    ) -> BoxFuture<'_, Result<Option<LoadedUnit>, StoreError>> {
-        async move {
-            let node = self.node()?;
-            let at = integer(epoch.0);
-            let retention = millis(self.options.retention);
-            let items = self.control.read(move |connection| {
-                sqlx::query(
-                    "SELECT number, games.form, header, over,
-                            kind, node = $2 AND epoch = $3 AND NOT over AS is_owned
-                     FROM owned LEFT JOIN games USING (game_id)
-                     WHERE unit = $1 AND (kind <> 0 OR durable AND number IS NOT NULL
-                                                 AND (NOT over OR ended_ms >= clock_ms() - $4))
-                     ORDER BY number",
-                )
-                .bind(unit.bytes().to_vec())
-                .bind(node)
-                .bind(at)
-                .bind(retention)
-                .fetch_all(connection)
-                .boxed()
-            });
-            let items = items.await?;
-            if !(items.iter()).any(|item| item.get::<Option<bool>, _>(5) == Some(true)) {
-                return Ok(None);
-            }
-            let (rooms, others): (Vec<_>, Vec<_>) =
-                (items.into_iter()).partition(|item| item.get::<i16, _>(4) == ROOM);
-            let kind = others.iter().find_map(|item| kind_of(item.get(4)));
-            let stored = match kind.map(|kind| kind.unit(*unit.bytes())) {
-                Some(unit) => (self.control.unit(unit).await?).map(|it| (unit, it)),
-                None => None,
-            };
-            let rooms = self.control.rooms(rooms).await?;
-            if stored.is_some() {
-                lock(&self.epochs).insert(unit, at);
-            }
-            Ok(Some(LoadedUnit {
-                stored,
-                // At the epoch that was asked for: if another one has come since, they are fenced.
-                games: (rooms.into_iter())
-                    .map(|room| self.resumable(room, at))
-                    .collect(),
-            }))
+    async fn load(&self, unit: UnitId, epoch: Epoch) -> Result<Option<LoadedUnit>, StoreError> {
+        let node = self.node()?;
+        let at = integer(epoch.0);
+        let retention = millis(self.options.retention);
+        let items = self.control.read(move |connection| {
+            sqlx::query(
+                "SELECT number, games.form, header, over,
+                        kind, node = $2 AND epoch = $3 AND NOT over AS is_owned
+                 FROM owned LEFT JOIN games USING (game_id)
+                 WHERE unit = $1 AND (kind <> 0 OR durable AND number IS NOT NULL
+                                             AND (NOT over OR ended_ms >= clock_ms() - $4))
+                 ORDER BY number",
+            )
+            .bind(unit.bytes().to_vec())
+            .bind(node)
+            .bind(at)
+            .bind(retention)
+            .fetch_all(connection)
+            .boxed()
+        });
+        let items = items.await?;
+        if !(items.iter()).any(|item| item.get::<Option<bool>, _>(5) == Some(true)) {
+            return Ok(None);
         }
-        .boxed()
+        let (rooms, others): (Vec<_>, Vec<_>) =
+            (items.into_iter()).partition(|item| item.get::<i16, _>(4) == ROOM);
+        let kind = others.iter().find_map(|item| kind_of(item.get(4)));
+        let stored = match kind.map(|kind| kind.unit(*unit.bytes())) {
+            Some(unit) => (self.control.unit(unit).await?).map(|it| (unit, it)),
+            None => None,
+        };
+        let rooms = self.control.rooms(rooms).await?;
+        if stored.is_some() {
+            lock(&self.epochs).insert(unit, at);
+        }
+        Ok(Some(LoadedUnit {
+            stored,
+            // At the epoch that was asked for: if another one has come since, they are fenced.
+            games: (rooms.into_iter())
+                .map(|room| self.resumable(room, at))
+                .collect(),
+        }))
     }
 
-    fn release(
+    async fn release(
         &self,
         unit: UnitId,
         epoch: Epoch,
         next: Option<NodeId>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            let expire_after = self.expire_after();
-            let unit = (unit, integer(epoch.0));
-            let nodes = (self.node()?, next.map(|node| integer(node.0)));
-            let released = self
-                .control
-                .read(move |connection| release(connection, unit, nodes, expire_after).boxed());
-            released.await
-        }
-        .boxed()
+    ) -> Result<(), StoreError> {
+        let expire_after = self.expire_after();
+        let unit = (unit, integer(epoch.0));
+        let nodes = (self.node()?, next.map(|node| integer(node.0)));
+        self.control
+            .read(move |connection| release(connection, unit, nodes, expire_after).boxed())
+            .await
     }
 
-    fn leave(&self) -> BoxFuture<'_, Result<bool, StoreError>> {
-        async move {
-            let node = self.node()?;
-            let left = self.control.read(move |connection| {
-                sqlx::query(
-                    "DELETE FROM nodes WHERE node = $1
-                       AND NOT EXISTS (SELECT FROM owned WHERE node = $1 AND NOT over)",
-                )
-                .bind(node)
-                .execute(connection)
-                .boxed()
-            });
-            Ok(left.await?.rows_affected() > 0)
-        }
-        .boxed()
-    }
-
-    fn locate(&self, id: UnitId) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
-        self.locate_where(locations!("WHERE id = $1"), LocatedBy::Id(*id.bytes()))
+    async fn leave(&self) -> Result<bool, StoreError> {
+        let node = self.node()?;
+        let left = self.control.read(move |connection| {
+            sqlx::query(
+                "DELETE FROM nodes WHERE node = $1
+                   AND NOT EXISTS (SELECT FROM owned WHERE node = $1 AND NOT over)",
+            )
+            .bind(node)
+            .execute(connection)
             .boxed()
+        });
+        Ok(left.await?.rows_affected() > 0)
     }
 
-    fn locate_code<'a>(
-        &'a self,
-        join_code: &'a str,
-    ) -> BoxFuture<'a, Result<Option<Location>, StoreError>> {
+    async fn locate(&self, id: UnitId) -> Result<Option<Location>, StoreError> {
+        self.locate_where(locations!("WHERE id = $1"), LocatedBy::Id(*id.bytes()))
+            .await
+    }
+
+    async fn locate_code(&self, join_code: &str) -> Result<Option<Location>, StoreError> {
         // A code may be used again once what had it is over.
         self.locate_where(
             locations!("WHERE join_code = $1 ORDER BY over, ended_ms DESC LIMIT 1"),
             LocatedBy::Code(text(join_code).into_owned()),
         )
-        .boxed()
+        .await
     }
 
-    fn locate_game(&self, game: GameId) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
+    async fn locate_game(&self, game: GameId) -> Result<Option<Location>, StoreError> {
         self.locate_where(
             locations!("WHERE game_id = $1 AND NOT over"),
             LocatedBy::Id(*game.bytes()),
         )
-        .boxed()
+        .await
     }
 
-    fn ended_room(&self, room: RoomId) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
-        async move {
-            let rows = self.reader.read(move |connection| {
-                sqlx::query(rooms!("id = $1 AND over"))
-                    .bind(room.bytes().to_vec())
-                    .fetch_all(connection)
-                    .boxed()
-            });
-            Ok(self.resumables(rows.await?).await?.pop())
-        }
-        .boxed()
-    }
-
-    fn alive(&self) -> BoxFuture<'_, Result<Vec<LivingNode>, StoreError>> {
-        async move {
-            let expire_after = self.expire_after();
-            let nodes = self.reader.read(move |connection| {
-                sqlx::query(
-                    "SELECT node, name, peer_endpoint, client_endpoint, build, capacity, reached, drain, rooms
-                     FROM nodes WHERE beat_ms + $1 > clock_ms()",
-                )
-                .bind(expire_after)
+    async fn ended_room(&self, room: RoomId) -> Result<Option<ResumableGame>, StoreError> {
+        let rows = self.reader.read(move |connection| {
+            sqlx::query(rooms!("id = $1 AND over"))
+                .bind(room.bytes().to_vec())
                 .fetch_all(connection)
                 .boxed()
+        });
+        Ok(self.resumables(rows.await?).await?.pop())
+    }
+
+    async fn alive(&self) -> Result<Vec<LivingNode>, StoreError> {
+        let expire_after = self.expire_after();
+        let nodes = self.reader.read(move |connection| {
+            sqlx::query(
+                "SELECT node, name, peer_endpoint, client_endpoint, build, capacity, reached, drain, rooms
+                 FROM nodes WHERE beat_ms + $1 > clock_ms()",
+            )
+            .bind(expire_after)
+            .fetch_all(connection)
+            .boxed()
+        });
+        let nodes = nodes.await?;
+        let alive = nodes.iter().map(|row| {
+            let (id, info) = node_of(row);
+            let reached = row.get("reached");
+            let takes_rooms = reached && !row.get::<bool, _>("drain") && info.capacity > 0;
+            let rooms: Option<i64> = row.get("rooms");
+            let load = rooms.filter(|_| takes_rooms).map(|rooms| Load {
+                rooms: rooms.cast_unsigned(),
+                capacity: info.capacity,
             });
-            let nodes = nodes.await?;
-            let alive = nodes.iter().map(|row| {
+            LivingNode {
+                id,
+                info,
+                reached,
+                load,
+            }
+        });
+        Ok(alive.collect())
+    }
+
+    async fn nodes(&self) -> Result<Vec<NodeStatus>, StoreError> {
+        let expire_after = self.expire_after();
+        let nodes = self.reader.read(move |connection| {
+            sqlx::query(
+                "SELECT node, name, peer_endpoint, client_endpoint, build, capacity,
+                        greatest(clock_ms() - beat_ms, 0) AS since_ms, beat_ms + $1 <= clock_ms() AS expired, drain, reached,
+                        (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 0) AS rooms,
+                        (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 1) AS tournaments,
+                        (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 2) AS studies
+                 FROM nodes ORDER BY expired, name, node",
+            )
+            .bind(expire_after)
+            .fetch_all(connection)
+            .boxed()
+        });
+        Ok((nodes.await?.iter())
+            .map(|row| {
                 let (id, info) = node_of(row);
-                let reached = row.get("reached");
-                let takes_rooms = reached && !row.get::<bool, _>("drain") && info.capacity > 0;
-                let rooms: Option<i64> = row.get("rooms");
-                let load = rooms.filter(|_| takes_rooms).map(|rooms| Load {
-                    rooms: rooms.cast_unsigned(),
-                    capacity: info.capacity,
-                });
-                LivingNode {
+                NodeStatus {
                     id,
                     info,
-                    reached,
-                    load,
+                    last_beat: Duration::from_millis(number(row, "since_ms")),
+                    expired: row.get("expired"),
+                    drain: row.get("drain"),
+                    reached: row.get("reached"),
+                    rooms: number(row, "rooms"),
+                    tournaments: number(row, "tournaments"),
+                    studies: number(row, "studies"),
                 }
-            });
-            Ok(alive.collect())
-        }
-        .boxed()
+            })
+            .collect())
     }
 
-    fn nodes(&self) -> BoxFuture<'_, Result<Vec<NodeStatus>, StoreError>> {
-        async move {
-            let expire_after = self.expire_after();
-            let nodes = self.reader.read(move |connection| {
-                sqlx::query(
-                    "SELECT node, name, peer_endpoint, client_endpoint, build, capacity,
-                            greatest(clock_ms() - beat_ms, 0) AS since_ms, beat_ms + $1 <= clock_ms() AS expired, drain, reached,
-                            (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 0) AS rooms,
-                            (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 1) AS tournaments,
-                            (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 2) AS studies
-                     FROM nodes ORDER BY expired, name, node",
-                )
-                .bind(expire_after)
-                .fetch_all(connection)
+    async fn request_drain(&self, node: NodeId) -> Result<bool, StoreError> {
+        let asked = self.control.read(move |connection| {
+            sqlx::query("UPDATE nodes SET drain = true WHERE node = $1")
+                .bind(integer(node.0))
+                .execute(connection)
                 .boxed()
-            });
-            Ok((nodes.await?.iter())
-                .map(|row| {
-                    let (id, info) = node_of(row);
-                    NodeStatus {
-                        id,
-                        info,
-                        last_beat: Duration::from_millis(number(row, "since_ms")),
-                        expired: row.get("expired"),
-                        drain: row.get("drain"),
-                        reached: row.get("reached"),
-                        rooms: number(row, "rooms"),
-                        tournaments: number(row, "tournaments"),
-                        studies: number(row, "studies"),
-                    }
-                })
-                .collect())
-        }
-        .boxed()
-    }
-
-    fn request_drain(&self, node: NodeId) -> BoxFuture<'_, Result<bool, StoreError>> {
-        async move {
-            let asked = self.control.read(move |connection| {
-                sqlx::query("UPDATE nodes SET drain = true WHERE node = $1")
-                    .bind(integer(node.0))
-                    .execute(connection)
-                    .boxed()
-            });
-            Ok(asked.await?.rows_affected() > 0)
-        }
-        .boxed()
+        });
+        Ok(asked.await?.rows_affected() > 0)
     }
 }
 

@@ -6,8 +6,6 @@
 use std::sync::Arc;
 
 use chefshat_proto::v1;
-use futures::FutureExt as _;
-use futures::future::BoxFuture;
 use sqlx::postgres::PgConnection;
 use sqlx::{Connection as _, Row as _};
 
@@ -71,26 +69,23 @@ impl Work for Command {
     type Answer = i64;
     const MOST: usize = 64;
 
-    fn commit<'a>(
-        connection: &'a mut PgConnection,
-        work: &'a [Arc<Self>],
+    async fn commit(
+        connection: &mut PgConnection,
+        work: &[Arc<Self>],
         again: bool,
-    ) -> BoxFuture<'a, sqlx::Result<Answers<Self>>> {
-        async move {
-            let mut transaction = connection.begin().await?;
-            let mut answers = Vec::with_capacity(work.len());
-            let mut listed = Vec::new();
-            lock_ids(&mut transaction, work).await?;
-            for command in work {
-                answers.push(command.run(&mut transaction, again, &mut listed).await?);
-            }
-            if !listed.is_empty() {
-                number(&mut transaction, &listed).await?;
-            }
-            transaction.commit().await?;
-            Ok(answers)
+    ) -> sqlx::Result<Answers<Self>> {
+        let mut transaction = connection.begin().await?;
+        let mut answers = Vec::with_capacity(work.len());
+        let mut listed = Vec::new();
+        lock_ids(&mut transaction, work).await?;
+        for command in work {
+            answers.push(command.run(&mut transaction, again, &mut listed).await?);
         }
-        .boxed()
+        if !listed.is_empty() {
+            number(&mut transaction, &listed).await?;
+        }
+        transaction.commit().await?;
+        Ok(answers)
     }
 }
 

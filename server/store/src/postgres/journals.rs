@@ -2,9 +2,8 @@
 
 use std::sync::Arc;
 
+use async_trait::async_trait;
 use chefshat_proto::v1;
-use futures::FutureExt as _;
-use futures::future::BoxFuture;
 
 use super::appends::Row;
 use super::commands::Command;
@@ -44,48 +43,37 @@ impl DurableJournal {
     }
 }
 
+#[async_trait]
 impl Journal for DurableJournal {
-    fn append<'a>(
-        &'a mut self,
-        entries: &'a mut Vec<Entry>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
-        async move {
-            self.settle().await?;
-            self.unanswered = Some(Arc::new(Row {
-                owned: self.owned,
-                game: self.number,
-                position: self.position,
-                entries: form::entries_to_bytes(entries),
-            }));
-            self.settle().await
-        }
-        .boxed()
+    async fn append(&mut self, entries: &mut Vec<Entry>) -> Result<(), StoreError> {
+        self.settle().await?;
+        self.unanswered = Some(Arc::new(Row {
+            owned: self.owned,
+            game: self.number,
+            position: self.position,
+            entries: form::entries_to_bytes(entries),
+        }));
+        self.settle().await
     }
 
-    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
-        async move {
-            self.settle().await?;
-            self.reader.entries(self.number).await
-        }
-        .boxed()
+    async fn entries(&mut self) -> Result<Vec<Entry>, StoreError> {
+        self.settle().await?;
+        self.reader.entries(self.number).await
     }
 
-    fn finish(
+    async fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            self.settle().await?;
-            let finish = Command::Finish {
-                owned: self.owned,
-                number: self.number,
-                rows: self.position,
-                end: end(summary, signature.as_ref().map(form::signature_to_bytes)),
-            };
-            self.commands.commit(Arc::new(finish)).await.map(drop)
-        }
-        .boxed()
+    ) -> Result<(), StoreError> {
+        self.settle().await?;
+        let finish = Command::Finish {
+            owned: self.owned,
+            number: self.number,
+            rows: self.position,
+            end: end(summary, signature.as_ref().map(form::signature_to_bytes)),
+        };
+        self.commands.commit(Arc::new(finish)).await.map(drop)
     }
 }
 
@@ -96,13 +84,13 @@ pub(super) struct Whole {
 }
 
 impl StoreFinished for Whole {
-    fn store_finished<'a>(
-        &'a self,
-        header: &'a GameHeader,
+    async fn store_finished(
+        &self,
+        header: &GameHeader,
         entries: Vec<u8>,
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<Vec<u8>>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
+    ) -> Result<(), StoreError> {
         let game = end(summary, signature).map(|end| {
             Box::new(WholeGame {
                 game_id: header.game_id,
@@ -113,7 +101,7 @@ impl StoreFinished for Whole {
         });
         let owned = self.owned;
         let whole = Command::Whole { owned, game };
-        async move { self.commands.commit(Arc::new(whole)).await.map(drop) }.boxed()
+        self.commands.commit(Arc::new(whole)).await.map(drop)
     }
 }
 

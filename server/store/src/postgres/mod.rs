@@ -29,11 +29,11 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
+use async_trait::async_trait;
 use chefshat_cluster::LeaseTimes;
 use chefshat_proto::v1;
 use chefshat_record::pseudonym::Pseudonym;
-use futures::FutureExt as _;
-use futures::future::{BoxFuture, pending};
+use futures::future::pending;
 use sqlx::postgres::{PgConnectOptions, PgPoolOptions};
 use tokio::sync::Mutex as AsyncMutex;
 use tokio::task::JoinHandle;
@@ -276,8 +276,23 @@ impl PostgresStore {
             concluded: room.over,
         }
     }
+}
 
-    async fn create_room(
+#[async_trait]
+impl Store for PostgresStore {
+    fn outlives_server(&self) -> bool {
+        true
+    }
+
+    fn metrics(&self) -> Option<&StoreMetrics> {
+        Some(&self.metrics)
+    }
+
+    fn queue_depth(&self) -> usize {
+        self.rows.depth() + self.commands.depth()
+    }
+
+    async fn create(
         &self,
         header: Arc<GameHeader>,
         mut entries: Vec<Entry>,
@@ -322,203 +337,147 @@ impl PostgresStore {
             }
         })
     }
-}
-
-impl Store for PostgresStore {
-    fn outlives_server(&self) -> bool {
-        true
-    }
-
-    fn metrics(&self) -> Option<&StoreMetrics> {
-        Some(&self.metrics)
-    }
-
-    fn queue_depth(&self) -> usize {
-        self.rows.depth() + self.commands.depth()
-    }
-
-    fn create(
-        &self,
-        header: Arc<GameHeader>,
-        entries: Vec<Entry>,
-    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
-        self.create_room(header, entries).boxed()
-    }
 
     /// Those of this node.
-    fn resumable_games(
+    async fn resumable_games(&self, ended_since_ms: u64) -> Result<Vec<ResumableGame>, StoreError> {
+        self.own_games(ended_since_ms).await
+    }
+
+    async fn summary(&self, game: GameId) -> Result<Option<v1::RecordSummary>, StoreError> {
+        self.reader.summary(game).await
+    }
+
+    async fn finished(&self, game: GameId) -> Result<Option<StoredGame>, StoreError> {
+        self.reader.finished(game).await
+    }
+
+    async fn list(
         &self,
-        ended_since_ms: u64,
-    ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>> {
-        self.own_games(ended_since_ms).boxed()
-    }
-
-    fn summary(
-        &self,
-        game: GameId,
-    ) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
-        self.reader.summary(game).boxed()
-    }
-
-    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
-        self.reader.finished(game).boxed()
-    }
-
-    fn list<'a>(
-        &'a self,
-        filter: &'a v1::RecordFilter,
+        filter: &v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>> {
-        self.reader.list(filter, part, count).boxed()
+    ) -> Result<Vec<Listed>, StoreError> {
+        self.reader.list(filter, part, count).await
     }
 
-    fn import(
+    async fn import(
         &self,
         game_id: GameId,
         mut summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
-    ) -> BoxFuture<'_, Result<bool, StoreError>> {
+    ) -> Result<bool, StoreError> {
         summary.added = true;
-        async move {
-            let count = lines.len();
-            let encoding = self
-                .decoding
-                .run(count, move || form::lines_to_bytes(&lines));
-            let import = Command::Import {
-                game_id,
-                record: encoding.await?,
-                summary: Box::new(summary),
-            };
-            match self.commands.commit(Arc::new(import)).await {
-                Ok(_) => Ok(true),
-                Err(StoreError::Taken(_)) => Ok(false),
-                Err(error) => Err(error),
-            }
+        let count = lines.len();
+        let encoding = self
+            .decoding
+            .run(count, move || form::lines_to_bytes(&lines));
+        let import = Command::Import {
+            game_id,
+            record: encoding.await?,
+            summary: Box::new(summary),
+        };
+        match self.commands.commit(Arc::new(import)).await {
+            Ok(_) => Ok(true),
+            Err(StoreError::Taken(_)) => Ok(false),
+            Err(error) => Err(error),
         }
-        .boxed()
     }
 
-    fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
-        self.reader.finished_games().boxed()
+    async fn finished_games(&self) -> Result<u64, StoreError> {
+        self.reader.finished_games().await
     }
 
-    fn prunable(
+    async fn prunable(
         &self,
         keep: Keep,
         after: u64,
         count: usize,
-    ) -> BoxFuture<'_, Result<Vec<(u64, GameId)>, StoreError>> {
+    ) -> Result<Vec<(u64, GameId)>, StoreError> {
         let part = (after, count);
         (self.reader)
             .prunable(keep, part, self.options.record_files)
-            .boxed()
+            .await
     }
 
-    fn prune(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
-        async move {
-            let prune = Command::Prune {
-                games: games.clone(),
-            };
-            self.commands.commit(Arc::new(prune)).await?;
-            self.reader.missing(games).await
+    async fn prune(&self, games: Vec<GameId>) -> Result<Vec<GameId>, StoreError> {
+        let prune = Command::Prune {
+            games: games.clone(),
+        };
+        self.commands.commit(Arc::new(prune)).await?;
+        self.reader.missing(games).await
+    }
+
+    async fn delete(&self, games: Vec<GameId>) -> Result<(), StoreError> {
+        let delete = Command::Delete { games };
+        self.commands.commit(Arc::new(delete)).await.map(drop)
+    }
+
+    async fn forget(&self, who: &Pseudonym) -> Result<Forgotten, ForgetError> {
+        let rewrite = self.reader.forgetting(who).await?;
+        let forgotten = rewrite.forgotten.clone();
+        let rewrite = Command::Rewrite(rewrite);
+        self.commands.commit(Arc::new(rewrite)).await?;
+        Ok(forgotten)
+    }
+
+    async fn without_record_file(&self) -> Result<Vec<GameId>, StoreError> {
+        self.reader.without_record_file().await
+    }
+
+    async fn mark_record_written(&self, game_id: GameId) -> Result<(), StoreError> {
+        let written = Command::RecordWritten { game_id };
+        self.commands.commit(Arc::new(written)).await.map(drop)
+    }
+
+    async fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> Result<(), StoreError> {
+        let is_new = matches!(write, UnitWrite::Create { .. });
+        let is_deletion = matches!(write, UnitWrite::Delete);
+        let change = self.change(unit, write)?;
+        self.commands
+            .commit(Arc::new(Command::Unit(change)))
+            .await?;
+        if is_new {
+            lock(&self.epochs).insert(unit.id(), FIRST_EPOCH);
         }
-        .boxed()
-    }
-
-    fn delete(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            let delete = Command::Delete { games };
-            self.commands.commit(Arc::new(delete)).await.map(drop)
+        if is_deletion {
+            lock(&self.epochs).remove(&unit.id());
         }
-        .boxed()
+        Ok(())
     }
 
-    fn forget<'a>(&'a self, who: &'a Pseudonym) -> BoxFuture<'a, Result<Forgotten, ForgetError>> {
-        async move {
-            let rewrite = self.reader.forgetting(who).await?;
-            let forgotten = rewrite.forgotten.clone();
-            let rewrite = Command::Rewrite(rewrite);
-            self.commands.commit(Arc::new(rewrite)).await?;
-            Ok(forgotten)
-        }
-        .boxed()
-    }
-
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
-        self.reader.without_record_file().boxed()
-    }
-
-    fn mark_record_written(&self, game_id: GameId) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            let written = Command::RecordWritten { game_id };
-            self.commands.commit(Arc::new(written)).await.map(drop)
-        }
-        .boxed()
-    }
-
-    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            let is_new = matches!(write, UnitWrite::Create { .. });
-            let is_deletion = matches!(write, UnitWrite::Delete);
-            let change = self.change(unit, write)?;
-            self.commands
-                .commit(Arc::new(Command::Unit(change)))
-                .await?;
-            if is_new {
-                lock(&self.epochs).insert(unit.id(), FIRST_EPOCH);
-            }
-            if is_deletion {
-                lock(&self.epochs).remove(&unit.id());
-            }
-            Ok(())
-        }
-        .boxed()
-    }
-
-    fn unit(&self, unit: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
-        self.reader.unit(unit).boxed()
+    async fn unit(&self, unit: UnitKey) -> Result<Option<StoredUnit>, StoreError> {
+        self.reader.unit(unit).await
     }
 
     /// The studies of all nodes, and the tournaments of this node that are not over with the newest
     /// ones of the cluster that are.
-    fn units(
-        &self,
-        kind: UnitKind,
-        newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>> {
-        async move {
-            match kind {
-                UnitKind::Study => self.reader.studies().await,
-                UnitKind::Tournament => self.reader.tournaments(self.node()?, newest_over).await,
-            }
+    async fn units(&self, kind: UnitKind, newest_over: usize) -> Result<Vec<UnitKey>, StoreError> {
+        match kind {
+            UnitKind::Study => self.reader.studies().await,
+            UnitKind::Tournament => self.reader.tournaments(self.node()?, newest_over).await,
         }
-        .boxed()
     }
 
-    fn traces(&self, study: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
-        self.reader.traces(study).boxed()
+    async fn traces(&self, study: StudyId) -> Result<Vec<StoredTraces>, StoreError> {
+        self.reader.traces(study).await
     }
 
     /// Never: a database that does not answer may do so later.
-    fn failed(&self) -> BoxFuture<'static, StoreError> {
-        pending().boxed()
+    async fn failed(&self) -> StoreError {
+        pending().await
     }
 
-    fn close(&self) -> BoxFuture<'_, ()> {
-        async move {
-            self.closing.cancel();
-            let writing = std::mem::take(&mut *lock(&self.writing));
-            for writer in writing {
-                if let Err(error) = writer.await {
-                    error!(%error, "a writer of the database did not close cleanly");
-                }
+    async fn close(&self) {
+        self.closing.cancel();
+        let writing = std::mem::take(&mut *lock(&self.writing));
+        for writer in writing {
+            if let Err(error) = writer.await {
+                error!(%error, "a writer of the database did not close cleanly");
             }
-            self.reader.pool.close().await;
-            self.control.pool.close().await;
-            self.beats.pool.close().await;
         }
-        .boxed()
+        self.reader.pool.close().await;
+        self.control.pool.close().await;
+        self.beats.pool.close().await;
     }
 }
 

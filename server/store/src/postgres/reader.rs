@@ -329,7 +329,8 @@ impl Reader {
         let (mut after, mut page) = (integer(after), count);
         let mut found = Vec::new();
         loop {
-            let games = self.read(|connection| old(connection, keep, (after, page), record_files));
+            let games =
+                self.read(|connection| old(connection, keep, (after, page), record_files).boxed());
             let games = games.await?;
             let Some(last) = games.last() else {
                 return Ok(found);

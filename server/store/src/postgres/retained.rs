@@ -4,8 +4,6 @@
 
 use std::collections::BTreeSet;
 
-use futures::FutureExt as _;
-use futures::future::BoxFuture;
 use sqlx::Row as _;
 use sqlx::postgres::{PgConnection, PgRow};
 
@@ -37,13 +35,13 @@ impl Candidate {
 
 /// The next games, after a number, that are old enough to be deleted and that have been written to
 /// files if they are to be.
-pub(super) fn old<'c>(
-    connection: &'c mut PgConnection,
+pub(super) async fn old(
+    connection: &mut PgConnection,
     keep: Keep,
     (after, count): (i64, usize),
     record_files: bool,
-) -> BoxFuture<'c, sqlx::Result<Vec<Candidate>>> {
-    let query = sqlx::query(
+) -> sqlx::Result<Vec<Candidate>> {
+    let rows = sqlx::query(
         "SELECT number, game_id, form, header FROM games
          WHERE state <> 0 AND number > $1 AND coalesce(ended_at_ms, created_at_ms, 0) < $3
            AND (summary IS NULL
@@ -56,12 +54,10 @@ pub(super) fn old<'c>(
     .bind(integer(keep.newest.unwrap_or_default().max(1)))
     .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
     .bind(integer(count as u64))
-    .bind(record_files);
-    async move {
-        let rows = query.fetch_all(connection).await?;
-        Ok(rows.iter().filter_map(Candidate::of).collect())
-    }
-    .boxed()
+    .bind(record_files)
+    .fetch_all(connection)
+    .await?;
+    Ok(rows.iter().filter_map(Candidate::of).collect())
 }
 
 /// Those of these games that are over, locked.

@@ -20,6 +20,8 @@ use chefshat_room::journal::{
 };
 use chefshat_room::policy::{Durability, Policy};
 use chefshat_tournament::Change as TournamentChange;
+use futures::FutureExt as _;
+use futures::future::BoxFuture;
 use sqlx::postgres::PgConnection;
 
 use super::*;

@@ -9,7 +9,6 @@ use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
-use futures::future::BoxFuture;
 use sqlx::postgres::{PgConnectOptions, PgConnection};
 use tokio::sync::{Mutex, mpsc, oneshot};
 use tokio::time::{Instant, sleep, timeout};
@@ -64,11 +63,11 @@ pub(super) trait Work: Send + Sync + Sized + 'static {
 
     /// Does all of it in one transaction, or nothing. `again` says that it may have been done
     /// before.
-    fn commit<'a>(
-        connection: &'a mut PgConnection,
-        work: &'a [Arc<Self>],
+    fn commit(
+        connection: &mut PgConnection,
+        work: &[Arc<Self>],
         again: bool,
-    ) -> BoxFuture<'a, sqlx::Result<Answers<Self>>>;
+    ) -> impl Future<Output = sqlx::Result<Answers<Self>>> + Send;
 }
 
 /// What became of each piece of work, in their order.

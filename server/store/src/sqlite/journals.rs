@@ -3,9 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, Ordering};
 
+use async_trait::async_trait;
 use chefshat_proto::v1;
-use futures::FutureExt as _;
-use futures::future::{BoxFuture, ready};
 use sqlx::sqlite::SqlitePool;
 use tokio::sync::{mpsc, oneshot};
 use tracing::error;
@@ -102,34 +101,29 @@ impl DurableJournal {
     }
 }
 
+#[async_trait]
 impl Journal for DurableJournal {
-    fn append<'a>(
-        &'a mut self,
-        entries: &'a mut Vec<Entry>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
+    async fn append(&mut self, entries: &mut Vec<Entry>) -> Result<(), StoreError> {
         let row = self.next_row(entries);
-        self.queue.send(WriteCommand::Append(row)).boxed()
+        self.queue.send(WriteCommand::Append(row)).await
     }
 
-    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
-        async move {
-            let read = rows::journal(&self.readers, &self.decoding, self.number, self.last_row);
-            match read.await? {
-                Ok(read) => Ok(read.entries),
-                Err(problem) => Err(StoreError::Failed(format!(
-                    "the journal of game number {} cannot be read back: {problem}",
-                    self.number
-                ))),
-            }
+    async fn entries(&mut self) -> Result<Vec<Entry>, StoreError> {
+        let read = rows::journal(&self.readers, &self.decoding, self.number, self.last_row);
+        match read.await? {
+            Ok(read) => Ok(read.entries),
+            Err(problem) => Err(StoreError::Failed(format!(
+                "the journal of game number {} cannot be read back: {problem}",
+                self.number
+            ))),
         }
-        .boxed()
     }
 
-    fn finish(
+    async fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
+    ) -> Result<(), StoreError> {
         let finish = WriteCommand::Finish {
             number: self.number,
             // Only an aborted game can end before the deal.
@@ -138,12 +132,9 @@ impl Journal for DurableJournal {
             summary,
             signature: signature.as_ref().map(form::signature_to_bytes),
         };
-        async move {
-            self.queue.send(finish).await?;
-            self.running = None;
-            Ok(())
-        }
-        .boxed()
+        self.queue.send(finish).await?;
+        self.running = None;
+        Ok(())
     }
 }
 
@@ -156,21 +147,21 @@ pub(super) struct Whole {
 }
 
 impl StoreFinished for Whole {
-    fn store_finished<'a>(
-        &'a self,
-        header: &'a GameHeader,
+    async fn store_finished(
+        &self,
+        header: &GameHeader,
         entries: Vec<u8>,
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<Vec<u8>>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
+    ) -> Result<(), StoreError> {
         let Some(summary) = summary else {
-            return ready(Ok(())).boxed();
+            return Ok(());
         };
         let is_single = header.tournament.is_none() && header.study.is_none();
         if is_single && self.queue.space.is_full() {
             // Such a game may be lost, so its players need not wait for the disk.
             error!(game = %header.game_id, "the disk is full: an ephemeral game is not stored");
-            return ready(Ok(())).boxed();
+            return Ok(());
         }
         let game = WriteCommand::Whole {
             number: self.number,
@@ -181,6 +172,6 @@ impl StoreFinished for Whole {
             summary,
             signature,
         };
-        self.queue.send(game).boxed()
+        self.queue.send(game).await
     }
 }

@@ -22,10 +22,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicI64, Ordering};
 use std::sync::{Arc, Mutex};
 
+use async_trait::async_trait;
 use chefshat_proto::v1;
 use chefshat_record::pseudonym::Pseudonym;
-use futures::FutureExt as _;
-use futures::future::BoxFuture;
+use futures::future::pending;
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
 use tracing::{error, warn};
@@ -73,7 +73,7 @@ pub struct SqliteStore {
     reserved: Reservations,
     scratch: Scratch,
     writing: Mutex<Option<JoinHandle<()>>>,
-    closed: Arc<AtomicBool>,
+    closed: AtomicBool,
     metrics: StoreMetrics,
     space: Arc<Space>,
     _lock: FolderLock,
@@ -171,7 +171,7 @@ impl SqliteStore {
             reserved: Reservations::default(),
             scratch,
             writing: Mutex::new(Some(writing)),
-            closed: Arc::new(AtomicBool::new(false)),
+            closed: AtomicBool::new(false),
             metrics,
             space,
             _lock: opened.lock,
@@ -179,6 +179,7 @@ impl SqliteStore {
     }
 }
 
+#[async_trait]
 impl Store for SqliteStore {
     fn outlives_server(&self) -> bool {
         true
@@ -188,8 +189,8 @@ impl Store for SqliteStore {
         self.space.has_some()
     }
 
-    fn wait_for_space(&self) -> BoxFuture<'_, bool> {
-        self.space.wait_for_some().boxed()
+    async fn wait_for_space(&self) -> bool {
+        self.space.wait_for_some().await
     }
 
     fn stop_waiting(&self) {
@@ -204,107 +205,93 @@ impl Store for SqliteStore {
         self.commands.depth()
     }
 
-    fn create(
+    async fn create(
         &self,
         header: Arc<GameHeader>,
         mut entries: Vec<Entry>,
-    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
+    ) -> Result<Box<dyn Journal>, StoreError> {
         let number = self.numbers.fetch_add(1, Ordering::Relaxed);
-        let (commands, readers) = (self.commands.clone(), self.reader.pool.clone());
-        let decoding = self.decoding.clone();
-        async move {
-            let game = header.game_id;
-            let taken = StoreError::Taken(game.to_string());
-            let reserved = self.reserved.take(game).ok_or_else(|| taken.clone())?;
-            if header.policy.durability == Durability::Ephemeral {
-                if self.reader.has_game(game).await? {
-                    return Err(taken);
-                }
-                let running = commands.space.game();
-                let whole = Whole {
-                    number,
-                    queue: commands,
-                    _running: running,
-                    _reserved: reserved,
-                };
-                let first = form::entries_to_bytes(&mut entries);
-                let journal = EphemeralJournal::new(header, first, self.scratch.clone(), whole);
-                return Ok(Box::new(journal) as Box<dyn Journal>);
+        let queue = self.commands.clone();
+        let game = header.game_id;
+        let taken = StoreError::Taken(game.to_string());
+        let reserved = self.reserved.take(game).ok_or_else(|| taken.clone())?;
+        if header.policy.durability == Durability::Ephemeral {
+            if self.reader.has_game(game).await? {
+                return Err(taken);
             }
-            let mut journal = DurableJournal {
+            let whole = Whole {
                 number,
-                position: 0,
-                last_row: None,
-                running: Some(commands.space.game()),
-                queue: commands,
-                readers,
-                decoding,
+                _running: queue.space.game(),
+                queue,
+                _reserved: reserved,
             };
-            journal.begin(&header, &mut entries).await?;
-            Ok(Box::new(journal) as Box<dyn Journal>)
+            let first = form::entries_to_bytes(&mut entries);
+            let journal = EphemeralJournal::new(header, first, self.scratch.clone(), whole);
+            return Ok(Box::new(journal));
         }
-        .boxed()
+        let mut journal = DurableJournal {
+            number,
+            position: 0,
+            last_row: None,
+            running: Some(queue.space.game()),
+            queue,
+            readers: self.reader.pool.clone(),
+            decoding: self.decoding.clone(),
+        };
+        journal.begin(&header, &mut entries).await?;
+        Ok(Box::new(journal))
     }
 
-    fn resumable_games(
-        &self,
-        ended_since_ms: u64,
-    ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>> {
+    async fn resumable_games(&self, ended_since_ms: u64) -> Result<Vec<ResumableGame>, StoreError> {
         self.reader
             .resumable_games(ended_since_ms, &self.commands)
-            .boxed()
+            .await
     }
 
-    fn summary(
+    async fn summary(&self, game: GameId) -> Result<Option<v1::RecordSummary>, StoreError> {
+        self.reader.summary(game).await
+    }
+
+    async fn finished(&self, game: GameId) -> Result<Option<StoredGame>, StoreError> {
+        self.reader.finished(game).await
+    }
+
+    async fn list(
         &self,
-        game: GameId,
-    ) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
-        self.reader.summary(game).boxed()
-    }
-
-    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
-        self.reader.finished(game).boxed()
-    }
-
-    fn list<'a>(
-        &'a self,
-        filter: &'a v1::RecordFilter,
+        filter: &v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>> {
-        self.reader.list(filter, part, count).boxed()
+    ) -> Result<Vec<Listed>, StoreError> {
+        self.reader.list(filter, part, count).await
     }
 
-    fn import(
+    async fn import(
         &self,
         game: GameId,
         mut summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
-    ) -> BoxFuture<'_, Result<bool, StoreError>> {
+    ) -> Result<bool, StoreError> {
         summary.added = true;
-        async move {
-            let Some(_reserved) = self.reserved.take(game) else {
-                return Ok(false);
-            };
-            let number = self.numbers.fetch_add(1, Ordering::Relaxed);
-            let count = lines.len();
-            let encoding = self
-                .decoding
-                .run(count, move || form::lines_to_bytes(&lines));
-            let record = encoding.await?;
-            let import = WriteCommand::Import {
-                number,
-                game_id: game,
-                record,
-                summary: Box::new(summary),
-            };
-            match self.commands.send(import).await {
-                Ok(()) => Ok(true),
-                Err(StoreError::Taken(_)) => Ok(false),
-                Err(error) => Err(error),
-            }
+        let Some(_reserved) = self.reserved.take(game) else {
+            return Ok(false);
+        };
+        let number = self.numbers.fetch_add(1, Ordering::Relaxed);
+        let count = lines.len();
+        let encoding = self
+            .decoding
+            .run(count, move || form::lines_to_bytes(&lines));
+        let record = encoding.await?;
+        let import = WriteCommand::Import {
+            number,
+            game_id: game,
+            record,
+            summary: Box::new(summary),
+        };
+        match self.commands.send(import).await {
+            Ok(()) => Ok(true),
+            Err(StoreError::Taken(_)) => Ok(false),
+            Err(error) => Err(error),
         }
-        .boxed()
     }
 
     fn disk(&self) -> Option<DiskUsage> {
@@ -317,122 +304,102 @@ impl Store for SqliteStore {
         })
     }
 
-    fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
-        self.reader.finished_games().boxed()
+    async fn finished_games(&self) -> Result<u64, StoreError> {
+        self.reader.finished_games().await
     }
 
-    fn prunable(
+    async fn prunable(
         &self,
         keep: Keep,
         after: u64,
         count: usize,
-    ) -> BoxFuture<'_, Result<Vec<(u64, GameId)>, StoreError>> {
+    ) -> Result<Vec<(u64, GameId)>, StoreError> {
         // What waits for space must not keep what frees some.
         let unwritten = !self.space.has_some();
-        (self.reader)
-            .prunable(keep, after, count, unwritten)
-            .boxed()
+        self.reader.prunable(keep, after, count, unwritten).await
     }
 
-    fn prune(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
-        async move {
-            let prune = WriteCommand::Prune {
-                games: games.clone(),
-            };
-            self.commands.send(prune).await?;
-            let mut gone = Vec::new();
-            for game in games {
-                if !self.reader.has_game(game).await? {
-                    gone.push(game);
-                }
+    async fn prune(&self, games: Vec<GameId>) -> Result<Vec<GameId>, StoreError> {
+        let prune = WriteCommand::Prune {
+            games: games.clone(),
+        };
+        self.commands.send(prune).await?;
+        let mut gone = Vec::new();
+        for game in games {
+            if !self.reader.has_game(game).await? {
+                gone.push(game);
             }
-            Ok(gone)
         }
-        .boxed()
+        Ok(gone)
     }
 
-    fn delete(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.commands.send(WriteCommand::Delete { games }).boxed()
+    async fn delete(&self, games: Vec<GameId>) -> Result<(), StoreError> {
+        self.commands.send(WriteCommand::Delete { games }).await
     }
 
-    fn forget<'a>(&'a self, who: &'a Pseudonym) -> BoxFuture<'a, Result<Forgotten, ForgetError>> {
-        async move {
-            let rewrite = self.reader.forgetting(who).await?;
-            let forgotten = rewrite.forgotten.clone();
-            self.commands
-                .send(WriteCommand::Rewrite(Box::new(rewrite)))
-                .await?;
-            Ok(forgotten)
-        }
-        .boxed()
+    async fn forget(&self, who: &Pseudonym) -> Result<Forgotten, ForgetError> {
+        let rewrite = self.reader.forgetting(who).await?;
+        let forgotten = rewrite.forgotten.clone();
+        self.commands
+            .send(WriteCommand::Rewrite(Box::new(rewrite)))
+            .await?;
+        Ok(forgotten)
     }
 
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
-        self.reader.without_record_file().boxed()
+    async fn without_record_file(&self) -> Result<Vec<GameId>, StoreError> {
+        self.reader.without_record_file().await
     }
 
-    fn mark_record_written(&self, game_id: GameId) -> BoxFuture<'_, Result<(), StoreError>> {
+    async fn mark_record_written(&self, game_id: GameId) -> Result<(), StoreError> {
         self.commands
             .send(WriteCommand::RecordWritten { game_id })
-            .boxed()
+            .await
     }
 
-    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.commands.send(WriteCommand::Unit(unit, write)).boxed()
+    async fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> Result<(), StoreError> {
+        self.commands.send(WriteCommand::Unit(unit, write)).await
     }
 
-    fn unit(&self, unit: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
-        self.reader.unit(unit).boxed()
+    async fn unit(&self, unit: UnitKey) -> Result<Option<StoredUnit>, StoreError> {
+        self.reader.unit(unit).await
     }
 
-    fn units(
-        &self,
-        kind: UnitKind,
-        newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>> {
-        self.reader.units(kind, newest_over).boxed()
+    async fn units(&self, kind: UnitKind, newest_over: usize) -> Result<Vec<UnitKey>, StoreError> {
+        self.reader.units(kind, newest_over).await
     }
 
-    fn traces(&self, study: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
-        self.reader.traces(study).boxed()
+    async fn traces(&self, study: StudyId) -> Result<Vec<StoredTraces>, StoreError> {
+        self.reader.traces(study).await
     }
 
-    fn failed(&self) -> BoxFuture<'static, StoreError> {
-        let mut failed = self.failed.clone();
-        let closed = Arc::clone(&self.closed);
-        async move {
-            let failure = match failed.wait_for(Option::is_some).await {
-                Ok(failure) => failure.clone(),
-                Err(_) if closed.load(Ordering::Acquire) => None,
-                Err(_) => Some(StoreError::Failed(
-                    "the writer of the database has ended unexpectedly".into(),
-                )),
-            };
-            match failure {
-                Some(failure) => failure,
-                None => futures::future::pending().await,
-            }
+    async fn failed(&self) -> StoreError {
+        let failure = match self.failed.clone().wait_for(Option::is_some).await {
+            Ok(failure) => failure.clone(),
+            Err(_) if self.closed.load(Ordering::Acquire) => None,
+            Err(_) => Some(StoreError::Failed(
+                "the writer of the database has ended unexpectedly".into(),
+            )),
+        };
+        match failure {
+            Some(failure) => failure,
+            None => pending().await,
         }
-        .boxed()
     }
 
-    fn close(&self) -> BoxFuture<'_, ()> {
-        async move {
-            self.closed.store(true, Ordering::Release);
-            self.reader.pool.close().await;
-            // A failed writer is reported elsewhere; here it is only awaited.
-            let _ = self.commands.send(WriteCommand::Close).await;
-            let writing = self
-                .writing
-                .lock()
-                .expect("no code that holds this lock can panic")
-                .take();
-            if let Some(writing) = writing
-                && let Err(error) = writing.await
-            {
-                error!(%error, "the writer of the database did not close cleanly");
-            }
+    async fn close(&self) {
+        self.closed.store(true, Ordering::Release);
+        self.reader.pool.close().await;
+        // A failed writer is reported elsewhere; here it is only awaited.
+        let _ = self.commands.send(WriteCommand::Close).await;
+        let writing = self
+            .writing
+            .lock()
+            .expect("no code that holds this lock can panic")
+            .take();
+        if let Some(writing) = writing
+            && let Err(error) = writing.await
+        {
+            error!(%error, "the writer of the database did not close cleanly");
         }
-        .boxed()
     }
 }

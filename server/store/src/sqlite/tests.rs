@@ -16,7 +16,6 @@ use chefshat_engine::SeedPlan;
 use chefshat_engine::{ActionId, RULES_VERSION, RuleSetSpec, Seat, Seed};
 use chefshat_proto::v1;
 use futures::FutureExt as _;
-use futures::future::{BoxFuture, ready};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteConnection};
 use sqlx::{Connection as _, Executor as _};
 
@@ -376,15 +375,15 @@ async fn a_long_ephemeral_game_is_in_a_file_until_it_ends() {
 struct Counted(AtomicUsize);
 
 impl StoreFinished for Arc<Counted> {
-    fn store_finished<'a>(
-        &'a self,
-        _: &'a GameHeader,
+    async fn store_finished(
+        &self,
+        _: &GameHeader,
         entries: Vec<u8>,
         _: Option<Box<v1::RecordSummary>>,
         _: Option<Vec<u8>>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
+    ) -> Result<(), StoreError> {
         self.0.store(entries.len(), Ordering::Relaxed);
-        ready(Ok(())).boxed()
+        Ok(())
     }
 }
 

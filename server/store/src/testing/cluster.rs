@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
+use async_trait::async_trait;
 use chefshat_cluster::{Created, LeaseTimes, Load, Tables, Written};
 use chefshat_proto::v1;
 use chefshat_room::ids::{GameId, RoomId, StudyId, UnitId};
 use chefshat_room::journal::{Change, Entry, GameHeader};
 use chefshat_room::policy::Durability;
-use futures::FutureExt as _;
-use futures::future::{BoxFuture, pending};
+use futures::future::pending;
 use tokio::sync::{Mutex as AsyncMutex, broadcast, watch};
 use tokio::time::{Instant, sleep};
 
@@ -259,47 +259,39 @@ impl FakeJournal {
     }
 }
 
+#[async_trait]
 impl Journal for FakeJournal {
-    fn append<'a>(
-        &'a mut self,
-        entries: &'a mut Vec<Entry>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
-        async move {
-            self.reached().await;
-            let row = Row::Game(entries.clone());
-            let room = self.header.room_id.unit();
-            let written = (self.database.tables()).append(room, self.epoch, self.rows, row);
-            self.written(written)?;
-            self.rows += 1;
-            self.entries.append(entries);
-            Ok(())
-        }
-        .boxed()
+    async fn append(&mut self, entries: &mut Vec<Entry>) -> Result<(), StoreError> {
+        self.reached().await;
+        let row = Row::Game(entries.clone());
+        let room = self.header.room_id.unit();
+        let written = (self.database.tables()).append(room, self.epoch, self.rows, row);
+        self.written(written)?;
+        self.rows += 1;
+        self.entries.append(entries);
+        Ok(())
     }
 
-    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
-        async move { Ok(self.entries.clone()) }.boxed()
+    async fn entries(&mut self) -> Result<Vec<Entry>, StoreError> {
+        Ok(self.entries.clone())
     }
 
-    fn finish(
+    async fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            self.reached().await;
-            let room = self.header.room_id.unit();
-            let written = (self.database.tables()).finish(room, self.epoch, self.rows);
-            self.written(written)?;
-            let finished = &self.database.finished;
-            let game = finished.create(Arc::clone(&self.header), self.entries.clone());
-            game.await?.finish(summary, signature).await?;
-            if self.unanswered.wait_for(|it| !it).await.is_err() {
-                pending().await
-            }
-            Ok(())
+    ) -> Result<(), StoreError> {
+        self.reached().await;
+        let room = self.header.room_id.unit();
+        let written = (self.database.tables()).finish(room, self.epoch, self.rows);
+        self.written(written)?;
+        let finished = &self.database.finished;
+        let game = finished.create(Arc::clone(&self.header), self.entries.clone());
+        game.await?.finish(summary, signature).await?;
+        if self.unanswered.wait_for(|it| !it).await.is_err() {
+            pending().await
         }
-        .boxed()
+        Ok(())
     }
 }
 
@@ -311,449 +303,395 @@ fn created(created: Created, id: UnitId) -> Result<(), StoreError> {
     }
 }
 
+#[async_trait]
 impl Store for FakeStore {
     fn outlives_server(&self) -> bool {
         true
     }
 
-    fn create(
+    async fn create(
         &self,
         header: Arc<GameHeader>,
         entries: Vec<Entry>,
-    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
-        async move {
-            self.reached().await;
-            let room = header.room_id.unit();
-            {
-                let mut taken = self.codes_taken.lock().expect("no test panics here");
-                if taken.1.len() < taken.0 {
-                    taken.1.push(header.join_code.clone());
-                    return Err(StoreError::Taken(header.game_id.to_string()));
-                }
+    ) -> Result<Box<dyn Journal>, StoreError> {
+        self.reached().await;
+        let room = header.room_id.unit();
+        {
+            let mut taken = self.codes_taken.lock().expect("no test panics here");
+            if taken.1.len() < taken.0 {
+                taken.1.push(header.join_code.clone());
+                return Err(StoreError::Taken(header.game_id.to_string()));
             }
-            let row = Row::Game(entries.clone());
-            let epoch = match header.tournament {
-                None => {
-                    let made = (self.database.tables()).create(room, self.node(), row);
-                    created(made, room)?;
-                    Epoch::FIRST
-                }
-                Some(game) => {
-                    let unit = game.tournament.unit();
-                    let epochs = self.epochs.lock().expect("no test panics here");
-                    let epoch = epochs.get(&unit).copied();
-                    let epoch = epoch.ok_or(StoreError::Fenced(room))?;
-                    let made = (self.database.tables()).create_in(unit, epoch, room, row);
-                    created(made, room)?;
-                    epoch
-                }
-            };
-            {
-                let mut games = self.database.games.lock().expect("no test panics here");
-                games.insert(room, Arc::clone(&header));
-            }
-            let mut unanswered = self.creations_unanswered.subscribe();
-            (unanswered.wait_for(|it| !it).await).expect("the sender is here");
-            Ok(self.journal(&header, epoch, 1, entries))
         }
-        .boxed()
+        let row = Row::Game(entries.clone());
+        let epoch = match header.tournament {
+            None => {
+                let made = (self.database.tables()).create(room, self.node(), row);
+                created(made, room)?;
+                Epoch::FIRST
+            }
+            Some(game) => {
+                let unit = game.tournament.unit();
+                let epochs = self.epochs.lock().expect("no test panics here");
+                let epoch = epochs.get(&unit).copied();
+                let epoch = epoch.ok_or(StoreError::Fenced(room))?;
+                let made = (self.database.tables()).create_in(unit, epoch, room, row);
+                created(made, room)?;
+                epoch
+            }
+        };
+        {
+            let mut games = self.database.games.lock().expect("no test panics here");
+            games.insert(room, Arc::clone(&header));
+        }
+        let mut unanswered = self.creations_unanswered.subscribe();
+        (unanswered.wait_for(|it| !it).await).expect("the sender is here");
+        Ok(self.journal(&header, epoch, 1, entries))
     }
 
-    fn resumable_games(&self, _: u64) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>> {
+    async fn resumable_games(&self, _: u64) -> Result<Vec<ResumableGame>, StoreError> {
         unreachable!("a node resumes units")
     }
 
-    fn summary(
+    async fn summary(&self, game: GameId) -> Result<Option<v1::RecordSummary>, StoreError> {
+        self.database.finished.summary(game).await
+    }
+
+    async fn finished(&self, game: GameId) -> Result<Option<StoredGame>, StoreError> {
+        self.database.finished.finished(game).await
+    }
+
+    async fn list(
         &self,
-        game: GameId,
-    ) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
-        self.database.finished.summary(game)
-    }
-
-    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
-        self.database.finished.finished(game)
-    }
-
-    fn list<'a>(
-        &'a self,
-        filter: &'a v1::RecordFilter,
+        filter: &v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>> {
-        self.database.finished.list(filter, part, count)
+    ) -> Result<Vec<Listed>, StoreError> {
+        self.database.finished.list(filter, part, count).await
     }
 
-    fn import(
+    async fn import(
         &self,
         game: GameId,
         summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
-    ) -> BoxFuture<'_, Result<bool, StoreError>> {
-        self.database.finished.import(game, summary, lines)
+    ) -> Result<bool, StoreError> {
+        self.database.finished.import(game, summary, lines).await
     }
 
-    fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
-        self.database.finished.finished_games()
+    async fn finished_games(&self) -> Result<u64, StoreError> {
+        self.database.finished.finished_games().await
     }
 
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
-        self.database.finished.without_record_file()
+    async fn without_record_file(&self) -> Result<Vec<GameId>, StoreError> {
+        self.database.finished.without_record_file().await
     }
 
-    fn mark_record_written(&self, game: GameId) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.database.finished.mark_record_written(game)
+    async fn mark_record_written(&self, game: GameId) -> Result<(), StoreError> {
+        self.database.finished.mark_record_written(game).await
     }
 
-    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
+    async fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> Result<(), StoreError> {
         assert_eq!(unit.kind(), UnitKind::Tournament, "tests have no studies");
-        async move {
-            self.reached().await;
-            let id = unit.id();
-            let mut epochs = self.epochs.lock().expect("no test panics here");
-            match write {
-                UnitWrite::Create { header, first, .. } => {
-                    let first = first.expect("a tournament begins with a row");
-                    let row = Row::Unit(first.entries);
-                    created(self.database.tables().create(id, self.node(), row), id)?;
-                    epochs.insert(id, Epoch::FIRST);
-                    let mut all = (self.database.tournaments.lock()).expect("no test panics here");
-                    all.insert(id, (unit, header));
-                    Ok(())
-                }
-                UnitWrite::Append(row) => {
-                    let fenced = StoreError::Fenced(id);
-                    let epoch = *epochs.get(&id).ok_or(fenced.clone())?;
-                    let mut tables = self.database.tables();
-                    let entries = Row::Unit(row.entries);
-                    match tables.append(id, epoch, row.position, entries) {
-                        Written::Committed if row.over => {
-                            tables.finish(id, epoch, row.position + 1);
-                            Ok(())
-                        }
-                        Written::Committed => Ok(()),
-                        Written::Refused => Err(fenced),
-                    }
-                }
-                _ => unreachable!("a tournament is not rewritten"),
+        self.reached().await;
+        let id = unit.id();
+        let mut epochs = self.epochs.lock().expect("no test panics here");
+        match write {
+            UnitWrite::Create { header, first, .. } => {
+                let first = first.expect("a tournament begins with a row");
+                let row = Row::Unit(first.entries);
+                created(self.database.tables().create(id, self.node(), row), id)?;
+                epochs.insert(id, Epoch::FIRST);
+                let mut all = (self.database.tournaments.lock()).expect("no test panics here");
+                all.insert(id, (unit, header));
+                Ok(())
             }
+            UnitWrite::Append(row) => {
+                let fenced = StoreError::Fenced(id);
+                let epoch = *epochs.get(&id).ok_or(fenced.clone())?;
+                let mut tables = self.database.tables();
+                let entries = Row::Unit(row.entries);
+                match tables.append(id, epoch, row.position, entries) {
+                    Written::Committed if row.over => {
+                        tables.finish(id, epoch, row.position + 1);
+                        Ok(())
+                    }
+                    Written::Committed => Ok(()),
+                    Written::Refused => Err(fenced),
+                }
+            }
+            _ => unreachable!("a tournament is not rewritten"),
         }
-        .boxed()
     }
 
-    fn unit(&self, _: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
-        async { Ok(None) }.boxed()
+    async fn unit(&self, _: UnitKey) -> Result<Option<StoredUnit>, StoreError> {
+        Ok(None)
     }
 
     /// None is over, and a node resumes units.
-    fn units(&self, _: UnitKind, _: usize) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>> {
-        async { Ok(Vec::new()) }.boxed()
+    async fn units(&self, _: UnitKind, _: usize) -> Result<Vec<UnitKey>, StoreError> {
+        Ok(Vec::new())
     }
 
-    fn traces(&self, _: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
-        async { Ok(Vec::new()) }.boxed()
+    async fn traces(&self, _: StudyId) -> Result<Vec<StoredTraces>, StoreError> {
+        Ok(Vec::new())
     }
 
-    fn failed(&self) -> BoxFuture<'static, StoreError> {
-        pending().boxed()
+    async fn failed(&self) -> StoreError {
+        pending().await
     }
 
-    fn close(&self) -> BoxFuture<'_, ()> {
-        self.reached().boxed()
+    async fn close(&self) {
+        self.reached().await
     }
 }
 
+#[async_trait]
 impl ClusterStore for FakeStore {
     fn lease(&self) -> LeaseTimes {
         LeaseTimes::DEFAULT
     }
 
-    fn join(&self, info: NodeInfo) -> BoxFuture<'_, Result<NodeId, StoreError>> {
-        async move {
-            self.reached().await;
-            let node = self.database.tables().join(self.database.now_ms());
-            *self.node.lock().expect("no test panics here") = node;
-            let mut nodes = self.database.nodes.lock().expect("no test panics here");
-            nodes.insert(node, (info, Heartbeat::default()));
-            Ok(node)
-        }
-        .boxed()
+    async fn join(&self, info: NodeInfo) -> Result<NodeId, StoreError> {
+        self.reached().await;
+        let node = self.database.tables().join(self.database.now_ms());
+        *self.node.lock().expect("no test panics here") = node;
+        let mut nodes = self.database.nodes.lock().expect("no test panics here");
+        nodes.insert(node, (info, Heartbeat::default()));
+        Ok(node)
     }
 
-    fn beat(&self, heartbeat: Heartbeat) -> BoxFuture<'_, Result<Option<Beat>, StoreError>> {
-        async move {
-            self.may_panic("beat");
-            self.reached().await;
-            let mut lost = self.beats_lost.subscribe();
-            (lost.wait_for(|lost| !lost).await).expect("the sender is here");
-            let is_unanswered = self.beats_unanswered.send_if_modified(|left| {
-                let is_any = *left > 0;
-                *left = left.saturating_sub(1);
-                is_any
-            });
-            if is_unanswered {
-                return pending().await;
-            }
-            // So that it is seen when a node has no lease until the answer.
-            sleep(Duration::from_millis(1)).await;
-            let mut tables = self.database.tables();
-            let node = self.node();
-            if !tables.beat(node, self.database.now_ms()) {
-                return Ok(None);
-            }
-            let mut nodes = self.database.nodes.lock().expect("no test panics here");
-            nodes.entry(node).and_modify(|(_, said)| *said = heartbeat);
-            let drain = *self.database.drain.lock().expect("no test panics here");
-            Ok(Some(Beat {
-                owned: tables.owned_by(node),
-                drain: drain == Some(node),
-            }))
+    async fn beat(&self, heartbeat: Heartbeat) -> Result<Option<Beat>, StoreError> {
+        self.may_panic("beat");
+        self.reached().await;
+        let mut lost = self.beats_lost.subscribe();
+        (lost.wait_for(|lost| !lost).await).expect("the sender is here");
+        let is_unanswered = self.beats_unanswered.send_if_modified(|left| {
+            let is_any = *left > 0;
+            *left = left.saturating_sub(1);
+            is_any
+        });
+        if is_unanswered {
+            return pending().await;
         }
-        .boxed()
+        // So that it is seen when a node has no lease until the answer.
+        sleep(Duration::from_millis(1)).await;
+        let mut tables = self.database.tables();
+        let node = self.node();
+        if !tables.beat(node, self.database.now_ms()) {
+            return Ok(None);
+        }
+        let mut nodes = self.database.nodes.lock().expect("no test panics here");
+        nodes.entry(node).and_modify(|(_, said)| *said = heartbeat);
+        let drain = *self.database.drain.lock().expect("no test panics here");
+        Ok(Some(Beat {
+            owned: tables.owned_by(node),
+            drain: drain == Some(node),
+        }))
     }
 
-    fn orphans(&self, count: usize) -> BoxFuture<'_, Result<Vec<(UnitId, Epoch)>, StoreError>> {
-        async move {
-            self.may_panic("orphans");
-            self.reached().await;
-            let mut orphans = self.database.orphans();
-            orphans.retain(|(id, _)| !self.database.is_ephemeral(*id));
-            orphans.truncate(count);
-            Ok(orphans)
-        }
-        .boxed()
+    async fn orphans(&self, count: usize) -> Result<Vec<(UnitId, Epoch)>, StoreError> {
+        self.may_panic("orphans");
+        self.reached().await;
+        let mut orphans = self.database.orphans();
+        orphans.retain(|(id, _)| !self.database.is_ephemeral(*id));
+        orphans.truncate(count);
+        Ok(orphans)
     }
 
-    fn handed_over(&self) -> BoxFuture<'_, (UnitId, Epoch)> {
-        async move {
-            let mut released = self.released.lock().await;
-            loop {
-                let Released { by, unit, next } =
-                    (released.recv().await).expect("a test releases few units");
-                if by != self.node() && next.is_none_or(|next| next == self.node()) {
-                    return unit;
-                }
+    async fn handed_over(&self) -> (UnitId, Epoch) {
+        let mut released = self.released.lock().await;
+        loop {
+            let Released { by, unit, next } =
+                (released.recv().await).expect("a test releases few units");
+            if by != self.node() && next.is_none_or(|next| next == self.node()) {
+                return unit;
             }
         }
-        .boxed()
     }
 
-    fn tidy(&self) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            self.may_panic("tidy");
-            self.reached().await;
-            let mut orphans = self.database.orphans();
-            orphans.retain(|(id, _)| self.database.is_ephemeral(*id));
-            let mut tables = self.database.tables();
-            for (id, epoch) in orphans {
-                let rows = tables.journal(id).len() as u64;
-                tables.finish(id, epoch, rows);
-            }
-            Ok(())
+    async fn tidy(&self) -> Result<(), StoreError> {
+        self.may_panic("tidy");
+        self.reached().await;
+        let mut orphans = self.database.orphans();
+        orphans.retain(|(id, _)| self.database.is_ephemeral(*id));
+        let mut tables = self.database.tables();
+        for (id, epoch) in orphans {
+            let rows = tables.journal(id).len() as u64;
+            tables.finish(id, epoch, rows);
         }
-        .boxed()
+        Ok(())
     }
 
-    fn claim_all(
+    async fn claim_all(
         &self,
         orphans: Vec<(UnitId, Epoch)>,
-    ) -> BoxFuture<'_, Result<Vec<Option<Epoch>>, StoreError>> {
-        async move {
-            self.may_panic("claim");
-            self.reached().await;
-            let games = self.database.games.lock().expect("no test panics here");
-            let restarted = |id| {
-                let at = Duration::ZERO;
-                let change = Change::ServerRestarted;
-                games
-                    .get(&id)
-                    .map(|_| Row::Game(vec![Entry { at, change }]))
-            };
-            let now_ms = self.database.now_ms();
-            let mut tables = self.database.tables();
-            let claim = |(unit, seen)| tables.claim(unit, seen, self.node(), now_ms, restarted);
-            Ok(orphans.into_iter().map(claim).collect())
-        }
-        .boxed()
+    ) -> Result<Vec<Option<Epoch>>, StoreError> {
+        self.may_panic("claim");
+        self.reached().await;
+        let games = self.database.games.lock().expect("no test panics here");
+        let restarted = |id| {
+            let at = Duration::ZERO;
+            let change = Change::ServerRestarted;
+            games
+                .get(&id)
+                .map(|_| Row::Game(vec![Entry { at, change }]))
+        };
+        let now_ms = self.database.now_ms();
+        let mut tables = self.database.tables();
+        let claim = |(unit, seen)| tables.claim(unit, seen, self.node(), now_ms, restarted);
+        Ok(orphans.into_iter().map(claim).collect())
     }
 
-    fn load(
-        &self,
-        unit: UnitId,
-        epoch: Epoch,
-    ) -> BoxFuture<'_, Result<Option<LoadedUnit>, StoreError>> {
-        async move {
-            self.may_panic("load");
-            self.reached().await;
-            self.loads.send_modify(|loads| *loads += 1);
-            let mut held = self.loads_held.subscribe();
-            (held.wait_for(|held| !held).await).expect("the sender is here");
-            let tables = self.database.tables();
-            if tables.owner(unit) != Some(self.node()) || tables.epoch(unit) != Some(epoch) {
-                return Ok(None);
-            }
-            let (mut games, mut stored) = (Vec::new(), None);
-            let headers = self.database.games.lock().expect("no test panics here");
-            for id in tables.open_items(unit) {
-                let journal = tables.journal(id);
-                let rows = journal.len() as u64;
-                if let Some(header) = headers.get(&id) {
-                    let entries = journal.iter().flat_map(|row| match &row.entries {
-                        Row::Game(entries) => entries.clone(),
-                        Row::Unit(_) => Vec::new(),
-                    });
-                    let entries: Vec<_> = entries.collect();
-                    games.push(ResumableGame {
-                        header: GameHeader::clone(header),
-                        journal: self.journal(header, epoch, rows, entries.clone()),
-                        entries,
-                        concluded: false,
-                    });
-                    continue;
-                }
-                let mut epochs = self.epochs.lock().expect("no test panics here");
-                epochs.insert(id, epoch);
-                let rows = journal.iter().filter_map(|row| match &row.entries {
-                    Row::Unit(entries) => Some(entries.clone()),
-                    Row::Game(_) => None,
+    async fn load(&self, unit: UnitId, epoch: Epoch) -> Result<Option<LoadedUnit>, StoreError> {
+        self.may_panic("load");
+        self.reached().await;
+        self.loads.send_modify(|loads| *loads += 1);
+        let mut held = self.loads_held.subscribe();
+        (held.wait_for(|held| !held).await).expect("the sender is here");
+        let tables = self.database.tables();
+        if tables.owner(unit) != Some(self.node()) || tables.epoch(unit) != Some(epoch) {
+            return Ok(None);
+        }
+        let (mut games, mut stored) = (Vec::new(), None);
+        let headers = self.database.games.lock().expect("no test panics here");
+        for id in tables.open_items(unit) {
+            let journal = tables.journal(id);
+            let rows = journal.len() as u64;
+            if let Some(header) = headers.get(&id) {
+                let entries = journal.iter().flat_map(|row| match &row.entries {
+                    Row::Game(entries) => entries.clone(),
+                    Row::Unit(_) => Vec::new(),
                 });
-                let all = (self.database.tournaments.lock()).expect("no test panics here");
-                let (unit, header) = all[&id].clone();
-                stored = Some((unit, StoredUnit::new(header, rows.collect())));
+                let entries: Vec<_> = entries.collect();
+                games.push(ResumableGame {
+                    header: GameHeader::clone(header),
+                    journal: self.journal(header, epoch, rows, entries.clone()),
+                    entries,
+                    concluded: false,
+                });
+                continue;
             }
-            Ok(Some(LoadedUnit { stored, games }))
+            let mut epochs = self.epochs.lock().expect("no test panics here");
+            epochs.insert(id, epoch);
+            let rows = journal.iter().filter_map(|row| match &row.entries {
+                Row::Unit(entries) => Some(entries.clone()),
+                Row::Game(_) => None,
+            });
+            let all = (self.database.tournaments.lock()).expect("no test panics here");
+            let (unit, header) = all[&id].clone();
+            stored = Some((unit, StoredUnit::new(header, rows.collect())));
         }
-        .boxed()
+        Ok(Some(LoadedUnit { stored, games }))
     }
 
-    fn release(
+    async fn release(
         &self,
         unit: UnitId,
         epoch: Epoch,
         next: Option<NodeId>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            self.may_panic("release");
-            self.reached().await;
-            self.database.tables().release(unit, epoch);
-            // Nobody may listen.
-            let _ = (self.database.released).send(Released {
-                by: self.node(),
-                unit: (unit, epoch),
-                next,
-            });
-            Ok(())
+    ) -> Result<(), StoreError> {
+        self.may_panic("release");
+        self.reached().await;
+        self.database.tables().release(unit, epoch);
+        // Nobody may listen.
+        let _ = (self.database.released).send(Released {
+            by: self.node(),
+            unit: (unit, epoch),
+            next,
+        });
+        Ok(())
+    }
+
+    async fn leave(&self) -> Result<bool, StoreError> {
+        self.may_panic("leave");
+        self.reached().await;
+        self.database.tables().leave(self.node());
+        Ok(!self.database.knows(self.node()))
+    }
+
+    async fn locate(&self, id: UnitId) -> Result<Option<Location>, StoreError> {
+        self.reached().await;
+        let tables = self.database.tables();
+        let games = self.database.games.lock().expect("no test panics here");
+        let units = (self.database.tournaments.lock()).expect("no test panics here");
+        let subject = match games.get(&id) {
+            Some(header) => Some(Subject::Room(header.room_id)),
+            None => units.get(&id).map(|(unit, _)| Subject::Unit(*unit)),
+        };
+        Ok(
+            (tables.epoch(id).zip(subject)).map(|(epoch, subject)| Location {
+                subject,
+                unit: id,
+                node: tables.owner(id),
+                epoch,
+                over: false,
+            }),
+        )
+    }
+
+    async fn locate_code(&self, _join_code: &str) -> Result<Option<Location>, StoreError> {
+        Ok(None)
+    }
+
+    async fn locate_game(&self, _: GameId) -> Result<Option<Location>, StoreError> {
+        Ok(None)
+    }
+
+    async fn ended_room(&self, room: RoomId) -> Result<Option<ResumableGame>, StoreError> {
+        self.reached().await;
+        self.ends_read.send_modify(|count| *count += 1);
+        // As a query takes its time.
+        sleep(Duration::from_millis(1)).await;
+        if *self.ends_unreadable.borrow() {
+            return Err(StoreError::Failed("as the test wants it".into()));
         }
-        .boxed()
+        let tables = self.database.tables();
+        let games = self.database.games.lock().expect("no test panics here");
+        let Some(header) = games.get(&room.unit()) else {
+            return Ok(None);
+        };
+        let rows = tables.journal(room.unit());
+        let entries = rows.iter().flat_map(|row| match &row.entries {
+            Row::Game(entries) => entries.clone(),
+            Row::Unit(_) => Vec::new(),
+        });
+        let entries: Vec<_> = entries.collect();
+        let count = rows.len() as u64;
+        Ok(Some(ResumableGame {
+            header: GameHeader::clone(header),
+            journal: self.journal(header, Epoch::FIRST, count, entries.clone()),
+            entries,
+            concluded: true,
+        }))
     }
 
-    fn leave(&self) -> BoxFuture<'_, Result<bool, StoreError>> {
-        async move {
-            self.may_panic("leave");
-            self.reached().await;
-            self.database.tables().leave(self.node());
-            Ok(!self.database.knows(self.node()))
-        }
-        .boxed()
+    async fn alive(&self) -> Result<Vec<LivingNode>, StoreError> {
+        self.reached().await;
+        let tables = self.database.tables();
+        let now_ms = self.database.now_ms();
+        let nodes = self.database.nodes.lock().expect("no test panics here");
+        let living = nodes.iter().filter(|(id, _)| {
+            (tables.last_beat(**id)).is_some_and(|beat| !LeaseTimes::DEFAULT.expired(beat, now_ms))
+        });
+        let living = living.map(|(id, (info, said))| LivingNode {
+            id: *id,
+            info: info.clone(),
+            reached: said.reached,
+            load: (said.reached && !said.drains).then_some(Load {
+                rooms: said.rooms,
+                capacity: info.capacity,
+            }),
+        });
+        Ok(living.collect())
     }
 
-    fn locate(&self, id: UnitId) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
-        async move {
-            self.reached().await;
-            let tables = self.database.tables();
-            let games = self.database.games.lock().expect("no test panics here");
-            let units = (self.database.tournaments.lock()).expect("no test panics here");
-            let subject = match games.get(&id) {
-                Some(header) => Some(Subject::Room(header.room_id)),
-                None => units.get(&id).map(|(unit, _)| Subject::Unit(*unit)),
-            };
-            Ok(
-                (tables.epoch(id).zip(subject)).map(|(epoch, subject)| Location {
-                    subject,
-                    unit: id,
-                    node: tables.owner(id),
-                    epoch,
-                    over: false,
-                }),
-            )
-        }
-        .boxed()
+    async fn nodes(&self) -> Result<Vec<NodeStatus>, StoreError> {
+        Ok(Vec::new())
     }
 
-    fn locate_code<'a>(
-        &'a self,
-        _join_code: &'a str,
-    ) -> BoxFuture<'a, Result<Option<Location>, StoreError>> {
-        async { Ok(None) }.boxed()
-    }
-
-    fn locate_game(&self, _: GameId) -> BoxFuture<'_, Result<Option<Location>, StoreError>> {
-        async { Ok(None) }.boxed()
-    }
-
-    fn ended_room(&self, room: RoomId) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
-        async move {
-            self.reached().await;
-            self.ends_read.send_modify(|count| *count += 1);
-            // As a query takes its time.
-            sleep(Duration::from_millis(1)).await;
-            if *self.ends_unreadable.borrow() {
-                return Err(StoreError::Failed("as the test wants it".into()));
-            }
-            let tables = self.database.tables();
-            let games = self.database.games.lock().expect("no test panics here");
-            let Some(header) = games.get(&room.unit()) else {
-                return Ok(None);
-            };
-            let rows = tables.journal(room.unit());
-            let entries = rows.iter().flat_map(|row| match &row.entries {
-                Row::Game(entries) => entries.clone(),
-                Row::Unit(_) => Vec::new(),
-            });
-            let entries: Vec<_> = entries.collect();
-            let count = rows.len() as u64;
-            Ok(Some(ResumableGame {
-                header: GameHeader::clone(header),
-                journal: self.journal(header, Epoch::FIRST, count, entries.clone()),
-                entries,
-                concluded: true,
-            }))
-        }
-        .boxed()
-    }
-
-    fn alive(&self) -> BoxFuture<'_, Result<Vec<LivingNode>, StoreError>> {
-        async move {
-            self.reached().await;
-            let tables = self.database.tables();
-            let now_ms = self.database.now_ms();
-            let nodes = self.database.nodes.lock().expect("no test panics here");
-            let living = nodes.iter().filter(|(id, _)| {
-                (tables.last_beat(**id))
-                    .is_some_and(|beat| !LeaseTimes::DEFAULT.expired(beat, now_ms))
-            });
-            let living = living.map(|(id, (info, said))| LivingNode {
-                id: *id,
-                info: info.clone(),
-                reached: said.reached,
-                load: (said.reached && !said.drains).then_some(Load {
-                    rooms: said.rooms,
-                    capacity: info.capacity,
-                }),
-            });
-            Ok(living.collect())
-        }
-        .boxed()
-    }
-
-    fn nodes(&self) -> BoxFuture<'_, Result<Vec<NodeStatus>, StoreError>> {
-        async { Ok(Vec::new()) }.boxed()
-    }
-
-    fn request_drain(&self, node: NodeId) -> BoxFuture<'_, Result<bool, StoreError>> {
-        async move {
-            self.database.ask_to_drain(node);
-            Ok(self.database.knows(node))
-        }
-        .boxed()
+    async fn request_drain(&self, node: NodeId) -> Result<bool, StoreError> {
+        self.database.ask_to_drain(node);
+        Ok(self.database.knows(node))
     }
 }

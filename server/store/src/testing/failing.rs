@@ -5,10 +5,9 @@ use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
+use async_trait::async_trait;
 use chefshat_proto::v1;
 use chefshat_record::pseudonym::Pseudonym;
-use futures::FutureExt as _;
-use futures::future::{BoxFuture, ready};
 use tokio::sync::{Semaphore, watch};
 
 use crate::units::{StoredTraces, StoredUnit, UnitKey, UnitKind, UnitWrite};
@@ -82,160 +81,135 @@ fn injected_failure() -> StoreError {
     StoreError::Failed("injected failure".into())
 }
 
+#[async_trait]
 impl Store for FailingStore {
     fn outlives_server(&self) -> bool {
         false
     }
 
-    fn create(
+    async fn create(
         &self,
         header: Arc<GameHeader>,
         entries: Vec<Entry>,
-    ) -> BoxFuture<'_, Result<Box<dyn Journal>, StoreError>> {
-        let appends_left = Arc::clone(&self.appends_left);
-        let has_failed = self.has_failed.clone();
-        let unreadable = Arc::clone(&self.journals_unreadable);
-        let inner = self.inner.create(header, entries);
-        async move {
-            let journal: Box<dyn Journal> = Box::new(FailingJournal {
-                inner: inner.await?,
-                appends_left,
-                has_failed,
-                unreadable,
-            });
-            Ok(journal)
-        }
-        .boxed()
+    ) -> Result<Box<dyn Journal>, StoreError> {
+        Ok(Box::new(FailingJournal {
+            inner: self.inner.create(header, entries).await?,
+            appends_left: Arc::clone(&self.appends_left),
+            has_failed: self.has_failed.clone(),
+            unreadable: Arc::clone(&self.journals_unreadable),
+        }))
     }
 
-    fn resumable_games(
-        &self,
-        ended_since_ms: u64,
-    ) -> BoxFuture<'_, Result<Vec<ResumableGame>, StoreError>> {
-        self.inner.resumable_games(ended_since_ms)
+    async fn resumable_games(&self, ended_since_ms: u64) -> Result<Vec<ResumableGame>, StoreError> {
+        self.inner.resumable_games(ended_since_ms).await
     }
 
-    fn summary(
-        &self,
-        game: GameId,
-    ) -> BoxFuture<'_, Result<Option<v1::RecordSummary>, StoreError>> {
+    async fn summary(&self, game: GameId) -> Result<Option<v1::RecordSummary>, StoreError> {
         self.count(Read::Summary);
-        self.inner.summary(game)
+        self.inner.summary(game).await
     }
 
-    fn finished(&self, game: GameId) -> BoxFuture<'_, Result<Option<StoredGame>, StoreError>> {
+    async fn finished(&self, game: GameId) -> Result<Option<StoredGame>, StoreError> {
         if self.games_unreadable.load(Ordering::Relaxed) {
             let unreadable = StoreError::Unreadable("an injected problem".to_owned());
-            return ready(Err(unreadable)).boxed();
+            return Err(unreadable);
         }
-        let finished = self.inner.finished(game);
-        let counted = |found: &Result<Option<_>, _>| {
-            if let Ok(Some(_)) = found {
-                self.count(Read::Game);
-            }
-        };
-        finished.inspect(counted).boxed()
+        let found = self.inner.finished(game).await?;
+        if found.is_some() {
+            self.count(Read::Game);
+        }
+        Ok(found)
     }
 
-    fn list<'a>(
-        &'a self,
-        filter: &'a v1::RecordFilter,
+    async fn list(
+        &self,
+        filter: &v1::RecordFilter,
         part: Part,
         count: usize,
-    ) -> BoxFuture<'a, Result<Vec<Listed>, StoreError>> {
+    ) -> Result<Vec<Listed>, StoreError> {
         self.count(Read::List);
-        self.inner.list(filter, part, count)
+        self.inner.list(filter, part, count).await
     }
 
-    fn import(
+    async fn import(
         &self,
         game: GameId,
         summary: v1::RecordSummary,
         lines: Arc<[v1::RecordLine]>,
-    ) -> BoxFuture<'_, Result<bool, StoreError>> {
-        self.inner.import(game, summary, lines)
+    ) -> Result<bool, StoreError> {
+        self.inner.import(game, summary, lines).await
     }
 
-    fn finished_games(&self) -> BoxFuture<'_, Result<u64, StoreError>> {
-        self.inner.finished_games()
+    async fn finished_games(&self) -> Result<u64, StoreError> {
+        self.inner.finished_games().await
     }
 
-    fn prunable(
+    async fn prunable(
         &self,
         keep: Keep,
         after: u64,
         count: usize,
-    ) -> BoxFuture<'_, Result<Vec<(u64, GameId)>, StoreError>> {
-        self.inner.prunable(keep, after, count)
+    ) -> Result<Vec<(u64, GameId)>, StoreError> {
+        self.inner.prunable(keep, after, count).await
     }
 
-    fn prune(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
-        self.inner.prune(games)
+    async fn prune(&self, games: Vec<GameId>) -> Result<Vec<GameId>, StoreError> {
+        self.inner.prune(games).await
     }
 
-    fn delete(&self, games: Vec<GameId>) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.inner.delete(games)
+    async fn delete(&self, games: Vec<GameId>) -> Result<(), StoreError> {
+        self.inner.delete(games).await
     }
 
-    fn forget<'a>(&'a self, who: &'a Pseudonym) -> BoxFuture<'a, Result<Forgotten, ForgetError>> {
-        self.inner.forget(who)
+    async fn forget(&self, who: &Pseudonym) -> Result<Forgotten, ForgetError> {
+        self.inner.forget(who).await
     }
 
-    fn without_record_file(&self) -> BoxFuture<'_, Result<Vec<GameId>, StoreError>> {
-        self.inner.without_record_file()
+    async fn without_record_file(&self) -> Result<Vec<GameId>, StoreError> {
+        self.inner.without_record_file().await
     }
 
-    fn mark_record_written(&self, game: GameId) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.inner.mark_record_written(game)
+    async fn mark_record_written(&self, game: GameId) -> Result<(), StoreError> {
+        self.inner.mark_record_written(game).await
     }
 
-    fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> BoxFuture<'_, Result<(), StoreError>> {
-        async move {
-            if matches!(
-                (unit.kind(), &write),
-                (UnitKind::Tournament, UnitWrite::Append(_))
-            ) {
-                let permit = self.tournament_commits.acquire().await;
-                permit.expect("the semaphore is never closed").forget();
-            }
-            self.inner.write_unit(unit, write).await
+    async fn write_unit(&self, unit: UnitKey, write: UnitWrite) -> Result<(), StoreError> {
+        if matches!(
+            (unit.kind(), &write),
+            (UnitKind::Tournament, UnitWrite::Append(_))
+        ) {
+            let permit = self.tournament_commits.acquire().await;
+            permit.expect("the semaphore is never closed").forget();
         }
-        .boxed()
+        self.inner.write_unit(unit, write).await
     }
 
-    fn unit(&self, unit: UnitKey) -> BoxFuture<'_, Result<Option<StoredUnit>, StoreError>> {
+    async fn unit(&self, unit: UnitKey) -> Result<Option<StoredUnit>, StoreError> {
         let unreadable = self.unreadable.lock();
-        match (unreadable.expect("no code that holds it can panic")).contains(&unit.id()) {
-            true => ready(Err(injected_failure())).boxed(),
-            false => self.inner.unit(unit),
+        let fails = (unreadable.expect("no code that holds it can panic")).contains(&unit.id());
+        match fails {
+            true => Err(injected_failure()),
+            false => self.inner.unit(unit).await,
         }
     }
 
-    fn units(
-        &self,
-        kind: UnitKind,
-        newest_over: usize,
-    ) -> BoxFuture<'_, Result<Vec<UnitKey>, StoreError>> {
+    async fn units(&self, kind: UnitKind, newest_over: usize) -> Result<Vec<UnitKey>, StoreError> {
         self.count(Read::Units);
-        self.inner.units(kind, newest_over)
+        self.inner.units(kind, newest_over).await
     }
 
-    fn traces(&self, study: StudyId) -> BoxFuture<'_, Result<Vec<StoredTraces>, StoreError>> {
-        self.inner.traces(study)
+    async fn traces(&self, study: StudyId) -> Result<Vec<StoredTraces>, StoreError> {
+        self.inner.traces(study).await
     }
 
-    fn failed(&self) -> BoxFuture<'static, StoreError> {
+    async fn failed(&self) -> StoreError {
         let mut has_failed = self.has_failed.subscribe();
-        async move {
-            // The sender lives as long as the store, whose failure this waits for.
-            let _ = has_failed.wait_for(|failed| *failed).await;
-            injected_failure()
-        }
-        .boxed()
+        (has_failed.wait_for(|failed| *failed).await).expect("the sender is here");
+        injected_failure()
     }
 
-    fn close(&self) -> BoxFuture<'_, ()> {
-        self.inner.close()
+    async fn close(&self) {
+        self.inner.close().await
     }
 }
 
@@ -246,11 +220,9 @@ struct FailingJournal {
     unreadable: Arc<AtomicBool>,
 }
 
+#[async_trait]
 impl Journal for FailingJournal {
-    fn append<'a>(
-        &'a mut self,
-        entries: &'a mut Vec<Entry>,
-    ) -> BoxFuture<'a, Result<(), StoreError>> {
+    async fn append(&mut self, entries: &mut Vec<Entry>) -> Result<(), StoreError> {
         let allowed = self
             .appends_left
             .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
@@ -258,24 +230,24 @@ impl Journal for FailingJournal {
             })
             .is_ok();
         if allowed {
-            return self.inner.append(entries);
+            return self.inner.append(entries).await;
         }
         self.has_failed.send_replace(true);
-        ready(Err(injected_failure())).boxed()
+        Err(injected_failure())
     }
 
-    fn entries(&mut self) -> BoxFuture<'_, Result<Vec<Entry>, StoreError>> {
+    async fn entries(&mut self) -> Result<Vec<Entry>, StoreError> {
         match self.unreadable.load(Ordering::Relaxed) {
-            true => ready(Err(injected_failure())).boxed(),
-            false => self.inner.entries(),
+            true => Err(injected_failure()),
+            false => self.inner.entries().await,
         }
     }
 
-    fn finish(
+    async fn finish(
         &mut self,
         summary: Option<Box<v1::RecordSummary>>,
         signature: Option<v1::RecordSignature>,
-    ) -> BoxFuture<'_, Result<(), StoreError>> {
-        self.inner.finish(summary, signature)
+    ) -> Result<(), StoreError> {
+        self.inner.finish(summary, signature).await
     }
 }
