@@ -19,8 +19,6 @@ use chefshat_server::peers::PeerPort;
 use chefshat_server::serve::{ServeError, Server};
 use chefshat_server::store::MemoryStore;
 use chefshat_server::tls::TlsFiles;
-use futures::FutureExt as _;
-use futures::future::{BoxFuture, ready};
 use tokio::task::JoinHandle;
 use tokio_util::sync::{CancellationToken, DropGuard};
 
@@ -48,28 +46,28 @@ struct View {
 }
 
 impl View {
-    fn location(&self, node: Option<usize>) -> BoxFuture<'static, Location> {
-        ready(match node {
+    fn location(&self, node: Option<usize>) -> Location {
+        match node {
             None => Location::Nowhere,
             Some(node) if node == self.node => Location::Here,
             Some(node) => Location::Node(self.peers[node].clone()),
-        })
-        .boxed()
+        }
     }
 }
 
+#[tonic::async_trait]
 impl Directory for View {
-    fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)> {
+    async fn nodes(&self) -> (Arc<str>, Vec<Peer>) {
         let mut others = self.peers.clone();
         let own = others.remove(self.node);
-        ready((own.node, others)).boxed()
+        (own.node, others)
     }
 
-    fn is_over(&self, _tournament: TournamentId) -> BoxFuture<'_, bool> {
-        ready(false).boxed()
+    async fn is_over(&self, _tournament: TournamentId) -> bool {
+        false
     }
 
-    fn locate<'a>(&'a self, found_by: &'a FoundBy, _caller: Key) -> BoxFuture<'a, Location> {
+    async fn locate(&self, found_by: &FoundBy, _caller: Key) -> Location {
         let places = self.places.lock().expect("nothing panics under this lock");
         self.location(match found_by {
             FoundBy::Id(id) => {

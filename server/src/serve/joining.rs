@@ -106,8 +106,7 @@ mod tests {
 
     use chefshat_admission::limits::Key;
     use chefshat_room::ids::TournamentId;
-    use futures::FutureExt as _;
-    use futures::future::{BoxFuture, ready};
+    use futures::future::ready;
 
     use super::*;
     use crate::cluster::{FoundBy, Location};
@@ -118,25 +117,26 @@ mod tests {
         unreached: Vec<&'static str>,
     }
 
+    #[tonic::async_trait]
     impl Directory for Others {
-        fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)> {
+        async fn nodes(&self) -> (Arc<str>, Vec<Peer>) {
             let nodes = self.nodes.lock().expect("no panic");
             let peers = nodes.iter().map(|node| Peer {
                 node: Arc::from(*node),
                 endpoint: Arc::from("192.0.2.1:1"),
             });
-            ready((Arc::from("own"), peers.collect())).boxed()
+            (Arc::from("own"), peers.collect())
         }
 
-        fn unreached(&self) -> BoxFuture<'_, BTreeSet<Arc<str>>> {
-            ready(self.unreached.iter().map(|node| Arc::from(*node)).collect()).boxed()
+        async fn unreached(&self) -> BTreeSet<Arc<str>> {
+            self.unreached.iter().map(|node| Arc::from(*node)).collect()
         }
 
-        fn is_over(&self, _: TournamentId) -> BoxFuture<'_, bool> {
+        async fn is_over(&self, _: TournamentId) -> bool {
             unreachable!("nobody asks")
         }
 
-        fn locate<'a>(&'a self, _: &'a FoundBy, _: Key) -> BoxFuture<'a, Location> {
+        async fn locate(&self, _: &FoundBy, _: Key) -> Location {
             unreachable!("nobody asks")
         }
 

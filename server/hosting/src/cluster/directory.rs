@@ -5,8 +5,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::Arc;
 
-use futures::FutureExt as _;
-use futures::future::{BoxFuture, ready};
+use async_trait::async_trait;
 
 use chefshat_admission::limits::Key;
 use chefshat_cluster::Load;
@@ -74,35 +73,33 @@ impl From<&str> for FoundBy {
 /// Finds the owners of rooms and tournaments. It may remember nodes that it has named; a node that
 /// is not the owner any more says so, and is then forgotten. That nobody has something is never
 /// remembered.
+#[async_trait]
 pub trait Directory: Send + Sync + 'static {
     /// The name of this node, and the other nodes that are alive.
-    fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)>;
+    async fn nodes(&self) -> (Arc<str>, Vec<Peer>);
 
     /// The names of the nodes that have not been reached since they joined.
-    fn unreached(&self) -> BoxFuture<'_, BTreeSet<Arc<str>>> {
-        ready(BTreeSet::new()).boxed()
+    async fn unreached(&self) -> BTreeSet<Arc<str>> {
+        BTreeSet::new()
     }
 
     /// The node that something new is for, if this node, which is this full, is not.
-    fn place(&self, _own: Load) -> BoxFuture<'_, Option<Peer>> {
-        ready(None).boxed()
+    async fn place(&self, _own: Load) -> Option<Peer> {
+        None
     }
 
     /// This node could not be reached: for some time, nothing new is for it.
     fn avoid(&self, _node: &Peer) {}
 
     /// The location of a room or tournament that is not in memory, for this caller.
-    fn locate<'a>(&'a self, found_by: &'a FoundBy, caller: Key) -> BoxFuture<'a, Location>;
+    async fn locate(&self, found_by: &FoundBy, caller: Key) -> Location;
 
     /// Whether a tournament of another node is over, so that no record of its games is withheld.
-    fn is_over(&self, tournament: TournamentId) -> BoxFuture<'_, bool>;
+    async fn is_over(&self, tournament: TournamentId) -> bool;
 
     /// The room of a game that is over, if its end is still shown.
-    fn ended_room(
-        &self,
-        _room: RoomId,
-    ) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
-        ready(Ok(None)).boxed()
+    async fn ended_room(&self, _room: RoomId) -> Result<Option<ResumableGame>, StoreError> {
+        Ok(None)
     }
 
     /// The node that was named last does not own it any more, or cannot be reached.
@@ -119,17 +116,18 @@ impl fmt::Debug for dyn Directory {
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SingleServer;
 
+#[async_trait]
 impl Directory for SingleServer {
-    fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)> {
-        ready((Arc::from(""), Vec::new())).boxed()
+    async fn nodes(&self) -> (Arc<str>, Vec<Peer>) {
+        (Arc::from(""), Vec::new())
     }
 
-    fn is_over(&self, _tournament: TournamentId) -> BoxFuture<'_, bool> {
-        ready(false).boxed()
+    async fn is_over(&self, _tournament: TournamentId) -> bool {
+        false
     }
 
-    fn locate<'a>(&'a self, _found_by: &'a FoundBy, _caller: Key) -> BoxFuture<'a, Location> {
-        ready(Location::Nowhere).boxed()
+    async fn locate(&self, _found_by: &FoundBy, _caller: Key) -> Location {
+        Location::Nowhere
     }
 
     fn forget(&self, _found_by: &FoundBy) {}

@@ -4,8 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
-use futures::FutureExt as _;
-use futures::future::BoxFuture;
+use async_trait::async_trait;
 use tokio::sync::Mutex as AsyncMutex;
 use tokio::time::{Instant, timeout};
 use tracing::{debug, warn};
@@ -158,90 +157,79 @@ impl StoreDirectory {
     }
 }
 
+#[async_trait]
 impl Directory for StoreDirectory {
-    fn ended_room(&self, room: RoomId) -> BoxFuture<'_, Result<Option<ResumableGame>, StoreError>> {
-        self.store.ended_room(room)
+    async fn ended_room(&self, room: RoomId) -> Result<Option<ResumableGame>, StoreError> {
+        self.store.ended_room(room).await
     }
 
-    fn locate<'a>(&'a self, found_by: &'a FoundBy, caller: Key) -> BoxFuture<'a, Location> {
-        async move {
-            if let Some(peer) = self.known().get(found_by) {
-                return Location::Node(peer.clone());
+    async fn locate(&self, found_by: &FoundBy, caller: Key) -> Location {
+        if let Some(peer) = self.known().get(found_by) {
+            return Location::Node(peer.clone());
+        }
+        let read = timeout(LOOK_LIMIT, self.read(found_by, caller)).await;
+        let location = match read {
+            Ok(Ok(location)) => location,
+            Ok(Err(error)) => {
+                debug!(%error, "the owner of a room or tournament cannot be found");
+                Location::Unknown
             }
-            let read = timeout(LOOK_LIMIT, self.read(found_by, caller)).await;
-            let location = match read {
-                Ok(Ok(location)) => location,
-                Ok(Err(error)) => {
-                    debug!(%error, "the owner of a room or tournament cannot be found");
-                    Location::Unknown
-                }
-                Err(_) => {
-                    debug!("the database did not say in time who owns a room or tournament");
-                    Location::Unknown
-                }
+            Err(_) => {
+                debug!("the database did not say in time who owns a room or tournament");
+                Location::Unknown
+            }
+        };
+        if let Location::Node(peer) = &location {
+            let mut known = self.known();
+            if known.len() >= MAX_REMEMBERED {
+                known.clear();
+            }
+            known.insert(found_by.clone(), peer.clone());
+        }
+        location
+    }
+
+    async fn nodes(&self) -> (Arc<str>, Vec<Peer>) {
+        let mut nodes = self.living().await.nodes;
+        let own = self.lease.node().and_then(|node| nodes.remove(&node));
+        let name = own.map_or_else(|| Arc::from(""), |own| own.node);
+        (name, nodes.into_values().collect())
+    }
+
+    async fn place(&self, own: Load) -> Option<Peer> {
+        let mut alive = self.living().await;
+        let own_node = self.lease.node()?;
+        let now = Instant::now();
+        let others: Vec<_> = {
+            let mut avoided = self.avoided();
+            avoided.retain(|_, until| now < *until);
+            let is_other = |node: &NodeId| {
+                let peer = alive.nodes.get(node);
+                *node != own_node && peer.is_some_and(|peer| !avoided.contains_key(peer))
             };
-            if let Location::Node(peer) = &location {
-                let mut known = self.known();
-                if known.len() >= MAX_REMEMBERED {
-                    known.clear();
-                }
-                known.insert(found_by.clone(), peer.clone());
-            }
-            location
+            (alive.loads.into_iter())
+                .filter(|(node, _)| is_other(node))
+                .collect()
+        };
+        let node = chefshat_cluster::place(own, &others)?;
+        // Until it is read again, the node has one more.
+        if let Some(Nodes {
+            alive: Ok(known), ..
+        }) = &mut *self.nodes.lock().await
+            && let Some(load) = known.loads.get_mut(&node)
+        {
+            load.rooms += 1;
         }
-        .boxed()
+        alive.nodes.remove(&node)
     }
 
-    fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)> {
-        async move {
-            let mut nodes = self.living().await.nodes;
-            let own = self.lease.node().and_then(|node| nodes.remove(&node));
-            let name = own.map_or_else(|| Arc::from(""), |own| own.node);
-            (name, nodes.into_values().collect())
-        }
-        .boxed()
+    async fn unreached(&self) -> BTreeSet<Arc<str>> {
+        self.living().await.unreached
     }
 
-    fn place(&self, own: Load) -> BoxFuture<'_, Option<Peer>> {
-        async move {
-            let mut alive = self.living().await;
-            let own_node = self.lease.node()?;
-            let now = Instant::now();
-            let others: Vec<_> = {
-                let mut avoided = self.avoided();
-                avoided.retain(|_, until| now < *until);
-                let is_other = |node: &NodeId| {
-                    let peer = alive.nodes.get(node);
-                    *node != own_node && peer.is_some_and(|peer| !avoided.contains_key(peer))
-                };
-                (alive.loads.into_iter())
-                    .filter(|(node, _)| is_other(node))
-                    .collect()
-            };
-            let node = chefshat_cluster::place(own, &others)?;
-            // Until it is read again, the node has one more.
-            if let Some(Nodes {
-                alive: Ok(known), ..
-            }) = &mut *self.nodes.lock().await
-                && let Some(load) = known.loads.get_mut(&node)
-            {
-                load.rooms += 1;
-            }
-            alive.nodes.remove(&node)
-        }
-        .boxed()
-    }
-
-    fn unreached(&self) -> BoxFuture<'_, BTreeSet<Arc<str>>> {
-        async move { self.living().await.unreached }.boxed()
-    }
-
-    fn is_over(&self, tournament: TournamentId) -> BoxFuture<'_, bool> {
-        async move {
-            let found = self.store.locate(tournament.unit()).await;
-            found.is_ok_and(|found| found.is_some_and(|location| location.over))
-        }
-        .boxed()
+    async fn is_over(&self, tournament: TournamentId) -> bool {
+        let found = self.store.locate(tournament.unit()).await;
+        found.is_ok_and(|found| found.is_some_and(|location| location.over))
     }
 
     fn avoid(&self, node: &Peer) {

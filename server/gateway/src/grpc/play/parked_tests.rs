@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1::{self, seat_command::Command, seat_update::Update};
-use futures::future::{BoxFuture, ready};
+use futures::future::ready;
 use futures::{FutureExt as _, StreamExt as _};
 use prost::Message as _;
 use tokio::net::TcpListener;
@@ -53,17 +53,18 @@ impl Says {
     }
 }
 
+#[tonic::async_trait]
 impl Directory for Says {
-    fn nodes(&self) -> BoxFuture<'_, (Arc<str>, Vec<Peer>)> {
-        ready((Arc::from(""), Vec::new())).boxed()
+    async fn nodes(&self) -> (Arc<str>, Vec<Peer>) {
+        (Arc::from(""), Vec::new())
     }
 
-    fn locate<'a>(&'a self, _found_by: &'a FoundBy, _caller: Key) -> BoxFuture<'a, Location> {
-        ready(self.now.lock().expect("no panic").clone()).boxed()
+    async fn locate(&self, _found_by: &FoundBy, _caller: Key) -> Location {
+        self.now.lock().expect("no panic").clone()
     }
 
-    fn is_over(&self, _tournament: TournamentId) -> BoxFuture<'_, bool> {
-        ready(false).boxed()
+    async fn is_over(&self, _tournament: TournamentId) -> bool {
+        false
     }
 
     fn forget(&self, _found_by: &FoundBy) {
