@@ -3,6 +3,7 @@
 
 mod claims;
 mod fencing;
+mod measure;
 mod model;
 mod opening;
 mod retention;
