@@ -10,6 +10,7 @@ mod form;
 mod memory;
 mod postgres;
 pub mod samples;
+mod sql;
 mod sqlite;
 pub mod studies;
 #[cfg(any(test, feature = "testing"))]

@@ -7,9 +7,9 @@ use sqlx::Row as _;
 use sqlx::postgres::PgConnection;
 use tracing::error;
 
-use super::values::integer;
 use crate::cluster::Epoch;
 use crate::form::{self, FORM};
+use crate::sql::integer;
 use chefshat_base::clock::since_epoch_ms;
 use chefshat_room::ids::UnitId;
 use chefshat_room::journal::{Change, Entry};

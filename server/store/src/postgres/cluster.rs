@@ -15,13 +15,14 @@ use sqlx::{Connection as _, Row as _};
 use super::claims::{Claims, claim};
 use super::handover::{Handed, release};
 use super::owned::rooms;
-use super::values::{ROOM, integer, kind_of, millis, text};
+use super::values::{ROOM, kind_of, millis, text};
 use super::{PostgresStore, lock};
 use crate::cluster::{
     Beat, ClusterStore, Epoch, Heartbeat, LivingNode, LoadedUnit, Location, NodeId, NodeInfo,
     NodeStatus, Subject, WithoutNode,
 };
 use crate::form::FORM;
+use crate::sql::integer;
 use crate::{ResumableGame, StoreError};
 use chefshat_room::ids::{GameId, Id, RoomId, UnitId};
 

@@ -13,11 +13,12 @@ use super::ends::{End, Ended, WholeGame, finish, give_up, import, number, whole}
 use super::forget::rewrite;
 use super::retained::{divided, locked};
 use super::units;
-use super::values::{Owned, integer, text};
+use super::values::{Owned, text};
 use super::writer::{Answers, Work, confirming};
 use crate::StoreError;
 use crate::forget::Rewrite;
 use crate::form::FORM;
+use crate::sql::integer;
 use chefshat_room::ids::GameId;
 
 /// A command to a writer. Its answer is the number of the game, if it has one, else 0.

@@ -8,10 +8,11 @@ use sqlx::query::Query;
 use sqlx::{Postgres, Row as _};
 
 use super::appends::report_hole;
-use super::values::{Owned, integer, text};
+use super::values::{Owned, text};
 use super::writer::confirming;
 use crate::StoreError;
 use crate::form::FORM;
+use crate::sql::integer;
 use chefshat_base::clock::since_epoch_ms;
 use chefshat_room::ids::GameId;
 

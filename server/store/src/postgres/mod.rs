@@ -395,7 +395,7 @@ impl Store for PostgresStore {
     ) -> Result<Vec<(u64, GameId)>, StoreError> {
         let part = (after, count);
         (self.reader)
-            .prunable(keep, part, self.options.record_files)
+            .prunable(keep, part, !self.options.record_files)
             .await
     }
 

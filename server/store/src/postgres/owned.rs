@@ -7,7 +7,7 @@ use sqlx::Row as _;
 use sqlx::postgres::PgRow;
 
 use super::PostgresStore;
-use super::values::integer;
+use crate::sql::integer;
 use crate::{ResumableGame, StoreError};
 
 /// Most ended games that are read at once.

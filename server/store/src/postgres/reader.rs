@@ -16,9 +16,10 @@ use tracing::error;
 
 use super::errors::failure;
 use super::retained::{divided, old};
-use super::values::{integer, text};
+use super::values::text;
 use crate::decode_pool::DecodePool;
 use crate::form::{self, OWNER_WITHIN, Unreadable, check_form, stored_header};
+use crate::sql::{MAX_PRUNABLE_READ, integer, list_query};
 use crate::{Keep, Listed, Part, StoreError, StoredGame, listed};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{GameId, Id};
@@ -26,29 +27,8 @@ use chefshat_room::journal::{Entry, GameHeader};
 
 /// How long one read may take.
 const READ_LIMIT: Duration = Duration::from_secs(15);
-/// Most games of which retention reads at a time whether they are needed.
-const MAX_PRUNABLE_READ: usize = 1_024;
 /// How long a connection that is given back may take to answer; then it is dropped.
 const RETURN_LIMIT: Duration = Duration::from_secs(1);
-
-/// The query for a list of finished games, with the condition on their numbers and the order.
-macro_rules! list_query {
-    ($part:literal, $order:literal) => {
-        concat!(
-            "SELECT listed, summary, game_id, substr(header, 1, $11) FROM games
-             WHERE summary IS NOT NULL AND ",
-            $part,
-            " AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)
-               AND created_at_ms >= $5 AND ($6 = 0 OR created_at_ms < $6)
-               AND ($7 = 0 OR EXISTS (SELECT FROM participants WHERE game = number AND kind = $7))
-               AND ($8 = '' OR number IN (SELECT game FROM participants WHERE (name = $8 AND agent = '') OR agent = $8))
-               AND NOT ($9 AND added)
-             ORDER BY ",
-            $order,
-            " LIMIT $10"
-        )
-    };
-}
 
 /// Reads stored games.
 #[derive(Clone)]
@@ -284,12 +264,9 @@ impl Reader {
         part: Part,
         count: usize,
     ) -> Result<Vec<Listed>, StoreError> {
-        let (query, number) = match part {
-            Part::After(number) => (list_query!("listed > $1", "listed"), number),
-            Part::Before(number) => (list_query!("listed < $1", "listed DESC"), number),
-        };
+        let (query, number) = list_query(part);
         let query = sqlx::query(query)
-            .bind(integer(number))
+            .bind(number)
             .bind(filter.state)
             .bind(filter.origin)
             .bind(text(&filter.room_name).into_owned())
@@ -319,18 +296,19 @@ impl Reader {
         Ok(u64::try_from(count).unwrap_or_default())
     }
 
-    /// See `Store::prunable`. Games without a record are none of the newest ones.
+    /// See `Store::prunable`. Games without a record are none of the newest ones. `unwritten`: also
+    /// those whose record is not written to a file.
     pub(super) async fn prunable(
         &self,
         keep: Keep,
         (after, count): (u64, usize),
-        record_files: bool,
+        unwritten: bool,
     ) -> Result<Vec<(u64, GameId)>, StoreError> {
         let (mut after, mut page) = (integer(after), count);
         let mut found = Vec::new();
         loop {
             let games =
-                self.read(|connection| old(connection, keep, (after, page), record_files).boxed());
+                self.read(|connection| old(connection, keep, (after, page), unwritten).boxed());
             let games = games.await?;
             let Some(last) = games.last() else {
                 return Ok(found);

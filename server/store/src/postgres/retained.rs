@@ -7,9 +7,9 @@ use std::collections::BTreeSet;
 use sqlx::Row as _;
 use sqlx::postgres::{PgConnection, PgRow};
 
-use super::values::integer;
 use crate::Keep;
 use crate::form;
+use crate::sql::{OLD_GAMES, integer};
 use crate::tournaments::StoredTournament;
 use crate::units::{ROWS, StoredUnit, UnitKey, UnitKind};
 use chefshat_room::ids::{GameId, Id, TournamentId, UnitId};
@@ -33,30 +33,21 @@ impl Candidate {
     }
 }
 
-/// The next games, after a number, that are old enough to be deleted and that have been written to
-/// files if they are to be.
+/// The next games, after a number, that are old enough to be deleted.
 pub(super) async fn old(
     connection: &mut PgConnection,
     keep: Keep,
     (after, count): (i64, usize),
-    record_files: bool,
+    unwritten: bool,
 ) -> sqlx::Result<Vec<Candidate>> {
-    let rows = sqlx::query(
-        "SELECT number, game_id, form, header FROM games
-         WHERE state <> 0 AND number > $1 AND coalesce(ended_at_ms, created_at_ms, 0) < $3
-           AND (summary IS NULL
-                OR (filed OR NOT $5)
-                   AND listed <= (SELECT listed FROM games WHERE listed IS NOT NULL
-                                  ORDER BY listed DESC LIMIT 1 OFFSET $2))
-         ORDER BY number LIMIT $4",
-    )
-    .bind(after)
-    .bind(integer(keep.newest.unwrap_or_default().max(1)))
-    .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
-    .bind(integer(count as u64))
-    .bind(record_files)
-    .fetch_all(connection)
-    .await?;
+    let rows = sqlx::query(OLD_GAMES)
+        .bind(after)
+        .bind(integer(keep.newest.unwrap_or_default().max(1)))
+        .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
+        .bind(integer(count as u64))
+        .bind(unwritten)
+        .fetch_all(connection)
+        .await?;
     Ok(rows.iter().filter_map(Candidate::of).collect())
 }
 

@@ -10,8 +10,9 @@ use tracing::error;
 
 use super::errors::{failure, is_temporary};
 use super::open::{self, DatabaseError};
-use super::values::{FIRST_EPOCH, integer, text};
+use super::values::{FIRST_EPOCH, text};
 use crate::form;
+use crate::sql::integer;
 use crate::sqlite::{
     self, Contents, GameRow, JournalRow, ParticipantRow, StudyRow, TournamentRow, TracesRow,
 };

@@ -8,10 +8,11 @@ use sqlx::postgres::{PgConnection, PgRow};
 
 use super::appends::report_hole;
 use super::reader::Reader;
-use super::values::{FIRST_EPOCH, Owned, integer, number_of, text};
+use super::values::{FIRST_EPOCH, Owned, number_of, text};
 use super::writer::confirming;
 use crate::StoreError;
 use crate::form::{self, FORM};
+use crate::sql::integer;
 use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitKey, UnitKind, UnitRow};
 use chefshat_room::ids::{StudyId, UnitId};
 

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::time::Duration;
 
 use crate::StoreError;
+use crate::sql::integer;
 use crate::units::UnitKind;
 use chefshat_room::ids::UnitId;
 
@@ -47,11 +48,6 @@ impl Owned {
     pub(super) fn fenced(self) -> StoreError {
         StoreError::Fenced(self.unit)
     }
-}
-
-/// A number.
-pub(super) fn integer(number: u64) -> i64 {
-    i64::try_from(number).unwrap_or(i64::MAX)
 }
 
 /// A time in milliseconds.

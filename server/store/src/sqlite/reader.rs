@@ -17,6 +17,7 @@ use super::rows::{self, Read};
 use crate::Keep;
 use crate::decode_pool::DecodePool;
 use crate::form::{self, OWNER_WITHIN, Unreadable, check_form, stored_header};
+use crate::sql::{MAX_PRUNABLE_READ, OLD_GAMES, integer, list_query};
 use crate::units::{HEADER, ROWS, StoredTraces, StoredUnit, UnitKey, UnitKind};
 use crate::{Listed, Part, ResumableGame, StoreError, StoredGame, listed};
 use chefshat_room::ids::{GameId, Id, StudyId};
@@ -24,27 +25,6 @@ use chefshat_room::ids::{GameId, Id, StudyId};
 /// Most ended games whose rooms are restored: the newest ones, because clients know the end of
 /// older ones.
 const MAX_ENDED: i64 = 256;
-/// Most games of which retention reads at a time whether they are needed.
-const MAX_PRUNABLE_READ: usize = 1_024;
-
-/// The query for a list of finished games, with the condition on their numbers and the order.
-macro_rules! list_query {
-    ($part:literal, $order:literal) => {
-        concat!(
-            "SELECT listed, summary, game_id, substr(header, 1, $11) FROM games
-             WHERE summary IS NOT NULL AND ",
-            $part,
-            " AND ($2 = 0 OR state = $2) AND ($3 = 0 OR origin = $3) AND ($4 = '' OR room_name = $4)
-               AND created_at_ms >= $5 AND ($6 = 0 OR created_at_ms < $6)
-               AND ($7 = 0 OR EXISTS (SELECT 1 FROM participants WHERE game = number AND kind = $7))
-               AND ($8 = '' OR number IN (SELECT game FROM participants WHERE (name = $8 AND agent = '') OR agent = $8))
-               AND NOT ($9 AND added)
-             ORDER BY ",
-            $order,
-            " LIMIT $10"
-        )
-    };
-}
 
 /// Reads stored games.
 pub(super) struct Reader {
@@ -68,7 +48,7 @@ impl Reader {
                      ORDER BY ended_at_ms DESC LIMIT $2))
              ORDER BY number",
         )
-        .bind(i64::try_from(ended_since_ms).unwrap_or(i64::MAX))
+        .bind(integer(ended_since_ms))
         .bind(MAX_ENDED)
         .fetch_all(&self.pool)
         .await
@@ -199,7 +179,6 @@ impl Reader {
         kind: UnitKind,
         newest_over: usize,
     ) -> Result<Vec<UnitKey>, StoreError> {
-        let newest_over = i64::try_from(newest_over).unwrap_or(i64::MAX);
         let query = match kind {
             UnitKind::Tournament => sqlx::query_scalar(
                 "SELECT tournament_id FROM tournaments WHERE number IN (
@@ -210,7 +189,7 @@ impl Reader {
                          ORDER BY number DESC LIMIT $1))
                  ORDER BY number",
             )
-            .bind(newest_over),
+            .bind(integer(newest_over as u64)),
             UnitKind::Study => sqlx::query_scalar("SELECT study_id FROM studies ORDER BY number"),
         };
         let ids: Vec<Vec<u8>> = query.fetch_all(&self.pool).await.map_err(failure)?;
@@ -271,21 +250,18 @@ impl Reader {
         part: Part,
         count: usize,
     ) -> Result<Vec<Listed>, StoreError> {
-        let (query, number) = match part {
-            Part::After(number) => (list_query!("listed > $1", "listed"), number),
-            Part::Before(number) => (list_query!("listed < $1", "listed DESC"), number),
-        };
+        let (query, number) = list_query(part);
         let rows = sqlx::query(query)
-            .bind(i64::try_from(number).unwrap_or(i64::MAX))
+            .bind(number)
             .bind(filter.state)
             .bind(filter.origin)
             .bind(filter.room_name.as_str())
-            .bind(i64::try_from(filter.created_from_ms).unwrap_or(i64::MAX))
-            .bind(i64::try_from(filter.created_before_ms).unwrap_or(i64::MAX))
+            .bind(integer(filter.created_from_ms))
+            .bind(integer(filter.created_before_ms))
             .bind(filter.kind)
             .bind(filter.participant.as_str())
             .bind(filter.hosted_here)
-            .bind(i64::try_from(count).unwrap_or(i64::MAX))
+            .bind(integer(count as u64))
             .bind(OWNER_WITHIN)
             .fetch_all(&self.pool)
             .await
@@ -314,30 +290,21 @@ impl Reader {
         count: usize,
         unwritten: bool,
     ) -> Result<Vec<(u64, GameId)>, StoreError> {
-        let integer = |number: u64| i64::try_from(number).unwrap_or(i64::MAX);
         let mut connection = self.pool.acquire().await.map_err(failure)?;
         let (mut found, mut units) = (Vec::new(), Units::default());
         let mut page = count;
         loop {
             /// Number, game, encoding version, header.
             type Row = (i64, Vec<u8>, i64, Option<Vec<u8>>);
-            let rows: Vec<Row> = sqlx::query_as(
-                "SELECT number, game_id, form, header FROM games
-                 WHERE state <> 0 AND number > $1 AND coalesce(ended_at_ms, created_at_ms, 0) < $3
-                   AND (summary IS NULL
-                        OR (filed = 1 OR $5)
-                           AND listed <= (SELECT listed FROM games WHERE listed IS NOT NULL
-                                          ORDER BY listed DESC LIMIT 1 OFFSET $2))
-                 ORDER BY number LIMIT $4",
-            )
-            .bind(integer(after))
-            .bind(integer(keep.newest.unwrap_or_default().max(1)))
-            .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
-            .bind(integer(page as u64))
-            .bind(unwritten)
-            .fetch_all(&mut *connection)
-            .await
-            .map_err(failure)?;
+            let rows: Vec<Row> = sqlx::query_as(OLD_GAMES)
+                .bind(integer(after))
+                .bind(integer(keep.newest.unwrap_or_default().max(1)))
+                .bind(integer(keep.ended_since_ms.unwrap_or(u64::MAX)))
+                .bind(integer(page as u64))
+                .bind(unwritten)
+                .fetch_all(&mut *connection)
+                .await
+                .map_err(failure)?;
             let Some((last, ..)) = rows.last() else {
                 return Ok(found);
             };

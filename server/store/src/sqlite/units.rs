@@ -3,6 +3,7 @@
 use sqlx::sqlite::SqliteConnection;
 
 use crate::form::{self, FORM};
+use crate::sql::integer;
 use crate::units::{UnitKey, UnitKind, UnitRow, UnitWrite};
 
 const CREATE: &str = "INSERT INTO {units} ({unit_id}, form, header) VALUES ($1, $2, $3)
@@ -86,7 +87,7 @@ async fn append(
 ) -> sqlx::Result<()> {
     let added = sqlx::query(unit.kind().sql(APPEND))
         .bind(unit.id().bytes().as_slice())
-        .bind(i64::try_from(row.position).unwrap_or(i64::MAX))
+        .bind(integer(row.position))
         .bind(row.entries.as_slice())
         .execute(&mut *connection)
         .await?;

@@ -24,6 +24,7 @@ use super::units;
 use crate::StoreError;
 use crate::forget::Rewrite;
 use crate::form::FORM;
+use crate::sql::integer;
 use crate::units::{UnitKey, UnitWrite};
 use chefshat_base::clock::since_epoch_ms;
 use chefshat_base::metrics::StoreMetrics;
@@ -330,7 +331,7 @@ async fn write(
                 )
                 .bind(*number)
                 .bind(*state)
-                .bind(i64::try_from(since_epoch_ms()).unwrap_or(i64::MAX))
+                .bind(integer(since_epoch_ms()))
                 .bind(*last_row)
                 .bind(signature.as_deref())
                 .execute(&mut *connection)
@@ -541,8 +542,8 @@ async fn summarise(
     .bind(summary.encode_to_vec())
     .bind(summary.origin)
     .bind(summary.room_name.as_str())
-    .bind(i64::try_from(summary.created_at_ms).unwrap_or(i64::MAX))
-    .bind(i64::try_from(ended_at_ms).unwrap_or(i64::MAX))
+    .bind(integer(summary.created_at_ms))
+    .bind(integer(ended_at_ms))
     .bind(*last_listed)
     .execute(&mut *connection)
     .await?;

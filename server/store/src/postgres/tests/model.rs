@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
 use super::*;
-use crate::postgres::values::integer;
+use crate::sql::integer;
 
 /// Nodes that take part.
 const NODES: usize = 3;
