@@ -156,7 +156,7 @@ test("the console says when to act", async () => {
   await show(undefined);
   expect(timer()).toBe("No decision is open.");
   await show(decisionAt(performance.now() + 5_000));
-  expect(timer()).toMatch(/^Act in 5\d s$/);
+  expect(timer()).toMatch(/^Act in 5\d\u00a0s$/);
   await show(undefined);
   await show(decisionAt(performance.now() - 50_000));
   expect(timer()).toBe("Act now");

@@ -117,9 +117,9 @@ export const lobby: Texts["lobby"] = {
         other: "nach # Zeitüberschreitungen in Folge",
       })} endet die Partie ohne Ergebnis.`,
     awaySubstituted: (seconds, substitute) =>
-      `Die Partie geht ohne dich weiter. Bei deiner nächsten Entscheidung spielt nach ${seconds} s der Agent „${substitute}“ für dich.`,
+      `Die Partie geht ohne dich weiter. Bei deiner nächsten Entscheidung spielt nach ${seconds}\u00a0s der Agent „${substitute}“ für dich.`,
     awayGivenUp: (seconds) =>
-      `Die Partie geht ohne dich weiter. Bei deiner nächsten Entscheidung endet sie nach ${seconds} s ohne Ergebnis.`,
+      `Die Partie geht ohne dich weiter. Bei deiner nächsten Entscheidung endet sie nach ${seconds}\u00a0s ohne Ergebnis.`,
     awayAlone: "Die Partie wartet auf dich, bis die Zeit für deine Entscheidung abläuft. Dann endet sie ohne Ergebnis.",
     back: "Du kannst jederzeit zurückkommen: Auf diesem Gerät führt die Lobby zu deinem Platz.",
     backUntilThen: "Bis dahin kannst du zurückkommen: Auf diesem Gerät führt die Lobby zu deinem Platz.",

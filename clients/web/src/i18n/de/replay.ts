@@ -22,7 +22,7 @@ export const replay: Texts["replay"] = {
   asSpectator: "Sicht der Zuschauer",
   possible: "Mögliche Aktionen",
   answered: (name, answer) => `${name}: ${answer}`,
-  seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")} s`,
+  seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")}\u00a0s`,
   estimate: (value) => `Schätzung ${value.toFixed(2).replace(".", ",")}`,
   hints: (count) => (count === 1 ? "nach einem Tipp" : `nach ${count} Tipps`),
   reason: (text) => `Angegebener Grund: ${text}`,

@@ -123,9 +123,9 @@ export const table: Texts["table"] = {
     giveOf: (name) => `${name} gibt eine Karte ab`,
     declareOf: (name) => `${name} darf ansagen`,
     wait: "Warten auf die anderen",
-    awaited: (name, seconds) => `Warten auf ${name} seit ${seconds} s`,
+    awaited: (name, seconds) => `Warten auf ${name} seit ${seconds}\u00a0s`,
     awaitedAway: (name, seconds) =>
-      seconds === undefined ? `Warten auf ${name} (abwesend)` : `Warten auf ${name} (abwesend): ${seconds} s`,
+      seconds === undefined ? `Warten auf ${name} (abwesend)` : `Warten auf ${name} (abwesend): ${seconds}\u00a0s`,
     waitExchange: "Die Karten sind ausgeteilt",
     youGive: "Du gibst eine Karte ab",
     youGiveOf: (number, of) => `Du gibst Karte ${number} von ${of} ab`,

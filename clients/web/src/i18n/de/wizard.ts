@@ -20,7 +20,7 @@ export const wizard: Texts["wizard"] = {
   expressions: "Reaktionen",
   timing: "Zeiten",
   noDecision: "Gerade ist nichts zu entscheiden.",
-  wait: (seconds) => `Handle in ${seconds} s`,
+  wait: (seconds) => `Handle in ${seconds}\u00a0s`,
   act: "Handle jetzt",
   pace: "Bedenkzeit in Sekunden",
   paceHint: "Von–bis, zum Beispiel 2-6. Für jede Entscheidung wird eine Zeit ausgelost.",

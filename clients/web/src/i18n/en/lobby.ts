@@ -116,9 +116,9 @@ export const lobby = {
         other: "after # timeouts in a row",
       })}, the game ends without a result.`,
     awaySubstituted: (seconds: number, substitute: string) =>
-      `The game continues without you. After ${seconds} s at your next decision, the agent “${substitute}” plays for you.`,
+      `The game continues without you. After ${seconds}\u00a0s at your next decision, the agent “${substitute}” plays for you.`,
     awayGivenUp: (seconds: number) =>
-      `The game continues without you. After ${seconds} s at your next decision, it ends without a result.`,
+      `The game continues without you. After ${seconds}\u00a0s at your next decision, it ends without a result.`,
     awayAlone: "The game waits for you until the time for your decision runs out. Then it ends without a result.",
     back: "You can come back at any time: on this device, the lobby shows the way to your seat.",
     backUntilThen: "Until then you can come back: on this device, the lobby shows the way to your seat.",

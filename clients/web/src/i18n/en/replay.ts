@@ -20,7 +20,7 @@ export const replay = {
   asSpectator: "as a spectator",
   possible: "Possible actions",
   answered: (name: string, answer: string) => `${name}: ${answer}`,
-  seconds: (seconds: number) => `${seconds.toFixed(1)} s`,
+  seconds: (seconds: number) => `${seconds.toFixed(1)}\u00a0s`,
   estimate: (value: number) => `estimate ${value.toFixed(2)}`,
   hints: (count: number) => (count === 1 ? "after a hint" : `after ${count} hints`),
   reason: (text: string) => `Reason given: ${text}`,

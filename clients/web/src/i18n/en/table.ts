@@ -118,9 +118,9 @@ export const table = {
     giveOf: (name: string) => `${name} gives a card`,
     declareOf: (name: string) => `${name} may declare`,
     wait: "Waiting for the others",
-    awaited: (name: string, seconds: number) => `Waiting for ${name} for ${seconds} s`,
+    awaited: (name: string, seconds: number) => `Waiting for ${name} for ${seconds}\u00a0s`,
     awaitedAway: (name: string, seconds: number | undefined) =>
-      seconds === undefined ? `Waiting for ${name} (away)` : `Waiting for ${name} (away): ${seconds} s`,
+      seconds === undefined ? `Waiting for ${name} (away)` : `Waiting for ${name} (away): ${seconds}\u00a0s`,
     waitExchange: "The cards have been dealt",
     youGive: "You give a card",
     youGiveOf: (number: number, of: number) => `You give card ${number} of ${of}`,

@@ -18,7 +18,7 @@ export const wizard = {
   expressions: "Expressions",
   timing: "Timing",
   noDecision: "No decision is open.",
-  wait: (seconds: number) => `Act in ${seconds} s`,
+  wait: (seconds: number) => `Act in ${seconds}\u00a0s`,
   act: "Act now",
   pace: "Thinking time, seconds",
   paceHint: "From–to, for instance 2-6. A time is drawn for each decision.",

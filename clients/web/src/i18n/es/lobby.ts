@@ -117,9 +117,9 @@ export const lobby: Texts["lobby"] = {
         other: "tras agotarse el tiempo # veces seguidas",
       })}, la partida termina sin resultado.`,
     awaySubstituted: (seconds, substitute) =>
-      `La partida continúa sin ti. En tu próxima decisión, después de ${seconds} s, el agente «${substitute}» juega por ti.`,
+      `La partida continúa sin ti. En tu próxima decisión, después de ${seconds}\u00a0s, el agente «${substitute}» juega por ti.`,
     awayGivenUp: (seconds) =>
-      `La partida continúa sin ti. En tu próxima decisión, después de ${seconds} s, termina sin resultado.`,
+      `La partida continúa sin ti. En tu próxima decisión, después de ${seconds}\u00a0s, termina sin resultado.`,
     awayAlone: "La partida te espera hasta que se agota el tiempo de tu decisión. Entonces termina sin resultado.",
     back: "Puedes volver cuando quieras: en este dispositivo, el vestíbulo te lleva a tu asiento.",
     backUntilThen: "Hasta entonces puedes volver: en este dispositivo, el vestíbulo te lleva a tu asiento.",

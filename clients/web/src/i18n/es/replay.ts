@@ -22,7 +22,7 @@ export const replay: Texts["replay"] = {
   asSpectator: "como espectador",
   possible: "Acciones posibles",
   answered: (name, answer) => `${name}: ${answer}`,
-  seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")} s`,
+  seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")}\u00a0s`,
   estimate: (value) => `estimación ${value.toFixed(2).replace(".", ",")}`,
   hints: (count) => (count === 1 ? "tras una pista" : `tras ${count} pistas`),
   reason: (text) => `Motivo indicado: ${text}`,

@@ -123,9 +123,9 @@ export const table: Texts["table"] = {
     giveOf: (name) => `${name} da una carta`,
     declareOf: (name) => `${name} puede declarar`,
     wait: "Esperando a los demás",
-    awaited: (name, seconds) => `Esperando a ${name} desde hace ${seconds} s`,
+    awaited: (name, seconds) => `Esperando a ${name} desde hace ${seconds}\u00a0s`,
     awaitedAway: (name, seconds) =>
-      seconds === undefined ? `Esperando a ${name} (ausente)` : `Esperando a ${name} (ausente): ${seconds} s`,
+      seconds === undefined ? `Esperando a ${name} (ausente)` : `Esperando a ${name} (ausente): ${seconds}\u00a0s`,
     waitExchange: "Las cartas están repartidas",
     youGive: "Das una carta",
     youGiveOf: (number, of) => `Das la carta ${number} de ${of}`,

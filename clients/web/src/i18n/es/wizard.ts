@@ -20,7 +20,7 @@ export const wizard: Texts["wizard"] = {
   expressions: "Reacciones",
   timing: "Tiempos",
   noDecision: "No hay ninguna decisión pendiente.",
-  wait: (seconds) => `Actúa en ${seconds} s`,
+  wait: (seconds) => `Actúa en ${seconds}\u00a0s`,
   act: "Actuar ahora",
   pace: "Tiempo para pensar, en segundos",
   paceHint: "De–a, por ejemplo 2-6. Para cada decisión se sortea un tiempo.",

@@ -117,9 +117,9 @@ export const lobby: Texts["lobby"] = {
         other: "dopo # decisioni scadute di seguito",
       })} la partita finisce senza risultato.`,
     awaySubstituted: (seconds, substitute) =>
-      `La partita continua. Alla tua prossima decisione, dopo ${seconds} s gioca per te l’agente «${substitute}».`,
+      `La partita continua. Alla tua prossima decisione, dopo ${seconds}\u00a0s gioca per te l’agente «${substitute}».`,
     awayGivenUp: (seconds) =>
-      `La partita continua. Alla tua prossima decisione, dopo ${seconds} s finisce senza risultato.`,
+      `La partita continua. Alla tua prossima decisione, dopo ${seconds}\u00a0s finisce senza risultato.`,
     awayAlone: "La partita ti aspetta finché scade il tempo della tua decisione. Poi finisce senza risultato.",
     back: "Puoi tornare in qualsiasi momento: su questo dispositivo, la sala ti riporta al tuo posto.",
     backUntilThen: "Fino ad allora puoi tornare: su questo dispositivo, la sala ti riporta al tuo posto.",

@@ -22,7 +22,7 @@ export const replay: Texts["replay"] = {
   asSpectator: "come spettatore",
   possible: "Giocate possibili",
   answered: (name, answer) => `${name}: ${answer}`,
-  seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")} s`,
+  seconds: (seconds) => `${seconds.toFixed(1).replace(".", ",")}\u00a0s`,
   estimate: (value) => `stima ${value.toFixed(2).replace(".", ",")}`,
   hints: (count) => (count === 1 ? "dopo un suggerimento" : `dopo ${count} suggerimenti`),
   reason: (text) => `Motivo indicato: ${text}`,

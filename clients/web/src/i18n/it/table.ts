@@ -125,9 +125,9 @@ export const table: Texts["table"] = {
     giveOf: (name) => `${name} dà una carta`,
     declareOf: (name) => `${name} può dichiarare`,
     wait: "Decidono gli altri",
-    awaited: (name, seconds) => `Si aspetta ${name} da ${seconds} s`,
+    awaited: (name, seconds) => `Si aspetta ${name} da ${seconds}\u00a0s`,
     awaitedAway: (name, seconds) =>
-      seconds === undefined ? `Si aspetta ${name} (assente)` : `Si aspetta ${name} (assente): ${seconds} s`,
+      seconds === undefined ? `Si aspetta ${name} (assente)` : `Si aspetta ${name} (assente): ${seconds}\u00a0s`,
     waitExchange: "Le carte sono distribuite",
     youGive: "Dai una carta",
     youGiveOf: (number, of) => `Dai la carta ${number} di ${of}`,

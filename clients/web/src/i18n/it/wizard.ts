@@ -13,7 +13,7 @@ export const wizard: Texts["wizard"] = {
   expressions: "Espressioni",
   timing: "Tempi",
   noDecision: "Nessuna decisione in corso.",
-  wait: (seconds) => `Agisci tra ${seconds} s`,
+  wait: (seconds) => `Agisci tra ${seconds}\u00a0s`,
   act: "Agisci ora",
   pace: "Tempo per pensare, secondi",
   paceHint: "Da–a, per esempio 2-6. Per ogni decisione si estrae un tempo.",
