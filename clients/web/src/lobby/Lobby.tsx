@@ -54,7 +54,9 @@ export function Lobby() {
           <h2>{words.make.title}</h2>
           <p>{words.make.text}</p>
           <ButtonLink href="/new">{words.make.link}</ButtonLink>
-          <a href={pathOf({ page: "studies" })}>{words.make.studies}</a>
+          <a class="own-line" href={pathOf({ page: "studies" })}>
+            {words.make.studies}
+          </a>
         </section>
       </div>
       {fault && <Notice kind="fault">{wordsOf(fault)}</Notice>}

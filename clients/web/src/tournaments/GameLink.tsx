@@ -20,7 +20,7 @@ export function GameLink({ tournament, game, several }: GameLinkProps) {
   switch (game.state) {
     case TournamentGameState.COUNTED:
       return (
-        <a href={pathOf({ page: "replay", gameId: game.gameId })}>
+        <a class="own-line" href={pathOf({ page: "replay", gameId: game.gameId })}>
           {words.games.replay}
           {number}
           {label}
@@ -28,7 +28,7 @@ export function GameLink({ tournament, game, several }: GameLinkProps) {
       );
     case TournamentGameState.PLAYING:
       return tournament.settings?.policy?.spectators && game.roomId !== "" ? (
-        <a href={pathOf({ page: "watch", roomId: game.roomId })}>
+        <a class="own-line" href={pathOf({ page: "watch", roomId: game.roomId })}>
           <span aria-hidden="true">▶ </span>
           {words.games.watch}
           {number}
