@@ -137,7 +137,7 @@ fn tournament_row(position: u64, entries: &[TournamentEntry]) -> UnitRow {
 /// The header of a game with this number.
 pub fn header(game: u8, durability: Durability) -> Arc<GameHeader> {
     Arc::new(GameHeader {
-        room_id: Id::from_bytes([200 + game; 16]),
+        room_id: Id::from_bytes([game.wrapping_add(200); 16]),
         game_id: Id::from_bytes([game; 16]),
         name: format!("game {game}"),
         rules: RuleSetSpec::default().validate().expect("the standard"),

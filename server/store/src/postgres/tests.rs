@@ -12,14 +12,11 @@ mod transfer;
 
 use std::sync::Arc;
 
-use chefshat_engine::{RULES_VERSION, RuleSetSpec, SeedPlan};
 use chefshat_postgres::Database;
 use chefshat_proto::v1;
-use chefshat_room::ids::{GameId, Id, SecretHash};
-use chefshat_room::journal::{
-    AbortReason, Change, Entry, Fill, GameHeader, GameStart, TournamentGame,
-};
-use chefshat_room::policy::{Durability, Policy};
+use chefshat_room::ids::{Id, SecretHash};
+use chefshat_room::journal::{AbortReason, Change, Entry, GameHeader, TournamentGame};
+use chefshat_room::policy::Durability;
 use chefshat_tournament::Change as TournamentChange;
 use futures::FutureExt as _;
 use futures::future::BoxFuture;
@@ -27,7 +24,7 @@ use sqlx::postgres::PgConnection;
 
 use super::*;
 use crate::cluster::{ClusterStore, Epoch, Heartbeat, NodeId, NodeInfo, Subject};
-use crate::testing::TypedUnits as _;
+use crate::testing::{self, TypedUnits as _};
 use crate::tournaments::{TournamentEntry, TournamentHeader};
 use crate::units::UnitKey;
 
@@ -121,33 +118,12 @@ async fn waiting(connection: &mut PgConnection, wait_event: &str) -> i32 {
 fn header(room: u8, tournament: Option<u8>, durability: Durability) -> Arc<GameHeader> {
     Arc::new(GameHeader {
         room_id: Id::from_bytes([room; 16]),
-        game_id: Id::from_bytes([room; 16]),
-        name: format!("room {room}"),
-        rules: RuleSetSpec::default().validate().expect("the standard"),
-        policy: Policy {
-            durability,
-            ..Policy::default()
-        },
-        rules_version: RULES_VERSION,
-        server_version: "0.0.1".into(),
-        participant_removed: false,
-        fills: vec![Fill::Open { reserved_for: None }; 4],
-        display_names: Default::default(),
-        wizards: std::collections::BTreeSet::new(),
-        recorded: Default::default(),
-        start: GameStart::default(),
-        seed: SeedPlan::Fixed {
-            game_seed: [room; 32],
-        },
-        created_at_ms: 1_000,
         join_code: format!("ROOM{room}"),
-        owner: SecretHash::of(b"owner"),
         tournament: tournament.map(|tournament| TournamentGame {
             tournament: Id::from_bytes([tournament; 16]),
             series: None,
         }),
-        table: None,
-        study: None,
+        ..GameHeader::clone(&testing::header(room, durability))
     })
 }
 
@@ -167,14 +143,7 @@ fn cup(tournament: u8) -> Arc<TournamentHeader> {
 }
 
 fn summary(room: u8) -> Box<v1::RecordSummary> {
-    Box::new(v1::RecordSummary {
-        game_id: GameId::from_bytes([room; 16]).to_string(),
-        room_name: format!("room {room}"),
-        state: v1::RoomState::Finished.into(),
-        created_at_ms: 1_000,
-        ended_at_ms: 2_000,
-        ..v1::RecordSummary::default()
-    })
+    testing::summary(&durable(room))
 }
 
 /// The first entries of a tournament that has begun.
