@@ -192,7 +192,7 @@ test("leaving frees the seat before the game, explains what happens during it, a
   const guest = await person(browser);
   await sitDown(guest.page, server, code, "Rosa");
   await guest.page.getByRole("button", { name: "Leave…" }).click();
-  await guest.page.getByText(/After \d+ s at your next decision, the agent “random” plays for you/).waitFor();
+  await guest.page.getByText(/After \d+\u00a0s at your next decision, the agent “random” plays for you/).waitFor();
   expect(await guest.page.getByRole("button", { name: "End the game" }).count()).toBe(0);
   await guest.page.getByRole("button", { name: "Stay" }).click();
 
@@ -212,7 +212,7 @@ test("the leave dialog stays open when the game starts meanwhile", async () => {
   await dialog.getByText("Your seat becomes free for someone else.").waitFor();
   await sitDown(ben.page, server, code, "Ben");
   await ada.page.locator('[data-decision], [data-part~="table"]').first().waitFor();
-  await dialog.getByText(/After \d+ s at your next decision, the agent “random” plays for you/).waitFor();
+  await dialog.getByText(/After \d+\u00a0s at your next decision, the agent “random” plays for you/).waitFor();
   await dialog.getByRole("button", { name: "Stay" }).click();
   await dialog.waitFor({ state: "detached" });
   expect([...ada.faults, ...ben.faults]).toEqual([]);
