@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cctype>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -76,7 +77,7 @@ Options parse(int count, char** arguments) {
 uint32_t number(const Options& options, const std::string& option) {
   std::istringstream text(options.at(option));
   uint32_t value = 0;
-  if (text >> value && text.eof()) return value;
+  if (std::isdigit(text.peek()) && text >> value && text.eof()) return value;
   throw Failure(option + " must be a number");
 }
 
@@ -138,7 +139,12 @@ std::string ticket_of(const Server& server, const Options& options) {
   if (std::ifstream(path) >> ticket) {
     std::cerr << "resuming with the ticket in " << path << std::endl;
   } else if (ticket.empty()) {
-    ticket = join(server, options);
+    try {
+      ticket = join(server, options);
+    } catch (...) {
+      unlink(path.c_str());  // It is empty.
+      throw;
+    }
     std::cerr << "if this process ends early, resume ";
     if (std::ofstream(path) << ticket << std::endl) {
       std::cerr << "by the same command: the ticket is in " << path << std::endl;

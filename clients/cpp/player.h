@@ -132,7 +132,8 @@ class Player {
   static constexpr int MAX_CONNECTIONS = 120;
   using SeatIterator = std::list<Seat>::iterator;
 
-  // Attaches all seats and plays until the stream ends. Returns OK if there was progress.
+  // Attaches all seats and plays until the stream ends. Returns OK if there was progress: a stream
+  // begins with the state, so only what follows its first message counts.
   grpc::Status play_on_stream(grpc::ClientContext* context) {
     const auto stub = v1::PlayService::NewStub(server_.channel);
     const auto stream = stub->Play(context);
@@ -147,9 +148,9 @@ class Player {
     stream->Write(commands_);
     v1::PlayResponse response;
     refused_ = grpc::Status::OK;
-    bool progress = false;
+    int messages = 0;
     while (!seats_.empty() && refused_.ok() && stream->Read(&response)) {
-      progress = true;
+      ++messages;
       commands_.Clear();
       for (const v1::SeatUpdate& update : response.updates()) receive(update);
       if (commands_.commands_size() > 0) stream->Write(commands_);
@@ -158,7 +159,7 @@ class Player {
     while (stream->Read(&response)) {
     }
     const grpc::Status end = stream->Finish();
-    if (progress) return refused_;
+    if (messages > 1 || seats_.empty() || !refused_.ok()) return refused_;
     return end.ok() ? grpc::Status(grpc::UNAVAILABLE, "the server ended the stream") : end;
   }
 

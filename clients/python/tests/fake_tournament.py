@@ -59,8 +59,9 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
         self._make_game = make_game
         self._lock = threading.RLock()
         self.breaks = False
-        # How often a tournament was followed.
+        # How often a tournament was followed, and whether one that followed it has left.
         self.followed = 0
+        self.follower_left = threading.Event()
         self._all: list[FakeTournament] = []
         self.joins: list[pb.JoinTournamentRequest] = []
 
@@ -141,6 +142,7 @@ class FakeTournaments(tournament_grpc.TournamentServiceServicer):
         """Reports every 20 ms, with a heartbeat before each report; with `breaks`, each stream breaks after its first report."""
         tournament = self._find(request.tournament_id, context)
         self.followed += 1
+        context.add_callback(self.follower_left.set)
         if self.breaks:
             yield pb.FollowTournamentResponse(tournament=tournament.shown)
             context.abort(grpc.StatusCode.UNAVAILABLE, "the connection is lost")

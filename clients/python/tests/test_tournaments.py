@@ -312,6 +312,37 @@ def test_a_server_whose_every_stream_breaks_is_given_up(fake: FakeServer) -> Non
     assert asyncio.run(follow(tournament_id)) == 2 * (1 + few.attempts)
 
 
+@pytest.mark.parametrize("asynchronous", [False, True])
+def test_the_server_sees_a_client_leave_a_stream_early(fake: FakeServer, asynchronous: bool) -> None:
+    async def follow(tournament_id: str) -> None:
+        async with aio.Client(fake.address) as client:
+            async for _ in client.tournaments.follow(tournament_id):
+                break
+            assert await asyncio.to_thread(fake.tournaments.follower_left.wait, LIMIT_S)
+
+    with chefshat.Client(fake.address) as client:
+        tournament_id = client.tournaments.create(settings()).tournament.tournament_id
+        if asynchronous:
+            asyncio.run(follow(tournament_id))
+            return
+        for _ in client.tournaments.follow(tournament_id):
+            break
+        assert fake.tournaments.follower_left.wait(LIMIT_S)
+
+
+def test_a_stream_of_a_closed_client_says_so(fake: FakeServer) -> None:
+    async def follow() -> None:
+        client = aio.Client(fake.address)
+        tournament_id = (await client.tournaments.create(settings())).tournament.tournament_id
+        reports = client.tournaments.follow(tournament_id)
+        await anext(reports)
+        await client.close()
+        with pytest.raises(ChefsHatError, match="CLIENT_CLOSED"):
+            await listed(reports)
+
+    asyncio.run(follow())
+
+
 def test_the_calls_of_the_asyncio_client(fake: FakeServer) -> None:
     async def run() -> None:
         async with aio.Client(fake.address, backoff=QUICK) as client:

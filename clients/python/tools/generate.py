@@ -27,6 +27,7 @@ SYNC_NAMES = {
     "aclosing": "closing",
     "async_channel": "channel",
     "async_pages": "pages",
+    "async_received": "received",
     "async_streamed": "streamed",
     "AsyncMessages": "Messages",
     "AsyncStreamed": "Streamed",
@@ -96,13 +97,13 @@ def generate(out: Path, proto: Path = PROTO) -> None:
 
 
 def blocking(source: Path) -> dict[Path, str]:
-    """Returns the blocking forms of the asyncio modules in a folder. The name of a class does without its `Async`."""
+    """Returns the blocking forms of the asyncio modules in a folder. The name of a class drops its prefix `Async`."""
     with tempfile.TemporaryDirectory() as scratch:
         copies = [str(shutil.copy(path, scratch)) for path in sorted(source.glob("*.py"))]
         classes = {name: name.removeprefix("Async") for path in copies for name in CLASS.findall(Path(path).read_text("utf-8"))}
         made = Path(scratch) / "_sync"
         unasync.unasync_files(copies, [unasync.Rule(scratch, str(made), additional_replacements=SYNC_NAMES | classes)])
-        # So that imports of modules that do not stand yet are sorted among those of the package.
+        # So that imports of modules that are not generated yet are sorted among those of the package.
         own = 'lint.isort.known-first-party = ["chefshat"]'
         for step in (["check", "--select=I", "--fix", "--quiet", "--config", own], ["format", "--quiet"]):
             subprocess.run(

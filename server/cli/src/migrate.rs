@@ -14,7 +14,8 @@ use super::{CommandError, progress, say};
 /// Create or upgrade the tables of a PostgreSQL database, or move a data directory there.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Upgrade the tables with the new version first, while the nodes of the old one run; then replace the nodes one by one.\n\n\
+    after_help = "Upgrade the tables with the new version first, while the nodes of the old one run; then replace the nodes one by one. \
+                  While a backup runs, it waits for a minute, then gives up: run it again.\n\n\
                   With --from, stop the server of the folder first. Finished and unfinished games and tournaments move in one transaction: \
                   all or nothing. The folder keeps everything, but no server starts on it again: its unfinished games resume on the cluster. \
                   The nodes need its signing-key and its files of tokens and certificates.\n\n\

@@ -187,7 +187,7 @@ impl Signer {
             None => tokio::task::spawn_blocking(reading).await.ok(),
         };
         if read.is_none() {
-            error!(%game, "the record of a game could not be read; it stays unsigned");
+            error!(%game, "the record of a game could not be read; it has no signature");
         }
         Ok(read.unwrap_or_default())
     }

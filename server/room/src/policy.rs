@@ -78,7 +78,8 @@ pub const ABSENCE_TIME_IN_TOURNAMENTS: Duration = Duration::from_secs(12);
 /// Default pace of built-in agents and substitutes in a game with people.
 const PACE_WITH_PEOPLE: Duration = Duration::from_secs(1);
 
-/// The policy of a room. `convert::policy` in `chefshat-wire` checks the ranges stated in `room.proto`.
+/// The policy of a room. `convert::policy` in `chefshat-wire` checks the ranges stated in
+/// `room.proto`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Policy {
     /// Time for a decision.

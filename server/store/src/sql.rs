@@ -6,8 +6,8 @@ use super::Part;
 /// Most games of which retention reads at a time whether they are needed.
 pub(super) const MAX_PRUNABLE_READ: usize = 1_024;
 
-/// The games after number `$1`, at most `$4`, that ended before `$3` and are not the `$2` newest ones.
-/// `$5`: also those whose record is not written to a file.
+/// The games after number `$1`, at most `$4`, that ended before `$3` and are not the `$2` newest
+/// ones. `$5`: also those whose record is not written to a file.
 pub(super) const OLD_GAMES: &str = "SELECT number, game_id, form, header FROM games
      WHERE state <> 0 AND number > $1 AND coalesce(ended_at_ms, created_at_ms, 0) < $3
        AND (summary IS NULL
@@ -43,7 +43,7 @@ pub(super) fn list_query(part: Part) -> (&'static str, i64) {
     }
 }
 
-/// A number.
+/// A number as both databases have it; the largest if it is too large.
 pub(super) fn integer(number: u64) -> i64 {
     i64::try_from(number).unwrap_or(i64::MAX)
 }

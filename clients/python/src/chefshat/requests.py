@@ -85,7 +85,7 @@ class AsyncStreamed(Protocol[Streaming]):
         """Ends the call."""
 
 
-# The messages of a stream, which whoever does not read all of them closes.
+# The messages of a stream. Close it unless you read it to its end.
 Messages: TypeAlias = Generator[Item, None, None]
 AsyncMessages: TypeAlias = AsyncGenerator[Item, None]
 
@@ -217,12 +217,32 @@ async def awaited(method: Callable[[Asked], Awaitable[Answered]], request: Asked
         except grpc.RpcError as error:
             pause = _pause_after(error, pauses)
         except asyncio.CancelledError:
-            task = asyncio.current_task()
-            if task is not None and task.cancelling():
+            if _is_cancelled():
                 raise
-            # Closing the channel cancelled the call.
             raise closed() from None
         await asyncio.sleep(pause)
+
+
+def _is_cancelled() -> bool:
+    """Whether the current task is cancelled, and not only its call, by closing the channel."""
+    task = asyncio.current_task()
+    return task is not None and task.cancelling() > 0
+
+
+def received(call: Streamed[Answered]) -> Iterator[Answered]:
+    """Returns the messages of a call."""
+    return iter(call)
+
+
+async def async_received(call: AsyncStreamed[Answered]) -> AsyncIterator[Answered]:
+    """Yields the messages of a call of asyncio. Raises `ChefsHatError` if the channel is closed meanwhile."""
+    try:
+        async for message in call:
+            yield message
+    except asyncio.CancelledError:
+        if _is_cancelled():
+            raise
+        raise closed() from None
 
 
 def streamed(method: Callable[[Asked], Streamed[Answered]], request: Asked) -> Iterator[Answered]:
@@ -248,7 +268,7 @@ async def async_streamed(method: Callable[[Asked], AsyncStreamed[Answered]], req
     while True:
         call = method(request)
         try:
-            async for response in call:
+            async for response in async_received(call):
                 pauses = {}
                 yield response
             return

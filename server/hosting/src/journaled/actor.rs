@@ -41,7 +41,7 @@ async fn run_on<U: Journaled>(
     inbox: &mut mpsc::Receiver<U::Message>,
     stop: Stop,
 ) -> Result<(), StoreError> {
-    // No end of a game is missed: one that nobody waits for is kept.
+    // It keeps one notification until it is waited for: no end of a game is missed.
     let games = Arc::clone(&unit.unit().games);
     let mut messages = Vec::new();
     loop {

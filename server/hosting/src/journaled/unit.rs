@@ -271,7 +271,7 @@ pub struct Unit<U: Journaled> {
     pub(super) pending: Vec<U::Entry>,
     /// What is done after the next commit.
     replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
-    /// Notified when one of its games has ended or a room of it is gone.
+    /// Notified when one of its games has ended or a room of it has stopped.
     pub(super) games: Arc<Notify>,
     /// Its place among its creator's units.
     _place: Permit,
@@ -280,7 +280,7 @@ pub struct Unit<U: Journaled> {
 impl<U: Journaled> Unit<U> {
     pub(super) fn new(handle: Arc<Handle<U>>, rooms: Arc<Rooms>, rows: u64, place: Permit) -> Self {
         let state = handle.committed().clone();
-        let games = rooms.wake(handle.id().unit());
+        let games = rooms.notify_of_games(handle.id().unit());
         Self {
             handle,
             rooms,
@@ -346,6 +346,6 @@ impl<U: Journaled> Unit<U> {
 
 impl<U: Journaled> Drop for Unit<U> {
     fn drop(&mut self) {
-        self.rooms.stop_waking(self.id().unit(), &self.games);
+        self.rooms.stop_notifying(self.id().unit(), &self.games);
     }
 }

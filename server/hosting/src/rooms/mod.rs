@@ -291,24 +291,27 @@ impl Rooms {
         self.lock().get(id)?.end.clone()
     }
 
-    /// What is notified when a game of a unit has ended or a room of it is gone, until
-    /// [`Rooms::stop_waking`].
-    pub(crate) fn wake(&self, unit: UnitId) -> Arc<Notify> {
+    /// Returns what is notified when a game of a unit has ended or a room of it has stopped, until
+    /// [`Rooms::stop_notifying`]. It keeps a notification until somebody waits.
+    pub(crate) fn notify_of_games(&self, unit: UnitId) -> Arc<Notify> {
         let waiting = Arc::default();
         (self.lock().waiting).insert(unit, Arc::clone(&waiting));
         waiting
     }
 
-    /// Ends [`Rooms::wake`], unless another task of the unit waits by now.
-    pub(crate) fn stop_waking(&self, unit: UnitId, waiting: &Arc<Notify>) {
+    /// Ends [`Rooms::notify_of_games`], unless another task of the unit waits by now.
+    pub(crate) fn stop_notifying(&self, unit: UnitId, waiting: &Arc<Notify>) {
         let mut table = self.lock();
-        if table
-            .waiting
-            .get(&unit)
-            .is_some_and(|it| Arc::ptr_eq(it, waiting))
-        {
+        let own = (table.waiting.get(&unit)).is_some_and(|it| Arc::ptr_eq(it, waiting));
+        if own {
             table.waiting.remove(&unit);
         }
+    }
+
+    /// Whether a task is notified of the games of a unit.
+    #[cfg(test)]
+    pub(crate) fn notifies(&self, unit: UnitId) -> bool {
+        self.lock().waiting.contains_key(&unit)
     }
 
     /// Number of deletions, of participants' data or of old games: what was computed before shows
@@ -486,33 +489,44 @@ struct Watcher(Weak<Rooms>);
 
 impl RoomWatcher for Watcher {
     fn game_over(&self, room: RoomId, end: GameEnd) {
-        if let Some(rooms) = self.0.upgrade() {
-            let mut table = rooms.lock();
-            if let Some(number) = table.number_of(room)
-                && let Some(entry) = table.by_number.get_mut(&number)
-            {
-                entry.over = true;
-                entry.end = Some(end);
-                entry.place = None;
-                table.wake_unit_of(number);
-            }
-            drop(table);
-            rooms.changed.notify_waiters();
-        }
+        self.change(room, |table, number| {
+            let entry = table.by_number.get_mut(&number)?;
+            entry.over = true;
+            entry.end = Some(end);
+            entry.place = None;
+            table.waiting_for(number)
+        });
     }
 
     fn gone(&self, room: RoomId) {
-        if let Some(rooms) = self.0.upgrade() {
-            let mut table = rooms.lock();
-            if let Some(number) = table.number_of(room) {
-                table.wake_unit_of(number);
-                match table.by_number.get_mut(&number) {
-                    Some(entry) if !entry.over => entry.suspended = true,
-                    _ => table.remove(number),
+        self.change(room, |table, number| {
+            match table.by_number.get_mut(&number) {
+                Some(entry) if !entry.over => entry.suspended = true,
+                _ => {
+                    table.remove(number);
+                    return None;
                 }
             }
-            drop(table);
-            rooms.changed.notify_waiters();
+            table.waiting_for(number)
+        });
+    }
+}
+
+impl Watcher {
+    /// Changes what the table says of a room. `change` returns whom to notify besides those who wait
+    /// for any change, once the table is unlocked.
+    fn change(&self, room: RoomId, change: impl FnOnce(&mut Table, u64) -> Option<Arc<Notify>>) {
+        let Some(rooms) = self.0.upgrade() else {
+            return;
+        };
+        let waiting = {
+            let mut table = rooms.lock();
+            let number = table.number_of(room);
+            number.and_then(|number| change(&mut table, number))
+        };
+        rooms.changed.notify_waiters();
+        if let Some(waiting) = waiting {
+            waiting.notify_one();
         }
     }
 }

@@ -172,12 +172,10 @@ impl Table {
         (!entry.over).then_some(entry)
     }
 
-    /// Wakes the task of the unit that a room is of.
-    pub(super) fn wake_unit_of(&self, number: u64) {
-        let entry = self.by_number.get(&number);
-        if let Some(waiting) = entry.and_then(|it| self.waiting.get(&it.header.unit())) {
-            waiting.notify_one();
-        }
+    /// What the task of the unit that a room is of waits on.
+    pub(super) fn waiting_for(&self, number: u64) -> Option<Arc<Notify>> {
+        let unit = self.by_number.get(&number)?.header.unit();
+        self.waiting.get(&unit).cloned()
     }
 
     /// Removes ended rooms if their space is needed.

@@ -149,10 +149,10 @@ async fn the_end_of_a_game_wakes_only_its_own_unit() {
             .handle
     };
     let (ending, other) = (created().await, created().await);
-    let woken = rooms.wake(ending.id().unit());
-    let asleep = rooms.wake(other.id().unit());
+    let woken = rooms.notify_of_games(ending.id().unit());
+    let asleep = rooms.notify_of_games(other.id().unit());
     ending.close_without_token().await;
-    // Whenever it waits, also if only now.
+    // The notification is kept until the task waits.
     woken.notified().await;
     assert!(rooms.end_of(ending.id()).is_some_and(|end| !end.finished));
     assert!(asleep.notified().now_or_never().is_none());
@@ -160,10 +160,10 @@ async fn the_end_of_a_game_wakes_only_its_own_unit() {
 
     // A task that has been replaced takes nothing from the one that waits.
     let unit = other.id().unit();
-    let next = rooms.wake(unit);
-    rooms.stop_waking(unit, &asleep);
+    let next = rooms.notify_of_games(unit);
+    rooms.stop_notifying(unit, &asleep);
     other.close_without_token().await;
     next.notified().await;
-    rooms.stop_waking(unit, &next);
-    assert!(!rooms.lock().waiting.contains_key(&unit));
+    rooms.stop_notifying(unit, &next);
+    assert!(!rooms.notifies(unit));
 }

@@ -1,6 +1,7 @@
 //! The games of a tournament and their rooms: a called game is assigned a room, its participants
 //! are notified, and its result counts exactly once: as the room says, or, if the server was
-//! restarted in between, as the store has it. The core decides when games are called and what counts.
+//! restarted in between, as the store has it. The core decides when games are called and what
+//! counts.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -25,10 +25,12 @@ const MIGRATIONS: [(i64, &str, &str); 4] = [
 const SCHEMA_LOCK: i64 = 0x6368_6566_7368_6174;
 /// How long connecting may take.
 const CONNECT_LIMIT: Duration = Duration::from_secs(5);
-/// How long a migration may wait for a lock, and with it every node that comes after it; the pause
-/// before it tries again, and how often it does. A backup holds locks of all tables as long as it runs.
+/// How long a migration may wait for a lock, and every node with it. A backup holds locks of all
+/// tables as long as it runs.
 const MIGRATION_LOCK_LIMIT: Duration = Duration::from_secs(1);
+/// The pause before the next attempt.
 const MIGRATION_PAUSE: Duration = Duration::from_secs(2);
+/// Number of attempts, for a minute in all.
 const MIGRATION_TRIES: u32 = 20;
 /// The settings of each session. Work that depends on nothing but `READ COMMITTED` and takes short;
 /// a server that stops in the middle of a transaction must not keep its locks for long.
@@ -71,7 +73,7 @@ pub enum DatabaseError {
     Newer,
     /// Other sessions hold locks of the tables.
     #[error(
-        "another session uses the tables that are to be upgraded, for example a backup; `chefshat migrate` waited a minute, and can be run again: see pg_locks"
+        "other sessions still use the tables that are to be changed, for example a backup: wait until they have ended (see pg_locks), then try again"
     )]
     InUse,
     /// Any other error.
@@ -275,8 +277,7 @@ pub async fn migrate(url: &str) -> Result<(i64, i64), DatabaseError> {
 }
 
 /// Runs what is missing, each migration in a transaction. The caller has the lock. While it waits
-/// for tables that others use, nobody else gets them, and no node its lease: so it waits for short,
-/// and often.
+/// for a table, nobody else gets that table, and no node its lease: so it waits briefly, and often.
 async fn migrations(connection: &mut PgConnection) -> Result<(), DatabaseError> {
     let all = MIGRATIONS.iter().map(|(version, name, sql)| {
         let sql = (*sql).into_sql_str();
@@ -284,7 +285,10 @@ async fn migrations(connection: &mut PgConnection) -> Result<(), DatabaseError> 
     });
     let migrator = Migrator::with_migrations(all.collect());
     set_lock_limit(connection, MIGRATION_LOCK_LIMIT).await?;
-    for _ in 0..MIGRATION_TRIES {
+    for attempt in 0..MIGRATION_TRIES {
+        if attempt > 0 {
+            sleep(MIGRATION_PAUSE).await;
+        }
         match migrator.run(&mut *connection).await {
             Ok(()) => return Ok(()),
             Err(MigrateError::Execute(error) | MigrateError::ExecuteMigration(error, _))
@@ -294,7 +298,6 @@ async fn migrations(connection: &mut PgConnection) -> Result<(), DatabaseError> 
                 return Err(DatabaseError::Other(problem));
             }
         }
-        sleep(MIGRATION_PAUSE).await;
     }
     Err(DatabaseError::InUse)
 }

@@ -9,7 +9,7 @@ from chefshat.backoff import Backoff
 from chefshat.channels import async_channel
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
 from chefshat.network import grpc
-from chefshat.requests import Answered, AsyncMessages, AsyncStreamed
+from chefshat.requests import Answered, AsyncMessages, AsyncStreamed, async_received
 
 
 class AsyncConnection:
@@ -33,14 +33,14 @@ class AsyncConnection:
         is given up.
 
         Args:
-            begin: opens the stream, from where it is to go on.
-            unfinished: what is said if the server ends the stream, which then counts as broken; empty: the messages end there.
+            begin: opens the stream, from the position to resume at.
+            unfinished: the error if the server ends the stream, which then counts as broken; empty: the messages end there.
         """
         failures = 0
         while True:
             call, progress = begin(), False
             try:
-                async for message in call:
+                async for message in async_received(call):
                     failures = 0 if progress else failures
                     progress = True
                     yield message

@@ -9,7 +9,7 @@ from chefshat.backoff import Backoff
 from chefshat.channels import channel
 from chefshat.errors import ChefsHatError, connection_lost, from_rpc_error
 from chefshat.network import grpc
-from chefshat.requests import Answered, Messages, Streamed
+from chefshat.requests import Answered, Messages, Streamed, received
 
 
 class Connection:
@@ -33,14 +33,14 @@ class Connection:
         is given up.
 
         Args:
-            begin: opens the stream, from where it is to go on.
-            unfinished: what is said if the server ends the stream, which then counts as broken; empty: the messages end there.
+            begin: opens the stream, from the position to resume at.
+            unfinished: the error if the server ends the stream, which then counts as broken; empty: the messages end there.
         """
         failures = 0
         while True:
             call, progress = begin(), False
             try:
-                for message in call:
+                for message in received(call):
                     failures = 0 if progress else failures
                     progress = True
                     yield message

@@ -142,8 +142,8 @@ impl Room {
         let header = self.core.header();
         let (game, unit) = (header.game_id, header.unit());
         let limit = match self.context.lease {
-            Some(_) => SIGNING_LIMIT,
-            None => Duration::ZERO,
+            Some(_) if self.context.signer.key().is_some() => SIGNING_LIMIT,
+            _ => Duration::ZERO,
         };
         let began = Instant::now();
         loop {
@@ -155,7 +155,7 @@ impl Room {
                 Err(error) => error,
             };
             if began.elapsed() >= limit {
-                error!(%game, %error, "a record could not be signed; it stays unsigned");
+                error!(%game, %error, "the record of a game could not be read; it has no signature");
                 return Ok(ReadRecord::default());
             }
             tokio::select! {

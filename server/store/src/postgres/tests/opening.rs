@@ -54,7 +54,9 @@ async fn an_upgrade_that_waits_for_a_backup_stops_no_node() {
     });
     let waiting = "SELECT count(*) FROM pg_stat_activity
                    WHERE wait_event_type = 'Lock' AND datname = current_database()";
-    while database.run(waiting).trim() == "0" {}
+    while database.run(waiting).trim() == "0" {
+        assert!(!upgrade.is_finished(), "it did not wait");
+    }
     database.run("SET statement_timeout = '30s'; UPDATE nodes SET beat_ms = clock_ms()");
     assert!(!upgrade.is_finished());
 
