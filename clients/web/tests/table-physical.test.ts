@@ -189,7 +189,7 @@ describe("a violation", () => {
     [BEGUN, ViolatedRule.FACE, "Sul piatto ci sono già carte di valore 9: serve un 8 o un numero più basso."],
     [BEGUN, ViolatedRule.SIZE, "Servono almeno 2 carte."],
     [BEGUN, ViolatedRule.TURN, "Non è il suo turno: tocca a Cleo."],
-    [START, ViolatedRule.OPENING, "Lo Shift si apre con il 11 d’oro: solo 11 e jolly insieme."],
+    [START, ViolatedRule.OPENING, "Lo Shift si apre con l’11 d’oro: solo 11 e jolly insieme."],
     [[...BEGUN, plays(2, 1, 2, 20)], ViolatedRule.FACE, "Niente batte il tartufo sul piatto: si può solo passare."],
     [BEGUN, ViolatedRule.CARDS, "The server's sentence."],
   ])("after %# has an Italian sentence where the page can make one", async (before, rule, sentence) => {

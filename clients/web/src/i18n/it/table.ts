@@ -9,6 +9,8 @@ const plural = plurals("it");
 const number = numerals(
   "uno due tre quattro cinque sei sette otto nove dieci undici dodici tredici quattordici quindici",
 );
+/** A face with its article: "l’8", "l’11", "il 9". */
+const il = (face: number) => `${face === 8 || face === 11 ? "l’" : "il "}${face}`;
 
 export const table: Texts["table"] = {
   title: "Tavolo",
@@ -35,7 +37,7 @@ export const table: Texts["table"] = {
     received: "ricevuta nello scambio",
   },
   play: (quantity, face, golden, jokers) => {
-    const one = golden ? `${face === 8 || face === 11 ? "l’" : "il "}${face} d’oro` : `un ${face}`;
+    const one = golden ? `${il(face)} d’oro` : `un ${face}`;
     const cards = quantity === 1 ? one : `${number(quantity)} ${face}${golden ? " (uno d’oro)" : ""}`;
     return cards + (jokers === 0 ? "" : plural(jokers, { one: " con jolly", other: " con # jolly" }));
   },
@@ -109,8 +111,8 @@ export const table: Texts["table"] = {
         return "Una giocata è di carte dello stesso valore, con o senza jolly, oppure di un solo jolly.";
       case ViolatedRule.OPENING:
         return golden
-          ? `Lo Shift si apre con il ${top} d’oro: solo ${top} e jolly insieme.`
-          : `Lo Shift si apre con il ${top}: nessun altro valore.`;
+          ? `Lo Shift si apre con ${il(top)} d’oro: solo ${top} e jolly insieme.`
+          : `Lo Shift si apre con ${il(top)}: nessun altro valore.`;
       case ViolatedRule.PASS:
         return "Ora non si può passare.";
       case ViolatedRule.DECISION:
@@ -183,12 +185,12 @@ export const table: Texts["table"] = {
     mustPlay: "Dopo più pizze senza giocate, ora devi giocare.",
   },
   reasons: {
-    openingGolden: (face) => `Lo Shift si apre con il ${face} d’oro: solo ${face} e jolly insieme.`,
-    openingFace: (face) => `Lo Shift si apre con il ${face}: nessun altro valore.`,
+    openingGolden: (face) => `Lo Shift si apre con ${il(face)} d’oro: solo ${face} e jolly insieme.`,
+    openingFace: (face) => `Lo Shift si apre con ${il(face)}: nessun altro valore.`,
     notRarer: (face, board) => `${face} non è più raro di ${board}: serve un numero più basso.`,
     nothingRarer: "Niente batte le carte sul piatto.",
     tooFew: (face, need, have) =>
-      `${plural(need, { one: "Ti serve # carta", other: "Ti servono # carte" })} dello stesso valore (i jolly contano); con il ${face} ne hai solo ${have}.`,
+      `${plural(need, { one: "Ti serve # carta", other: "Ti servono # carte" })} dello stesso valore (i jolly contano); con ${il(face)} ne hai solo ${have}.`,
     jokerAlone: "Un jolly da solo può soltanto aprire una pizza, e non hai carte con cui giocarlo.",
     other: "Questa carta ora non si può giocare.",
     declareFirst: "Prima decidi se dichiarare.",
