@@ -13,8 +13,9 @@ from hand_made import hand_made
 from chefshat import pb
 from chefshat.learn import features, network, ppo, ppo_checkpoint
 from chefshat.learn.ppo import Hyperparameters, Rates, Samples
-from chefshat.learn.ppo_checkpoint import Opponent, Plan, Progress
+from chefshat.learn.ppo_checkpoint import Opponent, Plan
 from chefshat.learn.training_file import TrainingFileError
+from chefshat.learn.training_log import Progress
 
 HYPER = Hyperparameters(policy_widths=(16,), value_widths=(16,), minibatches=4)
 DATA = Path(__file__).parent / "data"

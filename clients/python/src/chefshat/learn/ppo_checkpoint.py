@@ -20,6 +20,7 @@ from chefshat.learn.mlp import Params
 from chefshat.learn.network import Network
 from chefshat.learn.ppo import Hyperparameters, Learner
 from chefshat.learn.training_file import network_info, opened
+from chefshat.learn.training_log import Progress
 from chefshat.vector_setup import NETWORK_SUFFIX
 
 FORMAT = "chefshat-ppo-training-2"
@@ -119,23 +120,6 @@ class Plan:
         renamed = {"trace": "gae_lambda"}
         restored = {"opponents": tuple(Opponent(**opponent) for opponent in listed), "hyper": Hyperparameters(**hyper)}
         return cls(**{renamed.get(key, key): value for key, value in plain.items()} | restored)
-
-
-@dataclass(frozen=True)
-class Progress:
-    """The progress of a training.
-
-    Attributes:
-        updates: updates so far.
-        decisions: decisions taken.
-        seconds: seconds of training, evaluations included.
-        runs: times it was started or resumed.
-    """
-
-    updates: int = 0
-    decisions: int = 0
-    seconds: float = 0.0
-    runs: int = 0
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ import argparse
 import contextlib
 import dataclasses
 import json
-import logging
 import sys
 import time
 from collections.abc import Iterator
@@ -16,23 +15,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from google.protobuf import json_format
 from tqdm import tqdm
 
 from chefshat import join_options, pb
 from chefshat.errors import ChefsHatError, failed
-from chefshat.learn import network, plugins, ppo_checkpoint, runs
-from chefshat.learn.evaluation import Evaluation, evaluate
+from chefshat.learn import network, plugins, ppo_checkpoint, runs, training_log
+from chefshat.learn.evaluation import Evaluation
 from chefshat.learn.network import Network
-from chefshat.learn.plugins import PluginOpponent
 from chefshat.learn.ppo import Hyperparameters
-from chefshat.learn.ppo_checkpoint import Opponent, Plan, Progress, Training
+from chefshat.learn.ppo_checkpoint import Opponent, Plan, Training
 from chefshat.learn.ppo_training import Trainer
 from chefshat.learn.scalars import Scalars
 from chefshat.learn.training_file import TrainingFileError
-
-LOG = logging.getLogger("chefshat.learn")
-OPPONENTS = ("greedy", "random")
+from chefshat.learn.training_log import Progress
 
 
 def run(options: argparse.Namespace) -> int:
@@ -43,15 +38,19 @@ def run(options: argparse.Namespace) -> int:
     try:
         with runs.reserved(out, state, log, replace=options.resume or options.force):
             training = _resume(state, options) if options.resume else _start(options)
-            evaluated = _evaluated(log) if options.resume else None
-            with Trainer(training, address=join_options.server_if_any(options)) as trainer, _log_file(log, append=options.resume):
-                LOG.info(json.dumps(_setup(trainer.training)))
+            evaluated = training_log.last_evaluated(log) if options.resume else None
+            with (
+                Trainer(training, address=join_options.server_if_any(options)) as trainer,
+                training_log.written(log, append=options.resume),
+            ):
+                begun = trainer.training
+                training_log.log_setup(dataclasses.asdict(begun.plan), begun.seed, begun.rules, begun.trained_by)
                 with Scalars(options.tensorboard) as scalars:
                     evaluations = _train(trainer, options, state, scalars, evaluated)
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:
         return failed(error, as_json=options.json)
     if options.json:
-        print(json.dumps({"event": "trained", "file": str(out), **_summary(trainer.training, evaluations)}))
+        print(json.dumps({"event": "trained", "file": str(out), **training_log.summary(trainer.training.progress, evaluations)}))
     else:
         print(f"{out}: {trainer.training.progress.decisions:,} decisions")
         for evaluation in evaluations:
@@ -134,12 +133,12 @@ def _train(trainer: Trainer, options: argparse.Namespace, state: Path, scalars: 
     """
     evaluations = trainer.training.plan.evaluations
     done = _share_done(options, trainer.training.progress)
-    next_evaluation = _next_evaluation(done, evaluations) if evaluated == trainer.training.progress.decisions else done
+    next_evaluation = training_log.next_evaluation(done, evaluations) if evaluated == trainer.training.progress.decisions else done
     losses: dict[str, float] = {}
     with _bar() as bar, contextlib.suppress(KeyboardInterrupt):
         while (done := _share_done(options, trainer.training.progress)) < 1:
             if done >= next_evaluation:
-                next_evaluation = _next_evaluation(done, evaluations)
+                next_evaluation = training_log.next_evaluation(done, evaluations)
                 # Saves first: an evaluation may fail.
                 ppo_checkpoint.save(state, trainer.training)
                 _evaluate(trainer, options, losses, scalars)
@@ -157,19 +156,6 @@ def _train(trainer: Trainer, options: argparse.Namespace, state: Path, scalars: 
     return last
 
 
-def _next_evaluation(done: float, evaluations: int) -> float:
-    """Returns the share of the budget at the next evaluation, which is the same in a training that was not interrupted."""
-    before = int(done * evaluations)
-    return next(share for share in (number / evaluations for number in range(before, before + 3)) if share > done)
-
-
-def _evaluated(log: Path) -> int | None:
-    """Returns the decisions before the last evaluation of a log; None if there is none."""
-    lines = log.read_text(encoding="utf-8").splitlines() if log.exists() else []
-    found = [json.loads(line) for line in lines if line.startswith('{"event": "evaluation"') and line.endswith("}")]
-    return int(found[-1]["decisions"]) if found else None
-
-
 def _share_done(options: argparse.Namespace, progress: Progress) -> float:
     """Returns the share of the budget that is used up, 0..=1."""
     share = progress.seconds / (60 * options.minutes) if options.minutes else progress.decisions / options.decisions
@@ -182,58 +168,18 @@ def _evaluate(
     """Plays against the built-in agents, and logs the results. `stopped`: since Ctrl-C was pressed, not since it was due."""
     began = time.monotonic()
     training = trainer.training
-    current = training.network(options.name)
     plan = training.plan.checked()
-    tables: list[tuple[str | PluginOpponent, ...]] = [(name,) for name in OPPONENTS]
-    if plan.opponent_games:
-        tables.append(tuple(trainer.opponents))
-    evaluations = [
-        evaluate(
-            current,
-            opponents,
-            games=plan.evaluation_games,
-            seed=runs.EVALUATION_SEED,
-            rules=training.rules,
-            address=join_options.server_if_any(options),
-        )
-        for opponents in dict.fromkeys(tables)
-    ]
+    further = trainer.opponents if plan.opponent_games else ()
+    address = join_options.server_if_any(options)
+    evaluations = training_log.evaluate_all(
+        training.network(options.name), plan.evaluation_games, training.rules, address, further=further
+    )
     progress = dataclasses.replace(training.progress, seconds=training.progress.seconds + time.monotonic() - began)
     trainer.training = dataclasses.replace(training, progress=progress)
     points = {",".join(evaluation.opponents): evaluation.points for evaluation in evaluations}
     scalars.add("points_per_shift", points, progress.decisions)
-    line = {"event": "evaluation", **_summary(trainer.training, evaluations), "losses": losses}
-    LOG.info(json.dumps({**line, "stopped": True} if stopped else line))
+    training_log.log_evaluations(progress, evaluations, losses, stopped=stopped)
     return evaluations
-
-
-def _summary(training: Training, evaluations: list[Evaluation]) -> dict[str, Any]:
-    progress = dataclasses.asdict(training.progress)
-    return {**progress, "evaluations": [evaluation.to_json() for evaluation in evaluations]}
-
-
-def _setup(training: Training) -> dict[str, Any]:
-    return {
-        "event": "setup",
-        "plan": dataclasses.asdict(training.plan),
-        "seed": training.seed,
-        "rules": json_format.MessageToDict(training.rules),
-        "trained_by": training.trained_by,
-    }
-
-
-@contextlib.contextmanager
-def _log_file(path: Path, *, append: bool) -> Iterator[None]:
-    """Writes the messages of the logger `chefshat.learn` to a file."""
-    level, handler = LOG.level, logging.FileHandler(path, "a" if append else "w", encoding="utf-8")
-    LOG.addHandler(handler)
-    LOG.setLevel(logging.INFO)
-    try:
-        yield
-    finally:
-        LOG.setLevel(level)
-        LOG.removeHandler(handler)
-        handler.close()
 
 
 @contextlib.contextmanager

@@ -21,9 +21,10 @@ from chefshat.learn import plugins, ppo
 from chefshat.learn.all_hands import other_hands
 from chefshat.learn.plugins import PluginOpponent
 from chefshat.learn.ppo import Params, Samples
-from chefshat.learn.ppo_checkpoint import Opponent, Plan, Progress, Training
+from chefshat.learn.ppo_checkpoint import Opponent, Plan, Training
 from chefshat.learn.runs import SEED_STEP
 from chefshat.learn.self_play import Collector, Floats, advantages
+from chefshat.learn.training_log import Progress
 from chefshat.vector import VectorEnv
 
 
