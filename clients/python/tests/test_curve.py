@@ -1,13 +1,17 @@
 """The plot of a training."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from chefshat import pb
 from chefshat.learn import __main__ as command
 from chefshat.learn.curve import figure, interquartile_mean, read
+from chefshat.learn.evaluation import evaluate
+from chefshat.learn.runs import EVALUATION_SEED
 
 
 def a_look(decisions: int, points: float) -> dict[str, object]:
@@ -45,7 +49,10 @@ def test_the_command_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     log, out = tmp_path / "log.jsonl", tmp_path / "curve.png"
     log.write_text(LOG)
     assert command.main(["curve", str(log), "--out", str(out), "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {"out": str(out)}
+    printed = json.loads(capsys.readouterr().out)
+    assert (printed["out"], len(printed["summary"])) == (str(out), 2)
+    assert printed["summary"][0].items() >= {"panel": "Against 3 greedy", "label": "the policy", "points": 3.0}.items()
+    assert printed["summary"][1] == {"panel": "Against 3 greedy", "label": "mean of all seats", "points": 2.25}
     assert out.read_bytes().startswith(b"\x89PNG")
     log.write_text(LOG.splitlines()[0])
     capsys.readouterr()
@@ -85,6 +92,41 @@ def test_runs_that_differ_in_their_seed_are_one_line() -> None:
     against_random = read(a_run(8, 1.0).replace("greedy", "random"))
     with pytest.raises(ValueError, match="against different opponents"):
         figure([runs[0], against_random])
+
+
+def test_other_algorithms_are_other_lines() -> None:
+    logs = [a_run(1, 3.0, all_hands=False), a_run(1, 4.0, all_hands=True)]
+    deep_q = a_run(1, 1.0, mask=True).replace('"event": "setup"', '"event": "setup", "algorithm": "deep-q"')
+    (panel,) = figure([read(log) for log in (*logs, deep_q, deep_q.replace('"seed": 1', '"seed": 2'))]).panels
+    assert [line.label for line in panel.lines] == [
+        "ppo, all_hands False",
+        "ppo, all_hands True",
+        "deep-q: interquartile mean of 2 runs",
+    ]
+    assert panel.x_label == "decisions of the training, millions"
+    assert panel.lines[2].x[1] == 2.001
+    (panel,) = figure([read(logs[0].replace("2001000", "2001"))]).panels
+    assert (panel.x_label, panel.lines[0].x[1]) == ("decisions of the training, thousands", 2.001)
+    more_games = read(logs[1].replace('"points": 0.5', '"games": 3, "points": 0.5'))
+    with pytest.raises(ValueError, match="in different numbers of games"):
+        figure([read(logs[0]), more_games])
+
+
+def test_baselines_play_the_games_of_the_evaluations() -> None:
+    pytest.importorskip("chefshat_native")
+    rules = {"players": 2, "faces": 4, "jokers": 0, "targetShifts": 2, "points": [5, 0]}
+    (setup, first, last) = (
+        json.loads(line.replace('"points": 0.5', '"games": 3, "points": 0.5')) for line in a_run(1, 3.0).splitlines()
+    )
+    for line in (first, last):
+        line["evaluations"][0]["opponents"] = ["random"]
+    run = read("\n".join(map(json.dumps, ({**setup, "rules": rules}, first, last))))
+    (panel,) = figure([run], ["greedy", "random"]).panels
+    expected = [evaluate(name, "random", games=3, seed=EVALUATION_SEED, rules=run.rules).points for name in ("greedy", "random")]
+    assert [(level.label, level.y) for level in panel.levels] == list(zip(("greedy", "random"), expected, strict=True))
+    other_rules = replace(run, seed=2, rules=pb.RuleSet(players=2, faces=5))
+    with pytest.raises(ValueError, match="must all have the same"):
+        figure([run, other_rules], ["greedy"])
 
 
 def test_runs_of_other_experiments_are_other_lines() -> None:

@@ -136,7 +136,15 @@ def _curve(command: argparse.ArgumentParser) -> None:
         type=Path,
         nargs="+",
         metavar="LOG",
-        help="logs written by `ppo`; those that differ in nothing but their seed are one line, the interquartile mean of the runs",
+        help="logs of `ppo` or `deep-q`; those that differ in nothing but their seed are one line, the interquartile mean of "
+        "the runs",
+    )
+    command.add_argument(
+        "--baselines",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="built-in agents or network files that play the same games, as horizontal lines; built-in ones need chefshat-native",
     )
     command.add_argument("--out", type=Path, required=True, metavar="PNG", help="the picture to write")
 
@@ -158,7 +166,7 @@ PROGRAM = Program(
         "ppo": ("ppo_command", "trains an agent by self-play with proximal policy optimisation", _ppo),
         "value": ("value", "trains a value network: the expected points of a policy", _value),
         "evaluate": ("evaluation", "plays a trained network on one seat against built-in agents", _evaluate),
-        "curve": ("curve", "draws the learning curve of a training, from its log", _curve),
+        "curve": ("curve", "draws the learning curves of trainings, from their logs", _curve),
         "play": ("play", "plays a game in a room, or a whole tournament, with a trained network", _play),
     },
     extra="chefshat[learn]",

@@ -2,7 +2,7 @@
 
 import io
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import ceil
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
 from matplotlib.transforms import ScaledTranslation
 
-from chefshat.errors import failed
+from chefshat.errors import ChefsHatError, failed
 from chefshat.files import check_readable, write_atomically
 from chefshat.learn.figures import Figure, Panel
 
@@ -75,6 +75,7 @@ def draw_files(
     figure: Callable[[list[Read]], Figure],
     out: Path,
     *,
+    summary: Callable[[Figure], Sequence[Mapping[str, Any]]] = lambda figure: (),
     as_json: bool,
 ) -> int:
     """Draws a figure of text files, for a command. Returns the exit code.
@@ -86,6 +87,7 @@ def draw_files(
         read: reads the text of a file. Raises ValueError if it is wrong.
         figure: creates the figure from what was read. Raises ValueError if it does not fit together.
         out: the picture to write.
+        summary: returns what to print of the figure: texts and numbers by name.
         as_json: whether to print JSON.
     """
     found: list[Read] = []
@@ -96,10 +98,17 @@ def draw_files(
                 found.append(read(source.read_text(encoding="utf-8")))
             except ValueError as error:
                 raise ValueError(f"{source}: {error}") from error
-        write_atomically(out, png(figure(found)))
-    except (OSError, ValueError) as error:
+        drawing = figure(found)
+        write_atomically(out, png(drawing))
+    except (ChefsHatError, OSError, ValueError) as error:
         return failed(error, as_json=as_json)
-    print(json.dumps({"out": str(out)}) if as_json else f"wrote {out}")
+    rows = summary(drawing)
+    if as_json:
+        print(json.dumps({"out": str(out), **({"summary": rows} if rows else {})}))
+        return 0
+    print(f"wrote {out}")
+    for row in rows:
+        print("  " + ", ".join(f"{name} {value:.3f}" if isinstance(value, float) else str(value) for name, value in row.items()))
     return 0
 
 
