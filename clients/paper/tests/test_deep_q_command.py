@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from chefshat import pb
-from chefshat.learn import network, runs
+from chefshat.learn import curve, network, runs
+from chefshat.learn.__main__ import main as ppo_main
 from waiting import LIMIT_S, wait_until
 
 from chefshat_paper.learn import checkpoint, deep_q, deep_q_command
@@ -19,6 +20,7 @@ from chefshat_paper.learn.__main__ import main, parse
 from chefshat_paper.learn.deep_q import DeepQConfig
 
 SMALL = {"hidden": [8], "batch_size": 4, "memory_size": 32}
+FEW_EVALUATIONS = ["--evaluations", "2", "--evaluation-games", "2"]
 
 
 class Place:
@@ -33,7 +35,7 @@ class Place:
 
     def arguments(self, shifts: int, *more: str) -> list[str]:
         files = ["--out", str(self.out), "--parameters", str(self.parameters)]
-        return ["deep-q", *files, "--shifts", str(shifts), "--address", self.address, *more]
+        return ["deep-q", *files, "--shifts", str(shifts), "--address", self.address, *FEW_EVALUATIONS, *more]
 
 
 @pytest.fixture
@@ -73,10 +75,44 @@ def test_a_training_resumes_after_ctrl_c(
     assert (after.shifts, after.seed) == (stopped.shifts + 2, 5)
     assert int(after.agents.updates[0]) > int(stopped.agents.updates[0])
     assert int(after.agents.remembered[0]) > int(stopped.agents.remembered[0])
-    assert after.rules.target_shifts == after.shifts
+    assert after.rules == runs.full_rules("paper", place.address)
+    assert after.progress.runs == 2
+    assert after.progress.decisions > stopped.progress.decisions > 0
     first, second = after.trained_by.split("; ")
     assert ("--seed 5" in first, "--resume" in second) == (True, True)
     assert network.load(place.out).info.trained_by == after.trained_by
+
+
+@pytest.mark.server
+def test_its_log_is_like_that_of_ppo(place: Place, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    deep_q_log, ppo_log = place.out.with_suffix(".jsonl"), tmp_path / "ppo.jsonl"
+    command = place.arguments(1, "--seed", "5", "--json")
+    command[command.index("--shifts")] = "--decisions"
+    command[command.index("1")] = "40"
+    assert main(command) == 0
+    trained = json.loads(capsys.readouterr().out)
+    assert (trained["decisions"], trained["runs"], [one["games"] for one in trained["evaluations"]]) == (40, 1, [2, 2])
+    # Forced decisions do not count, but the agent learns from them. The first update waits for a batch.
+    assert trained["updates"] > 40
+    small = ["--games", "16", "--steps", "16", "--minibatches", "2", "--width", "8", "--value-width", "8", *FEW_EVALUATIONS]
+    ppo = ["ppo", "--out", str(ppo_log.with_suffix(".safetensors")), "--decisions", "512", "--address", place.address]
+    assert ppo_main([*ppo, *small]) == 0
+    logs = [[json.loads(line) for line in log.read_text().splitlines()] for log in (deep_q_log, ppo_log)]
+    assert [line["event"] for line in logs[0]] == ["setup", "evaluation", "evaluation", "evaluation"]
+    assert [line["decisions"] for line in logs[0][1:]] == [0, 20, 40]
+    assert [line["evaluations"][0]["games"] for line in logs[0][1:]] == [2, 2, 2]
+    for ours, theirs in zip(logs[0], logs[1], strict=True):
+        assert ours.keys() == theirs.keys()
+    assert logs[0][0]["rules"] == logs[1][0]["rules"]
+    panels = curve.figure([curve.read(log.read_text()) for log in (deep_q_log, ppo_log)]).panels
+    assert [[line.label for line in panel.lines] for panel in panels] == [["deep-q", "ppo"]] * 2
+
+    command[command.index("40")] = "60"
+    assert main([*command, "--resume"]) == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["runs"] == 2
+    assert [line["decisions"] for line in curve.read(deep_q_log.read_text()).evaluations] == [0, 20, 40, 60]
+    assert main([*command, "--resume"]) == 1
+    assert "has taken 60 decisions already: give more than that with --decisions" in json.loads(capsys.readouterr().out)["message"]
 
 
 @pytest.fixture(scope="module")
@@ -109,6 +145,16 @@ def test_contradicting_options_are_refused(
     assert message in found
     assert place.state.read_bytes() == before
     assert not place.out.exists()
+
+
+@pytest.mark.server
+def test_a_training_of_an_earlier_version_is_evaluated_in_games_of_the_usual_length(place: Place, full_rules: pb.RuleSet) -> None:
+    begin(place, full_rules)
+    assert main(place.arguments(4, "--resume")) == 0
+    assert checkpoint.load(place.state).rules == runs.full_rules("paper", place.address)
+    (evaluated, *_) = curve.read(place.out.with_suffix(".jsonl").read_text()).evaluations
+    assert evaluated["decisions"] == 0
+    assert evaluated["evaluations"][0]["shifts"] >= 2 * 3  # Two games to 15 points, of which a Shift brings 5 at most.
 
 
 @pytest.mark.server

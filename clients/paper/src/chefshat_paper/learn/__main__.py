@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from chefshat.learn.command import Given, Program, add_force, add_games, add_rules, count
+from chefshat.learn.command import Given, Program, add_evaluations, add_force, add_games, add_log, add_rules, count
 
 EXAMPLES = """examples:
   python -m chefshat_paper.learn deep-q --out deep_q.safetensors --shifts 1000 --mask
@@ -17,7 +17,9 @@ exit code: 0 success, 1 failure (the last line gives the reason), 2 wrong argume
 
 def _deep_q(command: argparse.ArgumentParser) -> None:
     command.add_argument("--out", type=Path, required=True, metavar="FILE", help="the network to write")
-    command.add_argument("--shifts", type=count, default=250, help="Shifts to play")
+    budget = command.add_mutually_exclusive_group()
+    budget.add_argument("--shifts", type=count, default=250, help="Shifts to play")
+    budget.add_argument("--decisions", type=count, help="stop after this many decisions among several legal actions instead")
     _deep_q_games(command)
     command.add_argument("--name", default="deep-q", help="name of the agent, written into the network")
     add_rules(command)
@@ -25,11 +27,13 @@ def _deep_q(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--resume",
         action="store_true",
-        help="resume from the checkpoint, with its settings; --shifts counts from the first start",
+        help="resume from the checkpoint, with its settings; the budget counts from the first start",
     )
     add_force(command)
     command.add_argument("--save-every", type=count, default=50, metavar="SHIFTS", help="Shifts between two writes of both files")
     command.add_argument("--checkpoint", type=Path, metavar="FILE", help="the checkpoint (default: OUT as .training)")
+    add_log(command)
+    add_evaluations(command)
 
 
 def _tune(command: argparse.ArgumentParser) -> None:

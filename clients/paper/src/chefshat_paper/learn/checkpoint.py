@@ -10,7 +10,7 @@ import itertools
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import jax
 from chefshat import pb
@@ -18,6 +18,7 @@ from chefshat.learn import mlp, training_file
 from chefshat.learn.mlp import Params
 from chefshat.learn.network import Layer, Network
 from chefshat.learn.training_file import network_info, opened
+from chefshat.learn.training_log import Progress
 
 from chefshat_paper.learn import deep_q
 from chefshat_paper.learn.deep_q import Agents, DeepQConfig
@@ -38,6 +39,7 @@ class Training:
         rewards: the reward scheme; empty: unknown.
         seed: the seed.
         shifts: Shifts played so far.
+        progress: what else is counted. Files of earlier versions do not say, and so count from 0.
     """
 
     config: DeepQConfig
@@ -48,6 +50,7 @@ class Training:
     rewards: str = ""
     seed: int = 0
     shifts: int = 0
+    progress: Progress = field(default_factory=Progress)
 
     def networks(self, name: str) -> list[Network]:
         """Returns the network of every agent, all with one name. Its outputs are those of `deep_q.outputs`, before the tanh."""
@@ -79,6 +82,7 @@ def save(path: str | os.PathLike[str], training: Training) -> None:
         "rewards": training.rewards,
         "seed": str(training.seed),
         "shifts": str(training.shifts),
+        "progress": json.dumps(dataclasses.asdict(training.progress)),
     }
     training_file.save(path, FORMAT, training.agents, training.rules, texts)
 
@@ -101,6 +105,7 @@ def load(path: str | os.PathLike[str]) -> Training:
             texts["rewards"],
             int(texts["seed"]),
             int(texts["shifts"]),
+            Progress(**json.loads(texts.get("progress", "{}"))),
         )
 
 

@@ -1,14 +1,15 @@
 """The command `python -m chefshat_paper.learn deep-q`: trains one Deep Q agent against three built-in ones.
 
-Writes two files: the network, which `play` and the server's agents can use, and a checkpoint to resume from. They are written every
-`--save-every` Shifts, at the end, and on Ctrl-C. The agent is in `deep_q`, its games are in `deep_q_training`.
+Writes three files: the network, which `play` and the server's agents can use, and a checkpoint to resume from, both every
+`--save-every` Shifts, at the end, and on Ctrl-C; and a log with the evaluations, like that of `ppo`. The agent is in `deep_q`, its
+games are in `deep_q_training`.
 """
 
 import argparse
 import dataclasses
 import json
-import logging
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,10 @@ import numpy as np
 from chefshat import join_options, pb
 from chefshat.errors import ChefsHatError, failed
 from chefshat.files import check_readable
-from chefshat.learn import features, network, runs
+from chefshat.learn import features, network, runs, training_log
+from chefshat.learn.evaluation import Evaluation
 from chefshat.learn.training_file import TrainingFileError
+from chefshat.learn.training_log import Progress
 from chefshat.vector import VectorEnv
 from tqdm import tqdm
 
@@ -25,8 +28,6 @@ from chefshat_paper.learn import checkpoint, deep_q, deep_q_training
 from chefshat_paper.learn.checkpoint import Training
 from chefshat_paper.learn.deep_q import Agents, DeepQConfig
 from chefshat_paper.learn.deep_q_training import Played
-
-LOG = logging.getLogger("chefshat.learn")
 
 
 class Stopped(Exception):
@@ -41,15 +42,17 @@ def run(options: argparse.Namespace) -> int:
     """Runs the command. Returns the exit code."""
     out: Path = options.out
     state: Path = options.checkpoint or out.with_suffix(".training")
+    log: Path = options.log or out.with_suffix(".jsonl")
     try:
-        with runs.reserved(out, state, replace=options.resume or options.force):
-            played = _train(options, state)
+        with runs.reserved(out, log, state, replace=options.resume or options.force):
+            training, played, evaluations = _train(options, state, log)
     except Stopped as stopped:
         if options.json:
             print(json.dumps({"event": "interrupted", "file": str(out), "training": str(state), "shifts": stopped.shifts}))
         else:
+            of = "" if options.decisions else f" of {options.shifts:,}"
             print(
-                f"interrupted after {stopped.shifts:,} of {options.shifts:,} Shifts; {out} and {state} are saved: "
+                f"interrupted after {stopped.shifts:,}{of} Shifts; {out} and {state} are saved: "
                 "resume by the same command with --resume",
                 file=sys.stderr,
             )
@@ -58,30 +61,37 @@ def run(options: argparse.Namespace) -> int:
         return failed(error, as_json=options.json)
     summary = _summary(played)
     if options.json:
-        print(json.dumps({"event": "trained", "file": str(out), "training": str(state), **summary}))
+        more = training_log.summary(training.progress, evaluations)
+        print(json.dumps({"event": "trained", "file": str(out), "training": str(state), **summary, **more}))
     else:
-        # Counts, because percentages of a few Shifts would suggest false precision.
-        won = f"won {summary['won'] * summary['last_shifts']:,.0f} of the last {summary['last_shifts']:,}"
-        print(f"{out}: {options.shifts:,} Shifts")
-        print(f"  {won}, mean place {summary['mean_place']:.2f}, {summary['wrong_per_shift']:.2f} illegal actions per Shift")
+        print(f"{out}: {training.shifts:,} Shifts, {training.progress.decisions:,} decisions")
+        if summary:
+            # Counts, because percentages of a few Shifts would suggest false precision.
+            won = f"won {summary['won'] * summary['last_shifts']:,.0f} of the last {summary['last_shifts']:,}"
+            print(f"  {won}, mean place {summary['mean_place']:.2f}, {summary['wrong_per_shift']:.2f} illegal actions per Shift")
+        for evaluation in evaluations:
+            print(f"  {evaluation}")
         print(f"{state}: checkpoint for --resume")
     return 0
 
 
-def _train(options: argparse.Namespace, state: Path) -> Played:
-    """Plays the remaining Shifts, and writes the files. Raises `Stopped` on Ctrl-C."""
+def _train(options: argparse.Namespace, state: Path, log: Path) -> tuple[Training, Played, list[Evaluation]]:
+    """Trains until the budget is used up, and writes the files. Raises `Stopped` on Ctrl-C."""
     before = _resumed(options, state) if options.resume else None
     parameters = _parameters(options)
-    rules = pb.RuleSet(preset=options.rules)
-    opponents, rewards, seed, shifts, updates = options.opponents, options.rewards, options.seed, 0, 0
+    rules, opponents, rewards, seed = options.rules, options.opponents, options.rewards, options.seed
     if before is not None:
-        rules.CopyFrom(before.rules)
-        opponents, rewards, seed, shifts = before.opponents, before.rewards, before.seed, before.shifts
-        updates = int(before.agents.updates[0])
-    rules.ClearField("target_points")
-    rules.target_shifts = options.shifts - shifts
+        rules, opponents, rewards, seed = before.rules, before.opponents, before.rewards, before.seed
+    address = join_options.server_if_any(options)
+    rules = runs.full_rules(rules, address)
+    lasting = pb.RuleSet()
+    lasting.CopyFrom(rules)
+    lasting.ClearField("target_points")
+    shifts, updates = (0, 0) if before is None else (before.shifts, int(before.agents.updates[0]))
+    # A Shift has more than one decision.
+    lasting.target_shifts = options.decisions or options.shifts - shifts
     env = VectorEnv(
-        join_options.server_if_any(options),
+        address,
         1,
         client_seats=[0],
         opponents=opponents,
@@ -92,69 +102,108 @@ def _train(options: argparse.Namespace, state: Path) -> Played:
         total_games=1,
         # A resumed training plays other games.
         seed=seed + runs.SEED_STEP * updates,
-        rules=rules,
+        rules=lasting,
         shift_statistics=True,
     )
     hidden = not sys.stderr.isatty()
+    total, unit = (options.decisions, " decisions") if options.decisions else (options.shifts, " Shifts")
     with (
         runs.Interrupts() as interrupts,
         env,
-        tqdm(total=options.shifts, initial=shifts, unit=" Shifts", file=sys.stderr, disable=hidden, leave=False) as bar,
+        tqdm(total=total, unit=unit, file=sys.stderr, disable=hidden, leave=False) as bar,
+        training_log.written(log, append=options.resume),
     ):
         if before is None:
             inputs, outputs = features.classic_width(env.faces, env.hand_size), env.turn_actions
             config = DeepQConfig(inputs=inputs, outputs=outputs, **parameters)
-            agents, commands = deep_q.start(config, [seed]), ""
-        else:
-            config, agents, commands = before.config, before.agents, before.trained_by
-        rules.CopyFrom(env.rules)
-        rules.target_shifts = options.shifts
-        commands = runs.trained_by(commands, options.trained_by)
-        files = _Files(options, state, Training(config, agents, rules, commands, opponents, rewards, seed, shifts))
+            before = Training(config, deep_q.start(config, [seed]), rules, "", opponents, rewards, seed)
+        begun = dataclasses.replace(
+            before,
+            trained_by=runs.trained_by(before.trained_by, options.trained_by),
+            progress=dataclasses.replace(before.progress, runs=before.progress.runs + 1),
+        )
+        plan = {"opponents": opponents, "rewards": rewards, "evaluation_games": options.evaluation_games}
+        plan |= {"evaluations": options.evaluations, "hyper": dataclasses.asdict(begun.config)}
+        training_log.log_setup("deep-q", plan, seed, rules, begun.trained_by)
+        running = _Running(options, state, begun, evaluated=training_log.last_evaluated(log) is not None)
 
-        def advance(more: int) -> None:
-            files.shifts += more
-            bar.update(more)
+        def on_decision(agents: Agents, decisions: int) -> bool:
+            running.decisions = begun.progress.decisions + decisions
+            bar.update((running.decisions if options.decisions else running.shifts) - bar.n)
+            if interrupts.asked or running.done >= 1:
+                return True
+            running.do_due(agents)
+            return False
 
-        def on_decision(agents: Agents) -> None:
-            if interrupts.asked:
-                files.write(agents)
-                raise Stopped(files.shifts)
-            files.write_if_due(agents)
-
-        agents, played = deep_q_training.play(env, config, agents, advance=advance, on_decision=on_decision)
-        files.write(agents)
-        return played
+        agents, played = deep_q_training.play(env, begun.config, begun.agents, advance=running.advance, on_decision=on_decision)
+        running.write(agents)
+        if running.done < 1:
+            raise Stopped(running.shifts)
+        return running.training(agents), played, running.evaluate(agents)
 
 
-class _Files:
-    """Writes the files of a training.
+class _Running:
+    """A running training: its progress, when its files are written, and when its network is evaluated.
 
     Attributes:
         shifts: Shifts played so far.
+        decisions: decisions taken so far, as `Progress` counts them.
     """
 
-    def __init__(self, options: argparse.Namespace, state: Path, begun: Training) -> None:
+    def __init__(self, options: argparse.Namespace, state: Path, begun: Training, *, evaluated: bool) -> None:
+        """Begins to count. `evaluated`: whether the log has an evaluation."""
         self.shifts = begun.shifts
+        self.decisions = begun.progress.decisions
         self._options = options
         self._state = state
         # Its agents are stale: learning consumes them.
         self._begun = begun
+        self._began = time.monotonic()
         self._written = begun.shifts
+        # What was due before the checkpoint was written is in the log.
+        self._next_evaluation = training_log.next_evaluation(self.done, options.evaluations) if evaluated else self.done
 
-    def write_if_due(self, agents: Agents) -> None:
-        """Writes the files if enough Shifts have been played since the last time."""
+    @property
+    def done(self) -> float:
+        """The share of the budget that is used up."""
+        options = self._options
+        return float(self.decisions / options.decisions if options.decisions else self.shifts / options.shifts)
+
+    def advance(self, shifts: int) -> None:
+        """Counts further Shifts."""
+        self.shifts += shifts
+
+    def do_due(self, agents: Agents) -> None:
+        """Evaluates the network, then writes the files, each if it is time."""
+        if self.done >= self._next_evaluation:
+            self._next_evaluation = training_log.next_evaluation(self.done, self._options.evaluations)
+            self.evaluate(agents)
         if self.shifts - self._written >= self._options.save_every:
             self.write(agents)
 
+    def training(self, agents: Agents) -> Training:
+        """Returns the training as it is now."""
+        before = self._begun.progress
+        seconds = before.seconds + time.monotonic() - self._began
+        progress = Progress(int(agents.updates[0]), self.decisions, seconds, before.runs)
+        return dataclasses.replace(self._begun, agents=agents, shifts=self.shifts, progress=progress)
+
+    def evaluate(self, agents: Agents) -> list[Evaluation]:
+        """Plays against the built-in agents, and logs the results."""
+        options = self._options
+        (net,) = self.training(agents).networks(options.name)
+        address = join_options.server_if_any(options)
+        evaluations = training_log.evaluate_all(net, options.evaluation_games, self._begun.rules, address)
+        training_log.log_evaluations(self.training(agents).progress, evaluations, {})
+        return evaluations
+
     def write(self, agents: Agents) -> None:
         """Writes the files."""
-        training = dataclasses.replace(self._begun, agents=agents, shifts=self.shifts)
+        training = self.training(agents)
         checkpoint.save(self._state, training)
         (net,) = training.networks(self._options.name)
         network.save(self._options.out, net.layers, net.info)
         self._written = self.shifts
-        LOG.info("saved %s after %d Shifts", self._state, self.shifts)
 
 
 def _resumed(options: argparse.Namespace, state: Path) -> Training:
@@ -166,10 +215,17 @@ def _resumed(options: argparse.Namespace, state: Path) -> Training:
     if "parameters" in options.given:
         asked = DeepQConfig(inputs=config.inputs, outputs=config.outputs, **{**_parameters(options), "mask": config.mask})
         runs.refuse_contradictions(dataclasses.asdict(asked), dataclasses.asdict(config))
+    asked_rules = runs.full_rules(options.rules, join_options.server_if_any(options))
     if "rules" in options.given:
-        runs.refuse_other_rules(runs.full_rules(options.rules, join_options.server_if_any(options)), before.rules)
-    if before.shifts >= options.shifts:
-        raise ValueError(f"the training has played {before.shifts:,} Shifts already: give more than that with --shifts")
+        runs.refuse_other_rules(asked_rules, before.rules)
+    if before.rules.target_shifts:
+        # In earlier versions, the rules had the length of the training.
+        before.rules.ClearField("target_shifts")
+        before.rules.target_points = asked_rules.target_points
+    done, budget = (before.progress.decisions, "decisions") if options.decisions else (before.shifts, "shifts")
+    if done >= getattr(options, budget):
+        what = f"taken {done:,} decisions" if options.decisions else f"played {done:,} Shifts"
+        raise ValueError(f"the training has {what} already: give more than that with --{budget}")
     return before
 
 
@@ -192,8 +248,10 @@ def _parameters(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _summary(played: Played) -> dict[str, float]:
-    """Summarises the last tenth of the Shifts."""
+    """Summarises the last tenth of the Shifts; empty if none has ended."""
     seats = {name: counted[0, :, 0] for name, counted in played.of_seats.items()}
+    if len(seats["places"]) == 0:
+        return {}
     last = max(1, len(seats["places"]) // 10)
     return {
         "last_shifts": last,

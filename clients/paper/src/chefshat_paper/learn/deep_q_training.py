@@ -144,9 +144,9 @@ def play(
     learn: bool = True,
     idle_pass_is_wrong: bool = False,
     advance: Callable[[int], object] = lambda shifts: None,
-    on_decision: Callable[[Agents], object] = lambda agents: None,
+    on_decision: Callable[[Agents, int], bool] = lambda agents, decisions: False,
 ) -> tuple[Agents, Played]:
-    """Plays all games of an env to their ends and lets the agents learn.
+    """Plays the games of an env, to their ends unless `on_decision` ends them, and lets the agents learn.
 
     Args:
         env: fresh, with decisions "turns", episode "shift", Shift statistics, a reward scheme, `total_games` equal to `games`, and
@@ -157,11 +157,11 @@ def play(
         learn: whether they learn.
         idle_pass_is_wrong: whether passing counts as illegal where another action is legal. Needs invalid "ask_again".
         advance: called with the number of Shifts that have ended since the last call.
-        on_decision: called with the agents before each decision. Learning consumes them, so it must not keep them. It may raise to
-            end the run.
+        on_decision: called before the decisions of each batch, with the agents and the decisions that they have taken among
+            several legal actions. Learning consumes the agents, so it must not keep them. It returns whether to end the run.
 
     Returns:
-        The agents, and the statistics.
+        The agents, and the statistics of the Shifts that have ended in all games.
 
     Raises:
         ValueError: env, config and agents do not fit each other.
@@ -173,6 +173,7 @@ def play(
     stack = LockStep(config, agents, env.games, explore=explore, learn=learn)
     log = ShiftLog(env)
     batch = env.reset()
+    decisions = 0
     while True:
         advance(log.add(batch))
         endings = batch.endings
@@ -180,9 +181,12 @@ def play(
             stack.end(_ids(endings.games, seat_index[endings.seats], seats), endings.rewards)
         if batch.done:
             return stack.agents, log.played()
-        on_decision(stack.agents)
+        if on_decision(stack.agents, decisions):
+            return stack.agents, log.played(ended_early=True)
         states = features.classic_of(batch)
         masks = states[:, -config.outputs :] != 0
+        # A decision that is asked again is the same one.
+        decisions += int(((masks.sum(axis=1) > 1) & (batch.attempts == 0)).sum())
         if idle_pass_is_wrong:
             masks = without_idle_passes(masks)
         actions = stack.decide(
@@ -218,11 +222,15 @@ class ShiftLog:
         self._ended[at] = True
         return len(ended)
 
-    def played(self) -> Played:
-        """Returns the statistics of all Shifts."""
-        if not self._ended.all():
+    def played(self, *, ended_early: bool = False) -> Played:
+        """Returns the statistics of all Shifts; of games that were ended early, of those that have ended in all of them."""
+        shifts = int(self._ended.all(axis=0).sum()) if ended_early else self._shifts
+        if not self._ended[:, :shifts].all():
             raise RuntimeError(f"only {int(self._ended.sum())} of {self._ended.size} Shifts ended")
-        return Played(self._of_shifts, self._of_seats, self._env.rules, self._most_attempts)
+        of_shifts, of_seats = (
+            {name: array[:, :shifts] for name, array in arrays.items()} for arrays in (self._of_shifts, self._of_seats)
+        )
+        return Played(of_shifts, of_seats, self._env.rules, self._most_attempts)
 
 
 def _check(env: VectorEnv, config: DeepQConfig, agents: Agents) -> None:

@@ -8,8 +8,10 @@ from chefshat.learn.command import (
     Given,
     Program,
     above_zero,
+    add_evaluations,
     add_force,
     add_games,
+    add_log,
     add_rules,
     count,
     json_object,
@@ -48,13 +50,10 @@ def _ppo(command: argparse.ArgumentParser) -> None:
     )
     add_force(command)
     command.add_argument("--checkpoint", type=Path, metavar="FILE", help="the checkpoint (default: OUT as .training)")
-    command.add_argument(
-        "--log", type=Path, metavar="FILE", help="JSON lines of the setup and the evaluations (default: OUT as .jsonl)"
-    )
+    add_log(command)
     command.add_argument("--tensorboard", type=Path, metavar="DIR", help="write losses and evaluations there, for TensorBoard")
     plan = command.add_argument_group("plan (stored in the checkpoint)")
-    plan.add_argument("--evaluations", "--looks", type=count, default=20, help="number of evaluations and checkpoints")
-    plan.add_argument("--evaluation-games", type=count, default=400, help="games against greedy and random in each evaluation")
+    add_evaluations(plan)
     plan.add_argument("--games", type=natural, default=256, help="parallel games of self-play; 0: learn a best response")
     plan.add_argument("--opponent-games", type=natural, default=0, help="further games with one seat against built-in agents")
     plan.add_argument(

@@ -10,6 +10,7 @@ import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from chefshat import join_options
@@ -103,6 +104,21 @@ def add_games(command: argparse.ArgumentParser) -> None:
 def add_rules(command: argparse.ArgumentParser) -> None:
     """Adds the option for the rule set."""
     command.add_argument("--rules", default="paper", metavar="PRESET", help="the rule set")
+
+
+def add_log(command: argparse.ArgumentParser) -> None:
+    """Adds the option for the log of a training."""
+    command.add_argument(
+        "--log", type=Path, metavar="FILE", help="JSON lines of the setup and the evaluations (default: OUT as .jsonl)"
+    )
+
+
+def add_evaluations(command: argparse._ActionsContainer) -> None:
+    """Adds the options for the evaluations of a training."""
+    command.add_argument(
+        "--evaluations", "--looks", type=count, default=20, help="number of evaluations, besides the one before the first update"
+    )
+    command.add_argument("--evaluation-games", type=count, default=400, help="games against greedy and random in each evaluation")
 
 
 def add_force(command: argparse.ArgumentParser) -> None:

@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
                 training_log.written(log, append=options.resume),
             ):
                 begun = trainer.training
-                training_log.log_setup(dataclasses.asdict(begun.plan), begun.seed, begun.rules, begun.trained_by)
+                training_log.log_setup("ppo", dataclasses.asdict(begun.plan), begun.seed, begun.rules, begun.trained_by)
                 with Scalars(options.tensorboard) as scalars:
                     evaluations = _train(trainer, options, state, scalars, evaluated)
     except (ChefsHatError, TrainingFileError, OSError, ValueError) as error:

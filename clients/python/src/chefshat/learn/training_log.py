@@ -56,9 +56,10 @@ def written(path: Path, *, append: bool) -> Iterator[None]:
         handler.close()
 
 
-def log_setup(plan: Mapping[str, Any], seed: int, rules: pb.RuleSet, trained_by: str) -> None:
+def log_setup(algorithm: str, plan: Mapping[str, Any], seed: int, rules: pb.RuleSet, trained_by: str) -> None:
     """Logs the settings of a training. Those that follow from the algorithm are in `plan["hyper"]`."""
     setup = {
+        "algorithm": algorithm,
         "plan": plan,
         "seed": seed,
         "rules": json_format.MessageToDict(rules),
