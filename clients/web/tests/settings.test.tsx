@@ -73,7 +73,7 @@ test("the time until the server answers is measured while the settings are open"
   const lag = () => root.querySelector('[data-part="lag"]')?.textContent;
   expect(lag()).toBe("The connection is being measured…");
   await later(120);
-  expect(lag()).toBe("The server answers after 120 ms.");
+  expect(lag()).toBe("The server answers after 120\u00a0ms.");
   ask.mockRejectedValue(new ConnectError("", Code.Unavailable));
   await later(3_000);
   expect(lag()).toMatch(/server/i);

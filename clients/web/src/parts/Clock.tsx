@@ -59,6 +59,6 @@ export function Clock({ timeLeftMs, bankLeftMs, sinceMs, wholeMs }: ClockProps) 
 /** Seconds, or minutes and seconds above 99 s. */
 function clockTime(leftMs: number): string {
   const seconds = Math.ceil(leftMs / 1000);
-  if (seconds < 100) return `${seconds} s`;
+  if (seconds < 100) return `${seconds}\u00a0s`;
   return `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
 }

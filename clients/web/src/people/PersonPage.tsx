@@ -57,7 +57,9 @@ export function PersonPage({ route }: PageProps<"person">) {
         </>
       )}
       <p>
-        <a href="/leaderboard">{words.toLeaderboard}</a>
+        <a class="own-line" href="/leaderboard">
+          {words.toLeaderboard}
+        </a>
       </p>
     </div>
   );

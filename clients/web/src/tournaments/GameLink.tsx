@@ -29,14 +29,14 @@ export function GameLink({ tournament, game, several }: GameLinkProps) {
     case TournamentGameState.PLAYING:
       return tournament.settings?.policy?.spectators && game.roomId !== "" ? (
         <a class="own-line" href={pathOf({ page: "watch", roomId: game.roomId })}>
-          <span aria-hidden="true">▶ </span>
+          <span aria-hidden="true">▶{"\u00a0"}</span>
           {words.games.watch}
           {number}
           {label}
         </a>
       ) : (
         <span>
-          <span aria-hidden="true">▶ </span>
+          <span aria-hidden="true">▶{"\u00a0"}</span>
           {words.games.playing}
           {number}
         </span>

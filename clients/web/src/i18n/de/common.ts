@@ -56,7 +56,7 @@ export const common: Texts["common"] = {
         "Dieses Gerät spielt dann als die Person des neuen Schlüssels. Kopiere zuerst den bisherigen, wenn du wieder diese Person sein willst.",
     },
     measuring: "Die Verbindung wird gemessen …",
-    lag: (ms) => `Der Server antwortet nach ${ms} ms.`,
+    lag: (ms) => `Der Server antwortet nach ${ms}\u00a0ms.`,
     fullScreen: "Vollbild",
     fullScreenOff: "Vollbild beenden",
     forget: "Alles auf diesem Gerät vergessen",

@@ -54,7 +54,7 @@ export const common = {
         "This device then plays as the person of the new key. Copy the former key first if you want to be that person again.",
     },
     measuring: "The connection is being measured…",
-    lag: (ms: number) => `The server answers after ${ms} ms.`,
+    lag: (ms: number) => `The server answers after ${ms}\u00a0ms.`,
     fullScreen: "Full screen",
     fullScreenOff: "Leave full screen",
     forget: "Forget everything on this device",

@@ -57,7 +57,7 @@ export const common: Texts["common"] = {
         "Este dispositivo jugará entonces como la persona de la clave nueva. Copia antes la anterior si quieres volver a ser esa persona.",
     },
     measuring: "Midiendo la conexión…",
-    lag: (ms) => `El servidor responde en ${ms} ms.`,
+    lag: (ms) => `El servidor responde en ${ms}\u00a0ms.`,
     fullScreen: "Pantalla completa",
     fullScreenOff: "Salir de la pantalla completa",
     forget: "Olvidar todo en este dispositivo",

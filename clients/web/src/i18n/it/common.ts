@@ -54,7 +54,7 @@ export const common: Texts["common"] = {
         "Questo dispositivo giocherà allora come la persona della nuova chiave. Copia prima quella di adesso se vuoi tornare a essere quella persona.",
     },
     measuring: "Misura della connessione…",
-    lag: (ms) => `Il server risponde dopo ${ms} ms.`,
+    lag: (ms) => `Il server risponde dopo ${ms}\u00a0ms.`,
     fullScreen: "Schermo intero",
     fullScreenOff: "Esci da schermo intero",
     forget: "Dimentica tutto su questo dispositivo",
