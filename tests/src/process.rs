@@ -74,6 +74,11 @@ impl Launch {
         self
     }
 
+    /// Starts the binary that `cargo xtask test` builds again.
+    pub fn own_binary(&mut self) {
+        self.binary = None;
+    }
+
     /// Starts it directly again.
     pub fn by_itself(&mut self) {
         self.through.clear();

@@ -18,7 +18,10 @@ const PLAYING: usize = 6;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn rooms_go_to_the_nodes_with_space() {
-    let mut cluster = Cluster::start_for(3, Leases::Steady, Some(MAX_ROOMS)).await;
+    let mut cluster = Cluster::start_with(3, Leases::Steady, |launch| {
+        launch.with("--max-rooms", MAX_ROOMS)
+    })
+    .await;
     cluster.stop(2).await;
     let kinds = rooms(PLAYING, 2, 3_600_000, Duration::from_millis(20));
     let playing = BusyRooms::start(&cluster.url(), kinds);

@@ -3,12 +3,13 @@
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use chefshat_client::Client;
 use chefshat_postgres::{Database, Server as Postgres};
-use chefshat_tests::{Ended, Held, Launch, Link, Process, Way, own_address, patiently};
+use chefshat_tests::{Ended, Held, Launch, Link, Process, Way, own_address, patiently, set_up};
 use futures::future::join_all;
 use procfs::process::{FDTarget, Process as Running};
 use tempfile::TempDir;
@@ -102,11 +103,15 @@ impl Pairs {
 impl Cluster {
     /// Starts this many nodes.
     pub(crate) async fn start(count: usize, leases: Leases) -> Self {
-        Self::start_for(count, leases, None).await
+        Self::start_with(count, leases, |launch| launch).await
     }
 
-    /// The same with this limit of rooms for each.
-    pub(crate) async fn start_for(count: usize, leases: Leases, max_rooms: Option<usize>) -> Self {
+    /// The same, each launched in a special way.
+    pub(crate) async fn start_with(
+        count: usize,
+        leases: Leases,
+        special: impl Fn(Launch) -> Launch,
+    ) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let postgres = tokio::task::block_in_place(match leases {
             Leases::Short | Leases::Steady => Postgres::start,
@@ -132,7 +137,7 @@ impl Cluster {
             let peers = Link::by_origin(listens, Way::default(), way_of).await;
             let log = folder.join("log");
             let shell = format!("exec \"$0\" \"$@\" 2>>{}", log.display());
-            let mut launch = Launch::new(&folder.join("data"))
+            let launch = Launch::new(&folder.join("data"))
                 .through(["sh", "-c", &shell])
                 .with("--database", url)
                 .with("--peer-listen", listens)
@@ -140,16 +145,13 @@ impl Cluster {
                 .with("--peer-cert", certificate.certificate.display())
                 .with("--peer-key", certificate.key.display())
                 .with("--peer-ca", certificate.authority.display());
-            if let Some(max_rooms) = max_rooms {
-                launch = launch.with("--max-rooms", max_rooms);
-            }
-            launch = match leases {
+            let launch = match leases {
                 Leases::Short => launch.with("--lease", 1_000),
                 Leases::Steady => launch.with("--lease", 4_000),
                 Leases::Default => launch,
             };
             nodes.push(Node {
-                launch,
+                launch: special(launch),
                 process: None,
                 database: link,
                 peers,
@@ -187,6 +189,17 @@ impl Cluster {
     pub(crate) async fn restart(&mut self, node: usize) {
         self.nodes[node].launch().await;
         self.pairs.note_processes(&self.nodes);
+    }
+
+    /// Upgrades the database for the binary of this build, with which nodes start from here on.
+    pub(crate) fn upgrade(&mut self) {
+        let mut migrate = Command::new(set_up("CHEFSHAT_BIN"));
+        migrate.args(["migrate", "--database", self.database.url()]);
+        let upgraded = tokio::task::block_in_place(|| migrate.status());
+        assert!(upgraded.expect("the binary starts").success());
+        self.nodes
+            .iter_mut()
+            .for_each(|node| node.launch.own_binary());
     }
 
     /// Kills a node.

@@ -3,9 +3,11 @@
 //!
 //! `cargo test -p chefshat-tests --test cluster measure -- --ignored --nocapture --test-threads 1`
 //!
-//! with CHEFSHAT_BIN set to the program to measure.
+//! with CHEFSHAT_BIN set to the program to measure, and CHEFSHAT_OLD_BIN to that of an earlier version
+//! from which nodes are upgraded.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use chefshat_client::Backoff;
@@ -201,12 +203,18 @@ async fn a_node_joins_full_ones() {
 #[tokio::test(flavor = "multi_thread")]
 #[ignore = "measures"]
 async fn an_upgrade_of_all_nodes_one_after_another() {
-    let mut cluster = Cluster::start(NODES, Leases::Default).await;
+    let old = std::env::var_os("CHEFSHAT_OLD_BIN");
+    let from = |launch: Launch| match &old {
+        Some(old) => launch.binary(Path::new(old)),
+        None => launch,
+    };
+    let mut cluster = Cluster::start_with(NODES, Leases::Default, from).await;
     let pace = Duration::from_secs(1);
     let rooms = BusyRooms::start(&cluster.url(), rooms(UPGRADED_ROOMS, 1, 5_000, pace));
     all_play(&rooms).await;
     let before = rooms.ledger.games();
     let begun = Instant::now();
+    cluster.upgrade();
     for node in 0..NODES {
         let games = cluster.games_of(node).len();
         let asked = Instant::now();
