@@ -38,11 +38,12 @@ class AsyncConnection:
         """
         failures = 0
         while True:
-            call, progress = begin(), False
+            call, has_state = begin(), False
             try:
                 async for message in async_received(call):
-                    failures = 0 if progress else failures
-                    progress = True
+                    if has_state:
+                        failures = 0
+                    has_state = True
                     yield message
                 if not unfinished:
                     return

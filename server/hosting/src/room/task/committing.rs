@@ -42,13 +42,13 @@ impl Room {
             self.now = self.clock.now();
         }
         let ends = self.core.state().is_over() && self.over_since.is_none();
-        let end = match ends {
-            true => match self.conclude().await {
-                Some(end) => Some(end),
-                None => return false,
-            },
-            false => None,
-        };
+        let mut end = None;
+        if ends {
+            end = self.conclude().await;
+            if end.is_none() {
+                return false;
+            }
+        }
         if !self.wait_for_lease().await {
             return false;
         }
