@@ -8,7 +8,9 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use super::import::TRANSCRIPT;
-use super::run::{Ended, chefshat, in_runtime, json_lines, run, serve, serve_with, until};
+use super::run::{
+    Ended, chefshat, in_runtime, json_lines, run, serve, serve_with, until, until_recorded,
+};
 
 /// The participant. Letters beyond ASCII test that names are compared as text.
 const NAME: &str = "Rosa Müßig";
@@ -146,6 +148,7 @@ fn a_participant_is_exported_and_deleted_and_every_record_still_verifies() {
         play_tournament(&client).await;
         game_id
     });
+    until_recorded(2, &data_dir);
     // A running server locks the folder.
     let refused = participant(&["delete", NAME, "--yes"], &data_dir);
     refused.assert_refused("another chefshat server uses");
@@ -218,6 +221,7 @@ fn a_participant_is_exported_and_deleted_while_the_server_runs() {
         client.join_with_code(made.join_code, NAME).await.unwrap();
         (game_id, made.room.unwrap().room_id)
     });
+    until_recorded(2, &data_dir);
     on_server(&delete).assert_failed("a game that is not over; nothing was changed");
     let close = [
         "admin", "close", "room", &room_id, "--server", &url, "--token", &token,

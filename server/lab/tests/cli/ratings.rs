@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use super::run::{chefshat, fixture, run, serve, until};
+use super::run::{chefshat, fixture, run, serve, until_recorded};
 
 const AGENTS: [&str; 4] = ["greedy", "random", "random_unmasked", "trained"];
 
@@ -16,13 +16,7 @@ fn played(games: usize) -> (TempDir, Value) {
         let seats = AGENTS.map(|agent| format!(" --seat {agent}")).concat();
         run(&url, &format!("room create --target-shifts 1{seats}")).well();
     }
-    let records = folder.path().join("records");
-    let filed = || {
-        let files = std::fs::read_dir(&records).into_iter().flatten();
-        let names = files.map(|file| file.unwrap().file_name().into_string().unwrap());
-        names.filter(|name| name.ends_with(".jsonl")).count()
-    };
-    until("the records of all games", || filed() == games);
+    until_recorded(games, folder.path());
     let board = run(&url, "leaderboard --json").json();
     (folder, board)
 }

@@ -23,6 +23,20 @@ pub(super) fn until(what: &str, holds: impl Fn() -> bool) {
     }
 }
 
+/// Waits until the server has written the records of this number of games: it tells of a game's end
+/// before its file is there.
+pub(super) fn until_recorded(games: usize, data_dir: &Path) {
+    let records = data_dir.join("records");
+    until("the records of all games", || {
+        let files = std::fs::read_dir(&records).into_iter().flatten();
+        let paths = files.map(|file| file.unwrap().path());
+        paths
+            .filter(|path| path.extension() == Some("jsonl".as_ref()))
+            .count()
+            == games
+    });
+}
+
 /// Runs what the test does with a client of the SDK.
 pub(super) fn in_runtime<T>(what: impl Future<Output = T>) -> T {
     let runtime = tokio::runtime::Builder::new_multi_thread()
