@@ -15,6 +15,7 @@ use sqlx::{Connection as _, Row as _};
 use super::claims::{Claims, claim};
 use super::handover::{Handed, release};
 use super::owned::rooms;
+use super::partitions;
 use super::values::{ROOM, kind_of, millis, text};
 use super::{PostgresStore, lock};
 use crate::cluster::{
@@ -238,7 +239,13 @@ impl ClusterStore for PostgresStore {
         let expire_after = self.expire_after();
         let retention = millis(self.options.retention);
         self.control
-            .read(move |connection| tidy(connection, expire_after, retention).boxed())
+            .read(move |connection| {
+                async move {
+                    tidy(connection, expire_after, retention).await?;
+                    partitions::tidy(connection).await
+                }
+                .boxed()
+            })
             .await
     }
 

@@ -262,12 +262,26 @@ async fn lock_ids(connection: &mut PgConnection, work: &[Arc<Command>]) -> sqlx:
     Ok(())
 }
 
-/// Deletes those of these finished games that no tournament or study needs.
+/// Deletes those of these finished games that no tournament or study needs. Their journals follow:
+/// see [`super::partitions`].
 async fn prune(connection: &mut PgConnection, games: &[GameId]) -> sqlx::Result<i64> {
     let games = locked(connection, games).await?;
     let (free, _) = divided(connection, games).await?;
-    let free: Vec<GameId> = free.iter().map(|game| game.game).collect();
-    delete(connection, &free).await
+    let free: Vec<i64> = free.iter().map(|game| game.number).collect();
+    sqlx::query(
+        "WITH game AS (
+             DELETE FROM games WHERE number = ANY ($1) RETURNING number
+         ), journals AS (
+             INSERT INTO pruned (game, at_ms) SELECT number, clock_ms() FROM game
+         ), added AS (
+             DELETE FROM added_records USING game WHERE game = number
+         )
+         DELETE FROM participants USING game WHERE game = number",
+    )
+    .bind(free)
+    .execute(connection)
+    .await
+    .map(|_| 0)
 }
 
 async fn delete(connection: &mut PgConnection, games: &[GameId]) -> sqlx::Result<i64> {

@@ -15,11 +15,22 @@ use crate::StoreError;
 
 /// The migrations, oldest first. They never change: sqlx refuses a database in which one ran with
 /// another text.
-const MIGRATIONS: [(i64, &str, &str); 4] = [
+pub(super) const MIGRATIONS: [(i64, &str, &str); 7] = [
     (1, "games", include_str!("migrations/0001_games.sql")),
     (2, "studies", include_str!("migrations/0002_studies.sql")),
     (3, "reached", include_str!("migrations/0003_reached.sql")),
     (4, "rooms", include_str!("migrations/0004_rooms.sql")),
+    (5, "pruned", include_str!("migrations/0005_pruned.sql")),
+    (
+        6,
+        "validated",
+        include_str!("migrations/0006_validated.sql"),
+    ),
+    (
+        7,
+        "partitions",
+        include_str!("migrations/0007_partitions.sql"),
+    ),
 ];
 /// Key of the advisory lock that is held while the schema is created or upgraded: "chefshat" in ASCII.
 const SCHEMA_LOCK: i64 = 0x6368_6566_7368_6174;
@@ -243,7 +254,7 @@ pub(super) async fn check(
     }
     let usable = match found {
         Schema::Empty if if_empty == IfEmpty::Refuse => Err(DatabaseError::Empty),
-        Schema::Empty => migrations(&mut connection).await,
+        Schema::Empty => run(&MIGRATIONS, &mut connection).await,
         Schema::Ours { version, .. } if version < NEWEST => Err(DatabaseError::Older),
         Schema::Ours { oldest, .. } if oldest > NEWEST => Err(DatabaseError::Newer),
         Schema::Ours { .. } => Ok(()),
@@ -270,16 +281,19 @@ pub async fn migrate(url: &str) -> Result<(i64, i64), DatabaseError> {
         Schema::Ours { version, .. } => version,
         Schema::Foreign => return Err(DatabaseError::NotOurs),
     };
-    migrations(&mut connection).await?;
+    run(&MIGRATIONS, &mut connection).await?;
     // The migrations are committed.
     let _ = connection.close().await;
     Ok((before, NEWEST))
 }
 
-/// Runs what is missing, each migration in a transaction. The caller has the lock. While it waits
+/// Runs those of these migrations that are missing, each in a transaction. The caller has the lock. While it waits
 /// for a table, nobody else gets that table, and no node its lease: so it waits briefly, and often.
-async fn migrations(connection: &mut PgConnection) -> Result<(), DatabaseError> {
-    let all = MIGRATIONS.iter().map(|(version, name, sql)| {
+pub(super) async fn run(
+    migrations: &[(i64, &'static str, &'static str)],
+    connection: &mut PgConnection,
+) -> Result<(), DatabaseError> {
+    let all = migrations.iter().map(|(version, name, sql)| {
         let sql = (*sql).into_sql_str();
         Migration::new(*version, (*name).into(), MigrationType::Simple, sql, false)
     });

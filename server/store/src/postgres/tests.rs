@@ -6,6 +6,7 @@ mod fencing;
 mod measure;
 mod model;
 mod opening;
+mod partitions;
 mod retention;
 mod retrying;
 mod transfer;

@@ -10,6 +10,7 @@ use tracing::error;
 
 use super::errors::{failure, is_temporary};
 use super::open::{self, DatabaseError};
+use super::partitions;
 use super::values::{FIRST_EPOCH, text};
 use crate::form;
 use crate::sql::integer;
@@ -121,6 +122,7 @@ pub async fn transfer(
     move_tournaments(&contents, &mut transaction, &mut moved).await?;
     move_studies(&contents, &mut transaction, &mut moved).await?;
     let all = contents.count().await?;
+    partitions::add(&mut transaction, contents.newest_game().await?).await?;
     let mut games = contents.games();
     let mut rows = Vec::new();
     while let Some(game) = games.try_next().await? {

@@ -98,6 +98,14 @@ impl Contents {
         Ok(count.cast_unsigned())
     }
 
+    /// The largest number of a game, 0 if there is none.
+    pub(crate) async fn newest_game(&self) -> Result<i64, StoreError> {
+        sqlx::query_scalar("SELECT coalesce(max(number), 0) FROM games")
+            .fetch_one(&self.0.readers)
+            .await
+            .map_err(failure)
+    }
+
     /// The studies, in the order of their numbers.
     pub(crate) fn studies(&self) -> Rows<'_, StudyRow> {
         self.rows(

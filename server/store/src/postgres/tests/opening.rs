@@ -8,6 +8,16 @@ use super::retrying::Line;
 use super::*;
 use crate::postgres::open::{IfEmpty, NEWEST};
 
+/// A database with the tables of an earlier version.
+async fn of_version(version: i64) -> Database {
+    let database = chefshat_postgres::database();
+    let mut connection = connected(&database).await;
+    let migrations = (open::MIGRATIONS.into_iter()).filter(|(number, ..)| *number <= version);
+    let created = open::run(&migrations.collect::<Vec<_>>(), &mut connection).await;
+    created.expect("an empty database");
+    database
+}
+
 async fn refusal(database: &Database) -> DatabaseError {
     let opened = PostgresStore::open(database.url(), PostgresOptions::default()).await;
     opened.err().expect("it is refused")
@@ -36,10 +46,7 @@ async fn only_an_empty_database_gets_tables_without_being_asked() {
 
 #[tokio::test]
 async fn an_upgrade_that_waits_for_a_backup_stops_no_node() {
-    let database = chefshat_postgres::database();
-    migrate(database.url()).await.expect("an empty database");
-    database.run("ALTER TABLE nodes DROP COLUMN rooms");
-    database.run("DELETE FROM _sqlx_migrations WHERE version > 3");
+    let database = of_version(3).await;
     let mut backup = PgConnection::connect(database.url())
         .await
         .expect("it answers");
@@ -66,28 +73,14 @@ async fn an_upgrade_that_waits_for_a_backup_stops_no_node() {
 
 #[tokio::test]
 async fn databases_of_earlier_versions_are_upgraded() {
-    let database = chefshat_postgres::database();
-    migrate(database.url()).await.expect("an empty database");
-    for (version, removed) in [
-        (3, "ALTER TABLE nodes DROP COLUMN rooms"),
-        (
-            2,
-            "ALTER TABLE nodes DROP COLUMN rooms, DROP COLUMN reached",
-        ),
-        (
-            1,
-            "ALTER TABLE nodes DROP COLUMN rooms, DROP COLUMN reached; DROP TABLE studies, study_changes, study_traces;
-             DROP INDEX owned_by_game",
-        ),
-    ] {
-        database.run(removed);
-        database.run(&format!(
-            "DELETE FROM _sqlx_migrations WHERE version > {version}"
-        ));
-        // A node of that version, which runs on meanwhile.
+    for version in 1..NEWEST {
+        let database = of_version(version).await;
+        // A node of that version, which runs on meanwhile and has created a game.
         database.run(
             "INSERT INTO nodes (name, peer_endpoint, client_endpoint, build, capacity, beat_ms)
-             VALUES ('earlier', '', '', '', 0, clock_ms())",
+             VALUES ('earlier', '', '', '', 0, clock_ms());
+             INSERT INTO games (game_id, form, state) VALUES ('1', 1, 0);
+             INSERT INTO journal SELECT number, 0, 1, '' FROM games",
         );
         let error = refusal(&database).await;
         assert!(matches!(error, DatabaseError::Older), "{error}");
@@ -96,6 +89,10 @@ async fn databases_of_earlier_versions_are_upgraded() {
         node(&database).await.close().await;
         let earlier = database.run("SELECT bool_and(reached) FROM nodes WHERE name = 'earlier'");
         assert_eq!(earlier.trim(), "t", "nobody asked it");
+        // It goes on.
+        database.run("INSERT INTO journal SELECT number, 1, 1, '' FROM games");
+        let rows = database.run("SELECT count(*) FROM journal JOIN games ON game = number");
+        assert_eq!(rows.trim(), "2");
     }
 }
 

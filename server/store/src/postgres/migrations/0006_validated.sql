@@ -1,0 +1,2 @@
+-- Reads all journals, while nodes write to them.
+ALTER TABLE journal VALIDATE CONSTRAINT journal_before;
