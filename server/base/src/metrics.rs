@@ -319,6 +319,8 @@ impl Metrics {
             registry.register("commit_commands", help, store.commands.clone());
             let help = "Transactions that were sent again because they had no answer";
             registry.register("commit_retries", help, store.retries.clone());
+            let help = "Rooms, tournaments and studies that had to stop because the database had lost what it had committed";
+            registry.register("commits_lost", help, store.losses.clone());
             registry.register_collector(Box::new(store.clone()));
         });
     }
@@ -502,6 +504,7 @@ pub struct StoreMetrics {
     commit: Histogram,
     commands: Histogram,
     retries: Counter,
+    losses: Counter,
     waiting: Arc<Mutex<Waiting>>,
     /// A transaction waits, and none did before.
     begun: Arc<Notify>,
@@ -535,6 +538,7 @@ impl Default for StoreMetrics {
             commit: Histogram::new(SERVER_TIMES, MICROS),
             commands: Histogram::new(BATCH_SIZES, 1.0),
             retries: Counter::default(),
+            losses: Counter::default(),
             waiting: Arc::new(Mutex::new(waiting)),
             begun: Arc::default(),
         }
@@ -552,6 +556,11 @@ impl StoreMetrics {
     /// Counts a transaction that is sent again.
     pub fn retried(&self) {
         self.retries.inc();
+    }
+
+    /// Counts units of which the database has lost rows.
+    pub fn lost(&self, units: u64) {
+        self.losses.inc_by(units);
     }
 
     /// A transaction waits for its commit while the guard lives.

@@ -18,4 +18,8 @@ pub enum StoreError {
     /// and the store has not failed; the room or tournament must stop and publish nothing more.
     #[error("another node has taken {0} over")]
     Fenced(UnitId),
+    /// The database has lost rows of this room, tournament or study that it had committed. Nothing was
+    /// changed, and the store has not failed; its owner stops, and goes on from what is stored.
+    #[error("the database has lost rows of {0} that it had committed")]
+    Lost(UnitId),
 }

@@ -116,7 +116,9 @@ fn fail<U: Journaled>(unit: &mut U, error: &StoreError) {
     let (core, name) = (unit.unit(), U::KIND);
     let id = core.id();
     match (error, core.rooms.lease()) {
-        (StoreError::Fenced(_), _) => info!(%id, %error, "the {name} stops here"),
+        (StoreError::Fenced(_) | StoreError::Lost(_), _) => {
+            info!(%id, %error, "the {name} stops here")
+        }
         (_, Some(_)) => warn!(%id, %error, "the {name} stops until it is resumed"),
         (_, None) => error!(%id, %error, "the store failed; the {name} stops"),
     }

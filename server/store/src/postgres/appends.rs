@@ -13,6 +13,7 @@ use tracing::error;
 
 use super::values::Owned;
 use super::writer::{Answers, Work, confirming};
+use crate::StoreError;
 use crate::units::UnitKind;
 
 /// A row of a journal.
@@ -72,10 +73,7 @@ async fn append(connection: &mut PgConnection, rows: &[Arc<Row>]) -> sqlx::Resul
         let kept = inserted.contains(&(row.game, row.position)) || stands(connection, row).await?;
         answers.push(match kept {
             true => Ok(()),
-            false => {
-                report_hole(connection, None, row.owned, row.position).await?;
-                Err(row.owned.fenced())
-            }
+            false => Err(refusal(connection, None, row.owned, row.position).await?),
         });
     }
     Ok(answers)
@@ -96,14 +94,14 @@ async fn stands(connection: &mut PgConnection, row: &Row) -> sqlx::Result<bool> 
     Ok(stands.is_some())
 }
 
-/// Says so if a row at this position was refused because the one before it is gone. The journal is
-/// that of a unit of this kind, or else of a room.
-pub(super) async fn report_hole(
+/// Why a row at this position was refused: another node has the unit, or the row before it is gone. The
+/// journal is that of a unit of this kind, or else of a room.
+pub(super) async fn refusal(
     connection: &mut PgConnection,
     kind: Option<UnitKind>,
     owned: Owned,
     position: i64,
-) -> sqlx::Result<()> {
+) -> sqlx::Result<StoreError> {
     let open = match kind {
         None => "SELECT EXISTS (SELECT FROM owned WHERE id = $1 AND epoch = $2 AND NOT over)
                     AND NOT EXISTS (SELECT FROM owned JOIN games USING (game_id)
@@ -124,16 +122,17 @@ pub(super) async fn report_hole(
         .bind(position - 1)
         .fetch_one(connection)
         .await?;
-    if is_hole {
-        let (id, of) = (owned.id, kind.map_or("rooms", UnitKind::plural));
-        error!(
-            %id,
-            of,
-            position,
-            "the database has lost rows of a journal that it had committed: its owner goes on from what is stored; was a backup put back, or did the database crash with fsync off?"
-        );
+    if !is_hole {
+        return Ok(owned.fenced());
     }
-    Ok(())
+    let (id, of) = (owned.id, kind.map_or("rooms", UnitKind::plural));
+    error!(
+        %id,
+        of,
+        position,
+        "the database has lost rows of a journal that it had committed: its owner goes on from what is stored; was a backup put back, or did the database crash with fsync off?"
+    );
+    Ok(StoreError::Lost(owned.unit))
 }
 
 fn all<'a, T>(rows: &'a [Arc<Row>], value: impl Fn(&'a Row) -> T) -> Vec<T> {

@@ -7,7 +7,7 @@ use sqlx::postgres::{PgArguments, PgConnection};
 use sqlx::query::Query;
 use sqlx::{Postgres, Row as _};
 
-use super::appends::report_hole;
+use super::appends::refusal;
 use super::values::{Owned, text};
 use super::writer::confirming;
 use crate::StoreError;
@@ -59,10 +59,10 @@ async fn not_ended(
     if over.is_some() {
         return Ok(Ended::Before);
     }
-    if let Some(rows) = rows {
-        report_hole(connection, None, owned, rows).await?;
-    }
-    Ok(Ended::Refused(owned.fenced()))
+    Ok(Ended::Refused(match rows {
+        Some(rows) => refusal(connection, None, owned, rows).await?,
+        None => owned.fenced(),
+    }))
 }
 
 /// Ends a durable game, whose journal has some rows, with a record. The last of them is there, or the

@@ -6,7 +6,7 @@ use futures::FutureExt as _;
 use sqlx::Row as _;
 use sqlx::postgres::{PgConnection, PgRow};
 
-use super::appends::report_hole;
+use super::appends::refusal;
 use super::reader::Reader;
 use super::values::{FIRST_EPOCH, Owned, number_of, text};
 use super::writer::confirming;
@@ -60,12 +60,14 @@ impl Change {
                         unit: unit.id(),
                         epoch: FIRST_EPOCH,
                     };
-                    append(connection, unit.kind(), owned, row).await?;
+                    let appended = append(connection, unit.kind(), owned, row).await?;
+                    return Ok(appended.map(|()| 0));
                 }
                 return Ok(created.map(|_| 0));
             }
             Self::Append(kind, owned, row) => {
-                (owned, append(connection, *kind, *owned, row).await?)
+                let appended = append(connection, *kind, *owned, row).await?;
+                return Ok(appended.map(|()| 0));
             }
             Self::Rewrite(kind, owned, entries, forgotten) => {
                 let written = rewrite(connection, *kind, *owned, entries, forgotten);
@@ -141,13 +143,13 @@ async fn create(
     }))
 }
 
-/// Adds a row; `false` if another node has the unit, or the row before it is gone.
+/// Adds a row, unless another node has the unit, or the row before it is gone.
 async fn append(
     connection: &mut PgConnection,
     kind: UnitKind,
     owned: Owned,
     row: &UnitRow,
-) -> sqlx::Result<bool> {
+) -> sqlx::Result<Result<(), StoreError>> {
     let position = integer(row.position);
     let added = sqlx::query(kind.sql(
         "WITH owner AS (
@@ -168,7 +170,7 @@ async fn append(
         if row.over {
             end(connection, owned.id).await?;
         }
-        return Ok(true);
+        return Ok(Ok(()));
     }
     let own = sqlx::query(kind.sql(confirming!(
         "{unit} FROM {units} JOIN {rows} ON {unit} = number
@@ -180,10 +182,10 @@ async fn append(
     .bind(row.entries.as_slice())
     .fetch_optional(&mut *connection)
     .await?;
-    if own.is_none() {
-        report_hole(connection, Some(kind), owned, position).await?;
-    }
-    Ok(own.is_some())
+    Ok(match own {
+        Some(_) => Ok(()),
+        None => Err(refusal(connection, Some(kind), owned, position).await?),
+    })
 }
 
 /// Marks a tournament, whose row is locked, as over.

@@ -235,6 +235,9 @@ impl<W: Work> Writer<W> {
                 }
                 let time = batch.began.elapsed();
                 self.shared.metrics.committed(batch.pieces.len(), time);
+                let lost = |answer: &&Result<_, _>| matches!(answer, Err(StoreError::Lost(_)));
+                let lost = answers.iter().filter(lost).count();
+                self.shared.metrics.lost(lost as u64);
                 batch.answer(answers);
                 self.pause = FIRST_PAUSE;
                 return;

@@ -172,7 +172,9 @@ impl Room {
         let room = self.core.header().room_id;
         self.after_commit.clear();
         match (error, &self.context.lease) {
-            (StoreError::Fenced(_), _) => info!(%room, %error, "the room stops here"),
+            (StoreError::Fenced(_) | StoreError::Lost(_), _) => {
+                info!(%room, %error, "the room stops here")
+            }
             (_, Some(_)) => warn!(%room, %error, "the room stops until its node resumes it"),
             (_, None) => {
                 error!(%room, %error, "the store failed; the room stops");

@@ -223,13 +223,16 @@ async fn nothing_is_written_over_a_hole() {
 
     database.run("DELETE FROM journal WHERE position = 1");
     database.run("DELETE FROM tournament_entries WHERE position = 1");
-    let fenced = |room: u8| Err(StoreError::Fenced(Id::from_bytes([room; 16])));
-    assert_eq!(append(&mut journals[0], 3).await, fenced(1));
+    let lost = |room: u8| Err(StoreError::Lost(Id::from_bytes([room; 16])));
+    assert_eq!(append(&mut journals[0], 3).await, lost(1));
     let finished = journals[1].finish(Some(summary(2)), None).await;
-    assert_eq!(finished, fenced(2));
-    assert_eq!(journals[2].finish(None, None).await, fenced(3));
+    assert_eq!(finished, lost(2));
+    assert_eq!(journals[2].finish(None, None).await, lost(3));
     let appended = store.append_tournament(cup_id, 2, begun()).await;
-    assert_eq!(appended, fenced(9));
+    assert_eq!(appended, lost(9));
+    let metrics = Metrics::default();
+    metrics.add_store(store.metrics().expect("it has writers"));
+    assert!(metrics.text().contains("chefshat_commits_lost_total 4\n"));
 
     // What is stored is read again, and goes on.
     for room in 1..=3 {
