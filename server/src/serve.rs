@@ -419,7 +419,8 @@ impl Server {
                         .layer(grpc::DecodingLayer::new(Arc::clone(&calls)))
                         .add_routes(routes.clone().add_service(of_nodes))
                         .serve_with_incoming_shutdown(
-                            port.incoming(rooms.metrics())?,
+                            port.incoming(rooms.metrics())?
+                                .map_ok(move |it| Metered::of_trusted(it, first_bytes)),
                             async move { closed.cancelled().await },
                         ),
                 )

@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use futures::future::join as both;
 use futures::{Stream, stream};
-use tokio::io::DuplexStream;
-use tokio::net::TcpListener;
+use tokio::io::{AsyncReadExt as _, DuplexStream};
+use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 use tokio::time::{sleep, timeout};
@@ -494,4 +494,26 @@ async fn a_node_whose_database_is_away_ends_within_one_budget() {
     let served = timeout(MINUTE + longest, both(serving, away)).await;
     let (served, ()) = served.expect("it ends in time");
     served.expect("only the database is away");
+}
+
+#[tokio::test]
+async fn a_silent_connection_to_the_listener_for_nodes_is_closed() {
+    let listener = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+    let address = listener.local_addr().expect("it listens");
+    let database = Database::new();
+    let shared: Arc<dyn ClusterStore> = FakeStore::new(&database);
+    let config = ServerConfig {
+        first_bytes_timeout: Duration::from_millis(10),
+        ..ServerConfig::default()
+    };
+    let node = Server::joined(config, shared, NodeInfo::default()).await;
+    let node = node.expect("the database is there");
+    let node = node.with_peers(PeerPort::new(listener, None).expect("on this machine"));
+    let nobody = stream::pending::<io::Result<DuplexStream>>();
+    let serving = tokio::spawn(node.serve_incoming(nobody, std::future::pending()));
+    let mut silent = TcpStream::connect(address).await.expect("it listens");
+    let read = timeout(MINUTE, silent.read_to_end(&mut Vec::new())).await;
+    // With or without an error.
+    let _ = read.expect("it is closed");
+    serving.abort();
 }

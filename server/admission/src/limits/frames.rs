@@ -55,7 +55,7 @@ enum Position {
         read: usize,
         skip: usize,
     },
-    /// Another protocol.
+    /// Not read: another protocol, or a connection of those who are trusted.
     Other,
 }
 
@@ -119,6 +119,14 @@ impl<S> Metered<S> {
             position: Position::Preface(0),
             full_at: None,
             pause: None,
+        }
+    }
+
+    /// Watches a connection of those who may send what they want, once its protocol is known.
+    pub fn of_trusted(stream: S, first_bytes_timeout: Duration) -> Self {
+        Self {
+            position: Position::Other,
+            ..Self::new(stream, first_bytes_timeout)
         }
     }
 
@@ -268,6 +276,27 @@ mod tests {
         let (mut client, server) = tokio::io::duplex(64);
         client.write_all(b"P").await.expect("a byte");
         let mut server = Metered::new(server, Duration::from_secs(10));
+        let read = server.read_to_end(&mut Vec::new()).await;
+        let error = read.expect_err("the protocol stays unknown");
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn those_who_are_trusted_send_what_they_want_once_their_protocol_is_known() {
+        let (mut client, server) = tokio::io::duplex(1 << 20);
+        let mut server = Metered::of_trusted(server, Duration::from_secs(10));
+        let begun = Instant::now();
+        let mut flood = PREFACE.to_vec();
+        for _ in 0..2 * BURST {
+            flood.extend(frame(6, 8));
+        }
+        client.write_all(&flood).await.expect("space");
+        let mut read = vec![0; flood.len()];
+        server.read_exact(&mut read).await.expect("open");
+        assert_eq!(begun.elapsed(), Duration::ZERO);
+
+        let (_client, server) = tokio::io::duplex(1 << 20);
+        let mut server = Metered::of_trusted(server, Duration::from_secs(10));
         let read = server.read_to_end(&mut Vec::new()).await;
         let error = read.expect_err("the protocol stays unknown");
         assert_eq!(error.kind(), io::ErrorKind::TimedOut);
