@@ -8,11 +8,10 @@ use std::time::Duration;
 
 use chefshat_engine::Seat;
 use chefshat_study::{Outcome, Participant, PlayedGame, Status};
-use tokio::time::Instant;
-use tracing::{error, warn};
+use tracing::error;
 
 use super::task::StudyTask;
-use crate::rooms::{CreateError, NewRoom, PartOf, Seating, retry_at};
+use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{GameId, RoomId};
 use chefshat_room::journal::{Change, Fill, GameStart, SeatedParticipant, StudyGame, StudyMember};
@@ -123,13 +122,13 @@ impl StudyTask {
     /// Creates the rooms of placed games.
     pub(super) async fn make_rooms(&mut self) -> Result<(), StoreError> {
         if self.without_room.is_empty() {
-            // What waited for a room has ended without one.
-            self.retry = None;
-        }
-        if self.retry.is_some_and(|retry| Instant::now() < retry) {
+            // What waited for a room may have ended without one.
+            self.retry.clear();
             return Ok(());
         }
-        self.retry = None;
+        if !self.retry.begin() {
+            return Ok(());
+        }
         for number in self.without_room.clone() {
             let Some(new) = self.new_room(number) else {
                 continue;
@@ -149,12 +148,9 @@ impl StudyTask {
                     }
                 }
                 Err(CreateError::Store(error)) => return Err(error),
-                // When the server is restarted, the game gets its room.
-                Err(CreateError::ShuttingDown) => self.retry = Some(retry_at()),
                 Err(error) => {
-                    if self.retry.replace(retry_at()).is_none() {
-                        warn!(study = %self.unit.handle.id(), %error, "games of a study wait for rooms");
-                    }
+                    let id = self.unit.handle.id();
+                    self.retry.again("study", id, &error);
                 }
             }
         }

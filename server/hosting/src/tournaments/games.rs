@@ -10,12 +10,11 @@ use chefshat_proto::v1;
 use chefshat_record::outcome::{Gathering, Outcome, OutcomeError};
 use chefshat_tournament::Ended;
 use futures::future::join_all;
-use tokio::time::Instant;
 use tracing::{error, warn};
 
 use super::message::Call;
 use super::task::TournamentTask;
-use crate::rooms::{CreateError, NewRoom, PartOf, Seating, Withheld, retry_at};
+use crate::rooms::{CreateError, NewRoom, PartOf, Seating, Withheld};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{GameId, Id, RoomId};
 use chefshat_room::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
@@ -138,19 +137,14 @@ impl TournamentTask {
 
     /// Creates the rooms of called games and notifies their participants.
     pub(super) async fn make_rooms(&mut self) -> Result<(), StoreError> {
-        if self.without_room.is_empty() {
-            // What waited for a room has ended without one.
-            self.retry = None;
-        }
-        if self.retry.is_some_and(|retry| Instant::now() < retry) {
+        // What waited for a room may have ended without one; what still does has not begun.
+        if self.without_room.is_empty() || self.unit.state.core.is_paused() {
+            self.retry.clear();
             return Ok(());
         }
-        // A game that waits for a room has not begun.
-        if self.unit.state.core.is_paused() {
-            self.retry = None;
+        if !self.retry.begin() {
             return Ok(());
         }
-        let has_waited = self.retry.take().is_some();
         let without_room: Vec<usize> = self.without_room.iter().copied().collect();
         let creating = without_room.iter().map(|game| {
             let new = self.new_room(*game);
@@ -171,12 +165,9 @@ impl TournamentTask {
                     self.place(game);
                 }
                 Err(CreateError::Store(error)) => return Err(error),
-                // When the server is restarted, the game is assigned a new room.
-                Err(CreateError::ShuttingDown) => self.retry = Some(retry_at()),
                 Err(error) => {
-                    if self.retry.replace(retry_at()).is_none() && !has_waited {
-                        warn!(tournament = %self.unit.handle.id(), %error, "games of a tournament wait for rooms");
-                    }
+                    let id = self.unit.handle.id();
+                    self.retry.again("tournament", id, &error);
                 }
             }
         }
