@@ -13,6 +13,7 @@ mod ledger;
 mod link;
 mod nodes;
 mod process;
+mod prometheus;
 mod scores;
 mod seat;
 mod server;
@@ -24,6 +25,7 @@ pub use ledger::{Ledger, Recorded};
 pub use link::{Held, Link, Way};
 pub use nodes::{TestNode, TestNodes};
 pub use process::{Ended, Launch, Process, set_up};
+pub use prometheus::{Prometheus, get, source};
 pub use scores::scores;
 pub use seat::{StreamSeat, attach_all, first_legal, first_update, is_legal, play_on};
 pub use server::{

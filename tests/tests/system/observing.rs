@@ -3,8 +3,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::SocketAddr;
-use std::path::{Path, PathBuf};
-use std::process::Stdio;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -17,15 +15,13 @@ use chefshat_server::store::SqliteStore;
 use chefshat_server::tls::TlsFiles;
 use chefshat_server::web::Origins;
 use chefshat_tests::{
-    Launch, StreamSeat, one_shift, own_address, patiently, random_agents, room_of_four, skip,
+    Launch, Prometheus, StreamSeat, get, one_shift, patiently, random_agents, room_of_four, skip,
+    source,
 };
-use http_body_util::{BodyExt as _, Full};
-use hyper_util::client::legacy::Client as HttpClient;
-use hyper_util::rt::TokioExecutor;
 use serde_json::Value;
 use tempfile::TempDir;
 use tokio::net::TcpListener;
-use tokio::process::{Child, Command};
+use tokio::process::Command;
 
 /// A server with a database, a certificate and its metrics.
 struct Observed {
@@ -87,20 +83,6 @@ impl Observed {
         }
         created.room.expect("a room").game_id
     }
-}
-
-async fn get(url: &str) -> String {
-    let http = HttpClient::builder(TokioExecutor::new()).build_http::<Full<bytes::Bytes>>();
-    let answer = http.get(url.parse().expect("a URL")).await;
-    let body = answer.expect("an answer").into_body().collect().await;
-    String::from_utf8(body.expect("complete").to_bytes().to_vec()).expect("text")
-}
-
-/// Whether a page is there.
-async fn is_ok(url: &str) -> bool {
-    let http = HttpClient::builder(TokioExecutor::new()).build_http::<Full<bytes::Bytes>>();
-    let answer = http.get(url.parse().expect("a URL")).await;
-    answer.is_ok_and(|answer| answer.status().is_success())
 }
 
 /// The value of a sample.
@@ -261,10 +243,6 @@ async fn each_decision_is_logged_in_the_spans_of_its_room_and_itself() {
 }
 
 /// A file of the source tree.
-fn source(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
-}
-
 fn read(path: &str) -> String {
     let path = source(path);
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
@@ -326,90 +304,6 @@ async fn the_docs_list_every_metric() {
     assert_eq!(listed, expected);
 }
 
-/// A Prometheus that scrapes a server by the shipped configuration, only more often.
-struct Prometheus {
-    url: String,
-    _process: Child,
-    _folder: TempDir,
-}
-
-impl Prometheus {
-    /// Starts it, unless it is not installed.
-    async fn start(scraped: SocketAddr) -> Option<Self> {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let config = read("docker/prometheus/prometheus.yml")
-            .replace("server:9464", &scraped.to_string())
-            .replace("15s", "100ms");
-        let config_file = folder.path().join("prometheus.yml");
-        std::fs::write(&config_file, config).expect("written");
-        let rules = source("docker/prometheus/alerts.yml");
-        std::fs::copy(rules, folder.path().join("alerts.yml")).expect("copied");
-
-        let checked = Command::new("promtool")
-            .arg("check")
-            .arg("config")
-            .arg(&config_file)
-            .output()
-            .await;
-        let Ok(checked) = checked else {
-            return None;
-        };
-        assert!(checked.status.success(), "{checked:?}");
-
-        // The port is free: no other program of this machine listens on this address.
-        let address = format!("{}:9090", own_address());
-        let process = Command::new("prometheus")
-            .arg(format!("--config.file={}", config_file.display()))
-            .arg(format!(
-                "--storage.tsdb.path={}",
-                folder.path().join("data").display()
-            ))
-            .arg(format!("--web.listen-address={address}"))
-            .current_dir(folder.path())
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .kill_on_drop(true)
-            .spawn()
-            .expect("promtool and prometheus are one package");
-        let ready = format!("http://{address}/-/ready");
-        patiently("Prometheus to be ready", async {
-            while !is_ok(&ready).await {
-                tokio::time::sleep(Duration::from_millis(50)).await;
-            }
-        })
-        .await;
-        Some(Self {
-            url: format!("http://{address}/api/v1"),
-            _process: process,
-            _folder: folder,
-        })
-    }
-
-    async fn api(&self, path: &str) -> Value {
-        serde_json::from_str(&get(&format!("{}/{path}", self.url)).await).expect("JSON")
-    }
-
-    /// Evaluates an expression until it has data.
-    async fn has_data(&self, expression: &str) {
-        let escaped: String = (expression.bytes())
-            .map(|byte| format!("%{byte:02x}"))
-            .collect();
-        patiently(expression, async {
-            loop {
-                let answer = self.api(&format!("query?query={escaped}")).await;
-                assert_eq!(answer["status"], "success", "{expression}: {answer}");
-                let result = answer["data"]["result"].as_array().expect("a result");
-                if !result.is_empty() {
-                    return;
-                }
-                tokio::time::sleep(Duration::from_millis(100)).await;
-            }
-        })
-        .await;
-    }
-}
-
 #[tokio::test]
 async fn the_alerts_of_a_cluster_fire_while_their_fault_lasts() {
     let checked = Command::new("promtool")
@@ -429,7 +323,7 @@ async fn the_shipped_dashboard_and_alerts_have_data_in_a_real_prometheus() {
     server.play().await;
     let unknown = server.client().await.get_room("0000").await;
     unknown.expect_err("there is no such room");
-    let Some(prometheus) = Prometheus::start(server.metrics).await else {
+    let Some(prometheus) = Prometheus::start(&[server.metrics], "100ms").await else {
         return skip("the_shipped_dashboard…", "Prometheus is not installed");
     };
 
