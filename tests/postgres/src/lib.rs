@@ -56,7 +56,7 @@ pub struct Server {
 }
 
 /// A database of its own.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Database {
     url: String,
     programs: PathBuf,

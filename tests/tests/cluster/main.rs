@@ -1,12 +1,14 @@
 //! Several server processes as the nodes of a cluster, on a real PostgreSQL server and behind a real
 //! proxy, while machines and networks fail.
 
+mod alerts;
 mod balance;
 mod certificates;
 mod cluster;
 mod cup;
 mod cuts;
 mod faults;
+mod growth;
 mod joining;
 mod measure;
 mod proxy;

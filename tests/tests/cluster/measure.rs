@@ -294,7 +294,7 @@ fn database() -> f64 {
 
 /// Measures rooms that play as fast as they can: opened at one URL, played at another. Returns the
 /// CPU time of the servers for each decision.
-async fn throughput(what: &str, opened_at: &str, played_at: &str, ids: &[u32]) -> f64 {
+pub(crate) async fn throughput(what: &str, opened_at: &str, played_at: &str, ids: &[u32]) -> f64 {
     let kinds = rooms(FAST_ROOMS, 50, 3_600_000, Duration::ZERO);
     let rooms = BusyRooms::start_apart(opened_at, played_at, kinds);
     all_play(&rooms).await;
