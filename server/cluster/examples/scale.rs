@@ -1,5 +1,6 @@
-//! What the costs that were measured on one machine say about a cluster of many nodes: CPU, the time
-//! until a decision is acknowledged, and the time until games continue after the loss of a node.
+//! What the costs that were measured on one machine say about a cluster of many nodes: CPU, what the
+//! database writes and keeps, the time until a decision is acknowledged, the time until games continue
+//! after the loss of a node, and what reaches its limit first.
 //! `docs/cluster.md` states what is assumed.
 //!
 //! `cargo run --release -p chefshat-cluster --example scale -- --help`
@@ -28,6 +29,9 @@ const LOOK_EVERY_MS: f64 = 250.0;
 /// Simulated time in which decisions are counted, and the time before it.
 const WINDOW_MS: f64 = 2_000.0;
 const WARM_UP_MS: f64 = 500.0;
+/// Games of a partition of the journal.
+const PARTITION: f64 = 262_144.0;
+const SECONDS_OF_A_DAY: f64 = 86_400.0;
 /// Simulated losses of a node.
 const LOSSES: usize = 50;
 /// The part of its CPU that a database may use in the long run.
@@ -48,9 +52,15 @@ struct Scale {
     /// Time from one decision of a room to the next, milliseconds.
     #[arg(long, default_value_t = 1_000.0)]
     pace_ms: f64,
+    /// Decisions of a game.
+    #[arg(long, default_value_t = 261.0)]
+    decisions: f64,
     /// Cores of the database.
     #[arg(long, default_value_t = 32)]
     cores: usize,
+    /// What the disk of the database writes, MB a second.
+    #[arg(long, default_value_t = 500.0)]
+    disk_mb: f64,
     /// CPU of a node for a decision of a client that is connected to it, microseconds.
     #[arg(long, default_value_t = 41.0)]
     direct_us: f64,
@@ -66,6 +76,18 @@ struct Scale {
     /// Time between two nodes, there and back, milliseconds.
     #[arg(long, default_value_t = 0.5)]
     hop_ms: f64,
+    /// CPU of the database for the start and the end of a game together, microseconds.
+    #[arg(long, default_value_t = 1_000.0)]
+    game_us: f64,
+    /// Ends of games that the database numbers in a second, in the order of their commits.
+    #[arg(long, default_value_t = 1_280.0)]
+    ends: f64,
+    /// Bytes that a decision adds to the log of the database.
+    #[arg(long, default_value_t = 232.0)]
+    log_bytes: f64,
+    /// Bytes that a decision adds to its tables and indexes.
+    #[arg(long, default_value_t = 200.0)]
+    row_bytes: f64,
     /// CPU of the database for a beat, microseconds.
     #[arg(long, default_value_t = 550.0)]
     beat_us: f64,
@@ -93,6 +115,11 @@ impl Scale {
         self.rooms() as f64 / self.pace_ms
     }
 
+    /// Games that begin, and that end, each second.
+    fn games(&self) -> f64 {
+        self.rate() * 1e3 / self.decisions
+    }
+
     /// The part of the decisions whose clients are connected to another node: any one.
     fn forwarded(&self) -> f64 {
         1.0 - 1.0 / self.nodes as f64
@@ -105,7 +132,35 @@ impl Scale {
         self.rate() / self.nodes as f64 * each / 1e3
     }
 
-    /// Cores of the database for everything but decisions.
+    /// Cores of the database for decisions.
+    fn decision_cores(&self) -> f64 {
+        self.rate() * self.database_us / 1e3
+    }
+
+    /// Cores of the database for starts and ends of games.
+    fn game_cores(&self) -> f64 {
+        self.games() * self.game_us / 1e6
+    }
+
+    /// MB a second that the database logs.
+    fn log_mb(&self) -> f64 {
+        self.rate() * self.log_bytes / 1e3
+    }
+
+    /// What limits the cluster, and at how many times this load.
+    fn limits(&self) -> [(&'static str, f64); 3] {
+        let cores = self.cores as f64 * USABLE - self.upkeep_cores();
+        [
+            (
+                "the CPU of the database",
+                cores / (self.decision_cores() + self.game_cores()),
+            ),
+            ("the ends of games", self.ends / self.games()),
+            ("what the disk writes", self.disk_mb / self.log_mb()),
+        ]
+    }
+
+    /// Cores of the database for what happens without games.
     fn upkeep_cores(&self) -> f64 {
         let units = (self.rooms() / self.nodes) as f64;
         let beats = (self.beat_us + units * self.owned_us) / beat_every_ms();
@@ -129,10 +184,17 @@ impl Scale {
             format!("{:.0} %", self.forwarded() * 100.0),
         );
         row("cores of a node", format!("{:.2}", self.node_cores()));
-        let decisions = self.rate() * self.database_us / 1e3;
+        row(
+            "games that begin and end, a second",
+            format!("{:.0}", self.games()),
+        );
         row(
             "cores of the database: decisions",
-            format!("{decisions:.1} of {}", self.cores),
+            format!("{:.1} of {}", self.decision_cores(), self.cores),
+        );
+        row(
+            "cores of the database: starts and ends",
+            format!("{:.2}", self.game_cores()),
         );
         row(
             "cores of the database: beats and searches",
@@ -142,12 +204,15 @@ impl Scale {
             "connections to the database",
             format!("{}", self.nodes * CONNECTIONS),
         );
-        let left = self.cores as f64 * USABLE - self.upkeep_cores();
+        row("log of the database", format!("{:.1} MB/s", self.log_mb()));
+        let kept = self.rate() * self.row_bytes * SECONDS_OF_A_DAY / 1e6;
+        let partitions = self.games() * SECONDS_OF_A_DAY / PARTITION;
         row(
-            "most decisions a second of that database",
-            format!("{:.0}", left / self.database_us * 1e6),
+            "its growth a day",
+            format!("{kept:.0} GB, {partitions:.1} partitions"),
         );
-        let latencies = Decisions::new(self).run();
+        let (latencies, rows) = Decisions::new(self).run();
+        row("decisions of a commit", quantiles(rows, "", 1.0));
         row("acknowledged after", quantiles(latencies, "ms", 1.0));
         let mut random = SmallRng::seed_from_u64(1);
         let losses = (0..LOSSES).flat_map(|_| Loss::new(self, &mut random).run(&mut random));
@@ -156,6 +221,11 @@ impl Scale {
             "a node is lost: next decision after",
             quantiles(losses, "s", 1e-3),
         );
+        let mut limits = self.limits();
+        limits.sort_by(|one, other| one.1.total_cmp(&other.1));
+        for ((limit, times), what) in limits.iter().zip(["limited first by", "then", "then"]) {
+            row(what, format!("{limit}, at {times:.1} times this load"));
+        }
     }
 }
 
@@ -171,8 +241,13 @@ fn quantiles(mut figures: Vec<f64>, unit: &str, factor: f64) -> String {
         figure.map_or(f64::NAN, |figure| figure * factor)
     });
     format!(
-        "{median:.1} {unit} (median), {late:.1} {unit} (p99), {most:.1} {unit} (most) of {}",
-        figures.len()
+        "{median:.1}{unit} (median), {late:.1}{unit} (p99), {most:.1}{unit} (most) of {}",
+        figures.len(),
+        unit = if unit.is_empty() {
+            String::new()
+        } else {
+            format!(" {unit}")
+        },
     )
 }
 
@@ -213,6 +288,8 @@ struct Decisions<'a> {
     for_sync: Vec<Batch>,
     syncing: Vec<Batch>,
     latencies: Vec<f64>,
+    /// How many decisions each commit had.
+    rows: Vec<f64>,
 }
 
 enum Event {
@@ -240,13 +317,14 @@ impl<'a> Decisions<'a> {
             for_sync: Vec::new(),
             syncing: Vec::new(),
             latencies: Vec::new(),
+            rows: Vec::new(),
         };
         (0..scale.nodes).for_each(|node| new.await_decision(node));
         new
     }
 
-    /// The times from decisions to their acknowledgements.
-    fn run(mut self) -> Vec<f64> {
+    /// The times from decisions to their acknowledgements, and how many each commit had.
+    fn run(mut self) -> (Vec<f64>, Vec<f64>) {
         while let Some(Reverse(At(now, event))) = self.events.pop() {
             if now > WARM_UP_MS + WINDOW_MS {
                 break;
@@ -267,7 +345,7 @@ impl<'a> Decisions<'a> {
                 Event::Synced => self.synced(),
             }
         }
-        self.latencies
+        (self.latencies, self.rows)
     }
 
     fn after(&mut self, ms: f64, event: Event) {
@@ -311,6 +389,7 @@ impl<'a> Decisions<'a> {
 
     fn synced(&mut self) {
         for batch in std::mem::take(&mut self.syncing) {
+            self.rows.push(batch.arrived.len() as f64);
             for arrived in batch.arrived {
                 let hop = match self.random.random_bool(self.scale.forwarded()) {
                     true => self.scale.hop_ms,
