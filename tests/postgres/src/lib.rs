@@ -1,6 +1,7 @@
 //! A PostgreSQL server for tests: Debian's, in a temporary folder, on an address of its own. All
 //! tests of a process share one server and have a database each; a test that stops its server has
-//! one of its own. The server ends with the process that started it, however that ends.
+//! one of its own, which may have a standby. The server ends with the process that started it, however
+//! that ends.
 
 use std::fs;
 use std::io::{self, Write as _};
@@ -35,11 +36,13 @@ const SETTINGS: [&str; 3] = [
     "unix_socket_directories=",
 ];
 /// Runs a server until a line with a signal or the end of the input arrives. It ends when the
-/// test's process ends, in whatever way; then the folder is removed too.
+/// test's process ends, in whatever way; then the folder is removed too. A server that is killed would
+/// leave its shared memory behind.
 const KEEPER: &str = r#"
 "$1" -D "$2/data" &
 server=$!
 read -r signal
+[ "$signal" != KILL ] || ipcrm --shmem-id "$(sed -n '7s/.* //p' "$2/data/postmaster.pid")"
 kill -"${signal:-QUIT}" $server
 wait $server
 [ -n "$signal" ] || rm -rf "$2"
@@ -51,7 +54,7 @@ pub struct Server {
     folder: TempDir,
     programs: PathBuf,
     ip: Ipv4Addr,
-    settings: &'static [&'static str],
+    settings: Vec<String>,
     keeper: Option<Child>,
 }
 
@@ -77,7 +80,7 @@ impl Server {
     /// # Panics
     /// If PostgreSQL is missing or does not start.
     pub fn start() -> Self {
-        Self::with(FAST)
+        Self::primary(FAST)
     }
 
     /// Starts a new server that syncs what it commits, for measurements.
@@ -85,10 +88,59 @@ impl Server {
     /// # Panics
     /// If PostgreSQL is missing or does not start.
     pub fn syncing() -> Self {
-        Self::with(&[])
+        Self::primary(&[])
     }
 
-    fn with(settings: &'static [&'static str]) -> Self {
+    fn primary(settings: &[&str]) -> Self {
+        let arguments = [
+            "--auth=trust",
+            "--encoding=UTF8",
+            "--locale=C.UTF-8",
+            "--no-sync",
+        ];
+        let settings = SETTINGS.iter().chain(settings);
+        let settings = settings.map(|&it| it.to_owned()).collect();
+        Self::with(settings, "initdb", &arguments)
+    }
+
+    /// Starts a standby, which follows this server at an address that leads to it. From now on, the
+    /// standby has what is committed before that is acknowledged.
+    ///
+    /// # Panics
+    /// If it does not start.
+    pub fn standby(&self, address: SocketAddr) -> Self {
+        let (ip, port) = (address.ip(), address.port());
+        let from = format!("host={ip} port={port} user={USER}");
+        let mut settings = self.settings.clone();
+        settings.push(format!("primary_conninfo={from} application_name=standby"));
+        let copied_from = format!("--dbname={from}");
+        let arguments = [
+            copied_from.as_str(),
+            "--checkpoint=fast",
+            "--write-recovery-conf",
+            "--no-sync",
+        ];
+        let standby = Self::with(settings, "pg_basebackup", &arguments);
+        let own = self.with_url("postgres");
+        own.run("ALTER SYSTEM SET synchronous_standby_names = 'standby'");
+        own.run("SELECT pg_reload_conf()");
+        let deadline = Instant::now() + LIMIT;
+        while own.run("SELECT sync_state FROM pg_stat_replication") != "sync" {
+            assert!(Instant::now() < deadline, "the standby does not follow");
+            sleep(Duration::from_millis(20));
+        }
+        standby
+    }
+
+    /// Makes a standby the primary.
+    ///
+    /// # Panics
+    /// If it is none.
+    pub fn promote(&self) {
+        assert_eq!(self.with_url("postgres").run("SELECT pg_promote()"), "t");
+    }
+
+    fn with(settings: Vec<String>, program: &str, arguments: &[&str]) -> Self {
         let programs = programs().expect(
             "the tests need PostgreSQL: install it, for example with `apt-get install postgresql`",
         );
@@ -106,18 +158,12 @@ impl Server {
             settings,
             keeper: None,
         };
-        let data = server.data();
-        let initdb = as_nobody(&server.programs.join("initdb"))
-            .args([
-                "--auth=trust",
-                "--encoding=UTF8",
-                "--locale=C.UTF-8",
-                "--no-sync",
-            ])
+        let filled = as_nobody(&server.programs.join(program))
+            .args(arguments)
             .args(["--username", USER, "--pgdata"])
-            .arg(&data)
+            .arg(server.data())
             .output();
-        succeeded("initdb", initdb);
+        succeeded(program, filled);
         server.resume();
         server
     }
@@ -132,6 +178,12 @@ impl Server {
         self.with_url("postgres")
             .run(&format!("CREATE DATABASE {name}"));
         self.with_url(&name)
+    }
+
+    /// The copy that a standby has of a database, or the primary that was one.
+    pub fn copy_of(&self, database: &Database) -> Database {
+        let (_, name) = database.url.rsplit_once('/').expect("a URL");
+        self.with_url(name)
     }
 
     fn with_url(&self, name: &str) -> Database {
@@ -149,6 +201,11 @@ impl Server {
     /// Ends the server at once, as a crash does.
     pub fn stop(&mut self) {
         self.end("QUIT");
+    }
+
+    /// Kills the server.
+    pub fn kill(&mut self) {
+        self.end("KILL");
     }
 
     /// Ends the server as an administrator does: it ends all connections first.
@@ -172,7 +229,7 @@ impl Server {
     /// If it does not start.
     pub fn resume(&mut self) {
         let deadline = Instant::now() + LIMIT;
-        let settings: String = (SETTINGS.iter().chain(self.settings))
+        let settings: String = (self.settings.iter())
             .map(|setting| {
                 format!("{setting}\n")
                     .replacen('=', " = '", 1)
@@ -338,6 +395,22 @@ mod tests {
         assert!(!server.is_ready());
         server.resume();
         assert_eq!(first.run("SELECT count(*) FROM dishes"), "2");
+    }
+
+    #[test]
+    fn a_standby_has_what_was_acknowledged() {
+        let mut server = Server::start();
+        let database = server.database();
+        database.run("CREATE TABLE dishes (name text)");
+        let standby = server.standby(server.address());
+        database.run("INSERT INTO dishes VALUES ('pizza')");
+        server.kill();
+        let copy = standby.copy_of(&database);
+        assert_eq!(copy.run("SELECT pg_is_in_recovery()"), "t");
+        standby.promote();
+        assert_eq!(copy.run("SELECT name FROM dishes"), "pizza");
+        copy.run("INSERT INTO dishes VALUES ('gelato')");
+        assert_eq!(copy.run("SELECT count(*) FROM dishes"), "2");
     }
 
     #[test]
