@@ -139,6 +139,7 @@ pub struct Link {
     /// Where to connect.
     pub address: SocketAddr,
     way: Way,
+    target: watch::Sender<SocketAddr>,
     accepting: JoinHandle<()>,
 }
 
@@ -159,16 +160,18 @@ impl Link {
     ) -> Self {
         let listener = listen().await;
         let address = listener.local_addr().expect("it is bound");
+        let (target, leads_to) = watch::channel(target);
         let accepting = async move {
             while let Ok((near, origin)) = listener.accept().await {
                 if let Some(way) = way_of(origin) {
-                    tokio::spawn(way.carry(near, target));
+                    tokio::spawn(way.carry(near, *leads_to.borrow()));
                 }
             }
         };
         Self {
             address,
             way,
+            target,
             accepting: tokio::spawn(accepting),
         }
     }
@@ -185,6 +188,12 @@ impl Link {
 
     /// Breaks the connections. New ones are possible.
     pub fn cut(&self) {
+        self.way.cut();
+    }
+
+    /// Breaks the connections. New ones lead to another target.
+    pub fn lead_to(&self, target: SocketAddr) {
+        self.target.send_replace(target);
         self.way.cut();
     }
 

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use chefshat_client::Client;
 use chefshat_postgres::{Database, Server as Postgres};
@@ -332,6 +332,20 @@ impl Cluster {
             end(&mut self.postgres);
             self.postgres.resume();
         });
+    }
+
+    /// Kills the database. Its address leads to this standby from then on, which is promoted. Returns
+    /// when it was killed.
+    pub(crate) fn fail_over(&mut self, standby: Postgres) -> Instant {
+        tokio::task::block_in_place(|| self.postgres.kill());
+        let killed = Instant::now();
+        for node in &self.nodes {
+            node.database.lead_to(standby.address());
+        }
+        tokio::task::block_in_place(|| standby.promote());
+        self.database = standby.copy_of(&self.database);
+        self.postgres = standby;
+        killed
     }
 }
 

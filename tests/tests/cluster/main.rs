@@ -7,6 +7,7 @@ mod certificates;
 mod cluster;
 mod cup;
 mod cuts;
+mod failover;
 mod faults;
 mod growth;
 mod joining;

@@ -6,7 +6,6 @@
 //! with CHEFSHAT_BIN set to the program to measure, and CHEFSHAT_OLD_BIN to that of an earlier version
 //! from which nodes are upgraded.
 
-use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -22,6 +21,8 @@ const NODES: usize = 3;
 const ROOMS: usize = 48;
 /// Nodes that are killed or drained.
 const TIMES: usize = 4;
+/// Rooms whose database is killed.
+const FAILED_OVER_ROOMS: usize = 100;
 /// Rooms during an upgrade.
 const UPGRADED_ROOMS: usize = 200;
 /// Rooms of the nodes that another one joins.
@@ -98,6 +99,25 @@ fn longest_pause(ledger: &Ledger, game: &str, from: Instant) -> Option<f64> {
     pauses.max().map(|pause| pause.as_secs_f64())
 }
 
+/// Waits for the next decision of each of these games. Returns after which times they were
+/// acknowledged, seconds.
+async fn next_decisions(ledger: &Ledger, mut games: Vec<String>, from: Instant) -> Vec<f64> {
+    let mut next = Vec::new();
+    let all_go_on = async {
+        while !games.is_empty() {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+            games.retain(|game| {
+                let times = ledger.times(game).into_iter();
+                let first = times.map(|it| it.0).filter(|it| *it > from).min();
+                next.extend(first.map(|first| (first - from).as_secs_f64()));
+                first.is_none()
+            });
+        }
+    };
+    patiently("every game to continue", all_go_on).await;
+    next
+}
+
 /// The node that owns most games, and those games.
 fn busiest(cluster: &Cluster) -> (usize, Vec<String>) {
     let games = (0..cluster.nodes.len()).map(|node| (node, cluster.games_of(node)));
@@ -116,26 +136,34 @@ async fn from_a_kill_to_the_next_decision_of_each_game() {
         let (node, games) = busiest(&cluster);
         cluster.kill(node).await;
         let killed = Instant::now();
-        let mut waiting: BTreeSet<String> = games.into_iter().collect();
-        let mut seconds = Vec::new();
-        let all_again = async {
-            while !waiting.is_empty() {
-                tokio::time::sleep(Duration::from_millis(5)).await;
-                waiting.retain(|game| {
-                    let times = rooms.ledger.times(game);
-                    let first = times.iter().map(|it| it.0).filter(|it| *it > killed).min();
-                    seconds.extend(first.map(|first| (first - killed).as_secs_f64()));
-                    first.is_none()
-                });
-            }
-        };
-        patiently("every game to continue", all_again).await;
+        let seconds = next_decisions(&rooms.ledger, games, killed).await;
         show("from the kill to the next decision", "s", seconds.clone());
         all.extend(seconds);
         cluster.restart(node).await;
     }
     show("all kills: from the kill to the next decision", "s", all);
     rooms.ledger.assert_nothing_unexpected();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[ignore = "measures"]
+async fn from_a_kill_of_the_database_to_the_next_decision_of_each_game() {
+    let mut cluster = Cluster::start(NODES, Leases::Default).await;
+    let address = cluster.postgres.address();
+    let standby = tokio::task::block_in_place(|| cluster.postgres.standby(address));
+    let pace = Duration::from_millis(200);
+    let rooms = rooms(FAILED_OVER_ROOMS, 4, 3_600_000, pace);
+    let rooms = BusyRooms::start(&cluster.url(), rooms);
+    all_play(&rooms).await;
+    let games = (0..NODES).flat_map(|node| cluster.games_of(node)).collect();
+    let killed = cluster.fail_over(standby);
+    let promoted = Instant::now();
+    let seconds = (promoted - killed).as_secs_f64();
+    eprintln!("the standby is the primary after {seconds:.2} s");
+    let next = next_decisions(&rooms.ledger, games, promoted).await;
+    let next = next.into_iter().map(|next| seconds + next).collect();
+    show("from the kill to the next decision", "s", next);
+    missed(&cluster, rooms).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
