@@ -213,18 +213,23 @@ impl Cluster {
         assert!(ended.status.success(), "node {node}: {ended:?}");
     }
 
+    /// The way from one node to another.
+    pub(crate) fn way(&self, from: usize, to: usize) -> &Way {
+        &self.pairs.ways[from][to]
+    }
+
     /// Holds everything between two nodes, in both directions.
     pub(crate) fn separate(&self, one: usize, other: usize) {
         for (from, to) in [(one, other), (other, one)] {
-            self.pairs.ways[from][to].hold(Held::Everything);
+            self.way(from, to).hold(Held::Everything);
         }
     }
 
     /// Ends a separation; the connections of that time are lost.
     pub(crate) fn join(&self, one: usize, other: usize) {
         for (from, to) in [(one, other), (other, one)] {
-            self.pairs.ways[from][to].cut();
-            self.pairs.ways[from][to].hold(Held::Nothing);
+            self.way(from, to).cut();
+            self.way(from, to).hold(Held::Nothing);
         }
     }
 

@@ -5,6 +5,7 @@ mod alerts;
 mod balance;
 mod certificates;
 mod cluster;
+mod creating;
 mod cup;
 mod cuts;
 mod failover;
