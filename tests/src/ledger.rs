@@ -116,7 +116,8 @@ impl Ledger {
             }
             assert!(found.insert(key), "a decision twice: {decision:?}");
         }
-        let lost = (accepted.keys()).find(|key| key.0 == game && !found.contains(*key));
+        let mut accepted = accepted.range(all_of(game)).map(|(key, _)| key);
+        let lost = accepted.find(|key| !found.contains(*key));
         assert_eq!(lost, None, "an acknowledged decision is lost");
         acknowledged
     }
