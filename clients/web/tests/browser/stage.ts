@@ -149,8 +149,8 @@ export async function person(
 }
 
 /** Waits until a condition holds. */
-export async function until(holds: () => boolean | Promise<boolean>): Promise<void> {
-  await vi.waitUntil(holds, { timeout: PATIENCE_MS });
+export async function until(holds: () => boolean | Promise<boolean>, timeout = PATIENCE_MS): Promise<void> {
+  await vi.waitUntil(holds, { timeout });
 }
 
 function dataFolder(): string {

@@ -10,10 +10,19 @@ import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { RecordLineSchema } from "../../src/gen/chefshat/v1/record_pb";
 import { type StudyParticipant, StudyParticipantState } from "../../src/gen/chefshat/v1/study_pb";
-import { consent, expectNoSecretOn, expectNoSecretSent, newStudy, playGame } from "./participants";
+import {
+  consent,
+  emptyCells,
+  expectNoSecretOn,
+  expectNoSecretSent,
+  newStudy,
+  playGame,
+  rowsOf,
+  visit,
+} from "./participants";
 import { PATIENCE_MS } from "./patience";
 import { clientsOf, program } from "./rooms";
-import { browser, person, server, until, useStage } from "./stage";
+import { server, until, useStage } from "./stage";
 import { Tap } from "./tap";
 
 /** Number of participants who complete the study, half of them in each condition. */
@@ -52,19 +61,9 @@ test(
     /** The decisions of each participant in its game, without practice. */
     const decisions = new Map<string, number>();
 
-    /** A page of a participant, with its link open. */
-    const visit = async (index: number) => {
-      const visitor = await person(browser);
-      await visitor.page.goto(`${tap.url}/study/${links[index]?.link}`);
-      const leave = async () => {
-        await expectNoSecretOn(visitor.page);
-        faults.push(...visitor.faults);
-        await visitor.page.context().close();
-      };
-      return { page: visitor.page, leave };
-    };
+    const open = (index: number) => visit(`${tap.url}/study/${links[index]?.link}`, faults);
     const begin = async (index: number) => {
-      const visitor = await visit(index);
+      const visitor = await open(index);
       await consent(visitor.page);
       return visitor;
     };
@@ -100,7 +99,7 @@ test(
       const first = await begin(index);
       await playGame(first.page);
       const before = await playGame(first.page, FEW);
-      const second = await visit(index);
+      const second = await open(index);
       await first.page.getByRole("heading", { name: "You continue on another device or page" }).waitFor();
       await first.leave();
       await finish(index, second.page, before);
@@ -214,20 +213,6 @@ function expectComplete(
   }
   expect(answers).toHaveLength(4 * COUNT);
   expect([...new Set(answers.flatMap(emptyCells))]).toEqual(["scale", "label", "passed"]);
-}
-
-/** The rows of a table whose cells are not quoted. */
-function rowsOf(csv: string): Partial<Record<string, string>>[] {
-  expect(csv).not.toContain('"');
-  const [names = [], ...rows] = csv
-    .trim()
-    .split("\n")
-    .map((line) => line.split(","));
-  return rows.map((cells) => Object.fromEntries(names.map((name, index) => [name, cells[index]])));
-}
-
-function emptyCells(row: Partial<Record<string, string>>): string[] {
-  return Object.keys(row).filter((name) => row[name] === "");
 }
 
 /** The files of an export, by name. */
