@@ -115,6 +115,8 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
     let (has_node, has_web) = (places.has_node_package(), places.has_web_package());
     let deployment = wants(Part::Deployment);
     let needs_python = has_python && (wants(Part::Rust) || wants(Part::Python) || deployment);
+    // The long tests of the page analyse the data of a study.
+    let analyses = has_python && slow && wants(Part::Web);
     let needs_node = has_node && (wants(Part::Rust) || wants(Part::Node) || deployment);
     let needs_page = has_web && (wants(Part::Rust) || wants(Part::Web) || deployment);
 
@@ -128,7 +130,7 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
             steps.program("build", build.args(lint::ALL_TARGETS))
         }),
         Box::new(|steps| {
-            if needs_python {
+            if needs_python || analyses {
                 steps.run("set up Python", || setup::python_packages(places))?;
             }
             if lint && has_python {
