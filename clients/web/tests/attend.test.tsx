@@ -80,8 +80,8 @@ describe("what the table waits for", () => {
 
   test("is shown with what a play must be, the board and the seats", async () => {
     await show(stateOf());
-    expect(part("awaited")?.textContent).toContain("≤ 8");
-    expect(part("awaited")?.textContent).toContain("≥ 3");
+    expect(part("awaited")?.textContent).toContain("8 or lower");
+    expect(part("awaited")?.textContent).toContain("3+ cards");
     expect(part("board-words")?.textContent).toBe("two 9s with a joker");
     const seats = [...root.querySelectorAll('[data-part~="attend-seat"]')].map(({ textContent }) => textContent);
     expect(seats[0]).toContain("16 cards");

@@ -30,6 +30,20 @@ test.each(languages)(
   },
 );
 
+/** What fits in two lines beside the clock, on a phone 390 pixels wide. */
+const BESIDE_CLOCK = 46;
+
+test.each(languages)("in $label, hints and reasons at the own turn are short enough for a phone", async ({ value }) => {
+  await setLanguage(value);
+  const { reasons, actions } = t().table;
+  const { openingGolden, openingFace, notRarer, tooFew, notHeld, ...others } = reasons;
+  const { pick, pickMust, onlyPass, autoPassing, noPass, mustPlay, ready, sending } = actions;
+  const hints = [pick, pickMust, onlyPass, autoPassing, noPass, mustPlay, ready, sending, actions.more(2)];
+  const made = [openingGolden(11), openingFace(11), notRarer(11, 10), tooFew(3, 2), notHeld(11), notHeld(undefined)];
+  const lines = [...hints, ...made, ...Object.values(others)];
+  expect(lines.filter((line) => line.length > BESIDE_CLOCK)).toEqual([]);
+});
+
 test("a language without texts is not shown", async () => {
   await setLanguage("it");
   await showLanguage("xx");

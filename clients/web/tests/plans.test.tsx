@@ -154,7 +154,7 @@ test("cards that were picked before the turn do not stay picked while others ope
 test("a pass is planned too, and cards that do not beat the board are refused", async () => {
   await show(table());
   await pick(9);
-  expect(note()).toBe("9 is not rarer than 9: a lower number is needed.");
+  expect(note()).toBe("9 does not beat 9: play a lower number.");
   await click("plan-pass");
   await show(table(), turn(EIGHTS, PASS));
   await wait();

@@ -64,7 +64,7 @@ function requirementWords({ requirement }: OpenDecision): string {
   const words = t().table.now;
   if (!requirement) return "";
   const { lowestFace, highestFace, fewestCards, goldenCard, loneJoker } = requirement;
-  if (isOpening(requirement)) return `${lowestFace} ${goldenCard ? words.openingGolden : words.openingFace}.`;
+  if (isOpening(requirement)) return `${lowestFace}: ${goldenCard ? words.openingGolden : words.openingFace}.`;
   if (loneJoker) return words.anything;
   if (highestFace === 0) return words.nothing;
   return words.beat(highestFace, fewestCards);

@@ -202,7 +202,7 @@ export function reasonWords(reason: Reason): string {
     case "notRarer":
       return words.notRarer(reason.face, reason.board);
     case "tooFew":
-      return words.tooFew(reason.face, reason.need, reason.have);
+      return words.tooFew(reason.need, reason.have);
     default:
       return words[reason.kind];
   }

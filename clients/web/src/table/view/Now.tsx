@@ -106,7 +106,7 @@ function OwnState({ table, own }: { table: TableState; own: number | undefined }
   return seat.passed ? <p>{t().table.now.outOfPizza}</p> : null;
 }
 
-/** The requirement as tiles, and a sentence. */
+/** The requirement as tiles; at the opening with a sentence. */
 export function Demands({ requirement, mayPass }: { requirement: Requirement; mayPass: boolean }) {
   const words = t().table.now;
   const { lowestFace, highestFace, fewestCards, goldenCard, loneJoker } = requirement;
@@ -114,7 +114,7 @@ export function Demands({ requirement, mayPass }: { requirement: Requirement; ma
     return (
       <>
         <div class={css.tiles} data-part="requirement">
-          <Tile number={lowestFace} text={goldenCard ? words.openingGolden : words.openingFace} />
+          <Tile number={String(lowestFace)} text={goldenCard ? words.openingGolden : words.openingFace} />
         </div>
         <p>{mayPass ? words.opensMayPass : words.opens}</p>
       </>
@@ -123,23 +123,17 @@ export function Demands({ requirement, mayPass }: { requirement: Requirement; ma
   if (loneJoker) return <p>{words.anything}</p>;
   if (highestFace === 0) return <p>{words.nothing}</p>;
   return (
-    <>
-      <div class={css.tiles} data-part="requirement">
-        <Tile sign="≤" number={highestFace} text={words.face} />
-        <Tile sign="≥" number={fewestCards} text={words.cards(fewestCards)} />
-      </div>
-      <p>{words.beat(highestFace, fewestCards)}</p>
-    </>
+    <div class={css.tiles} data-part="requirement">
+      <Tile number={String(highestFace)} text={highestFace > 1 ? words.orLower : words.openingFace} />
+      <Tile number={`${fewestCards}+`} text={words.cards} />
+    </div>
   );
 }
 
-function Tile({ sign = "", number, text }: { sign?: string; number: number; text: string }) {
+function Tile({ number, text }: { number: string; text: string }) {
   return (
     <p class={css.tile}>
-      <strong class="number">
-        {sign && <small>{sign}</small>} {number}
-      </strong>
-      <span>{text}</span>
+      <strong class="number">{number}</strong> <span>{text}</span>
     </p>
   );
 }

@@ -126,11 +126,12 @@ function Chip({ table, seat, state, kind }: ChipProps) {
   return seat.lastMove ? <Play cards={seat.lastMove} /> : null;
 }
 
-/** The cards of a play, small and one over the other. */
+/** The cards of a play, small and one over the other: said to be played, since cards in the hand look alike. */
 function Play({ cards }: { cards: readonly CardValue[] }) {
   const words = playWords(cards);
   return (
     <span class={`${css.chip} ${css.play}`} data-part="chip" title={words}>
+      <small>{t().table.chips.played}</small>
       <span class="visually-hidden">{words}</span>
       {cards.map((card, index) => (
         <b key={index} class={`number ${card.kind === "golden" ? css.playGolden : ""}`} aria-hidden="true">
