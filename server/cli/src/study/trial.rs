@@ -36,10 +36,10 @@ use crate::{CommandError, progress, say};
 pub(super) struct Test {
     #[command(flatten)]
     owned: Owned,
-    /// Number of test participants to add; by default 8, or as many more as make whole groups.
+    /// Number of test participants to add, at most 1000; by default 8, or as many more as make whole groups.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000))]
     participants: Option<u32>,
-    /// How many of them take part at the same time.
+    /// How many of them take part at the same time, at most 32.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=32))]
     at_once: u32,
     /// The built-in agent that plays their games.
