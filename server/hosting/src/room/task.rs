@@ -19,6 +19,7 @@ use chefshat_engine::Seat;
 use chefshat_proto::v1;
 use chefshat_record::outcome::Outcome;
 use chefshat_room::ids::RoomId;
+use chefshat_room::journal::AbortReason;
 use chefshat_room::{Answer, ConnectionId, Core, JoinError, LeaveError, ReportOutcome, Searched};
 use futures::future::BoxFuture;
 use futures::stream::FuturesUnordered;
@@ -115,8 +116,10 @@ impl TaskContext {
 /// How a game has ended, as its record says.
 #[derive(Debug, Clone)]
 pub struct GameEnd {
-    /// Whether it was finished.
-    pub finished: bool,
+    /// Why it was aborted; `None` if it was finished.
+    pub aborted: Option<AbortReason>,
+    /// Whether it has a record: something was dealt.
+    pub has_record: bool,
     /// The outcome, if it was finished and is of a tournament. Missing if its record could not be
     /// read.
     pub outcome: Option<Arc<Outcome>>,

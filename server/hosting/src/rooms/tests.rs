@@ -154,7 +154,11 @@ async fn the_end_of_a_game_wakes_only_its_own_unit() {
     ending.close_without_token().await;
     // The notification is kept until the task waits.
     woken.notified().await;
-    assert!(rooms.end_of(ending.id()).is_some_and(|end| !end.finished));
+    assert!(
+        rooms
+            .end_of(ending.id())
+            .is_some_and(|end| end.aborted.is_some())
+    );
     assert!(asleep.notified().now_or_never().is_none());
     assert!(rooms.end_of(other.id()).is_none());
 

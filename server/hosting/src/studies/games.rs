@@ -90,9 +90,9 @@ impl StudyTask {
     /// The outcome of a game whose room is over or gone; `None` if it has no room yet.
     async fn outcome(&self, game: &PlayedGame) -> Result<Option<Outcome>, StoreError> {
         if let Some(end) = self.unit.rooms.end_of(convert::room_of(&game.placed)) {
-            return Ok(Some(match end.finished {
-                true => Outcome::Finished,
-                false => Outcome::Aborted,
+            return Ok(Some(match end.aborted {
+                None => Outcome::Finished,
+                Some(_) => Outcome::Aborted,
             }));
         }
         let id = convert::game_of(&game.placed);

@@ -14,10 +14,11 @@ use tracing::{error, warn};
 
 use super::message::Call;
 use super::task::TournamentTask;
+use crate::room::GameEnd;
 use crate::rooms::{CreateError, NewRoom, PartOf, Seating, Withheld};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{GameId, Id, RoomId};
-use chefshat_room::journal::{Fill, GameStart, SeatedParticipant, TournamentGame};
+use chefshat_room::journal::{AbortReason, Fill, GameStart, SeatedParticipant, TournamentGame};
 use chefshat_store::tournaments::TournamentEntry;
 use chefshat_store::{StoreError, StoredGame};
 use chefshat_wire::convert::MAX_NAME_CHARS;
@@ -82,9 +83,31 @@ impl TournamentTask {
         room: RoomId,
         game_id: GameId,
     ) -> Result<Option<Ended>, StoreError> {
-        if let Some(outcome) = (self.unit.rooms.end_of(room)).and_then(|end| end.outcome) {
-            return Ok(Some(played(&outcome)));
+        match self.unit.rooms.end_of(room) {
+            Some(GameEnd {
+                outcome: Some(outcome),
+                ..
+            }) => Ok(Some(played(&outcome))),
+            Some(GameEnd {
+                aborted: Some(reason),
+                has_record: true,
+                ..
+            }) => Ok((reason != AbortReason::Shutdown).then_some(Ended::Aborted)),
+            Some(GameEnd {
+                has_record: false, ..
+            }) => Ok(self.without_deal(game, room).await),
+            // Its record could not be read when it ended, or the server was restarted since.
+            _ => self.ended_as_stored(game, room, game_id).await,
         }
+    }
+
+    /// The result of a game as its record says.
+    async fn ended_as_stored(
+        &self,
+        game: usize,
+        room: RoomId,
+        game_id: GameId,
+    ) -> Result<Option<Ended>, StoreError> {
         // An imported record with this id is not the tournament's game.
         let is_ours = |game: &StoredGame| {
             (game.tournament()).is_some_and(|game| game.tournament == self.unit.handle.id())
@@ -113,13 +136,13 @@ impl TournamentTask {
                 }
             });
         }
-        let Some(handle) = self.unit.rooms.get(room) else {
-            return Ok(None);
-        };
-        let Ok(described) = handle.describe().await else {
-            return Ok(None);
-        };
-        Ok(match described.abort_reason() {
+        Ok(self.without_deal(game, room).await)
+    }
+
+    /// The result of a game that ended before the deal; `None` if it must be played again.
+    async fn without_deal(&self, game: usize, room: RoomId) -> Option<Ended> {
+        let described = self.unit.rooms.get(room)?.describe().await.ok()?;
+        match described.abort_reason() {
             v1::AbortReason::Shutdown => None,
             // The participants present at that time are unknown.
             _ if !self.seen.contains(&game) => None,
@@ -132,7 +155,7 @@ impl TournamentTask {
                     .collect();
                 Some(Ended::NeverStarted { missing })
             }
-        })
+        }
     }
 
     /// Creates the rooms of called games and notifies their participants.

@@ -125,8 +125,13 @@ impl Room {
                 .record_writer
                 .write_record(header.game_id, owner);
         }
+        let aborted = match self.core.state() {
+            State::Aborted(reason) => Some(reason),
+            _ => None,
+        };
         Some(GameEnd {
-            finished: self.core.state() == State::Finished,
+            aborted,
+            has_record,
             outcome: outcome.map(Arc::new),
         })
     }
