@@ -298,8 +298,8 @@ pub trait Store: Send + Sync + 'static {
     ) -> Result<Vec<(u64, GameId)>, StoreError> {
         Ok(Vec::new())
     }
-    /// Deletes those of these games that a tournament or study does not need, as `prunable` says,
-    /// and gives their space back. Returns those that it no longer has: only their files may be
+    /// Deletes those of these games that a tournament or study does not need, as `prunable` says, and
+    /// gives their space back, now or soon. Returns those that it no longer has: only their files may be
     /// deleted.
     async fn prune(&self, _games: Vec<GameId>) -> Result<Vec<GameId>, StoreError> {
         Ok(Vec::new())

@@ -241,6 +241,8 @@ impl ClusterStore for PostgresStore {
         self.control
             .read(move |connection| {
                 async move {
+                    // First: without them, nothing can be played.
+                    partitions::add_next(connection).await?;
                     tidy(connection, expire_after, retention).await?;
                     partitions::tidy(connection).await
                 }
@@ -444,7 +446,7 @@ impl ClusterStore for PostgresStore {
     }
 }
 
-/// Removes what is over since long, and what died with its node.
+/// Removes what has long been over, and what died with its node.
 async fn tidy(
     connection: &mut PgConnection,
     expire_after: i64,
@@ -476,7 +478,7 @@ async fn tidy(
              DELETE FROM games WHERE state <> 0 AND summary IS NULL AND ended_at_ms < clock_ms() - $1
              RETURNING number
          )
-         DELETE FROM journal USING game WHERE game = number",
+         INSERT INTO pruned (game, at_ms) SELECT number, clock_ms() FROM game ON CONFLICT DO NOTHING",
     )
     .bind(retention)
     .execute(&mut *connection)

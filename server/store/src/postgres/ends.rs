@@ -65,8 +65,8 @@ async fn not_ended(
     }))
 }
 
-/// Ends a durable game, whose journal has some rows, with a record. The last of them is there, or the
-/// room is fenced: see [`super::appends`].
+/// Ends a durable game, whose journal has some rows, with a record. The last of them is there, or it
+/// is refused: see [`super::appends`].
 pub(super) async fn finish(
     connection: &mut PgConnection,
     owned: Owned,

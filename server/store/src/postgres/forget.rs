@@ -90,6 +90,36 @@ impl Reader {
         Ok(games)
     }
 
+    /// Deletes the rows that contain a name from the journals of games that retention has deleted.
+    pub(super) async fn forget_pruned(&self, name: &str) -> Result<(), StoreError> {
+        let mut after = 0;
+        loop {
+            let games: Vec<i64> = (self.read(|connection| {
+                sqlx::query_scalar("SELECT game FROM pruned WHERE game > $1 ORDER BY game LIMIT $2")
+                    .bind(after)
+                    .bind(GAMES_AT_A_TIME)
+                    .fetch_all(connection)
+                    .boxed()
+            }))
+            .await?;
+            let Some(last) = games.last() else {
+                return Ok(());
+            };
+            after = *last;
+            let name = name.as_bytes().to_vec();
+            let deleting = self.read(|connection| {
+                sqlx::query(
+                    "DELETE FROM journal WHERE game = ANY ($1) AND position($2 IN entries) > 0",
+                )
+                .bind(games)
+                .bind(name)
+                .execute(connection)
+                .boxed()
+            });
+            deleting.await?;
+        }
+    }
+
     /// The rows of a game; `None` if it was deleted.
     async fn game_rows(&self, number: i64) -> Result<Option<GameRows>, StoreError> {
         let game: Option<PgRow> = (self.read(|connection| {

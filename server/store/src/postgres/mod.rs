@@ -418,6 +418,8 @@ impl Store for PostgresStore {
         let forgotten = rewrite.forgotten.clone();
         let rewrite = Command::Rewrite(rewrite);
         self.commands.commit(Arc::new(rewrite)).await?;
+        // After the games: one that retention deletes meanwhile is found here.
+        self.control.forget_pruned(&who.of.name).await?;
         Ok(forgotten)
     }
 

@@ -24,7 +24,8 @@ const TIME: Duration = Duration::from_secs(5);
 /// Key of the advisory lock that is held while partitions are added: "journals" in ASCII.
 const LOCK: i64 = 0x6a6f_7572_6e61_6c73;
 
-/// Adds the partitions for games up to a number and for those that follow soon. Nobody waits for it.
+/// Adds the partitions for games up to a number and for those that follow soon. This waits for no
+/// reader or writer of the table, and they do not wait for it.
 pub(super) async fn add(connection: &mut PgConnection, game: i64) -> sqlx::Result<()> {
     let needed = game / GAMES + 1 + AHEAD;
     if newest(connection).await? >= needed {
@@ -47,6 +48,19 @@ pub(super) async fn add(connection: &mut PgConnection, game: i64) -> sqlx::Resul
     transaction.commit().await
 }
 
+/// Adds the partitions that the next games need.
+pub(super) async fn add_next(connection: &mut PgConnection) -> sqlx::Result<()> {
+    let game = newest_game(connection).await?;
+    add(connection, game).await
+}
+
+/// The largest number of a game that was drawn.
+async fn newest_game(connection: &mut PgConnection) -> sqlx::Result<i64> {
+    sqlx::query_scalar("SELECT last_value FROM games_number_seq")
+        .fetch_one(connection)
+        .await
+}
+
 /// The number of the newest partition.
 async fn newest(connection: &mut PgConnection) -> sqlx::Result<i64> {
     sqlx::query_scalar(
@@ -57,15 +71,10 @@ async fn newest(connection: &mut PgConnection) -> sqlx::Result<i64> {
     .await
 }
 
-/// Adds what is needed, drops what no game is left in, and deletes what is left of single games.
+/// Drops the partitions that no game is left in, and deletes what is left of single games.
 pub(super) async fn tidy(connection: &mut PgConnection) -> sqlx::Result<()> {
-    let game: i64 = sqlx::query_scalar("SELECT last_value FROM games_number_seq")
-        .fetch_one(&mut *connection)
-        .await?;
-    add(connection, game).await?;
-    for (number, from) in without_games(connection, game).await? {
+    for (number, from) in without_games(connection).await? {
         match remove(connection, number, from).await {
-            // Those who use the table come first, for example a backup.
             Err(error) if is_locked(&error) => break,
             removed => removed?,
         }
@@ -73,21 +82,26 @@ pub(super) async fn tidy(connection: &mut PgConnection) -> sqlx::Result<()> {
     delete_singles(connection).await
 }
 
-/// The partitions in which no game is left, with the number of their first game. The newest ones
-/// are needed: a transaction that creates a game has drawn its number before it can be seen.
-async fn without_games(
-    connection: &mut PgConnection,
-    newest_game: i64,
-) -> sqlx::Result<Vec<(i64, i64)>> {
+/// The partitions in which no game is left, with the number of their first game; none while a long
+/// transaction, such as a backup, uses the table: dropping one would wait for it, and everybody else
+/// for that. The newest partitions are needed: a transaction that creates a game has drawn its number
+/// before it can be seen.
+async fn without_games(connection: &mut PgConnection) -> sqlx::Result<Vec<(i64, i64)>> {
+    let newest_game = newest_game(connection).await?;
     sqlx::query_as(
-        "SELECT number, first FROM (
-             SELECT number, $1 * coalesce(lag(number) OVER (ORDER BY number), 0) AS first FROM (
-                 SELECT substr(relname::text, 9)::bigint AS number
+        "WITH partitions AS (
+             SELECT inhrelid, number, $1 * coalesce(lag(number) OVER (ORDER BY number), 0) AS first FROM (
+                 SELECT inhrelid, substr(relname::text, 9)::bigint AS number
                  FROM pg_inherits JOIN pg_class ON pg_class.oid = inhrelid
-                 WHERE inhparent = 'journal'::regclass) AS names) AS partitions
+                 WHERE inhparent = 'journal'::regclass) AS names
+         )
+         SELECT number, first FROM partitions
          WHERE $1 * (number + 1) <= $2
            AND NOT EXISTS (SELECT FROM games
                            WHERE games.number >= first AND games.number < $1 * partitions.number)
+           AND NOT EXISTS (SELECT FROM pg_locks LEFT JOIN pg_stat_activity USING (pid)
+                           WHERE relation IN ('journal'::regclass, inhrelid) AND pid <> pg_backend_pid()
+                             AND coalesce(xact_start < now() - interval '1 second', true))
          ORDER BY number",
     )
     .bind(GAMES)
@@ -96,23 +110,43 @@ async fn without_games(
     .await
 }
 
-/// Drops a partition. Everybody waits for those who use the table, so this waits briefly.
+/// Drops a partition, if still no game is left in it. Everybody waits while this waits for a lock: it
+/// does so briefly.
 async fn remove(connection: &mut PgConnection, number: i64, from: i64) -> sqlx::Result<()> {
     let to = number * GAMES;
     let mut transaction = connection.begin().await?;
-    sqlx::raw_sql(AssertSqlSafe(format!(
-        "SET LOCAL lock_timeout = '100ms';
-         DROP TABLE IF EXISTS journal_{number};
-         DELETE FROM pruned WHERE game >= {from} AND game < {to}"
-    )))
+    sqlx::raw_sql(
+        "SET LOCAL lock_timeout = '100ms'; LOCK TABLE ONLY journal IN ACCESS EXCLUSIVE MODE",
+    )
     .execute(&mut *transaction)
     .await?;
+    let is_needed: bool = sqlx::query_scalar(
+        "SELECT EXISTS (SELECT FROM games WHERE number >= $1 AND number < $2)
+             OR to_regclass('journal_' || $3::bigint) IS NULL",
+    )
+    .bind(from)
+    .bind(to)
+    .bind(number)
+    .fetch_one(&mut *transaction)
+    .await?;
+    if is_needed {
+        return transaction.rollback().await;
+    }
+    sqlx::raw_sql(AssertSqlSafe(format!("DROP TABLE journal_{number}")))
+        .execute(&mut *transaction)
+        .await?;
     transaction.commit().await?;
     info!(
         partition = format!("journal_{number}"),
         "the journals of deleted games were dropped"
     );
-    Ok(())
+    // By itself: nobody should wait for it.
+    sqlx::query("DELETE FROM pruned WHERE game >= $1 AND game < $2")
+        .bind(from)
+        .bind(to)
+        .execute(connection)
+        .await
+        .map(drop)
 }
 
 /// Deletes the journals of deleted games whose partitions are needed.

@@ -111,7 +111,8 @@ pub async fn transfer(
         .await?;
     let empty: bool = sqlx::query_scalar(
         "SELECT NOT EXISTS (SELECT FROM games) AND NOT EXISTS (SELECT FROM tournaments)
-                AND NOT EXISTS (SELECT FROM studies) AND NOT EXISTS (SELECT FROM owned)",
+                AND NOT EXISTS (SELECT FROM studies) AND NOT EXISTS (SELECT FROM owned)
+                AND NOT EXISTS (SELECT FROM pruned)",
     )
     .fetch_one(&mut *transaction)
     .await?;
@@ -149,7 +150,8 @@ pub async fn transfer(
     }
     for statement in [
         "UPDATE finished SET last = (SELECT coalesce(max(listed), 0) FROM games)",
-        "SELECT setval(pg_get_serial_sequence('games', 'number'), max(number)) FROM games HAVING count(*) > 0",
+        "SELECT setval('games_number_seq', greatest(max(number), (SELECT last_value FROM games_number_seq)))
+         FROM games HAVING count(*) > 0",
         "SELECT setval(pg_get_serial_sequence('tournaments', 'number'), max(number)) FROM tournaments HAVING count(*) > 0",
         "SELECT setval(pg_get_serial_sequence('studies', 'number'), max(number)) FROM studies HAVING count(*) > 0",
     ] {

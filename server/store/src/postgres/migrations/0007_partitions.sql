@@ -20,10 +20,8 @@ BEGIN
     EXECUTE format('ALTER TABLE journal ATTACH PARTITION %I FOR VALUES FROM (MINVALUE) TO (%s)', first, partitions * 262144);
     EXECUTE format('ALTER TABLE %I DROP CONSTRAINT journal_before', first);
     -- Nodes of the earlier version add none.
-    IF partitions > 1 THEN
-        FOR before IN partitions .. partitions + 3 LOOP
-            EXECUTE format('CREATE TABLE %I PARTITION OF journal FOR VALUES FROM (%s) TO (%s)', 'journal_' || before + 1,
-                           before * 262144, (before + 1) * 262144);
-        END LOOP;
-    END IF;
+    FOR before IN partitions .. partitions + 3 LOOP
+        EXECUTE format('CREATE TABLE %I PARTITION OF journal FOR VALUES FROM (%s) TO (%s)', 'journal_' || before + 1,
+                       before * 262144, (before + 1) * 262144);
+    END LOOP;
 END $$;

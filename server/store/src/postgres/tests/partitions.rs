@@ -2,6 +2,26 @@
 
 use super::*;
 
+/// Removing a participant finds its name in what retention has left of a game, too.
+#[tokio::test]
+async fn a_name_is_removed_from_journals_of_deleted_games() {
+    let database = chefshat_postgres::database();
+    let store = node(&database).await;
+    played(&store, 1).await;
+    played(&store, 2).await;
+    database.run("UPDATE journal SET entries = entries || 'Rosa'::bytea WHERE position = 0");
+    prune(&store, [1]).await;
+    let with_name = "SELECT count(*) FROM journal WHERE position('Rosa'::bytea IN entries) > 0";
+    assert_eq!(database.run(with_name), "2");
+    store
+        .control
+        .forget_pruned("Rosa")
+        .await
+        .expect("it answers");
+    assert_eq!(database.run(with_name), "1");
+    store.close().await;
+}
+
 /// The number of each partition, and of the games with rows in it.
 fn partitions(database: &Database) -> String {
     database.run(
@@ -42,7 +62,7 @@ async fn journals_of_deleted_games_go_with_their_partition_or_after_a_minute() {
     stop_clock(&database);
     let tidy = || async { store.tidy().await.expect("it answers") };
     tidy().await;
-    assert_eq!(partitions(&database), "1:0 2:0 3:0");
+    assert_eq!(partitions(&database), "1:0 2:0 3:0 4:0 5:0");
     played(&store, 1).await;
     played(&store, 2).await;
     filled(&database, 1);
@@ -116,6 +136,7 @@ async fn nodes_add_and_drop_partitions_at_the_same_time() {
         10,
         "{kept}"
     );
+    assert!(kept.starts_with("3:1 5:1 7:1 9:1 11:1 "), "{kept}");
     for node in [first, second] {
         node.close().await;
     }
