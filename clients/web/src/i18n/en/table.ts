@@ -173,7 +173,7 @@ export const table = {
     sending: "Sending…",
     notYourTurn: "It is not your turn.",
     noPass: "Pick cards: you open and cannot pass.",
-    mustPlay: "Nobody played for long: you must play now.",
+    mustPlay: "Nobody has played for a while: you must play.",
   },
   reasons: {
     openingGolden: (face: number) => `Play the Golden ${face}, with ${face}s and jokers only.`,

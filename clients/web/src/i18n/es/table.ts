@@ -21,7 +21,7 @@ export const table: Texts["table"] = {
   you: "tú",
   freeSeat: "asiento libre",
   pointsWord: (count) => plural(count, { one: "punto", other: "puntos" }),
-  chips: { toPlay: "juega", toGive: "da", toDeclare: "¿declara?", passed: "ha pasado", played: "jugado" },
+  chips: { toPlay: "juega", toGive: "da", toDeclare: "¿declara?", passed: "ha pasado", played: "ha jugado" },
   presence: {
     away: "sin conexión",
     substituted: (agent) => `juega ${agent}`,
@@ -187,7 +187,7 @@ export const table: Texts["table"] = {
     nothingRarer: "Nada supera las cartas del tablero.",
     tooFew: (need, have) =>
       `${plural(need, { one: "Necesitas # carta", other: "Necesitas # cartas" })} de un valor; tienes ${have}.`,
-    jokerAlone: "Un comodín solo únicamente abre una pizza.",
+    jokerAlone: "Un único comodín solo puede abrir una pizza.",
     other: "Esta carta no se puede jugar ahora.",
     declareFirst: "Decide primero si declaras.",
     gift: "Esta carta no se puede dar ahora.",

@@ -25,7 +25,7 @@ export const table: Texts["table"] = {
   you: "tu",
   freeSeat: "posto libero",
   pointsWord: (count) => plural(count, { one: "punto", other: "punti" }),
-  chips: { toPlay: "gioca", toGive: "dà", toDeclare: "dichiara?", passed: "ha passato", played: "giocato" },
+  chips: { toPlay: "gioca", toGive: "dà", toDeclare: "dichiara?", passed: "ha passato", played: "ha giocato" },
   presence: {
     away: "non connesso",
     substituted: (agent) => `sostituito da ${agent}`,
@@ -191,7 +191,7 @@ export const table: Texts["table"] = {
     nothingRarer: "Niente batte le carte sul piatto.",
     tooFew: (need, have) =>
       `${plural(need, { one: "Ti serve # carta", other: "Ti servono # carte" })} di un valore; ne hai ${have}.`,
-    jokerAlone: "Un jolly da solo può solo aprire una pizza.",
+    jokerAlone: "Un jolly da solo apre soltanto una pizza.",
     other: "Questa carta ora non si può giocare.",
     declareFirst: "Prima decidi se dichiarare.",
     gift: "Questa carta ora non si può dare.",

@@ -13,7 +13,7 @@ export type Reason =
   | { readonly kind: "opening"; readonly face: number; readonly golden: boolean }
   | { readonly kind: "notRarer"; readonly face: number; readonly board: number }
   | { readonly kind: "nothingRarer" }
-  | { readonly kind: "tooFew"; readonly face: number; readonly need: number; readonly have: number }
+  | { readonly kind: "tooFew"; readonly need: number; readonly have: number }
   | { readonly kind: "jokerAlone" }
   | { readonly kind: "other" };
 
@@ -237,5 +237,5 @@ export function reasonAgainst(requirement: Requirement, hand: readonly Card[], i
   if (face === undefined) return requirement.loneJoker ? { kind: "other" } : { kind: "jokerAlone" };
   if (face > highestFace) return { kind: "notRarer", face, board: highestFace + 1 };
   const have = countOf(hand, face) + countOf(hand, undefined);
-  return have < fewestCards ? { kind: "tooFew", face, need: fewestCards, have } : { kind: "other" };
+  return have < fewestCards ? { kind: "tooFew", need: fewestCards, have } : { kind: "other" };
 }
