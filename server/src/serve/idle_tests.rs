@@ -515,5 +515,6 @@ async fn a_silent_connection_to_the_listener_for_nodes_is_closed() {
     let read = timeout(MINUTE, silent.read_to_end(&mut Vec::new())).await;
     // With or without an error.
     let _ = read.expect("it is closed");
+    assert!(!serving.is_finished(), "the node serves others");
     serving.abort();
 }

@@ -37,6 +37,13 @@ async fn fires(prometheus: &Prometheus, what: &str, alert: Option<&str>) {
     );
 }
 
+/// Waits until an alert does not fire any more.
+async fn ends(prometheus: &Prometheus, alert: &str) {
+    while prometheus.firing().await.contains(alert) {
+        tokio::time::sleep(LOOK_AGAIN).await;
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 #[ignore = "measures"]
 async fn an_alert_fires_in_each_fault() {
@@ -66,6 +73,8 @@ async fn an_alert_fires_in_each_fault() {
     .await;
     way.hold(Held::Nothing);
     rooms.all_go_on().await;
+    ends(&prometheus, "ChefshatNoLease").await;
+    ends(&prometheus, "ChefshatCommitsWait").await;
 
     let lock = "BEGIN; LOCK TABLE journal IN SHARE MODE; SELECT pg_sleep(60); COMMIT";
     let database = cluster.database.clone();

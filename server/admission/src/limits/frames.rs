@@ -55,7 +55,7 @@ enum Position {
         read: usize,
         skip: usize,
     },
-    /// Not read: another protocol, or a connection of those who are trusted.
+    /// Not read: another protocol, or a connection of a trusted peer.
     Other,
 }
 
@@ -122,7 +122,7 @@ impl<S> Metered<S> {
         }
     }
 
-    /// Watches a connection of those who may send what they want, once its protocol is known.
+    /// Watches a connection of a trusted peer, whose frames have no limit once its protocol is known.
     pub fn of_trusted(stream: S, first_bytes_timeout: Duration) -> Self {
         Self {
             position: Position::Other,
