@@ -86,7 +86,7 @@ struct Scale {
     #[arg(long, default_value_t = 232.0)]
     log_bytes: f64,
     /// Bytes that a decision adds to its tables and indexes.
-    #[arg(long, default_value_t = 200.0)]
+    #[arg(long, default_value_t = 118.0)]
     row_bytes: f64,
     /// CPU of the database for a beat, microseconds.
     #[arg(long, default_value_t = 550.0)]

@@ -3,7 +3,6 @@
 //!
 //! `cargo test -p chefshat-tests --test cluster alerts -- --ignored --nocapture`
 
-use std::cell::RefCell;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
@@ -48,10 +47,9 @@ async fn ends(prometheus: &Prometheus, alert: &str) {
 #[ignore = "measures"]
 async fn an_alert_fires_in_each_fault() {
     let scraped = [(); 3].map(|()| SocketAddr::from((own_address(), 9_464)));
-    let left = RefCell::new(scraped.iter());
+    let mut left = scraped.iter();
     let mut cluster = Cluster::start_with(3, Leases::Default, |launch| {
-        let next = left.borrow_mut().next().expect("one for each");
-        launch.with("--metrics-listen", next)
+        launch.with("--metrics-listen", left.next().expect("one for each"))
     })
     .await;
     let prometheus = Prometheus::start(&scraped, "15s").await;

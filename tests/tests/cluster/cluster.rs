@@ -110,7 +110,7 @@ impl Cluster {
     pub(crate) async fn start_with(
         count: usize,
         leases: Leases,
-        special: impl Fn(Launch) -> Launch,
+        mut special: impl FnMut(Launch) -> Launch,
     ) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let postgres = tokio::task::block_in_place(match leases {

@@ -7,7 +7,7 @@
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use chefshat_tests::{BusyRooms, patiently, set_up};
+use chefshat_tests::{BusyRooms, Launch, patiently, set_up};
 
 use crate::cluster::{Cluster, Leases};
 use crate::measure::{all_play, rooms, throughput};
@@ -17,7 +17,7 @@ const ROWS: usize = 10_000_000;
 /// Rooms that play games, of which all others are copies.
 const ROOMS: usize = 8;
 /// The next copy has a number larger by this, so that they fill several partitions.
-const APART: usize = 10;
+const APART: usize = 25;
 /// Games that are copied in one statement.
 const AT_ONCE: usize = 2_000;
 /// Games of a partition.
@@ -32,13 +32,25 @@ fn number(cluster: &Cluster, sql: &str) -> f64 {
     said.parse().unwrap_or_else(|_| panic!("{sql}: {said}"))
 }
 
+/// A token for a node that has not started.
+fn admin_token(launch: &Launch) -> String {
+    let mut create = Command::new(set_up("CHEFSHAT_BIN"));
+    create.args(["token", "create", "--role", "admin", "--data-dir"]);
+    let created = create.arg(launch.data_dir()).output();
+    let token = String::from_utf8(created.expect("the binary starts").stdout);
+    token.expect("text").trim().to_owned()
+}
+
 /// Copies the games that are over until the journal has this many rows. Returns how many games were
 /// added.
 fn copy(cluster: &Cluster, rows: usize) -> usize {
     let played = "SELECT string_agg(number::text, ',') FROM games WHERE listed IS NOT NULL";
     let played = cluster.select(played);
     let count = played.split(',').count();
-    let own = number(cluster, "SELECT count(*) FROM journal");
+    let own = number(
+        cluster,
+        "SELECT count(*) FROM journal JOIN games ON game = number WHERE listed IS NOT NULL",
+    );
     let games = (rows as f64 / own * count as f64) as usize;
     let first = number(cluster, "SELECT last_value FROM games_number_seq") as usize + 1;
     for from in (0..games).step_by(AT_ONCE) {
@@ -77,7 +89,12 @@ fn copy(cluster: &Cluster, rows: usize) -> usize {
 #[ignore = "measures"]
 async fn play_beside_a_long_journal_and_its_deletion() {
     let rows = std::env::var("CHEFSHAT_ROWS").map_or(ROWS, |rows| rows.parse().expect("a number"));
-    let cluster = Cluster::start(1, Leases::Default).await;
+    let mut token = String::new();
+    let cluster = Cluster::start_with(1, Leases::Default, |launch| {
+        token = admin_token(&launch);
+        launch.with("--access", "open")
+    });
+    let cluster = cluster.await;
     let (url, ids) = (cluster.nodes[0].url(), cluster.process_ids());
     let busy_rooms = BusyRooms::start(&url, rooms(ROOMS, 2, 3_600_000, Duration::ZERO));
     all_play(&busy_rooms).await;
@@ -115,14 +132,8 @@ async fn play_beside_a_long_journal_and_its_deletion() {
 
     let full = number(&cluster, BYTES);
     let mut prune = Command::new(set_up("CHEFSHAT_BIN"));
-    prune.args([
-        "records",
-        "prune",
-        "--keep",
-        &KEPT.to_string(),
-        "--server",
-        &url,
-    ]);
+    prune.args(["records", "prune", "--keep", &KEPT.to_string()]);
+    prune.args(["--server", &url, "--token", &token]);
     let begun = Instant::now();
     let mut pruning = prune.spawn().expect("the binary starts");
     throughput("while they are deleted", &url, &url, &ids).await;
