@@ -190,6 +190,7 @@ export function TableView(props: TableViewProps) {
           class={`${css.own} sheet`}
           data-part="own"
           data-deciding={decision && ""}
+          data-waiting={decision || props.replayed ? undefined : ""}
           data-picking={decision && !special ? "" : undefined}
           aria-label={handLabel}
           data-decision={decision && String(decision.id)}
