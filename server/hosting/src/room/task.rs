@@ -115,14 +115,14 @@ impl TaskContext {
 
 /// How a game has ended, as its record says.
 #[derive(Debug, Clone)]
-pub struct GameEnd {
-    /// Why it was aborted; `None` if it was finished.
-    pub aborted: Option<AbortReason>,
-    /// Whether it has a record: something was dealt.
-    pub has_record: bool,
-    /// The outcome, if it was finished and is of a tournament. Missing if its record could not be
+pub enum GameEnd {
+    /// It was finished, with this outcome if it is of a tournament. Missing if its record could not be
     /// read.
-    pub outcome: Option<Arc<Outcome>>,
+    Finished(Option<Arc<Outcome>>),
+    /// It was aborted after the deal.
+    Aborted(AbortReason),
+    /// It was aborted before the deal, and has no record.
+    NotDealt,
 }
 
 /// Maintains the list of rooms.

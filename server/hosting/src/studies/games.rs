@@ -11,6 +11,7 @@ use chefshat_study::{Outcome, Participant, PlayedGame, Status};
 use tracing::error;
 
 use super::task::StudyTask;
+use crate::room::GameEnd;
 use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{GameId, RoomId};
@@ -90,9 +91,9 @@ impl StudyTask {
     /// The outcome of a game whose room is over or gone; `None` if it has no room yet.
     async fn outcome(&self, game: &PlayedGame) -> Result<Option<Outcome>, StoreError> {
         if let Some(end) = self.unit.rooms.end_of(convert::room_of(&game.placed)) {
-            return Ok(Some(match end.aborted {
-                None => Outcome::Finished,
-                Some(_) => Outcome::Aborted,
+            return Ok(Some(match end {
+                GameEnd::Finished(_) => Outcome::Finished,
+                GameEnd::Aborted(_) | GameEnd::NotDealt => Outcome::Aborted,
             }));
         }
         let id = convert::game_of(&game.placed);

@@ -84,20 +84,13 @@ impl TournamentTask {
         game_id: GameId,
     ) -> Result<Option<Ended>, StoreError> {
         match self.unit.rooms.end_of(room) {
-            Some(GameEnd {
-                outcome: Some(outcome),
-                ..
-            }) => Ok(Some(played(&outcome))),
-            Some(GameEnd {
-                aborted: Some(reason),
-                has_record: true,
-                ..
-            }) => Ok((reason != AbortReason::Shutdown).then_some(Ended::Aborted)),
-            Some(GameEnd {
-                has_record: false, ..
-            }) => Ok(self.without_deal(game, room).await),
+            Some(GameEnd::Finished(Some(outcome))) => Ok(Some(played(&outcome))),
+            Some(GameEnd::Aborted(reason)) => {
+                Ok((reason != AbortReason::Shutdown).then_some(Ended::Aborted))
+            }
+            Some(GameEnd::NotDealt) => Ok(self.without_deal(game, room).await),
             // Its record could not be read when it ended, or the server was restarted since.
-            _ => self.ended_as_stored(game, room, game_id).await,
+            Some(GameEnd::Finished(None)) | None => self.ended_as_stored(game, room, game_id).await,
         }
     }
 

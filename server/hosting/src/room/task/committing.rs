@@ -125,14 +125,10 @@ impl Room {
                 .record_writer
                 .write_record(header.game_id, owner);
         }
-        let aborted = match self.core.state() {
-            State::Aborted(reason) => Some(reason),
-            _ => None,
-        };
-        Some(GameEnd {
-            aborted,
-            has_record,
-            outcome: outcome.map(Arc::new),
+        Some(match self.core.state() {
+            State::Aborted(_) if !has_record => GameEnd::NotDealt,
+            State::Aborted(reason) => GameEnd::Aborted(reason),
+            _ => GameEnd::Finished(outcome.map(Arc::new)),
         })
     }
 
