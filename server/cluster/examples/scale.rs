@@ -213,13 +213,13 @@ impl Scale {
         );
         let (latencies, rows) = Decisions::new(self).run();
         row("decisions of a commit", quantiles(rows, "", 1.0));
-        row("acknowledged after", quantiles(latencies, "ms", 1.0));
+        row("acknowledged after", quantiles(latencies, " ms", 1.0));
         let mut random = SmallRng::seed_from_u64(1);
         let losses = (0..LOSSES).flat_map(|_| Loss::new(self, &mut random).run(&mut random));
         let losses: Vec<f64> = losses.collect();
         row(
             "a node is lost: next decision after",
-            quantiles(losses, "s", 1e-3),
+            quantiles(losses, " s", 1e-3),
         );
         let mut limits = self.limits();
         limits.sort_by(|one, other| one.1.total_cmp(&other.1));
@@ -242,12 +242,7 @@ fn quantiles(mut figures: Vec<f64>, unit: &str, factor: f64) -> String {
     });
     format!(
         "{median:.1}{unit} (median), {late:.1}{unit} (p99), {most:.1}{unit} (most) of {}",
-        figures.len(),
-        unit = if unit.is_empty() {
-            String::new()
-        } else {
-            format!(" {unit}")
-        },
+        figures.len()
     )
 }
 

@@ -54,8 +54,8 @@ fn copy(cluster: &Cluster, rows: usize) -> usize {
     let games = (rows as f64 / own * count as f64) as usize;
     let first = number(cluster, "SELECT last_value FROM games_number_seq") as usize + 1;
     for from in (0..games).step_by(AT_ONCE) {
+        let to = first + (games.min(from + AT_ONCE) - 1) * APART;
         let from = first + from * APART;
-        let to = from + (AT_ONCE - 1) * APART;
         // Partitions are added as by a node.
         for partition in from / PARTITION..=to / PARTITION + 1 {
             let (begin, end) = (partition * PARTITION, (partition + 1) * PARTITION);
@@ -141,12 +141,9 @@ async fn play_beside_a_long_journal_and_its_deletion() {
     assert!(pruned.expect("it ends").success());
     eprintln!("deleted within {:.0} s", begun.elapsed().as_secs_f64());
     throughput("while their journals are deleted", &url, &url, &ids).await;
-    let deleted = async {
-        while cluster.select("SELECT count(*) FROM pruned") != "0" {
-            tokio::time::sleep(Duration::from_secs(1)).await;
-        }
-    };
-    deleted.await;
+    while cluster.select("SELECT count(*) FROM pruned") != "0" {
+        tokio::time::sleep(Duration::from_secs(1)).await;
+    }
     eprintln!(
         "all of it within {:.0} s; the journal takes {:.0} MB, {:.0} MB before",
         begun.elapsed().as_secs_f64(),
