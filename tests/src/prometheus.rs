@@ -109,7 +109,7 @@ impl Prometheus {
     /// What its interface answers at a path.
     ///
     /// # Panics
-    /// It is no JSON.
+    /// The answer is not JSON.
     pub async fn api(&self, path: &str) -> Value {
         serde_json::from_str(&get(&format!("{}/{path}", self.url)).await).expect("JSON")
     }
@@ -129,7 +129,7 @@ impl Prometheus {
     /// Evaluates an expression until it has data.
     ///
     /// # Panics
-    /// It is no expression, or has no data.
+    /// The expression is invalid, or has no data for long.
     pub async fn has_data(&self, expression: &str) {
         let escaped: String = (expression.bytes())
             .map(|byte| format!("%{byte:02x}"))

@@ -242,7 +242,7 @@ async fn each_decision_is_logged_in_the_spans_of_its_room_and_itself() {
     }
 }
 
-/// A file of the source tree.
+/// The text of a file of the repository.
 fn read(path: &str) -> String {
     let path = source(path);
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))

@@ -1,7 +1,8 @@
 //! Stores games in a PostgreSQL database that several servers may share. `open` connects, `reader`
 //! reads, `journals`, `appends`, `commands`, `ends`, `forget` and `units` write through `writer`, `cluster`,
-//! `claims`, `handover` and `owned` are about nodes and what they own, `partitions` divides the table of
-//! journals, `transfer` moves an SQLite database here, `form` (beside this folder) encodes; this file joins them into a store.
+//! `claims`, `handover` and `owned` are about nodes and what they own, `partitions` divides the table
+//! of journals, `transfer` moves an SQLite database here, `form` (beside this folder) encodes; this
+//! file joins them into a store.
 
 mod appends;
 mod claims;

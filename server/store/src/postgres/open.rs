@@ -287,8 +287,9 @@ pub async fn migrate(url: &str) -> Result<(i64, i64), DatabaseError> {
     Ok((before, NEWEST))
 }
 
-/// Runs those of these migrations that are missing, each in a transaction. The caller has the lock. While it waits
-/// for a table, nobody else gets that table, and no node its lease: so it waits briefly, and often.
+/// Runs those of these migrations that are missing, each in a transaction. The caller has the lock.
+/// While it waits for a table, nobody else gets that table, and no node its lease: so it waits
+/// briefly, and often.
 pub(super) async fn run(
     migrations: &[(i64, &'static str, &'static str)],
     connection: &mut PgConnection,
