@@ -9,6 +9,7 @@ mod health;
 #[cfg(test)]
 mod idle_tests;
 mod joining;
+mod probing;
 
 use std::future::Future;
 use std::io;
@@ -380,6 +381,11 @@ impl Server {
                 signing_key.unwrap_or_default(),
             );
             tracker.spawn(until_closing(LongTask::Joining, joining.boxed()));
+        }
+        if let Some(peers) = to_others.clone() {
+            let metrics = Arc::clone(rooms.metrics());
+            let probing = probing::probe(Arc::clone(&directory), peers, metrics);
+            tracker.spawn(until_closing(LongTask::Probing, probing.boxed()));
         }
         let forwarding = to_others.clone().map(|to_others| {
             grpc::ForwardLayer::new(Arc::clone(&directory), to_others, Arc::clone(&calls))

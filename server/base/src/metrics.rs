@@ -189,6 +189,7 @@ pub struct Metrics {
     handovers: Counter,
     not_resumed: Counter,
     peer_errors: Counter,
+    peers_unreachable: Gauge,
     outboxes: Mutex<Vec<Weak<dyn Queue>>>,
 }
 
@@ -288,6 +289,11 @@ impl Default for Metrics {
                 all,
                 "peer_errors",
                 "Connections to other nodes that could not be opened",
+            ),
+            peers_unreachable: plain(
+                all,
+                "peers_unreachable",
+                "Other nodes with a lease that this node does not reach",
             ),
             outboxes: Mutex::default(),
             registry: Mutex::new(registry),
@@ -459,6 +465,12 @@ impl Metrics {
     /// Counts a connection to another node that could not be opened.
     pub fn peer_error(&self) {
         self.peer_errors.inc();
+    }
+
+    /// Says how many other nodes this one does not reach.
+    pub fn unreachable_peers(&self, peers: usize) {
+        let peers = i64::try_from(peers).unwrap_or(i64::MAX);
+        self.peers_unreachable.set(peers);
     }
 
     /// Counts a unit that could not be resumed.

@@ -30,6 +30,8 @@ long_tasks! {
     Node,
     /// Asks other nodes to reach one that has joined.
     Joining,
+    /// Looks whether a node reaches the others.
+    Probing,
     /// Notices pauses of the process.
     ProcessClock,
     /// Reports whether the server serves.

@@ -315,7 +315,7 @@ impl Peers {
     ///
     /// # Errors
     /// Nobody, or another node, answers at its endpoint; says so.
-    pub(crate) async fn reach(&self, peer: &Peer) -> Result<(), String> {
+    pub async fn reach(&self, peer: &Peer) -> Result<(), String> {
         let Peer { node, endpoint } = peer;
         let mut service = PeerServiceClient::new(self.channel(peer));
         let asked = timeout(ANSWER_TIMEOUT, service.identify(IdentifyRequest {}));

@@ -53,7 +53,12 @@ const OF_A_SERVER: [LongTask; 18] = [
 ];
 
 /// What only the node runs in [`the_tasks_of_a_node_sleep_while_nothing_is_due`].
-const OF_A_NODE: [LongTask; 3] = [LongTask::Node, LongTask::Joining, LongTask::Certificates];
+const OF_A_NODE: [LongTask; 4] = [
+    LongTask::Node,
+    LongTask::Joining,
+    LongTask::Probing,
+    LongTask::Certificates,
+];
 
 /// What neither runs.
 const ELSEWHERE: [(LongTask, &str); 5] = [
@@ -106,7 +111,7 @@ fn bound(task: LongTask, time: Duration) -> u64 {
         LongTask::TokenFile => 120,
         LongTask::Certificates => 60,
         // Every 5 seconds.
-        LongTask::StalledConnections => 12,
+        LongTask::StalledConnections | LongTask::Probing => 12,
         // At most heartbeats, every 15 seconds, and attempts to deliver.
         _ => 5,
     };
@@ -426,6 +431,8 @@ async fn the_tasks_of_a_node_sleep_while_nothing_is_due() {
     let longest = longest_shutdown(config.grace);
     let node = Server::joined(config, shared, NodeInfo::default()).await;
     let node = node.expect("the database is there");
+    let of_nodes = TcpListener::bind("127.0.0.1:0").await.expect("a port");
+    let node = node.with_peers(PeerPort::new(of_nodes, None).expect("on this machine"));
     let rooms = Arc::clone(&node.rooms);
     let mut serves = node.node.as_ref().expect("a node").serves();
     let serving = tokio::spawn(node.serve_incoming(

@@ -1,6 +1,5 @@
 //! How long after a fault the shipped alerts fire, in a real Prometheus that scrapes and evaluates as it
-//! is shipped: measured, never asserted, except that they fire. A cut between two nodes is not among them:
-//! once their clients have found a way around it, nobody notices it.
+//! is shipped: measured, never asserted, except that they fire.
 //!
 //! `cargo test -p chefshat-tests --test cluster alerts -- --ignored --nocapture`
 
@@ -107,6 +106,17 @@ async fn an_alert_fires_in_each_fault() {
     .await;
     cluster.show(1);
     rooms.all_go_on().await;
+
+    cluster.separate(0, 1);
+    fires(
+        &prometheus,
+        "two nodes are cut off from each other",
+        Some("ChefshatPeersUnreachable"),
+    )
+    .await;
+    cluster.join(0, 1);
+    rooms.all_go_on().await;
+    ends(&prometheus, "ChefshatPeersUnreachable").await;
 
     cluster.kill(2).await;
     fires(&prometheus, "a node is down", Some("ChefshatDown")).await;
