@@ -4,13 +4,14 @@
 //!
 //! with CHEFSHAT_BIN set to the program to measure. CHEFSHAT_ROWS: rows of the journal.
 
-use std::process::Command;
+use std::process::{Child, Command};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use chefshat_tests::{BusyRooms, Launch, patiently, set_up};
 
 use crate::cluster::{Cluster, Leases};
-use crate::measure::{all_play, rooms, throughput};
+use crate::measure::{acknowledged, all_play, rooms, throughput};
 
 /// Rows of the journal, by default.
 const ROWS: usize = 10_000_000;
@@ -24,8 +25,19 @@ const AT_ONCE: usize = 2_000;
 const PARTITION: usize = 262_144;
 /// Games that are kept.
 const KEPT: usize = 1_000;
+/// Hours of a day.
+const HOURS: usize = 24;
+/// Decisions of an hour: of a thousand seats, each of which decides every twenty seconds.
+const OF_AN_HOUR: u64 = 180_000;
+/// Rooms that play them, as fast as they can.
+const FAST_ROOMS: usize = 64;
 /// Bytes of what a journal and its indexes take.
 const BYTES: &str = "SELECT sum(pg_total_relation_size(inhrelid)) FROM pg_inherits WHERE inhparent = 'journal'::regclass";
+
+/// Rows of all journals.
+const JOURNAL: &str = "SELECT count(*) FROM journal";
+/// What the database has tidied up by itself.
+const VACUUMS: &str = "SELECT format('%s vacuums, %s dead rows', sum(autovacuum_count), sum(n_dead_tup)) FROM pg_stat_user_tables";
 
 fn number(cluster: &Cluster, sql: &str) -> f64 {
     let said = cluster.select(sql);
@@ -85,18 +97,16 @@ fn copy(cluster: &Cluster, rows: usize) -> usize {
     games
 }
 
-#[tokio::test(flavor = "multi_thread")]
-#[ignore = "measures"]
-async fn play_beside_a_long_journal_and_its_deletion() {
-    let rows = std::env::var("CHEFSHAT_ROWS").map_or(ROWS, |rows| rows.parse().expect("a number"));
+/// A node whose games all others are copies of, and a token that may delete them.
+async fn played_a_few_games() -> (Cluster, String) {
     let mut token = String::new();
     let cluster = Cluster::start_with(1, Leases::Default, |launch| {
         token = admin_token(&launch);
         launch.with("--access", "open")
     });
     let cluster = cluster.await;
-    let (url, ids) = (cluster.nodes[0].url(), cluster.process_ids());
-    let busy_rooms = BusyRooms::start(&url, rooms(ROOMS, 2, 3_600_000, Duration::ZERO));
+    let games = rooms(ROOMS, 2, 3_600_000, Duration::ZERO);
+    let busy_rooms = BusyRooms::start(&cluster.nodes[0].url(), games);
     all_play(&busy_rooms).await;
     let played = busy_rooms.finish().await.len();
     let written = async {
@@ -105,37 +115,59 @@ async fn play_beside_a_long_journal_and_its_deletion() {
         }
     };
     patiently("the games to be over", written).await;
+    (cluster, token)
+}
 
-    let wal = || number(&cluster, "SELECT pg_current_wal_lsn() - '0/0'");
-    let before = wal();
-    throughput("an empty database", &url, &url, &ids).await;
-    let journal = "SELECT count(*) FROM journal";
-    eprintln!(
-        "WAL of a row of the journal, ends of games and checkpoints included: {:.0} B",
-        (wal() - before) / number(&cluster, journal)
-    );
-
+/// Copies games until the journal is long. Returns how many there are.
+fn fill(cluster: &Cluster) -> usize {
+    let rows = std::env::var("CHEFSHAT_ROWS").map_or(ROWS, |rows| rows.parse().expect("a number"));
     let begun = Instant::now();
-    let games = tokio::task::block_in_place(|| copy(&cluster, rows));
+    let games = tokio::task::block_in_place(|| copy(cluster, rows));
     cluster.select("ANALYZE; CHECKPOINT");
     eprintln!(
         "{games} games, {:.0} rows of {:.0} B with their index, in {:.0} partitions, copied within {:.0} s",
-        number(&cluster, journal),
-        number(&cluster, BYTES) / number(&cluster, journal),
+        number(cluster, JOURNAL),
+        number(cluster, BYTES) / number(cluster, JOURNAL),
         number(
-            &cluster,
+            cluster,
             "SELECT count(*) FROM pg_inherits WHERE inhparent = 'journal'::regclass"
         ),
         begun.elapsed().as_secs_f64()
     );
+    games
+}
+
+/// Bytes of the write-ahead log so far.
+fn wal(cluster: &Cluster) -> f64 {
+    number(cluster, "SELECT pg_current_wal_lsn() - '0/0'")
+}
+
+/// Deletes all games but the newest.
+fn prune(keep: usize, url: &str, token: &str) -> Child {
+    let mut prune = Command::new(set_up("CHEFSHAT_BIN"));
+    prune.args(["records", "prune", "--keep", &keep.to_string()]);
+    prune.args(["--server", url, "--token", token]);
+    prune.spawn().expect("the binary starts")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[ignore = "measures"]
+async fn play_beside_a_long_journal_and_its_deletion() {
+    let (cluster, token) = played_a_few_games().await;
+    let (url, ids) = (cluster.nodes[0].url(), cluster.process_ids());
+    let before = wal(&cluster);
+    throughput("an empty database", &url, &url, &ids).await;
+    eprintln!(
+        "WAL of a row of the journal, ends of games and checkpoints included: {:.0} B",
+        (wal(&cluster) - before) / number(&cluster, JOURNAL)
+    );
+
+    fill(&cluster);
     throughput("beside them", &url, &url, &ids).await;
 
     let full = number(&cluster, BYTES);
-    let mut prune = Command::new(set_up("CHEFSHAT_BIN"));
-    prune.args(["records", "prune", "--keep", &KEPT.to_string()]);
-    prune.args(["--server", &url, "--token", &token]);
     let begun = Instant::now();
-    let mut pruning = prune.spawn().expect("the binary starts");
+    let mut pruning = prune(KEPT, &url, &token);
     throughput("while they are deleted", &url, &url, &ids).await;
     let pruned = tokio::task::block_in_place(|| pruning.wait());
     assert!(pruned.expect("it ends").success());
@@ -153,4 +185,33 @@ async fn play_beside_a_long_journal_and_its_deletion() {
     let begun = Instant::now();
     cluster.select("VACUUM");
     eprintln!("a vacuum takes {:.1} s", begun.elapsed().as_secs_f64());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+#[ignore = "measures"]
+async fn a_day_of_play_beside_a_long_journal() {
+    let (cluster, token) = played_a_few_games().await;
+    let url = cluster.nodes[0].url();
+    let kept = fill(&cluster);
+    for hour in 1..=HOURS {
+        let (begun, wal_before) = (Instant::now(), wal(&cluster));
+        let games = rooms(FAST_ROOMS, 2, 3_600_000, Duration::ZERO);
+        let busy_rooms = BusyRooms::start(&url, games);
+        let ledger = Arc::clone(&busy_rooms.ledger);
+        let mut pruning = prune(kept, &url, &token);
+        ledger.reaches(OF_AN_HOUR).await;
+        let seconds = begun.elapsed().as_secs_f64();
+        let played = busy_rooms.finish().await.len();
+        let pruned = tokio::task::block_in_place(|| pruning.wait());
+        assert!(pruned.expect("it ends").success());
+        eprintln!(
+            "hour {hour}: {:.0} decisions/s, {}; {played} games; {:.0} rows; the journal takes {:.0} MB; WAL {:.0} MB; {}",
+            OF_AN_HOUR as f64 / seconds,
+            acknowledged(&ledger, begun),
+            number(&cluster, JOURNAL),
+            number(&cluster, BYTES) / 1e6,
+            (wal(&cluster) - wal_before) / 1e6,
+            cluster.select(VACUUMS),
+        );
+    }
 }

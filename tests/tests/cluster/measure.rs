@@ -337,23 +337,29 @@ pub(crate) async fn throughput(what: &str, opened_at: &str, played_at: &str, ids
     let seconds = begun.elapsed().as_secs_f64();
     let decisions = (rooms.ledger.count() - count) as f64;
     let (cpu, of_database) = (servers(ids) - cpu, database() - of_database);
-    let times = rooms.ledger.games();
-    let mut times: Vec<f64> = (times.iter())
-        .flat_map(|game| rooms.ledger.times(game))
-        .filter(|(at, _)| *at >= begun)
-        .map(|(_, time)| time.as_secs_f64() * 1e3)
-        .collect();
-    times.sort_by(f64::total_cmp);
     eprintln!(
-        "{what}: {:.0} decisions/s; for each {:.0} us CPU of the servers and {:.0} us of the database; acknowledged after {:.1} ms \
-         (median), {:.1} ms (p99)",
+        "{what}: {:.0} decisions/s; for each {:.0} us CPU of the servers and {:.0} us of the database; {}",
         decisions / seconds,
         cpu / decisions * 1e6,
         of_database / decisions * 1e6,
-        quantile(&times, 0.5),
-        quantile(&times, 0.99),
+        acknowledged(&rooms.ledger, begun),
     );
     cpu / decisions
+}
+
+/// After which times decisions since then were acknowledged.
+pub(crate) fn acknowledged(ledger: &Ledger, since: Instant) -> String {
+    let mut times: Vec<f64> = (ledger.games().iter())
+        .flat_map(|game| ledger.times(game))
+        .filter(|(at, _)| *at >= since)
+        .map(|(_, time)| time.as_secs_f64() * 1e3)
+        .collect();
+    times.sort_by(f64::total_cmp);
+    format!(
+        "acknowledged after {:.1} ms (median), {:.1} ms (p99)",
+        quantile(&times, 0.5),
+        quantile(&times, 0.99)
+    )
 }
 
 #[tokio::test(flavor = "multi_thread")]
