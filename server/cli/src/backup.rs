@@ -107,6 +107,13 @@ pub(super) struct Restore {
 impl Restore {
     pub(super) async fn run(self) -> Result<ExitCode, CommandError> {
         let (source, target) = (self.source, data_dir::name(self.data_dir)?);
+        if !source.join(DATABASE_FILE).exists() {
+            return Err(format!(
+                "{} has no {DATABASE_FILE}; name a folder that `chefshat backup` has made",
+                source.display()
+            )
+            .into());
+        }
         let copied = check_copy(&source).await?;
         if let Some(file) = first_entry(&target)? {
             return Err(format!(

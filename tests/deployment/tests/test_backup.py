@@ -106,6 +106,9 @@ def test_nothing_is_overwritten_and_damaged_copies_are_refused(server: GuardedSe
         assert refused.returncode == 1, reason
         assert reason in refused.stderr
         assert not (tmp_path / "new").exists()
+    nowhere = attempt("restore", tmp_path / "nowhere", "--data-dir", tmp_path / "new")
+    assert nowhere.returncode == 1
+    assert "`chefshat backup`" in nowhere.stderr
     missing = attempt("backup", tmp_path / "other", "--data-dir", tmp_path / "nowhere")
     assert missing.returncode == 1
     assert "nowhere" in missing.stderr

@@ -48,12 +48,22 @@ impl Prune {
         let pruned = pruned.map_err(admin::refused)?.into_inner();
         match self.json {
             true => say(json!({ "games": pruned.games, "freed_bytes": pruned.freed_bytes }))?,
-            false => say(format_args!(
-                "{} deleted, {:.1} MiB freed",
-                counted(pruned.games, "game"),
-                pruned.freed_bytes as f64 / (1024.0 * 1024.0)
-            ))?,
+            false => say(words(pruned))?,
         }
         Ok(ExitCode::SUCCESS)
+    }
+}
+
+/// What was deleted.
+fn words(pruned: v1::PruneRecordsResponse) -> String {
+    let games = counted(pruned.games, "game");
+    match pruned.freed_bytes {
+        0 if pruned.games > 0 => {
+            format!("{games} deleted; the database gives their space back within minutes")
+        }
+        freed => format!(
+            "{games} deleted, {:.1} MiB freed",
+            freed as f64 / (1024.0 * 1024.0)
+        ),
     }
 }

@@ -353,7 +353,9 @@ class PruneRecordsResponse(_message.Message):
     games: _builtins.int
     """Number of deleted games."""
     freed_bytes: _builtins.int
-    """Bytes that the database and the files of records take less."""
+    """Bytes that the database and the files of records take less; 0 in a cluster, whose database gives
+    the space back within minutes.
+    """
     def __init__(
         self,
         *,
