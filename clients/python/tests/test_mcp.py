@@ -57,14 +57,14 @@ class Table:
                 text = await self.say("wait_for_turn")
                 continue
             decision = int(open_decision[1])
-            options = re.findall(r"^(\d+)=(.+)$", text, re.MULTILINE)
+            options = re.findall(r"^(a\d+)=(.+)$", text, re.MULTILINE)
             assert options, text
             if self.played == 0:
-                refused, is_error = await self.call("play", decision=decision, action=9999)
+                refused, is_error = await self.call("play", decision=decision, action="a9999")
                 assert is_error
-                assert re.findall(r"^(\d+)=(.+)$", refused, re.MULTILINE) == options
+                assert re.findall(r"^(a\d+)=(.+)$", refused, re.MULTILINE) == options
             action, words = options[-1]
-            text = await self.say("play", decision=decision, action=int(action), reason=f"why not {words}", wait=True)
+            text = await self.say("play", decision=decision, action=action, reason=f"why not {words}", wait=True)
             self.played += 1
         record = re.search(r"chefshat://records/([0-9a-f]{32})", text)
         assert record is not None, text

@@ -136,8 +136,9 @@ impl Player {
                     true => "",
                     false => ": too many to call it the model's game",
                 };
+                let cost = (model.cost()).map_or_else(String::new, |cost| format!(" ({cost:.4})"));
                 format!(
-                    "{result}, {} tokens for {} decisions, {} of them without its answer{verdict}",
+                    "{result}, {} tokens{cost} for {} decisions, {} of them without its answer{verdict}",
                     grouped(spent.tokens),
                     grouped(spent.decisions),
                     grouped(spent.fallbacks)
@@ -154,6 +155,9 @@ impl Player {
             result["decisions"] = spent.decisions.into();
             result["fallbacks"] = spent.fallbacks.into();
             result["played_by_model"] = model.has_played().into();
+            if let Some(cost) = model.cost() {
+                result["cost"] = cost.into();
+            }
         }
         result
     }

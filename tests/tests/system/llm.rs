@@ -119,10 +119,11 @@ fn options(messages: &[Value]) -> Vec<u32> {
     let (_, options) = last
         .and_then(|it| it.rsplit_once("options\n"))
         .expect("options");
-    let ids = options
-        .lines()
-        .map(|line| line.split_once('=').expect("an option").0);
-    ids.map(|id| id.parse().expect("an id")).collect()
+    let ids = options.lines().map(|line| {
+        let (id, _) = line.split_once('=').expect("an option");
+        id.strip_prefix('a').expect("an id")
+    });
+    ids.map(|id| id.parse().expect("a number")).collect()
 }
 
 /// The first option, in the words of a model that explains itself.
@@ -302,13 +303,43 @@ async fn a_model_plays_and_its_reasons_are_recorded() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_first_message_of_ones_own_and_what_the_game_costs_are_said() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let own = folder.path().join("first-message.txt");
+    std::fs::write(&own, "Play like a thief.\n{rules}\n{form}\n").expect("written");
+    let own = own.to_str().expect("text");
+    let arguments = ["--prompt", own, "--price", "0.5,2,0.1"];
+    let played = play(honest, AMPLE, &arguments).await;
+    let choices = played.choices();
+    let asked = played.asked.lock().expect("no panic");
+    let prompt = asked[1].body["messages"][0]["content"].as_str();
+    let prompt = prompt.expect("text");
+    assert!(
+        prompt.starts_with("Play like a thief.\nThe rules in short"),
+        "{prompt}"
+    );
+    assert!(prompt.contains(r#"{"action": "a84""#), "{prompt}");
+    let digest = hex::encode(&Sha256::digest(prompt)[..8]);
+    let first = &choices[0].1;
+    assert_eq!(first["prompt"], format!("own {digest}"));
+    assert_eq!(
+        first["price"],
+        r#"{"questions":0.5,"answers":2.0,"kept":0.1}"#
+    );
+    // Of each question 5 of 492 tokens were kept, and the answer has 8.
+    let expected = choices.len() as f64 * (487.0 * 0.5 + 5.0 * 0.1 + 8.0 * 2.0) / 1e6;
+    let cost = played.result["cost"].as_f64().expect("a number");
+    assert!((cost - expected).abs() < 1e-9, "{cost} {expected}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn illegal_answers_are_told_and_counted() {
     let lies: Script = |number, messages| match messages {
         [_] => honest(number, messages),
         [_, _] => Said::Text(r#"{"action": 77777, "reason": "trust me"}"#.to_owned(), 0),
         [.., told] => {
             let told = told["content"].as_str().expect("words");
-            assert!(told.starts_with("Illegal: 77777: "), "{told}");
+            assert!(told.starts_with("Illegal: a77777: "), "{told}");
             honest(number, messages)
         }
         [] => unreachable!("there is a question"),
@@ -424,9 +455,10 @@ async fn an_answer_in_any_usual_form_is_read() {
             Ok(_) => action,
             Err(_) => cards,
         };
+        let digits = action.strip_prefix('a').expect("an id");
         let message = match number % 5 {
             0 => {
-                json!({"content": [{"type": "reasoning"}, {"type": "text", "text": format!("{action}.0")}]})
+                json!({"content": [{"type": "reasoning"}, {"type": "text", "text": format!("{digits}.0")}]})
             }
             1 => json!({"content": null, "reasoning_content": "{\"action\": 0}", "tool_calls": [
                 {"function": {"name": "play", "arguments": json!({"action": cards}).to_string()}}]}),

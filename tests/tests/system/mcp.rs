@@ -84,7 +84,8 @@ pub(crate) fn options(text: &str) -> Vec<(u32, &str)> {
     let (_, options) = (text.split_once("\noptions\n")).expect("a decision has options");
     let options = options.lines().map(|line| {
         let (id, words) = line.split_once('=').expect("an id and words");
-        (id.parse().expect("an id"), words)
+        let id = id.strip_prefix('a').expect("an id");
+        (id.parse().expect("a number"), words)
     });
     options.collect()
 }
@@ -192,7 +193,7 @@ async fn plays_a_game(player: &mut Player) -> String {
             assert_eq!(refused.is_error, Some(true));
             let refused = text_of(&refused);
             assert!(
-                refused.starts_with(&format!("Illegal: {illegal} (")),
+                refused.starts_with(&format!("Illegal: a{illegal} (")),
                 "{refused}"
             );
             assert!(refused.contains("Attempts left: 9."), "{refused}");
@@ -339,8 +340,12 @@ async fn a_model_begins_a_game_of_its_own_and_decides_only_where_it_can() {
         };
         let legal = options(&text);
         assert!(legal.len() > 1, "{text}");
-        // As models write numbers.
-        let (decision, action) = (number.to_string(), f64::from(legal[0].0));
+        // As models write numbers, and the ids of actions.
+        let (decision, action) = (number.to_string(), format!("a{}", legal[0].0));
+        let action = match number % 2 {
+            0 => json!(action),
+            _ => json!(f64::from(legal[0].0)),
+        };
         let answer =
             json!({"decision": decision, "action": action, "wait": true, "skip_forced": true});
         text = player.say("play", answer).await;
@@ -368,5 +373,42 @@ async fn a_model_begins_a_game_of_its_own_and_decides_only_where_it_can() {
         sources.iter().any(|(_, legal)| *legal == 1),
         "some were forced"
     );
+    player.stop().await;
+}
+
+#[tokio::test]
+async fn a_client_that_has_died_plays_on_with_the_tickets_of_a_file() {
+    let server = TestServer::start().await;
+    let rules = v1::RuleSet::default();
+    let created = room(&server.client().await, rules, v1::Visibility::Public).await;
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("tickets");
+    let arguments = ["--tickets", file.to_str().expect("text")];
+    let start = async || {
+        let child = program(&server, &arguments, None);
+        Player::start(child, ClientLifecycleMode::Initialize).await
+    };
+    let mut player = start().await;
+    let joined = json!({"join_code": created.join_code, "name": "Ada"});
+    player.say("join_room", joined).await;
+    let turn = async |player: &mut Player| loop {
+        let table = player.say("get_table", json!({})).await;
+        if let Some(number) = decision(&table) {
+            return (number, options(&table)[0].0);
+        }
+        player.say("wait_for_turn", json!({})).await;
+    };
+    let (number, action) = turn(&mut player).await;
+    let kept = std::fs::read_to_string(&file).expect("a file");
+    assert_eq!(kept.lines().count(), 1, "{kept}");
+    player.child.kill().await.expect("it has run");
+
+    let mut player = start().await;
+    assert_eq!(turn(&mut player).await, (number, action));
+    let answer = json!({"decision": number, "action": action});
+    player.say("play", answer).await;
+    assert_eq!(std::fs::read_to_string(&file).expect("a file"), kept);
+    player.say("leave", json!({})).await;
+    assert_eq!(std::fs::read_to_string(&file).expect("a file"), "");
     player.stop().await;
 }

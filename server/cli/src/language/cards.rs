@@ -90,10 +90,26 @@ fn legal(space: ActionSpace, request: &v1::DecisionRequest) -> Vec<(u32, String)
     legal.collect()
 }
 
-/// The legal actions of a decision, each in a line: `13=2x6`, `199=pass`.
+/// What an id of an action begins with, so that it is not mistaken for a face.
+const OF_ACTION: char = 'a';
+
+/// The id of an action as a model reads it: `a84`.
+pub fn id(action: u32) -> String {
+    format!("{OF_ACTION}{action}")
+}
+
+/// The number of an id: of `a84`, or of a number alone.
+pub fn id_in(word: &str) -> &str {
+    word.strip_prefix([OF_ACTION, OF_ACTION.to_ascii_uppercase()])
+        .unwrap_or(word)
+}
+
+/// The legal actions of a decision, each in a line: `a13=2x6`, `a199=pass`.
 pub fn options(space: ActionSpace, request: &v1::DecisionRequest) -> String {
     let legal = legal(space, request).into_iter();
-    let lines: Vec<String> = legal.map(|(id, words)| format!("{id}={words}")).collect();
+    let lines: Vec<String> = legal
+        .map(|(id, words)| format!("{}={words}", self::id(id)))
+        .collect();
     lines.join("\n")
 }
 

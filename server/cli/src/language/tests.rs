@@ -55,7 +55,7 @@ fn transcript(rules: &RuleSetSpec, seed: u8) -> String {
         let action = *plays.unwrap_or(&legal[0]);
         if decision.seat == me {
             let id = u32::from(action.index());
-            text += &format!("> play {id}\n\n");
+            text += &format!("> play a{id}\n\n");
             live.close(live.open.as_ref().unwrap().request.decision_id);
         }
         take(&mut live, dealt.apply(action));

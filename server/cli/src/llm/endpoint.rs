@@ -27,7 +27,7 @@ const FIRST_ANSWER: Duration = Duration::from_secs(120);
 const FIRST_ATTEMPTS: u32 = 3;
 /// The first question, which no game depends on, in the form of those that follow.
 const FIRST_QUESTION: &str = "\
-Before the game: a question to see whether you can be asked. Answer with one JSON object: {\"action\": 199}\noptions\n199=pass";
+Before the game: a question to see whether you can be asked. Answer with one JSON object: {\"action\": \"a199\"}\noptions\na199=pass";
 /// Longest text in which a record says how a model is asked.
 const MAX_SAMPLING_BYTES: usize = 1_024;
 /// What follows the address that is given.
@@ -76,13 +76,13 @@ pub(super) struct Completion {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub(super) struct Used {
     /// Of questions.
-    prompt: u64,
+    pub(super) prompt: u64,
     /// Of those, which the server had kept from earlier ones.
-    cached: u64,
+    pub(super) cached: u64,
     /// Of answers.
-    completion: u64,
+    pub(super) completion: u64,
     /// Of those, which the model thought with.
-    reasoning: u64,
+    pub(super) reasoning: u64,
 }
 
 impl AddAssign for Used {

@@ -3,6 +3,8 @@
 
 use serde_json::Value;
 
+use crate::language::cards;
+
 /// The members of the object that a model is asked for.
 const ACTION: &str = "action";
 const REASON: &str = "reason";
@@ -38,9 +40,9 @@ pub(super) fn parse(text: &str, by_cards: impl Fn(&str) -> Option<u32>) -> Optio
     object.or_else(|| in_words(text).map(alone))
 }
 
-/// An id as a number in a text: `84`, `84.0`.
+/// An id in a text: `a84`, `84`, `84.0`.
 fn id(text: &str) -> Option<u32> {
-    let text = text.trim();
+    let text = cards::id_in(text.trim());
     let whole = match text.split_once('.') {
         Some((whole, zeros)) if zeros.bytes().all(|digit| digit == b'0') => whole,
         Some(_) => return None,
@@ -62,14 +64,15 @@ fn of_object(value: &Value, named: impl Fn(&str) -> Option<u32>) -> Option<Reply
     })
 }
 
-/// The number after the last word "action" of a text without an object: "I play action 84."
+/// The id after the last word "action" of a text without an object: "I play action a84."
 fn in_words(text: &str) -> Option<u32> {
     let text = text.to_ascii_lowercase();
     let (_, after) = text.rsplit_once(ACTION).filter(|_| !text.contains('{'))?;
     let after = after.trim_start_matches([' ', ':', '=', '*', '`', '"', '#']);
+    let number = cards::id_in(after);
     let is_number = |it: char| it.is_ascii_digit() || it == '.';
-    let end = after.find(|it| !is_number(it)).unwrap_or(after.len());
-    id(after[..end].trim_end_matches('.'))
+    let end = number.find(|it| !is_number(it)).unwrap_or(number.len());
+    id(number[..end].trim_end_matches('.'))
 }
 
 #[cfg(test)]
@@ -83,7 +86,10 @@ mod tests {
     #[test]
     fn the_last_action_of_a_text_counts() {
         let cases = [
+            (r#"{"action": "a84", "reason": "low"}"#, Some((84, "low"))),
             (r#"{"action": 84, "reason": "low"}"#, Some((84, "low"))),
+            ("A84", Some((84, ""))),
+            ("I play action a84.", Some((84, ""))),
             (
                 "```json\n{\"reason\": \"a {b\", \"action\": \"7\"}\n```",
                 Some((7, "a {b")),

@@ -10,6 +10,7 @@ mod tools;
 
 use std::fmt;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -50,6 +51,10 @@ pub(super) struct Mcp {
         conflicts_with = "listen"
     )]
     ticket: Option<String>,
+    /// File that keeps the tickets of the seats, readable only by you. Seats of games that it names are
+    /// resumed, so that a client that starts again plays on.
+    #[arg(long, value_name = "FILE", conflicts_with = "listen")]
+    tickets: Option<PathBuf>,
     /// Serve streamable HTTP at this address instead of standard input and output. Only this
     /// computer can reach a loopback address; there is no other protection.
     #[arg(long, value_name = "ADDRESS")]
@@ -70,13 +75,14 @@ impl Mcp {
             None => Handles::Counted,
         };
         let settings = Arc::new(Settings {
-            seats: Seats::new(self.server, handles),
+            seats: Seats::new(self.server, handles, self.tickets),
             join_code: self.code,
             name: self.name,
             name_key: self.name_key.key()?,
         });
         match self.listen {
             None => {
+                settings.seats.resume_kept().await?;
                 if let Some(ticket) = self.ticket {
                     settings.seats.resume(ticket).await?;
                 }

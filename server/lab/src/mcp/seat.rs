@@ -1,5 +1,6 @@
 //! A seat that a client of this program has taken: follows it while the client is silent, waits for
-//! its turn, answers. The ticket stays here and in no other place; no text shows it.
+//! its turn, answers. The ticket stays here and in the file of tickets, if there is one; no text shows
+//! it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -79,6 +80,11 @@ impl Seat {
     /// Reads the state.
     pub(super) fn read<T>(&self, read: impl FnOnce(&Live) -> T) -> T {
         read(&self.live.borrow())
+    }
+
+    /// Its ticket.
+    pub(super) fn ticket(&self) -> &str {
+        &self.ticket
     }
 
     /// The client that shows the ticket as a secret, which a private room asks for.
@@ -213,7 +219,8 @@ impl Seat {
             self.live.send_modify(|live| live.close(result.decision_id));
             return format!(
                 "Illegal: {} ({words}): {}. No attempts are left, so the server has decided for you. Call wait_for_turn.",
-                result.action, result.detail
+                cards::id(result.action),
+                result.detail
             );
         }
         let left = match result.invalid_attempts_left {
@@ -223,7 +230,7 @@ impl Seat {
         self.read(|live| {
             let request = live.open.as_ref().map(|open| &open.request);
             let legal = request.map_or_else(String::new, |it| cards::options(live.space(), it));
-            let (action, detail) = (result.action, &result.detail);
+            let (action, detail) = (cards::id(result.action), &result.detail);
             format!("Illegal: {action} ({words}): {detail}.{left}\noptions\n{legal}")
         })
     }

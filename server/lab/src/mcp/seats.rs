@@ -2,10 +2,13 @@
 //! ticket in what a language model reads: it is worth nothing outside of this process.
 
 use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use chefshat_client::{Client, v1};
+use chefshat_record::atomic_file::{AtomicFile, WriteError};
 use tokio::sync::{OnceCell, OwnedSemaphorePermit, Semaphore, oneshot};
 use tokio::time::{sleep, timeout};
 use tokio_util::task::TaskTracker;
@@ -43,6 +46,8 @@ pub(super) struct Seats {
     places: Arc<Semaphore>,
     /// Seats that are being taken or given back.
     working: TaskTracker,
+    /// The file that keeps the tickets of games that are not over, one in a line.
+    tickets: Option<PathBuf>,
 }
 
 /// A seat and its place among [`MAX_SEATS`].
@@ -68,14 +73,16 @@ impl Drop for Unclaimed {
     fn drop(&mut self) {
         let seat = (self.handle.take()).and_then(|handle| self.seats.taken().remove(&handle));
         if let Some(Taken { seat, .. }) = seat {
+            self.seats.keep_tickets();
             self.seats.working.spawn(give_back(seat));
         }
     }
 }
 
 impl Seats {
-    pub(super) fn new(server: ServerArg, handles: Handles) -> Arc<Self> {
+    pub(super) fn new(server: ServerArg, handles: Handles, tickets: Option<PathBuf>) -> Arc<Self> {
         Arc::new(Self {
+            tickets,
             server,
             client: OnceCell::new(),
             handles,
@@ -106,7 +113,58 @@ impl Seats {
         let place = self.place()?;
         let seat = Seat::follow(self.client().await?, ticket, GameView::default(), None);
         seat.attached().await?;
-        Ok(self.insert(seat, place))
+        let handle = self.insert(seat, place);
+        self.keep_tickets();
+        Ok(handle)
+    }
+
+    /// Takes the seats whose tickets the file keeps, but those that the server does not know any more.
+    ///
+    /// # Errors
+    /// The file cannot be read or written, or the server does not answer. The file is unchanged.
+    pub(super) async fn resume_kept(&self) -> Result<(), CommandError> {
+        let Some(file) = &self.tickets else {
+            return Ok(());
+        };
+        let kept = match std::fs::read_to_string(file) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
+            kept => kept.map_err(|error| format!("{}: {error}", file.display()))?,
+        };
+        let mut seats = Vec::new();
+        for ticket in kept.lines().map(str::trim).filter(|it| !it.is_empty()) {
+            let (place, client) = (self.place()?, self.client().await?);
+            let seat = Seat::follow(client, ticket.to_owned(), GameView::default(), None);
+            match seat.attached().await {
+                Ok(()) => seats.push((seat, place)),
+                Err(refusal) if seat.read(|live| live.lost.is_some()) => {
+                    tracing::warn!("a seat is not resumed: {refusal}");
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+        for (seat, place) in seats {
+            self.insert(seat, place);
+        }
+        Ok(self.write_tickets(file)?)
+    }
+
+    /// Writes the tickets to their file, if there is one.
+    fn keep_tickets(&self) {
+        if let Some(file) = &self.tickets
+            && let Err(error) = self.write_tickets(file)
+        {
+            tracing::warn!("the tickets are not kept: {error}");
+        }
+    }
+
+    fn write_tickets(&self, path: &Path) -> Result<(), WriteError> {
+        let taken = self.taken();
+        let seats = taken.values().map(|taken| &taken.seat);
+        let tickets = seats.filter(|seat| !seat.read(Live::is_over));
+        let tickets: String = tickets.map(|seat| format!("{}\n", seat.ticket())).collect();
+        let mut file = AtomicFile::create_private(path)?;
+        file.write_all(tickets.as_bytes())?;
+        file.finish()
     }
 
     /// Joins a room; returns the handle of the seat. If it fails after the seat was taken, or nobody
@@ -149,7 +207,9 @@ impl Seats {
             give_back(seat).await;
             return Err(error.into());
         }
-        Ok(self.insert(seat, place))
+        let handle = self.insert(seat, place);
+        self.keep_tickets();
+        Ok(handle)
     }
 
     fn insert(&self, seat: Arc<Seat>, place: OwnedSemaphorePermit) -> String {
@@ -212,6 +272,7 @@ impl Seats {
     /// Forgets a seat.
     pub(super) fn forget(&self, seat: &Arc<Seat>) {
         (self.taken()).retain(|_, other| !Arc::ptr_eq(&other.seat, seat));
+        self.keep_tickets();
     }
 
     /// The seats with their handles, for a client that has them all; none where several clients may

@@ -6,6 +6,8 @@ use serde::Deserialize;
 use serde::de::{Deserializer, Error as _};
 use serde_json::{Value, json};
 
+use chefshat_cli::language::cards;
+
 /// Arguments of `create_room`.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -47,7 +49,7 @@ pub(super) struct Wait {
 pub(super) struct Play {
     #[serde(deserialize_with = "whole")]
     pub(super) decision: u64,
-    #[serde(deserialize_with = "whole")]
+    #[serde(deserialize_with = "action")]
     pub(super) action: u32,
     #[serde(default)]
     pub(super) reason: Option<String>,
@@ -89,6 +91,15 @@ where
         value = Value::from(number as u64);
     }
     N::deserialize(&value).map_err(|_| D::Error::custom(format!("{value} is not a whole number")))
+}
+
+/// Reads the id of an action: "a84", or a whole number as models write it.
+fn action<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    let mut value = Value::deserialize(deserializer)?;
+    if let Value::String(text) = &mut value {
+        *text = cards::id_in(text.trim()).to_owned();
+    }
+    whole(value).map_err(D::Error::custom)
 }
 
 /// All tools. `must_name_table`: several clients may share the server.
@@ -174,7 +185,7 @@ pub(super) fn all(must_name_table: bool) -> Vec<Tool> {
             &["decision", "action"],
             json!({
                 "decision": {"type": "integer", "description": "number of the open decision"},
-                "action": {"type": "integer", "description": "id of a legal action"},
+                "action": {"type": "string", "description": "id of a legal action, such as a84"},
                 "reason": {"type": "string", "description": "recorded with the decision, hidden from others until the game is over"},
                 "wait": {"type": "boolean", "description": "then do as wait_for_turn"},
                 "skip_forced": skip_forced,
