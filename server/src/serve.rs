@@ -373,18 +373,15 @@ impl Server {
         let directory = Arc::clone(rooms.directory());
         let to_others = (peers.as_ref()).map(|port| port.peers(rooms.metrics()));
         if let Some(lease) = rooms.lease() {
-            let signing_key = rooms.signing_key().map(|key| key.to_string());
-            let joining = joining::be_reached(
-                Arc::clone(lease),
-                Arc::clone(&directory),
-                to_others.clone(),
-                signing_key.unwrap_or_default(),
-            );
+            let joining =
+                joining::be_reached(Arc::clone(lease), Arc::clone(&directory), to_others.clone());
             tracker.spawn(until_closing(LongTask::Joining, joining.boxed()));
         }
         if let Some(peers) = to_others.clone() {
+            let signing_key = rooms.signing_key();
+            let signing_key = signing_key.map_or_else(String::new, |key| key.to_string());
             let metrics = Arc::clone(rooms.metrics());
-            let probing = probing::probe(Arc::clone(&directory), peers, metrics);
+            let probing = probing::probe(Arc::clone(&directory), peers, signing_key, metrics);
             tracker.spawn(until_closing(LongTask::Probing, probing.boxed()));
         }
         let forwarding = to_others.clone().map(|to_others| {

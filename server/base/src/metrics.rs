@@ -190,6 +190,7 @@ pub struct Metrics {
     not_resumed: Counter,
     peer_errors: Counter,
     peers_unreachable: Gauge,
+    peers_other_key: Gauge,
     outboxes: Mutex<Vec<Weak<dyn Queue>>>,
 }
 
@@ -294,6 +295,11 @@ impl Default for Metrics {
                 all,
                 "peers_unreachable",
                 "Other nodes with a lease that this node does not reach",
+            ),
+            peers_other_key: plain(
+                all,
+                "peers_other_key",
+                "Other nodes with a lease that sign records with another key",
             ),
             outboxes: Mutex::default(),
             registry: Mutex::new(registry),
@@ -467,10 +473,16 @@ impl Metrics {
         self.peer_errors.inc();
     }
 
-    /// Says how many other nodes this one does not reach.
-    pub fn unreachable_peers(&self, peers: usize) {
-        let peers = i64::try_from(peers).unwrap_or(i64::MAX);
-        self.peers_unreachable.set(peers);
+    /// Says how many other nodes this one does not reach, and how many sign records with another key.
+    pub fn peers(&self, unreachable: usize, other_key: usize) {
+        let number = |peers| i64::try_from(peers).unwrap_or(i64::MAX);
+        self.peers_unreachable.set(number(unreachable));
+        self.peers_other_key.set(number(other_key));
+    }
+
+    /// How many other nodes this one does not reach.
+    pub fn unreachable_peers(&self) -> u32 {
+        u32::try_from(self.peers_unreachable.get()).unwrap_or(0)
     }
 
     /// Counts a unit that could not be resumed.

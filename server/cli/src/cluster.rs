@@ -145,6 +145,19 @@ fn state(node: &NodeStatus) -> &'static str {
     }
 }
 
+/// The same for people, with what is wrong with a node that lives.
+fn state_in_words(node: &NodeStatus) -> String {
+    let mut words = state(node).to_owned();
+    if !node.expired && node.unreachable > 0 {
+        let others = counted(node.unreachable.into(), "other");
+        words.push_str(&format!(", does not reach {others}"));
+    }
+    if !node.expired && node.is_stalled {
+        words.push_str(", commits wait");
+    }
+    words
+}
+
 fn as_json(node: &NodeStatus) -> serde_json::Value {
     json!({
         "node": node.id.0,
@@ -153,6 +166,8 @@ fn as_json(node: &NodeStatus) -> serde_json::Value {
         "state": state(node),
         "lease_expired": node.expired,
         "reached": node.reached,
+        "unreachable": node.unreachable,
+        "stalled": node.is_stalled,
         "last_beat_ms": node.last_beat.as_millis(),
         "rooms": node.rooms,
         "tournaments": node.tournaments,
@@ -168,7 +183,7 @@ fn as_row(node: &NodeStatus) -> Vec<String> {
         node.id.0.to_string(),
         node.info.name.clone(),
         node.info.build.clone(),
-        state(node).to_owned(),
+        state_in_words(node),
         format!("{:.1} s ago", node.last_beat.as_secs_f64()),
         node.rooms.to_string(),
         node.tournaments.to_string(),

@@ -14,6 +14,7 @@ use futures::{Stream, StreamExt as _};
 use http::{Request, Response, Uri};
 use hyper_util::rt::TokioIo;
 use rayon::ThreadPoolBuildError;
+use rustls::ClientConfig;
 use rustls::pki_types::ServerName;
 use tokio::net::{TcpListener, TcpStream};
 use tokio::time::error::Elapsed;
@@ -25,13 +26,12 @@ use tonic::body::Body;
 use tonic::transport::{Channel, Endpoint};
 use tonic::{Code, Status};
 use tower::{ServiceExt as _, service_fn};
-use tracing::warn;
-use v1::server_service_client::ServerServiceClient;
+use tracing::debug;
 
 use crate::connections::{self, Connection, Connections, Limits};
 use crate::handshakes::Handshakes;
 use crate::tls::{MaybeTls, Tls, TlsError, TlsFiles};
-use chefshat_admission::limits::{LogPace, Shares};
+use chefshat_admission::limits::Shares;
 use chefshat_base::metrics::Metrics;
 use chefshat_base::proxies::TrustedProxies;
 use chefshat_hosting::cluster::Peer;
@@ -66,8 +66,6 @@ pub const CONNECTION_WINDOW: u32 = 1 << 30;
 /// nodes, whose connection must survive it.
 pub const MAX_RESET_STREAMS: usize = 1 << 20;
 
-/// Most lines of the log in a minute about nodes that cannot be reached.
-const LOGGED: u32 = 6;
 /// Most connections from other nodes at a time: each has one, and a few that are ending.
 const MAX_PEER_CONNECTIONS: usize = 512;
 /// How much of them one machine may have. In tests and at home, it has all nodes.
@@ -144,8 +142,8 @@ impl PeerPort {
         Arc::new(Peers {
             opening: Arc::new(Opening {
                 tls: self.tls.as_ref().map(|tls| tls.files.clone()),
+                config: Mutex::default(),
                 metrics: Arc::clone(metrics),
-                logged: LogPace::new(LOGGED),
             }),
             channels: Mutex::default(),
         })
@@ -244,39 +242,7 @@ impl Peers {
     }
 }
 
-/// Why a node does not fit to another one.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Misfit {
-    /// It does not answer.
-    #[error(
-        "it does not answer ({0}); look at the network, its --peer-endpoint, and the authority of its certificate"
-    )]
-    Silent(String),
-    /// It signs records with another key.
-    #[error(
-        "it signs records with another key; copy one signing-key into the data directories of all nodes"
-    )]
-    OtherKey,
-}
-
 impl Peers {
-    /// Asks other nodes who they are; returns those that do not fit to a node that signs records with
-    /// this key, empty if it signs none.
-    pub async fn misfits(&self, others: Vec<Peer>, signing_key: &str) -> Vec<(Peer, Misfit)> {
-        let asked = others.into_iter().map(async |peer| {
-            let mut service = ServerServiceClient::new(self.channel(&peer));
-            let asked = service.get_server_info(v1::GetServerInfoRequest {});
-            let misfit = match answered(timeout(ANSWER_TIMEOUT, asked).await) {
-                Ok(answer) if answer.signing_key == signing_key => None,
-                Ok(_) => Some(Misfit::OtherKey),
-                Err(status) => Some(Misfit::Silent(status.message().to_owned())),
-            };
-            misfit.map(|misfit| (peer, misfit))
-        });
-        let misfits = futures::future::join_all(asked).await;
-        misfits.into_iter().flatten().collect()
-    }
-
     /// Asks other nodes to reach this one, which is called `own`. One that does is enough; those of an
     /// earlier version, which cannot say, are enough if none says that it does not.
     ///
@@ -311,17 +277,23 @@ impl Peers {
         }
     }
 
-    /// Reaches another node.
+    /// Reaches another node. Returns the key with which it signs records, empty if it signs none; `None`
+    /// if it is of an earlier version, which does not say.
     ///
     /// # Errors
     /// Nobody, or another node, answers at its endpoint; says so.
-    pub async fn reach(&self, peer: &Peer) -> Result<(), String> {
+    pub async fn reach(&self, peer: &Peer) -> Result<Option<String>, String> {
         let Peer { node, endpoint } = peer;
         let mut service = PeerServiceClient::new(self.channel(peer));
         let asked = timeout(ANSWER_TIMEOUT, service.identify(IdentifyRequest {}));
         match answered(asked.await) {
-            Ok(answer) if *answer.node == **node => Ok(()),
+            Ok(answer) if *answer.node == **node => Ok(answer.signing_key),
+            Ok(answer) if answer.node.is_empty() => {
+                Err(format!("the node at {endpoint} has no lease"))
+            }
             Ok(answer) => Err(format!("node {:?} answers at {endpoint}", answer.node)),
+            // An earlier version, which cannot say who it is.
+            Err(status) if status.code() == Code::Unimplemented => Ok(None),
             Err(status) => Err(format!("{endpoint} does not answer: {}", status.message())),
         }
     }
@@ -340,8 +312,9 @@ type ToPeer = Either<TcpStream, Box<TlsStream<TcpStream>>>;
 #[derive(Debug)]
 struct Opening {
     tls: Option<TlsFiles>,
+    /// What the files were when they could be used last.
+    config: Mutex<Option<Arc<ClientConfig>>>,
     metrics: Arc<Metrics>,
-    logged: LogPace,
 }
 
 impl Opening {
@@ -351,11 +324,19 @@ impl Opening {
         let connected = connected.unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()));
         if let Err(error) = &connected {
             self.metrics.peer_error();
-            if self.logged.admits() {
-                warn!(%address, %error, "another node cannot be reached");
-            }
+            debug!(%address, %error, "another node cannot be reached");
         }
         connected.map(TokioIo::new)
+    }
+
+    /// The files as they are now, since they may have been renewed; or as they could be used last.
+    fn config(&self, files: &TlsFiles) -> Result<Arc<ClientConfig>, TlsError> {
+        let mut last = (self.config.lock()).expect("nothing panics under this lock");
+        match (files.client_config(), &*last) {
+            (Ok(config), _) => Ok(Arc::clone(last.insert(config))),
+            (Err(_), Some(last)) => Ok(Arc::clone(last)),
+            (Err(error), None) => Err(error),
+        }
     }
 
     async fn connect(&self, address: &str) -> io::Result<ToPeer> {
@@ -364,8 +345,7 @@ impl Opening {
         let Some(files) = &self.tls else {
             return Ok(Either::Left(stream));
         };
-        // Read for each connection: the files may have been renewed.
-        let config = files.client_config().map_err(io::Error::other)?;
+        let config = self.config(files).map_err(io::Error::other)?;
         let name = ServerName::try_from(PEER_NAME).expect("a valid name");
         let stream = TlsConnector::from(config).connect(name, stream).await?;
         Ok(Either::Right(Box::new(stream)))
@@ -458,25 +438,6 @@ mod tests {
         peer(node, address)
     }
 
-    #[tokio::test]
-    async fn nodes_that_do_not_answer_or_sign_with_another_key_do_not_fit() {
-        let (_, port) = port().await;
-        let peers = port.peers(&Arc::default());
-        let other = async |node, key| serving(node, ServerServiceServer::new(Other(key))).await;
-        let (fits, differs) = (
-            other("fits", "ours").await,
-            other("differs", "theirs").await,
-        );
-        // Nobody listens there.
-        let silent = peer("silent", SocketAddr::from(([127, 0, 0, 1], 1)));
-        let others = vec![fits, differs.clone(), silent.clone()];
-        let misfits = peers.misfits(others, "ours").await;
-        let found: Vec<&Peer> = misfits.iter().map(|(peer, _)| peer).collect();
-        assert_eq!(found, [&differs, &silent]);
-        assert_eq!(misfits[0].1, Misfit::OtherKey);
-        assert!(matches!(misfits[1].1, Misfit::Silent(_)), "{misfits:?}");
-    }
-
     /// A node that answers those who ask to be reached.
     #[derive(Clone)]
     struct Asked(&'static str);
@@ -516,8 +477,10 @@ mod tests {
             &self,
             _: tonic::Request<IdentifyRequest>,
         ) -> Result<tonic::Response<IdentifyResponse>, Status> {
-            let node = self.0.to_owned();
-            Ok(tonic::Response::new(IdentifyResponse { node }))
+            Ok(tonic::Response::new(IdentifyResponse {
+                node: self.0.to_owned(),
+                signing_key: Some("key".to_owned()),
+            }))
         }
     }
 
@@ -526,7 +489,7 @@ mod tests {
         let (_, port) = port().await;
         let peers = port.peers(&Arc::default());
         let one = serving("one", PeerServiceServer::new(Asked("one"))).await;
-        assert_eq!(peers.reach(&one).await, Ok(()));
+        assert_eq!(peers.reach(&one).await, Ok(Some("key".to_owned())));
         // Its --peer-endpoint is that of another.
         let other = Peer {
             node: "other".into(),
@@ -562,6 +525,7 @@ mod tests {
         assert_eq!(peers.reached_by(&others, "own #1").await, Ok(()));
         let earlier = std::slice::from_ref(&earlier);
         assert_eq!(peers.reached_by(earlier, "own #1").await, Ok(()));
+        assert_eq!(peers.reach(&earlier[0]).await, Ok(None));
         let others = [earlier, &[does_not]].concat();
         let refused = peers.reached_by(&others, "own #1").await;
         assert_eq!(refused.map_err(|problems| problems.len()), Err(1));
@@ -611,31 +575,26 @@ mod tests {
                 node: "other".into(),
                 endpoint: address.to_string().into(),
             };
-            let sent = peers.send(&peer, Request::new(Body::empty())).await;
-            sent.expect_err("it cannot be reached");
-            metrics.text()
+            let problem = peers.reach(&peer).await.expect_err("nobody answers");
+            (problem, metrics.text())
         };
 
         // Nobody listens there, and the port is not given to others.
         let closed = TcpSocket::new_v4().expect("a socket");
         closed.bind(([127, 0, 0, 1], 0).into()).expect("a port");
         let closed_at = closed.local_addr().expect("bound");
-        assert!(
-            errors(closed_at)
-                .await
-                .contains("chefshat_peer_errors_total 1\n")
-        );
+        let (problem, counted) = errors(closed_at).await;
+        assert!(problem.contains("refused"), "{problem}");
+        assert!(counted.contains("chefshat_peer_errors_total 1\n"));
         // Its certificate is of another authority.
         let listener = listen().await.expect("a port");
         let address = listener.local_addr().expect("bound");
         let strange = PeerPort::new(listener, Some(other)).expect("usable");
         let incoming = strange.incoming(&Arc::default()).expect("a thread");
         let accepting = tokio::spawn(incoming.for_each(async |_| {}));
-        assert!(
-            errors(address)
-                .await
-                .contains("chefshat_peer_errors_total 2\n")
-        );
+        let (problem, counted) = errors(address).await;
+        assert!(problem.contains("certificate"), "{problem}");
+        assert!(counted.contains("chefshat_peer_errors_total 2\n"));
         accepting.abort();
     }
 

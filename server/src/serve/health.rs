@@ -14,6 +14,7 @@ pub(super) async fn report(
     mut node: Option<watch::Receiver<bool>>,
     written: Option<StoreMetrics>,
 ) {
+    let mut was_stalled = false;
     loop {
         let node_serves = node.as_mut().is_none_or(|it| *it.borrow_and_update());
         let is_stalled = written.as_ref().is_some_and(StoreMetrics::is_stalled);
@@ -22,9 +23,12 @@ pub(super) async fn report(
             false => ServingStatus::NotServing,
         };
         health.set_service_status("", status).await;
-        if is_stalled {
+        if is_stalled && !was_stalled {
             warn!("nothing has been committed for a while: health checks fail until something is");
+        } else if was_stalled && !is_stalled {
+            warn!("something has been committed: health checks pass again");
         }
+        was_stalled = is_stalled;
         let node_changes = async {
             match &mut node {
                 // Its node has ended otherwise.

@@ -24,12 +24,11 @@ const UNKNOWN_FOR: Duration = Duration::from_secs(2);
 const AMONG_NEW: Duration = Duration::from_secs(6);
 
 /// Each time this node has joined: lets it take rooms once another node has reached it, or if there
-/// is none; then logs which of the others do not fit to it.
+/// is none.
 pub(super) async fn be_reached(
     lease: Arc<NodeLease>,
     directory: Arc<dyn Directory>,
     peers: Option<Arc<Peers>>,
-    signing_key: String,
 ) {
     loop {
         lease.joined_anew().await;
@@ -43,10 +42,6 @@ pub(super) async fn be_reached(
         })
         .await;
         lease.set_reached();
-        let (_, others) = directory.nodes().await;
-        for (peer, misfit) in peers.misfits(others, &signing_key).await {
-            warn!(node = %peer.node, address = %peer.endpoint, %misfit, "another node does not fit to this one");
-        }
     }
 }
 
@@ -60,7 +55,7 @@ where
     F: Future<Output = Result<(), Problems>>,
 {
     let began = Instant::now();
-    let (mut pause, mut first) = (FIRST_PAUSE, 0);
+    let (mut pause, mut first, mut has_warned) = (FIRST_PAUSE, 0, false);
     loop {
         let (own, others) = directory.nodes().await;
         if !own.is_empty() {
@@ -79,10 +74,15 @@ where
             asked.truncate(ASKED_AT_ONCE);
             first += ASKED_AT_ONCE;
             let Err(problems) = reached_by(asked, own).await else {
-                info!("another node reaches this one, which takes rooms");
+                // Who has read the warnings reads that they are over.
+                match has_warned {
+                    true => warn!("another node reaches this one, which takes rooms"),
+                    false => info!("another node reaches this one, which takes rooms"),
+                }
                 return;
             };
             if began.elapsed() > UNKNOWN_FOR {
+                has_warned = true;
                 for (peer, problem) in problems {
                     warn!(node = %peer.node, %problem, "no other node reaches this one, which takes no rooms");
                 }

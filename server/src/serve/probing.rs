@@ -1,5 +1,5 @@
-//! A node looks all the time whether it reaches the others: a cut between two nodes shows before a
-//! client needs the way between them.
+//! A node looks all the time whether it reaches the others, and whether they sign records with its
+//! key: a cut between two nodes shows before a client needs the way between them.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -8,7 +8,7 @@ use std::time::Duration;
 use chefshat_base::metrics::Metrics;
 use futures::{StreamExt as _, stream};
 use tokio::time::sleep;
-use tracing::{info, warn};
+use tracing::warn;
 
 use crate::cluster::{Directory, Peer};
 use crate::peers::Peers;
@@ -18,52 +18,81 @@ const INTERVAL: Duration = Duration::from_secs(5);
 /// Other nodes that are asked at a time.
 const ASKED_AT_ONCE: usize = 64;
 
-/// Reaches all other nodes again and again, and reports which it does not reach.
-pub(super) async fn probe(directory: Arc<dyn Directory>, peers: Arc<Peers>, metrics: Arc<Metrics>) {
+/// What is wrong with another node, as far as this one sees it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Problem {
+    /// It is not reached.
+    Unreached,
+    /// It signs records with another key.
+    OtherKey,
+}
+
+/// The nodes with which something is wrong.
+type Problems = BTreeMap<Peer, Problem>;
+
+/// Reaches all other nodes again and again, and reports with which something is wrong. `signing_key`:
+/// with which this node signs records, empty if it signs none.
+pub(super) async fn probe(
+    directory: Arc<dyn Directory>,
+    peers: Arc<Peers>,
+    signing_key: String,
+    metrics: Arc<Metrics>,
+) {
     let reach = |peer: Peer| {
         let peers = Arc::clone(&peers);
         async move { peers.reach(&peer).await }
     };
-    let mut unreached = Unreached::new();
+    let mut problems = Problems::new();
     loop {
         sleep(INTERVAL).await;
-        unreached = look(&*directory, reach, unreached).await;
-        metrics.unreachable_peers(unreached.len());
+        problems = look(&*directory, reach, &signing_key, problems).await;
+        let count = |problem| problems.values().filter(|it| **it == problem).count();
+        metrics.peers(count(Problem::Unreached), count(Problem::OtherKey));
     }
 }
 
-/// The nodes that were not reached, and why.
-type Unreached = BTreeMap<Peer, String>;
-
-/// Reaches all other nodes once. Logs what differs from the last look, whose result is `before`.
-async fn look<F: Future<Output = Result<(), String>>>(
+/// Reaches all other nodes once. Logs what differs from the last look, whose result is `before`, as
+/// warnings: who has read of a problem reads that it is over.
+async fn look<F: Future<Output = Result<Option<String>, String>>>(
     directory: &dyn Directory,
     reach: impl Fn(Peer) -> F,
-    before: Unreached,
-) -> Unreached {
+    own_key: &str,
+    before: Problems,
+) -> Problems {
     let (_, others) = directory.nodes().await;
     let asked = stream::iter(others).map(|peer| {
         let reached = reach(peer.clone());
         async move { (peer, reached.await) }
     });
     let answers: Vec<_> = asked.buffer_unordered(ASKED_AT_ONCE).collect().await;
-    let mut unreached = Unreached::new();
+    let mut problems = Problems::new();
     for (peer, answer) in answers {
-        match answer {
-            Ok(()) if before.contains_key(&peer) => {
-                info!(node = %peer.node, "this node reaches another one again");
-            }
-            Ok(()) => {}
-            Err(problem) => {
-                directory.avoid(&peer);
-                if !before.contains_key(&peer) {
-                    warn!(node = %peer.node, %problem, "this node does not reach another one");
-                }
-                unreached.insert(peer, problem);
+        let last = before.get(&peer).copied();
+        let (problem, why) = match answer {
+            Err(why) => (Some(Problem::Unreached), why),
+            Ok(Some(key)) if key != own_key => (Some(Problem::OtherKey), String::new()),
+            Ok(_) => (None, String::new()),
+        };
+        if problem == Some(Problem::Unreached) {
+            directory.avoid(&peer);
+        }
+        if problem != last {
+            let node = &peer.node;
+            match problem {
+                Some(Problem::Unreached) => warn!(
+                    %node, %why,
+                    "this node does not reach another one: look at the network between them, the other one's --peer-endpoint and the authority of its certificate"
+                ),
+                Some(Problem::OtherKey) => warn!(
+                    %node,
+                    "another node signs records with another key: copy one signing-key into the data directories of all nodes"
+                ),
+                None => warn!(%node, "this node reaches another one, which has its signing key"),
             }
         }
+        problems.extend(problem.map(|problem| (peer, problem)));
     }
-    unreached
+    problems
 }
 
 #[cfg(test)]
@@ -105,23 +134,29 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn nodes_that_are_not_reached_are_counted_and_avoided() {
+    async fn nodes_that_are_not_reached_are_avoided_and_other_keys_are_noticed() {
         let peer = |node: &str| Peer {
             node: node.into(),
             endpoint: "192.0.2.1:1".into(),
         };
         let others = Others {
-            nodes: ["a", "b", "c"].map(peer).to_vec(),
+            nodes: ["a", "b", "c", "earlier"].map(peer).to_vec(),
             ..Others::default()
         };
-        let not_b = async |peer: Peer| match &*peer.node {
+        let answer = async |peer: Peer| match &*peer.node {
             "b" => Err("no answer".to_owned()),
-            _ => Ok(()),
+            "c" => Ok(Some("theirs".to_owned())),
+            "earlier" => Ok(None),
+            _ => Ok(Some("ours".to_owned())),
         };
-        let unreached = look(&others, not_b, Unreached::new()).await;
-        assert_eq!(unreached.keys().collect::<Vec<_>>(), [&peer("b")]);
+        let problems = look(&others, answer, "ours", Problems::new()).await;
+        let expected = [
+            (peer("b"), Problem::Unreached),
+            (peer("c"), Problem::OtherKey),
+        ];
+        assert_eq!(problems, BTreeMap::from(expected));
         assert_eq!(*others.avoided.lock().expect("no panic"), [peer("b")]);
-        let reached = look(&others, async |_| Ok(()), unreached).await;
-        assert!(reached.is_empty());
+        let fits = async |_| Ok(Some("ours".to_owned()));
+        assert!(look(&others, fits, "ours", problems).await.is_empty());
     }
 }

@@ -38,6 +38,10 @@ pub struct Heartbeat {
     pub rooms: u64,
     /// Whether it hands over what it owns, to leave.
     pub drains: bool,
+    /// Other nodes that it does not reach.
+    pub unreachable: u32,
+    /// Whether nothing that it writes is committed.
+    pub is_stalled: bool,
 }
 
 /// A node that has a lease.
@@ -68,6 +72,10 @@ pub struct NodeStatus {
     pub drain: bool,
     /// Whether it has been reached since it joined.
     pub reached: bool,
+    /// Other nodes that it does not reach.
+    pub unreachable: u32,
+    /// Whether nothing that it writes is committed.
+    pub is_stalled: bool,
     /// Rooms that it owns and that are not over.
     pub rooms: u64,
     /// Tournaments that it owns and that are not over.

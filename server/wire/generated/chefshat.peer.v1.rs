@@ -94,9 +94,13 @@ pub struct IdentifyRequest {}
 /// The node that answers.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct IdentifyResponse {
-    /// Its name, unique in the cluster; empty if it has not joined yet.
+    /// Its name, unique in the cluster; empty if it has not joined yet, or has no lease.
     #[prost(string, tag = "1")]
     pub node: ::prost::alloc::string::String,
+    /// The public key of the signatures of its records, 64 hexadecimal digits; empty if it signs none.
+    /// An older version does not say.
+    #[prost(string, optional, tag = "2")]
+    pub signing_key: ::core::option::Option<::prost::alloc::string::String>,
 }
 /// Generated client implementations.
 pub mod peer_service_client {

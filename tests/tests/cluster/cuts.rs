@@ -27,9 +27,20 @@ async fn a_cut_between_two_nodes_costs_nobody_a_decision() {
     let kinds = rooms(ROOMS, 1, 10_000, Duration::from_millis(50));
     let rooms = BusyRooms::start_apart(&owner, &gateway, kinds);
     all_play(&rooms).await;
+    // `chefshat cluster status` shows it.
+    let not_reached = async |expected: &str| {
+        let shown = async {
+            while cluster.select("SELECT string_agg(unreachable::text, ' ') FROM nodes") != expected
+            {
+                tokio::time::sleep(LOOK_AGAIN).await;
+            }
+        };
+        patiently("the nodes to notice", shown).await;
+    };
     cluster.separate(0, 1);
-    tokio::time::sleep(CUT).await;
+    tokio::join!(tokio::time::sleep(CUT), not_reached("1 1"));
     cluster.join(0, 1);
+    not_reached("0 0").await;
     assert_eq!(missed(&cluster, rooms).await, 0);
 }
 

@@ -183,7 +183,8 @@ impl PeerService for OfNodes {
         let Some(peer) = others.iter().find(|peer| *peer.node == *name) else {
             return Err(Status::not_found("it does not know this node yet"));
         };
-        let problem = self.peers.reach(peer).await.err().unwrap_or_default();
+        let reached = self.peers.reach(peer).await;
+        let problem = reached.err().unwrap_or_default();
         Ok(Response::new(ReachResponse { problem }))
     }
 
@@ -192,8 +193,11 @@ impl PeerService for OfNodes {
         _: Request<IdentifyRequest>,
     ) -> Result<Response<IdentifyResponse>, Status> {
         let (own, _) = self.directory.nodes().await;
-        let node = own.to_string();
-        Ok(Response::new(IdentifyResponse { node }))
+        let signing_key = self.play.rooms.signing_key();
+        Ok(Response::new(IdentifyResponse {
+            node: own.to_string(),
+            signing_key: Some(signing_key.map_or_else(String::new, |key| key.to_string())),
+        }))
     }
 }
 

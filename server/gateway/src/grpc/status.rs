@@ -294,7 +294,7 @@ pub fn room_gone() -> Status {
     status(
         Code::Unavailable,
         "ROOM_GONE",
-        "the room cannot be reached: it has just ended, or the server is stopping; try again",
+        "the room cannot be reached here: it has just ended, the server is stopping, or it does not reach the one that has the room; connect again",
         [],
     )
 }

@@ -12,6 +12,7 @@ use std::panic::AssertUnwindSafe;
 use std::sync::Arc;
 use std::time::Duration;
 
+use chefshat_base::metrics::StoreMetrics;
 use chefshat_cluster::{BeatAnswer, ClaimAnswer, Input, Node, Output, Phase, surplus};
 use futures::FutureExt as _;
 use futures::future::pending;
@@ -104,6 +105,7 @@ impl ClusterNode {
             serves,
             reached,
             leaves: false,
+            was_suspended: false,
         };
         Self {
             task: tokio::spawn(named(LongTask::Node, task.run(drain.clone()))),
@@ -193,6 +195,8 @@ struct Task {
     reached: watch::Receiver<bool>,
     /// Whether it is leaving by itself, after it has handed over everything.
     leaves: bool,
+    /// Whether it has lost its lease and said so.
+    was_suspended: bool,
 }
 
 impl Task {
@@ -333,6 +337,8 @@ impl Task {
                     reached: *self.reached.borrow(),
                     rooms: self.load().rooms,
                     drains: self.node.phase() != Phase::Serving,
+                    unreachable: self.units.metrics().unreachable_peers(),
+                    is_stalled: store.metrics().is_some_and(StoreMetrics::is_stalled),
                 };
                 // A beat without an answer must not take up the time of the next one, which the
                 // lease may still wait for.
@@ -362,8 +368,15 @@ impl Task {
                 self.queue(unit, resuming, Event::Nothing);
             }
             Output::Stop(unit) => self.stop(unit),
-            Output::Suspend => warn!("the node has no lease; it publishes nothing until it has"),
-            Output::Resume => info!("the node has a lease"),
+            Output::Suspend => {
+                self.was_suspended = true;
+                warn!("the node has no lease; it publishes nothing until it has");
+            }
+            // Who has read the warning reads that it is over.
+            Output::Resume => match std::mem::take(&mut self.was_suspended) {
+                true => warn!("the node has a lease again"),
+                false => info!("the node has a lease"),
+            },
             Output::Release(unit, epoch) => {
                 self.units.unwant(unit);
                 let next = self.next_owners.get(&unit).copied();

@@ -164,13 +164,16 @@ impl ClusterStore for PostgresStore {
             async move {
                 let mut transaction = connection.begin().await?;
                 let drain: Option<bool> = sqlx::query_scalar(
-                    "UPDATE nodes SET beat_ms = greatest(beat_ms, clock_ms()), reached = $2, rooms = $3, drain = drain OR $4
+                    "UPDATE nodes SET beat_ms = greatest(beat_ms, clock_ms()), reached = $2, rooms = $3, drain = drain OR $4,
+                            unreachable = $5, stalled = $6
                      WHERE node = $1 RETURNING drain",
                 )
                 .bind(node)
                 .bind(heartbeat.reached)
                 .bind(integer(heartbeat.rooms))
                 .bind(heartbeat.drains)
+                .bind(i32::try_from(heartbeat.unreachable).unwrap_or(i32::MAX))
+                .bind(heartbeat.is_stalled)
                 .fetch_optional(&mut *transaction)
                 .await?;
                 let Some(drain) = drain else {
@@ -408,6 +411,7 @@ impl ClusterStore for PostgresStore {
             sqlx::query(
                 "SELECT node, name, peer_endpoint, client_endpoint, build, capacity,
                         greatest(clock_ms() - beat_ms, 0) AS since_ms, beat_ms + $1 <= clock_ms() AS expired, drain, reached,
+                        unreachable, stalled,
                         (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 0) AS rooms,
                         (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 1) AS tournaments,
                         (SELECT count(*) FROM owned WHERE owned.node = nodes.node AND NOT over AND kind = 2) AS studies
@@ -427,6 +431,8 @@ impl ClusterStore for PostgresStore {
                     expired: row.get("expired"),
                     drain: row.get("drain"),
                     reached: row.get("reached"),
+                    unreachable: u32::try_from(row.get::<i32, _>("unreachable")).unwrap_or(0),
+                    is_stalled: row.get("stalled"),
                     rooms: number(row, "rooms"),
                     tournaments: number(row, "tournaments"),
                     studies: number(row, "studies"),

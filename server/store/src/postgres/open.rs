@@ -15,7 +15,7 @@ use crate::StoreError;
 
 /// The migrations, oldest first. They never change: sqlx refuses a database in which one ran with
 /// another text.
-pub(super) const MIGRATIONS: [(i64, &str, &str); 7] = [
+pub(super) const MIGRATIONS: [(i64, &str, &str); 8] = [
     (1, "games", include_str!("migrations/0001_games.sql")),
     (2, "studies", include_str!("migrations/0002_studies.sql")),
     (3, "reached", include_str!("migrations/0003_reached.sql")),
@@ -31,6 +31,7 @@ pub(super) const MIGRATIONS: [(i64, &str, &str); 7] = [
         "partitions",
         include_str!("migrations/0007_partitions.sql"),
     ),
+    (8, "troubles", include_str!("migrations/0008_troubles.sql")),
 ];
 /// Key of the advisory lock that is held while the schema is created or upgraded: "chefshat" in ASCII.
 const SCHEMA_LOCK: i64 = 0x6368_6566_7368_6174;

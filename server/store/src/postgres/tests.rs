@@ -34,6 +34,8 @@ const REACHED: Heartbeat = Heartbeat {
     reached: true,
     rooms: 0,
     drains: false,
+    unreachable: 0,
+    is_stalled: false,
 };
 
 /// A node that has just joined, whose writes wait for a lock as long as a test wants.

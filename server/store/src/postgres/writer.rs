@@ -13,7 +13,7 @@ use sqlx::postgres::{PgConnectOptions, PgConnection};
 use tokio::sync::{Mutex, mpsc, oneshot};
 use tokio::time::{Instant, sleep, timeout};
 use tokio_util::sync::CancellationToken;
-use tracing::{error, info, warn};
+use tracing::{error, warn};
 
 use super::errors::{LOCKED, failure, is_locked, is_temporary};
 use super::open::{connect_writer, set_lock_limit};
@@ -231,7 +231,7 @@ impl<W: Work> Writer<W> {
         let cause = match self.attempt(&mut batch).await {
             Ok(answers) => {
                 if batch.again {
-                    info!("the database answers again");
+                    warn!("the database answers again");
                 }
                 let time = batch.began.elapsed();
                 self.shared.metrics.committed(batch.pieces.len(), time);

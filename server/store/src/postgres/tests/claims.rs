@@ -146,6 +146,17 @@ async fn nodes_say_how_full_they_are() {
     }
     pair.second.beat(REACHED).await.expect("it answers");
     assert_eq!(load().await.map(|load| load.rooms), Some(0));
+    let troubled = Heartbeat {
+        unreachable: 2,
+        is_stalled: true,
+        ..REACHED
+    };
+    for (said, expected) in [(troubled, (2, true)), (REACHED, (0, false))] {
+        pair.second.beat(said).await.expect("it answers");
+        let nodes = pair.first.nodes().await.expect("readable");
+        let status = nodes.iter().find(|it| it.id == node).expect("it lives");
+        assert_eq!((status.unreachable, status.is_stalled), expected);
+    }
     let leaves = Heartbeat {
         drains: true,
         ..REACHED
