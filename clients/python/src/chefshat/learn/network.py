@@ -283,7 +283,11 @@ def load(path: str | os.PathLike[str]) -> Network:
     else:
         check_readable(path, "network", "`python -m chefshat.learn ppo` or `deep-q` writes")
         file = Path(path).read_bytes()
-    name = os.fspath(path)
+    return parse(file, os.fspath(path))
+
+
+def parse(file: bytes, name: str) -> Network:
+    """Reads a network from the content of a file, which error messages name. Raises NetworkFileError if it is none."""
     try:
         tensors = safetensors.numpy.load(file)
         info = NetworkInfo.of(_metadata(file))
