@@ -58,7 +58,7 @@ def test_printed(number: int, address: str, tmp_path: Path, request: pytest.Fixt
         pytest.importorskip("chefshat_native")
         if "import pyspiel" in PRINTED[number]:
             pytest.importorskip("pyspiel")
-        assert re.search(r"chefshat\.(make|VectorEnv)\(|evaluate\(|pyspiel\.", PRINTED[number])
+        assert re.search(r"chefshat\.(make|VectorEnv)\(|(evaluate|compare)\(|pyspiel\.", PRINTED[number])
         if "fake" in request.fixturenames:
             pytest.skip("it plays in this process, so once is enough")
     if "replay" in PRINTED[number] and "fake" in request.fixturenames:
