@@ -68,6 +68,11 @@ class Greedy(Agent):
         return PolicyAgent(greedy).decide(request)
 
 
+def made(times: int = 1) -> Agent:
+    """Makes the same."""
+    return [Greedy() for _ in range(times)][-1]
+
+
 class Coroutine(Agent):
     """The same, in a coroutine."""
 
@@ -116,7 +121,16 @@ def points(
 
 def test_every_form_of_a_player_has_the_same_points(real_address: str, built_in: Callable[[str], Command]) -> None:
     pytest.importorskip("chefshat_native")
-    forms: list[Player] = [greedy, Greedy, Greedy(), lambda: Greedy(), functools.partial(Greedy), Coroutine, built_in("greedy")]
+    forms: list[Player] = [
+        greedy,
+        Greedy,
+        Greedy(),
+        lambda: Greedy(),
+        functools.partial(Greedy),
+        functools.partial(made, times=2),
+        Coroutine,
+        built_in("greedy"),
+    ]
     for form in forms:
         # No error: the points are the same on every deal, not only their mean.
         found = compare(form, "greedy", "trained", deals=DEALS, seats=[1, 2], seed=5, rules=RULES, address=real_address)

@@ -30,7 +30,7 @@ long_tasks! {
     Node,
     /// Asks other nodes to reach one that has joined.
     Joining,
-    /// Looks whether a node reaches the others.
+    /// Probes the other nodes of a cluster.
     Probing,
     /// Notices pauses of the process.
     ProcessClock,

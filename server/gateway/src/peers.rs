@@ -289,7 +289,7 @@ impl Peers {
         match answered(asked.await) {
             Ok(answer) if *answer.node == **node => Ok(answer.signing_key),
             Ok(answer) if answer.node.is_empty() => {
-                Err(format!("the node at {endpoint} has no lease"))
+                Err(format!("the node at {endpoint} has not joined yet"))
             }
             Ok(answer) => Err(format!("node {:?} answers at {endpoint}", answer.node)),
             // An earlier version, which cannot say who it is.

@@ -74,7 +74,7 @@ where
             asked.truncate(ASKED_AT_ONCE);
             first += ASKED_AT_ONCE;
             let Err(problems) = reached_by(asked, own).await else {
-                // Who has read the warnings reads that they are over.
+                // Logged like the problem that it ends.
                 match has_warned {
                     true => warn!("another node reaches this one, which takes rooms"),
                     false => info!("another node reaches this one, which takes rooms"),

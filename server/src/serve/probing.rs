@@ -1,5 +1,5 @@
-//! A node looks all the time whether it reaches the others, and whether they sign records with its
-//! key: a cut between two nodes shows before a client needs the way between them.
+//! A node probes the others: whether it reaches them, and whether they sign records with its key. So
+//! a cut between two nodes shows before a client needs the way between them.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -7,16 +7,22 @@ use std::time::Duration;
 
 use chefshat_base::metrics::Metrics;
 use futures::{StreamExt as _, stream};
-use tokio::time::sleep;
+use tokio::time::{sleep, timeout};
 use tracing::warn;
 
-use crate::cluster::{Directory, Peer};
+use crate::cluster::{AVOIDED_FOR, Directory, Peer};
 use crate::peers::Peers;
 
-/// Time between two looks. Shorter than nothing new is for a node that was not reached.
+/// Time between two rounds of probes.
 const INTERVAL: Duration = Duration::from_secs(5);
+/// How long another node may take to answer.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(4);
+const _: () = assert!(
+    INTERVAL.as_secs() + ANSWER_TIMEOUT.as_secs() < AVOIDED_FOR.as_secs(),
+    "nothing new is for a node that is not reached, from one round to the next"
+);
 /// Other nodes that are asked at a time.
-const ASKED_AT_ONCE: usize = 64;
+const ASKED_AT_ONCE: usize = 256;
 
 /// What is wrong with another node, as far as this one sees it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,7 +36,7 @@ enum Problem {
 /// The nodes with which something is wrong.
 type Problems = BTreeMap<Peer, Problem>;
 
-/// Reaches all other nodes again and again, and reports with which something is wrong. `signing_key`:
+/// Probes all other nodes, round after round, and reports with which something is wrong. `signing_key`:
 /// with which this node signs records, empty if it signs none.
 pub(super) async fn probe(
     directory: Arc<dyn Directory>,
@@ -40,33 +46,44 @@ pub(super) async fn probe(
 ) {
     let reach = |peer: Peer| {
         let peers = Arc::clone(&peers);
-        async move { peers.reach(&peer).await }
+        async move {
+            let reached = timeout(ANSWER_TIMEOUT, peers.reach(&peer)).await;
+            let late = || format!("{} does not answer in time", peer.endpoint);
+            reached.unwrap_or_else(|_| Err(late()))
+        }
     };
     let mut problems = Problems::new();
     loop {
         sleep(INTERVAL).await;
-        problems = look(&*directory, reach, &signing_key, problems).await;
+        problems = probe_once(&*directory, reach, &signing_key, problems).await;
         let count = |problem| problems.values().filter(|it| **it == problem).count();
         metrics.peers(count(Problem::Unreached), count(Problem::OtherKey));
     }
 }
 
-/// Reaches all other nodes once. Logs what differs from the last look, whose result is `before`, as
-/// warnings: who has read of a problem reads that it is over.
-async fn look<F: Future<Output = Result<Option<String>, String>>>(
+/// Probes all other nodes once. What differs from the last round, whose result is `before`, is logged
+/// as a warning, also the end of a problem.
+async fn probe_once<F: Future<Output = Result<Option<String>, String>>>(
     directory: &dyn Directory,
     reach: impl Fn(Peer) -> F,
     own_key: &str,
     before: Problems,
 ) -> Problems {
-    let (_, others) = directory.nodes().await;
-    let asked = stream::iter(others).map(|peer| {
+    let (own, others) = directory.nodes().await;
+    if own.is_empty() {
+        // The nodes are unknown, or this one has no lease.
+        return before;
+    }
+    // Of those that no other node reaches, one node less says nothing: they have an alert of their own.
+    let new = directory.unreached().await;
+    let asked = others.into_iter().filter(|peer| !new.contains(&peer.node));
+    let asked = stream::iter(asked).map(|peer| {
         let reached = reach(peer.clone());
         async move { (peer, reached.await) }
     });
-    let answers: Vec<_> = asked.buffer_unordered(ASKED_AT_ONCE).collect().await;
+    let mut answers = std::pin::pin!(asked.buffer_unordered(ASKED_AT_ONCE));
     let mut problems = Problems::new();
-    for (peer, answer) in answers {
+    while let Some((peer, answer)) = answers.next().await {
         let last = before.get(&peer).copied();
         let (problem, why) = match answer {
             Err(why) => (Some(Problem::Unreached), why),
@@ -87,7 +104,9 @@ async fn look<F: Future<Output = Result<Option<String>, String>>>(
                     %node,
                     "another node signs records with another key: copy one signing-key into the data directories of all nodes"
                 ),
-                None => warn!(%node, "this node reaches another one, which has its signing key"),
+                None => {
+                    warn!(%node, "this node reaches another one again, and nothing is wrong with its key")
+                }
             }
         }
         problems.extend(problem.map(|problem| (peer, problem)));
@@ -97,6 +116,7 @@ async fn look<F: Future<Output = Result<Option<String>, String>>>(
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
     use std::sync::Mutex;
 
     use chefshat_admission::limits::Key;
@@ -108,6 +128,8 @@ mod tests {
     /// The other nodes, and those that nothing new is for.
     #[derive(Default)]
     struct Others {
+        /// Whether they cannot be read.
+        unknown: bool,
         nodes: Vec<Peer>,
         avoided: Mutex<Vec<Peer>>,
     }
@@ -115,7 +137,14 @@ mod tests {
     #[tonic::async_trait]
     impl Directory for Others {
         async fn nodes(&self) -> (Arc<str>, Vec<Peer>) {
-            (Arc::from("own"), self.nodes.clone())
+            match self.unknown {
+                true => (Arc::from(""), Vec::new()),
+                false => (Arc::from("own"), self.nodes.clone()),
+            }
+        }
+
+        async fn unreached(&self) -> BTreeSet<Arc<str>> {
+            BTreeSet::from([Arc::from("new")])
         }
 
         fn avoid(&self, node: &Peer) {
@@ -139,24 +168,28 @@ mod tests {
             node: node.into(),
             endpoint: "192.0.2.1:1".into(),
         };
-        let others = Others {
-            nodes: ["a", "b", "c", "earlier"].map(peer).to_vec(),
+        let mut others = Others {
+            nodes: ["a", "b", "c", "earlier", "new"].map(peer).to_vec(),
             ..Others::default()
         };
         let answer = async |peer: Peer| match &*peer.node {
-            "b" => Err("no answer".to_owned()),
+            "b" | "new" => Err("no answer".to_owned()),
             "c" => Ok(Some("theirs".to_owned())),
             "earlier" => Ok(None),
             _ => Ok(Some("ours".to_owned())),
         };
-        let problems = look(&others, answer, "ours", Problems::new()).await;
+        let problems = probe_once(&others, answer, "ours", Problems::new()).await;
         let expected = [
             (peer("b"), Problem::Unreached),
             (peer("c"), Problem::OtherKey),
         ];
         assert_eq!(problems, BTreeMap::from(expected));
         assert_eq!(*others.avoided.lock().expect("no panic"), [peer("b")]);
+        others.unknown = true;
+        let problems = probe_once(&others, answer, "ours", problems).await;
+        assert_eq!(problems.len(), 2, "as before");
+        others.unknown = false;
         let fits = async |_| Ok(Some("ours".to_owned()));
-        assert!(look(&others, fits, "ours", problems).await.is_empty());
+        assert!(probe_once(&others, fits, "ours", problems).await.is_empty());
     }
 }

@@ -303,7 +303,7 @@ async fn a_model_plays_and_its_reasons_are_recorded() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_first_message_of_ones_own_and_what_the_game_costs_are_said() {
+async fn another_first_message_and_what_the_game_costs_are_said() {
     let folder = tempfile::tempdir().expect("a folder");
     let own = folder.path().join("first-message.txt");
     std::fs::write(&own, "Play like a thief.\n{rules}\n{form}\n").expect("written");
@@ -324,12 +324,22 @@ async fn a_first_message_of_ones_own_and_what_the_game_costs_are_said() {
     assert_eq!(first["prompt"], format!("own {digest}"));
     assert_eq!(
         first["price"],
-        r#"{"questions":0.5,"answers":2.0,"kept":0.1}"#
+        r#"{"questions":0.5,"answers":2.0,"cached":0.1}"#
     );
-    // Of each question 5 of 492 tokens were kept, and the answer has 8.
+    // Of each question 5 of 492 tokens were cached, and the answer has 8.
     let expected = choices.len() as f64 * (487.0 * 0.5 + 5.0 * 0.1 + 8.0 * 2.0) / 1e6;
     let cost = played.result["cost"].as_f64().expect("a number");
     assert!((cost - expected).abs() < 1e-9, "{cost} {expected}");
+    // A part of the tokens is not enough.
+    let silent: Script = |number, messages| match number {
+        2 => {
+            let action = options(messages)[0].to_string();
+            Said::Whole(json!({"choices": [{"message": {"content": action}}]}))
+        }
+        _ => honest(number, messages),
+    };
+    let played = play(silent, AMPLE, &["--price", "0.5,2"]).await;
+    assert_eq!(played.result.get("cost"), None);
 }
 
 #[tokio::test(flavor = "multi_thread")]

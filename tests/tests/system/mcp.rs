@@ -401,6 +401,12 @@ async fn a_client_that_has_died_plays_on_with_the_tickets_of_a_file() {
     let (number, action) = turn(&mut player).await;
     let kept = std::fs::read_to_string(&file).expect("a file");
     assert_eq!(kept.lines().count(), 1, "{kept}");
+    let other = program(&server, &arguments, None).wait_with_output();
+    let other = patiently("the other program to end", other).await;
+    assert!(
+        !other.expect("it runs").status.success(),
+        "the file is taken"
+    );
     player.child.kill().await.expect("it has run");
 
     let mut player = start().await;

@@ -47,6 +47,8 @@ pub struct Live {
     pub played: Hand,
     /// Why no more updates come although the game has not ended.
     pub lost: Option<String>,
+    /// Whether that is because the game is over, or the server does not know the seat.
+    pub is_gone: bool,
 }
 
 impl Live {
@@ -60,6 +62,7 @@ impl Live {
             awaited: None,
             played: Hand::default(),
             lost: None,
+            is_gone: false,
         }
     }
 

@@ -66,7 +66,7 @@ const RULES_HERE: &str = "{rules}";
 const FORM_HERE: &str = "{form}";
 /// The first message.
 const FIRST_MESSAGE: &str = "You play the card game Chef's Hat. {rules}\n\n{form}";
-/// Maximum bytes of a first message of one's own.
+/// Maximum bytes of another one.
 const MAX_FIRST_MESSAGE: u64 = 64 * 1024;
 
 /// How a model is to answer.
@@ -106,8 +106,9 @@ pub(crate) struct LlmArgs {
     /// the game and {form} for how to answer. Default: these two.
     #[arg(long, value_name = "FILE", value_parser = first_message)]
     prompt: Option<FirstMessage>,
-    /// For llm: what a million tokens cost: of questions, of answers, and of questions that the
-    /// endpoint had kept (default: as others), such as 0.4,1.6,0.1. The result has the cost of a game.
+    /// For llm: prices of a million tokens: of questions, of answers, and of cached questions (default:
+    /// as others), such as 0.4,1.6,0.1. The result has the cost of a game if the endpoint reports all
+    /// tokens.
     #[arg(long, value_name = "PRICES")]
     price: Option<Price>,
     /// For llm: the share of decisions with a choice that the fallback may take, 0 to 1. A game with
@@ -137,7 +138,7 @@ fn share(text: &str) -> Result<f64, String> {
     share.ok_or_else(|| "a share is a number from 0 to 1".to_owned())
 }
 
-/// A first message of one's own.
+/// A first message instead of [`FIRST_MESSAGE`].
 #[derive(Debug, Clone)]
 struct FirstMessage(Arc<str>);
 
@@ -255,6 +256,8 @@ pub(crate) struct Spent {
     pub(crate) fallbacks: u64,
     /// Tokens in parts.
     used: Used,
+    /// Whether some have no parts: of questions without an answer, or as the endpoint reports them.
+    has_more: bool,
 }
 
 /// A language model that plays a seat.
@@ -295,12 +298,11 @@ impl LanguageModel {
         self.spent
     }
 
-    /// What the last game has cost, if that is known: prices are given, and the endpoint reports the
-    /// tokens of questions and answers.
+    /// What the last game has cost, if prices are given, and the endpoint has reported the tokens of all
+    /// questions and answers.
     pub(crate) fn cost(&self) -> Option<f64> {
-        let Spent { tokens, used, .. } = self.spent;
-        let is_known = tokens == 0 || used != Used::default();
-        self.price.filter(|_| is_known).map(|price| price.of(used))
+        let Spent { used, has_more, .. } = self.spent;
+        self.price.filter(|_| !has_more).map(|price| price.of(used))
     }
 
     /// Whether the fallback has taken so few decisions of the last game that it is the model's.
@@ -383,6 +385,7 @@ impl LanguageModel {
                 Ok(completion) => completion,
                 Err((error, tokens)) => {
                     self.spent.tokens = self.spent.tokens.saturating_add(tokens);
+                    self.spent.has_more |= tokens > 0;
                     problem = error.to_string();
                     let EndpointError::Passing { pause, .. } = error else {
                         break;
@@ -397,6 +400,7 @@ impl LanguageModel {
             self.spent.tokens = self.spent.tokens.saturating_add(completion.tokens);
             self.used += completion.used;
             self.spent.used += completion.used;
+            self.spent.has_more |= completion.used == Used::default();
             let by_cards = |cards: &str| cards::option_of(self.live.space(), request, cards);
             let Some(reply) = reply::parse(&completion.text, by_cards) else {
                 problem = match completion.cut {

@@ -16,18 +16,18 @@ pub(super) struct Price {
     questions: f64,
     /// Of answers.
     answers: f64,
-    /// Of questions that the server had kept from earlier ones.
-    kept: f64,
+    /// Of cached questions.
+    cached: f64,
 }
 
 impl Price {
     /// What these tokens cost.
     pub(super) fn of(self, used: Used) -> f64 {
-        let kept = used.cached.min(used.prompt);
-        let new = used.prompt - kept;
+        let cached = used.cached.min(used.prompt);
+        let new = used.prompt - cached;
         let parts = [
             (new, self.questions),
-            (kept, self.kept),
+            (cached, self.cached),
             (used.completion, self.answers),
         ];
         let sum: f64 = (parts.iter())
@@ -40,7 +40,7 @@ impl Price {
 /// Prices that cannot be read.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "give the prices of a million tokens of questions and of answers, and perhaps of kept questions, as in 0.4,1.6,0.1"
+    "give the prices of a million tokens of questions and of answers, and perhaps of cached questions, as in 0.4,1.6,0.1"
 )]
 pub(super) struct NotPrices;
 
@@ -53,15 +53,15 @@ impl FromStr for Price {
             price.ok().filter(|it| it.is_finite() && *it >= 0.0)
         };
         let prices: Option<Vec<f64>> = text.split(',').map(price).collect();
-        let (questions, answers, kept) = match prices.as_deref() {
+        let (questions, answers, cached) = match prices.as_deref() {
             Some(&[questions, answers]) => (questions, answers, questions),
-            Some(&[questions, answers, kept]) => (questions, answers, kept),
+            Some(&[questions, answers, cached]) => (questions, answers, cached),
             _ => return Err(NotPrices),
         };
         Ok(Self {
             questions,
             answers,
-            kept,
+            cached,
         })
     }
 }
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn kept_questions_have_a_price_of_their_own() {
+    fn cached_questions_have_a_price_of_their_own() {
         let used = Used {
             prompt: 3_000_000,
             cached: 1_000_000,

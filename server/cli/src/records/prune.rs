@@ -58,9 +58,7 @@ impl Prune {
 fn words(pruned: v1::PruneRecordsResponse) -> String {
     let games = counted(pruned.games, "game");
     match pruned.freed_bytes {
-        0 if pruned.games > 0 => {
-            format!("{games} deleted; the database gives their space back within minutes")
-        }
+        0 => format!("{games} deleted"),
         freed => format!(
             "{games} deleted, {:.1} MiB freed",
             freed as f64 / (1024.0 * 1024.0)

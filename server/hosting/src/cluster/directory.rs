@@ -78,6 +78,11 @@ pub trait Directory: Send + Sync + 'static {
     /// The name of this node, and the other nodes that are alive.
     async fn nodes(&self) -> (Arc<str>, Vec<Peer>);
 
+    /// The name of this node, as it was read last: nothing is read. Empty before the first time.
+    fn own_name(&self) -> Arc<str> {
+        Arc::from("")
+    }
+
     /// The names of the nodes that have not been reached since they joined.
     async fn unreached(&self) -> BTreeSet<Arc<str>> {
         BTreeSet::new()

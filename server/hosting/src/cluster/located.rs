@@ -29,7 +29,7 @@ pub(crate) const LOOK_LIMIT: Duration = Duration::from_secs(2);
 const NODES_KNOWN_FOR: Duration = Duration::from_secs(1);
 
 /// How long nothing new is for a node that could not be reached.
-const AVOIDED_FOR: Duration = Duration::from_secs(10);
+pub const AVOIDED_FOR: Duration = Duration::from_secs(10);
 
 /// Finds the owners of rooms and tournaments in the database.
 pub struct StoreDirectory {
@@ -40,6 +40,8 @@ pub struct StoreDirectory {
     looking: Arc<FairSemaphore>,
     /// Nodes that could not be reached, and until when nothing new is for them.
     avoided: Mutex<BTreeMap<Peer, Instant>>,
+    /// The name of this node, as it was read last; empty before.
+    own: Mutex<Arc<str>>,
     /// Locked while they are read, so that one request reads them for all.
     nodes: AsyncMutex<Option<Nodes>>,
 }
@@ -69,12 +71,17 @@ impl StoreDirectory {
             known: Mutex::default(),
             looking: FairSemaphore::new(LOOKED_FOR_AT_ONCE, shares),
             avoided: Mutex::default(),
+            own: Mutex::new(Arc::from("")),
             nodes: AsyncMutex::default(),
         }
     }
 
     fn avoided(&self) -> MutexGuard<'_, BTreeMap<Peer, Instant>> {
         (self.avoided.lock()).expect("nothing panics under this lock")
+    }
+
+    fn own(&self) -> MutexGuard<'_, Arc<str>> {
+        (self.own.lock()).expect("nothing panics under this lock")
     }
 
     fn known(&self) -> MutexGuard<'_, BTreeMap<FoundBy, Peer>> {
@@ -122,6 +129,7 @@ impl StoreDirectory {
         if let Some(nodes) = nodes.as_ref().filter(recent) {
             return nodes.alive.clone();
         }
+        let was_known = nodes.as_ref().is_none_or(|nodes| nodes.alive.is_ok());
         let alive = self.store.alive().await.map(|alive| {
             let mut read = Alive::default();
             for living in alive {
@@ -141,6 +149,11 @@ impl StoreDirectory {
             }
             read
         });
+        match &alive {
+            Err(error) if was_known => warn!(%error, "the nodes of the cluster are unknown"),
+            Ok(_) if !was_known => warn!("the nodes of the cluster are known again"),
+            _ => {}
+        }
         *nodes = Some(Nodes {
             read: Instant::now(),
             alive: alive.clone(),
@@ -150,10 +163,7 @@ impl StoreDirectory {
 
     /// The nodes that have a lease, as far as they are known.
     async fn living(&self) -> Alive {
-        self.alive().await.unwrap_or_else(|error| {
-            warn!(%error, "the nodes of the cluster are unknown");
-            Alive::default()
-        })
+        self.alive().await.unwrap_or_default()
     }
 }
 
@@ -193,7 +203,14 @@ impl Directory for StoreDirectory {
         let mut nodes = self.living().await.nodes;
         let own = self.lease.node().and_then(|node| nodes.remove(&node));
         let name = own.map_or_else(|| Arc::from(""), |own| own.node);
+        if !name.is_empty() {
+            *self.own() = Arc::clone(&name);
+        }
         (name, nodes.into_values().collect())
+    }
+
+    fn own_name(&self) -> Arc<str> {
+        Arc::clone(&self.own())
     }
 
     async fn place(&self, own: Load) -> Option<Peer> {

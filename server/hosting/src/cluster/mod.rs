@@ -12,4 +12,4 @@ pub use directory::{Directory, Elsewhere, FoundBy, Location, Peer, SingleServer}
 pub use lease::{NodeLease, UnitEvent};
 #[cfg(test)]
 pub(crate) use located::LOOK_LIMIT;
-pub use located::StoreDirectory;
+pub use located::{AVOIDED_FOR, StoreDirectory};

@@ -372,7 +372,7 @@ impl Task {
                 self.was_suspended = true;
                 warn!("the node has no lease; it publishes nothing until it has");
             }
-            // Who has read the warning reads that it is over.
+            // Logged like the problem that it ends.
             Output::Resume => match std::mem::take(&mut self.was_suspended) {
                 true => warn!("the node has a lease again"),
                 false => info!("the node has a lease"),

@@ -51,18 +51,20 @@ impl Seat {
         let updates = live.clone();
         let following = tokio::spawn(async move {
             loop {
-                let lost = match follower.next().await {
+                let (lost, reason) = match follower.next().await {
                     Ok(Some(update)) => {
                         let now_ms = elapsed_ms(began);
                         updates.send_modify(|live| live.take(update, now_ms));
                         continue;
                     }
-                    Ok(None) => None,
-                    Err(error) => Some(error.message()),
+                    Ok(None) => (None, None),
+                    Err(error) => (Some(error.message()), error.reason().map(str::to_owned)),
                 };
                 updates.send_modify(|live| {
                     live.open = None;
                     live.lost = lost;
+                    live.is_gone =
+                        matches!(reason.as_deref(), Some("TICKET_UNKNOWN" | "GAME_OVER"));
                 });
                 return;
             }

@@ -2,9 +2,10 @@
 //! ticket in what a language model reads: it is worth nothing outside of this process.
 
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use chefshat_client::{Client, v1};
@@ -48,6 +49,8 @@ pub(super) struct Seats {
     working: TaskTracker,
     /// The file that keeps the tickets of games that are not over, one in a line.
     tickets: Option<PathBuf>,
+    /// Held while this program runs.
+    lock: OnceLock<File>,
 }
 
 /// A seat and its place among [`MAX_SEATS`].
@@ -83,6 +86,7 @@ impl Seats {
     pub(super) fn new(server: ServerArg, handles: Handles, tickets: Option<PathBuf>) -> Arc<Self> {
         Arc::new(Self {
             tickets,
+            lock: OnceLock::new(),
             server,
             client: OnceCell::new(),
             handles,
@@ -110,6 +114,12 @@ impl Seats {
     /// # Errors
     /// The server does not answer or refuses the ticket; too many seats are taken.
     pub(super) async fn resume(&self, ticket: String) -> Result<String, CommandError> {
+        let known = (self.taken().iter())
+            .find(|(_, taken)| taken.seat.ticket() == ticket)
+            .map(|(handle, _)| handle.clone());
+        if let Some(handle) = known {
+            return Ok(handle);
+        }
         let place = self.place()?;
         let seat = Seat::follow(self.client().await?, ticket, GameView::default(), None);
         seat.attached().await?;
@@ -118,14 +128,18 @@ impl Seats {
         Ok(handle)
     }
 
-    /// Takes the seats whose tickets the file keeps, but those that the server does not know any more.
+    /// Takes the seats whose tickets the file keeps, but those of games that are over. The file is this
+    /// program's as long as it runs.
     ///
     /// # Errors
-    /// The file cannot be read or written, or the server does not answer. The file is unchanged.
+    /// The file cannot be read or written, or is another program's; or the server does not answer, or
+    /// refuses a ticket. The file is unchanged.
     pub(super) async fn resume_kept(&self) -> Result<(), CommandError> {
         let Some(file) = &self.tickets else {
             return Ok(());
         };
+        let lock = lock(file)?;
+        self.lock.set(lock).expect("this is called once");
         let kept = match std::fs::read_to_string(file) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
             kept => kept.map_err(|error| format!("{}: {error}", file.display()))?,
@@ -136,10 +150,13 @@ impl Seats {
             let seat = Seat::follow(client, ticket.to_owned(), GameView::default(), None);
             match seat.attached().await {
                 Ok(()) => seats.push((seat, place)),
-                Err(refusal) if seat.read(|live| live.lost.is_some()) => {
+                Err(refusal) if seat.read(|live| live.is_gone) => {
                     tracing::warn!("a seat is not resumed: {refusal}");
                 }
-                Err(error) => return Err(error.into()),
+                Err(error) => {
+                    let file = file.display();
+                    return Err(format!("a seat of {file} is not resumed: {error}").into());
+                }
             }
         }
         for (seat, place) in seats {
@@ -203,12 +220,13 @@ impl Seats {
         let joined = client.join(request).await?;
         let view = GameView::of_room(&joined.room.unwrap_or_default());
         let seat = Seat::follow(client, joined.ticket, view, Some(joined.seat));
+        let handle = self.insert(Arc::clone(&seat), place);
+        self.keep_tickets();
         if let Err(error) = seat.attached().await {
+            self.forget(&seat);
             give_back(seat).await;
             return Err(error.into());
         }
-        let handle = self.insert(seat, place);
-        self.keep_tickets();
         Ok(handle)
     }
 
@@ -316,6 +334,27 @@ impl Seats {
         // A panic while the map was locked has left it whole: each change is one call.
         self.taken.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Locks a file of tickets, by a file beside it: the file itself is replaced.
+fn lock(tickets: &Path) -> Result<File, CommandError> {
+    let mut path = tickets.as_os_str().to_owned();
+    path.push(".lock");
+    let path = PathBuf::from(path);
+    let open = || {
+        let file = (File::options().write(true).create(true).truncate(false)).open(&path)?;
+        file.try_lock().map(|()| file).map_err(io::Error::from)
+    };
+    open().map_err(|error| match error.kind() {
+        io::ErrorKind::WouldBlock => {
+            let tickets = tickets.display();
+            format!(
+                "another program has the seats of {tickets}: give each program a file of its own"
+            )
+            .into()
+        }
+        _ => format!("{}: {error}", path.display()).into(),
+    })
 }
 
 /// Gives a seat back if its game has not begun, and follows it no longer.

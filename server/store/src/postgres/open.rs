@@ -31,7 +31,7 @@ pub(super) const MIGRATIONS: [(i64, &str, &str); 8] = [
         "partitions",
         include_str!("migrations/0007_partitions.sql"),
     ),
-    (8, "troubles", include_str!("migrations/0008_troubles.sql")),
+    (8, "problems", include_str!("migrations/0008_problems.sql")),
 ];
 /// Key of the advisory lock that is held while the schema is created or upgraded: "chefshat" in ASCII.
 const SCHEMA_LOCK: i64 = 0x6368_6566_7368_6174;

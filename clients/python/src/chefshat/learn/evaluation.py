@@ -399,7 +399,8 @@ def _makes_agents(given: object) -> bool:
         signature.bind()
     except (TypeError, ValueError):
         return False
-    return not signature.parameters
+    anything = inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD
+    return all(parameter.kind not in anything for parameter in signature.parameters.values())
 
 
 @contextmanager

@@ -306,6 +306,9 @@ class _Game:
         assert not isinstance(make, str | Command), "they have no tickets"
         try:
             result = await self._client.play(make(), ticket)
+        except ChefsHatError:
+            # The server's, or the connection's.
+            raise
         except Exception as error:
             raise self._failed(number, f"raised {error!r}") from error
         if not result.finished:
