@@ -23,7 +23,7 @@ use chefshat_server::config::ServerConfig;
 use chefshat_server::host::Host;
 use chefshat_server::store::studies::StoredStudy;
 use chefshat_server::store::{SqliteStore, Store as _};
-use chefshat_tests::{one_shift, patiently, set_up};
+use chefshat_tests::{one_shift, patiently, set_up, skip};
 use futures::future::join_all;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
 use tokio::net::{TcpListener, TcpStream};
@@ -567,27 +567,71 @@ pub(crate) fn assert_as_described(files: &BTreeMap<String, Vec<u8>>) {
     assert_eq!(described, tables.cloned().collect());
 }
 
-/// What the sample in Python prints of the exported tables.
-pub(crate) async fn analysed(files: &BTreeMap<String, Vec<u8>>) -> String {
+/// What the samples print of the exported tables, with these options; that in R prints the same as
+/// that in Python.
+pub(crate) async fn analysed(files: &BTreeMap<String, Vec<u8>>, options: &[&str]) -> String {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, bytes) in files.iter().filter(|(name, _)| !name.contains('/')) {
         std::fs::write(folder.path().join(name), bytes).expect("a file");
     }
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../clients/python");
-    let analysing = Command::new(set_up("CHEFSHAT_PYTHON"))
-        .arg(python.join("samples/study/analysis.py"))
-        .arg(folder.path())
-        .kill_on_drop(true)
-        .output();
-    let analysed = patiently("the analysis", analysing).await.expect("Python");
-    let problem = String::from_utf8_lossy(&analysed.stderr);
-    assert!(analysed.status.success(), "{problem}");
-    String::from_utf8(analysed.stdout).expect("UTF-8")
+    let samples = python.join("samples/study");
+    let run = async |interpreter: &Path, sample: &str| {
+        let analysing = Command::new(interpreter)
+            .arg(samples.join(sample))
+            .arg(folder.path())
+            .args(options)
+            .kill_on_drop(true)
+            .output();
+        let analysed = patiently("the analysis", analysing).await.expect(sample);
+        let problem = String::from_utf8_lossy(&analysed.stderr);
+        assert!(analysed.status.success(), "{sample}: {problem}");
+        String::from_utf8(analysed.stdout).expect("UTF-8")
+    };
+    let printed = run(&set_up("CHEFSHAT_PYTHON"), "analysis.py").await;
+    let version = Command::new("Rscript").arg("--version").output();
+    match version.await {
+        Ok(version) if version.status.success() => {
+            let in_r = run(Path::new("Rscript"), "analysis.R").await;
+            assert_same_figures(&printed, &in_r);
+        }
+        _ => skip(
+            "the analysis in R",
+            "R is not installed; run `apt-get install r-base-core`",
+        ),
+    }
+    printed
 }
 
-/// Asserts that the sample in Python reads the exported tables and summarises them by condition.
+/// Asserts that two analyses print the same lines. Means may differ in how they are rounded.
+fn assert_same_figures(python: &str, r: &str) {
+    let in_both = format!("Python:\n{python}R:\n{r}");
+    assert_eq!(python.lines().count(), r.lines().count(), "{in_both}");
+    for (in_python, in_r) in python.lines().zip(r.lines()) {
+        let words = |line: &str| -> Vec<String> {
+            // A deviation of one value.
+            let named = line.split_whitespace().map(|word| match word {
+                "NA" => "NaN",
+                word => word,
+            });
+            named.map(str::to_owned).collect()
+        };
+        let (in_python, in_r) = (words(in_python), words(in_r));
+        assert_eq!(in_python.len(), in_r.len(), "{in_both}");
+        for (one, other) in in_python.iter().zip(&in_r) {
+            let same = match (one.parse::<f64>(), other.parse::<f64>()) {
+                _ if one == other => true,
+                (Ok(one), Ok(other)) => (one - other).abs() < 0.0015,
+                _ => false,
+            };
+            assert!(same, "{one} is not {other}\n{in_both}");
+        }
+    }
+}
+
+/// Asserts that the samples read the exported tables and summarise them by condition.
 async fn assert_analysed(files: &BTreeMap<String, Vec<u8>>) {
-    let printed = analysed(files).await;
+    let printed = analysed(files, &[]).await;
     let first = printed.lines().next().unwrap_or_default();
     assert!(
         first.contains(&format!("{PARTICIPANTS} completed")),
@@ -609,6 +653,49 @@ async fn assert_analysed(files: &BTreeMap<String, Vec<u8>>) {
             }
         }
     }
+}
+
+/// Asserts that the samples leave out what the tables say is not counted: games in which a substitute
+/// played, practice, and attention checks.
+async fn assert_left_out(mut files: BTreeMap<String, Vec<u8>>) {
+    let (finished, slider) = (("outcome", "finished"), ("kind", "slider"));
+    let edit = |files: &mut BTreeMap<String, Vec<u8>>, table: &str, of_kind, column, value| {
+        let edited = with_cell(&files[table], of_kind, column, value);
+        files.insert(table.to_owned(), edited);
+    };
+    // One game counts visibly.
+    edit(&mut files, "games.csv", finished, "points", "1000");
+    let counted = analysed(&files, &[]).await;
+    for (table, of_kind, column, value) in [
+        ("games.csv", finished, "substituted", "true"),
+        ("games.csv", finished, "practice", "true"),
+        ("items.csv", slider, "attention_check", "5"),
+    ] {
+        let mut edited = files.clone();
+        edit(&mut edited, table, of_kind, column, value);
+        let left_out = analysed(&edited, &[]).await;
+        assert_ne!(left_out, counted, "{column} of {table} changes nothing");
+    }
+}
+
+/// A table with another value in this column of the first row that has a value in another one.
+fn with_cell(file: &[u8], (of, kind): (&str, &str), column: &str, value: &str) -> Vec<u8> {
+    let mut rows: Vec<Vec<String>> = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .from_reader(file)
+        .into_deserialize()
+        .map(|row| row.expect("a row"))
+        .collect();
+    let index = |name| rows[0].iter().position(|it| it == name).expect("a column");
+    let (of, column) = (index(of), index(column));
+    let row = rows.iter_mut().find(|row| row[of] == kind).expect("a row");
+    assert_ne!(row[column], value);
+    row[column] = value.to_owned();
+    let mut edited = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        edited.write_record(row).expect("a row");
+    }
+    edited.into_inner().expect("all rows")
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -775,6 +862,7 @@ async fn a_study_from_its_links_to_its_data() {
     let files = lab.export().await;
     assert_as_described(&files);
     assert_analysed(&files).await;
+    assert_left_out(files.clone()).await;
     let table = |name: &str| rows(&files[name]);
     assert_eq!(table("participants.csv").len(), PARTICIPANTS as usize + 2);
     let games = table("games.csv");

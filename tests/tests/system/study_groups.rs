@@ -303,7 +303,7 @@ async fn pairs_of_people_play_together_and_a_partner_who_leaves_is_replaced() {
     let expected = [((1, vec![1, 2]), 2), ((2, vec![3]), 1)];
     assert_eq!(recorded, expected.into());
 
-    let printed = analysed(&files).await;
+    let printed = analysed(&files, &[]).await;
     // In each condition, what its group scored counts once.
     let points = printed.lines().filter(|line| line.contains(" points "));
     let counts: Vec<&str> = points
@@ -314,6 +314,9 @@ async fn pairs_of_people_play_together_and_a_partner_who_leaves_is_replaced() {
         printed.contains("groups: 2, of which 1 are whole"),
         "{printed}"
     );
+    let of_whole = analysed(&files, &["--whole-groups"]).await;
+    let points = of_whole.lines().filter(|line| line.contains(" points "));
+    assert_eq!(points.count(), 1, "{of_whole}");
 
     // A game is deleted with the data of one of its players.
     let request = v1::DeleteStudyParticipantRequest {

@@ -39,12 +39,13 @@ const CPP_PACKAGES: [&str; 7] = [
 pub(crate) type Program = (&'static str, &'static str);
 
 /// What the tests in Rust use, and the agent in C++ is built with.
-pub(crate) const FOR_RUST: [Program; 6] = [
+pub(crate) const FOR_RUST: [Program; 7] = [
     ("psql", "postgresql"),
     ("/usr/sbin/haproxy", "haproxy"),
     ("strace", "strace"),
     ("promtool", "prometheus"),
     ("tmux", "tmux"),
+    ("Rscript", "r-base-core"),
     ("grpc_cpp_plugin", "protobuf-compiler-grpc"),
 ];
 
@@ -257,6 +258,14 @@ pub(crate) fn tmux() -> Result<(), Failure> {
         return Ok(());
     }
     debian_package("tmux")
+}
+
+/// R, for the sample that analyses a study.
+pub(crate) fn r() -> Result<(), Failure> {
+    if succeeds("Rscript", &["--version"]) {
+        return Ok(());
+    }
+    debian_package("r-base-core")
 }
 
 /// The proxies that are Debian packages, for the tests of docker/proxies, and what makes the

@@ -203,6 +203,9 @@ pub(crate) fn run(places: &Places, steps: &mut Steps, options: &Options) -> Resu
         if let Err(failure) = setup::tmux() {
             steps.skip("commands at a terminal", &failure.to_string());
         }
+        if let Err(failure) = setup::r() {
+            steps.skip("the analysis in R", &failure.to_string());
+        }
         let mut runs = in_rust.integration;
         if slow {
             // The others that are ignored measure something.
