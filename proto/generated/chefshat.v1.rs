@@ -9127,6 +9127,22 @@ pub struct StudySettings {
     /// Participants who play together; unset: everybody plays its own games.
     #[prost(message, optional, tag = "17")]
     pub groups: ::core::option::Option<StudyGroups>,
+    /// The device that participants need; unset: any.
+    #[prost(message, optional, tag = "18")]
+    pub device: ::core::option::Option<StudyRequiredDevice>,
+}
+/// The device that participants need. On another one, or without StudyDevice, nobody can join or open
+/// the study: nothing changes then, so that the same link can be opened on the right device. A test
+/// participant needs no StudyDevice.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct StudyRequiredDevice {
+    /// Its most exact pointer: FINE for a computer, COARSE for a phone or tablet. UNSPECIFIED: any. Not
+    /// NONE.
+    #[prost(enumeration = "StudyPointer", tag = "1")]
+    pub pointer: i32,
+    /// Least width of the page, in CSS pixels, at most 3840; 0: any.
+    #[prost(uint32, tag = "2")]
+    pub min_width: u32,
 }
 /// A participant's device, as its page describes it. Sent by participants; exported data have it.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -10204,6 +10220,9 @@ pub struct JoinStudyRequest {
     /// response, adds nobody and returns the same link.
     #[prost(bytes = "vec", tag = "3")]
     pub request_id: ::prost::alloc::vec::Vec<u8>,
+    /// The device of the person. An invalid one counts as none.
+    #[prost(message, optional, tag = "4")]
+    pub device: ::core::option::Option<StudyDevice>,
 }
 /// The participant takes part.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -10218,7 +10237,7 @@ pub struct OpenStudyRequest {
     /// The secret of the link: `link` of StudyLink.
     #[prost(string, tag = "1")]
     pub link: ::prost::alloc::string::String,
-    /// The device on which it is opened. An invalid one is ignored.
+    /// The device on which it is opened. An invalid one counts as none.
     #[prost(message, optional, tag = "2")]
     pub device: ::core::option::Option<StudyDevice>,
 }
@@ -11628,7 +11647,9 @@ pub mod participation_service_client {
             self
         }
         /// Adds a participant who has the open link (`open_link` of Study), and returns its own link for
-        /// OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+        /// OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL;
+        /// WRONG_DEVICE if `device` is not the StudyRequiredDevice, which it has as metadata: `pointer`,
+        /// "fine", "coarse" or empty, `min_width`, and `language` of the study; nothing has changed);
         /// INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
         /// RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
         /// study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
@@ -11661,9 +11682,9 @@ pub mod participation_service_client {
         }
         /// Opens the study on this device: the participant's earlier session ends. For a participant whose
         /// participation is over there is only the end to show, and no session. UNAUTHENTICATED
-        /// (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; LINK_OPEN for an open link, with the
-        /// metadata `id_parameter`: take part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS);
-        /// UNAVAILABLE (SHUTTING_DOWN).
+        /// (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; WRONG_DEVICE as JoinStudy, and an
+        /// earlier session does not end; LINK_OPEN for an open link, with the metadata `id_parameter`: take
+        /// part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS); UNAVAILABLE (SHUTTING_DOWN).
         pub async fn open_study(
             &mut self,
             request: impl tonic::IntoRequest<super::OpenStudyRequest>,
@@ -11923,7 +11944,9 @@ pub mod participation_service_server {
     #[async_trait]
     pub trait ParticipationService: std::marker::Send + std::marker::Sync + 'static {
         /// Adds a participant who has the open link (`open_link` of Study), and returns its own link for
-        /// OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+        /// OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL;
+        /// WRONG_DEVICE if `device` is not the StudyRequiredDevice, which it has as metadata: `pointer`,
+        /// "fine", "coarse" or empty, `min_width`, and `language` of the study; nothing has changed);
         /// INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
         /// RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
         /// study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
@@ -11937,9 +11960,9 @@ pub mod participation_service_server {
         >;
         /// Opens the study on this device: the participant's earlier session ends. For a participant whose
         /// participation is over there is only the end to show, and no session. UNAUTHENTICATED
-        /// (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; LINK_OPEN for an open link, with the
-        /// metadata `id_parameter`: take part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS);
-        /// UNAVAILABLE (SHUTTING_DOWN).
+        /// (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; WRONG_DEVICE as JoinStudy, and an
+        /// earlier session does not end; LINK_OPEN for an open link, with the metadata `id_parameter`: take
+        /// part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS); UNAVAILABLE (SHUTTING_DOWN).
         async fn open_study(
             &self,
             request: tonic::Request<super::OpenStudyRequest>,

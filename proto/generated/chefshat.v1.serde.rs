@@ -17605,6 +17605,9 @@ impl serde::Serialize for JoinStudyRequest {
         if !self.request_id.is_empty() {
             len += 1;
         }
+        if self.device.is_some() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.JoinStudyRequest", len)?;
         if !self.open_link.is_empty() {
             struct_ser.serialize_field("openLink", &self.open_link)?;
@@ -17616,6 +17619,9 @@ impl serde::Serialize for JoinStudyRequest {
             #[allow(clippy::needless_borrow)]
             #[allow(clippy::needless_borrows_for_generic_args)]
             struct_ser.serialize_field("requestId", pbjson::private::base64::encode(&self.request_id).as_str())?;
+        }
+        if let Some(v) = self.device.as_ref() {
+            struct_ser.serialize_field("device", v)?;
         }
         struct_ser.end()
     }
@@ -17633,6 +17639,7 @@ impl<'de> serde::Deserialize<'de> for JoinStudyRequest {
             "panelId",
             "request_id",
             "requestId",
+            "device",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -17640,6 +17647,7 @@ impl<'de> serde::Deserialize<'de> for JoinStudyRequest {
             OpenLink,
             PanelId,
             RequestId,
+            Device,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -17664,6 +17672,7 @@ impl<'de> serde::Deserialize<'de> for JoinStudyRequest {
                             "openLink" | "open_link" => Ok(GeneratedField::OpenLink),
                             "panelId" | "panel_id" => Ok(GeneratedField::PanelId),
                             "requestId" | "request_id" => Ok(GeneratedField::RequestId),
+                            "device" => Ok(GeneratedField::Device),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -17686,6 +17695,7 @@ impl<'de> serde::Deserialize<'de> for JoinStudyRequest {
                 let mut open_link__ = None;
                 let mut panel_id__ = None;
                 let mut request_id__ = None;
+                let mut device__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::OpenLink => {
@@ -17708,12 +17718,19 @@ impl<'de> serde::Deserialize<'de> for JoinStudyRequest {
                                 Some(map_.next_value::<::pbjson::private::BytesDeserialize<_>>()?.0)
                             ;
                         }
+                        GeneratedField::Device => {
+                            if device__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("device"));
+                            }
+                            device__ = map_.next_value()?;
+                        }
                     }
                 }
                 Ok(JoinStudyRequest {
                     open_link: open_link__.unwrap_or_default(),
                     panel_id: panel_id__.unwrap_or_default(),
                     request_id: request_id__.unwrap_or_default(),
+                    device: device__,
                 })
             }
         }
@@ -40953,6 +40970,119 @@ impl<'de> serde::Deserialize<'de> for StudyRecruiting {
         deserializer.deserialize_struct("chefshat.v1.StudyRecruiting", FIELDS, GeneratedVisitor)
     }
 }
+impl serde::Serialize for StudyRequiredDevice {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if self.pointer != 0 {
+            len += 1;
+        }
+        if self.min_width != 0 {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyRequiredDevice", len)?;
+        if self.pointer != 0 {
+            let v = StudyPointer::try_from(self.pointer)
+                .map_err(|_| serde::ser::Error::custom(format!("Invalid variant {}", self.pointer)))?;
+            struct_ser.serialize_field("pointer", &v)?;
+        }
+        if self.min_width != 0 {
+            struct_ser.serialize_field("minWidth", &self.min_width)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyRequiredDevice {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "pointer",
+            "min_width",
+            "minWidth",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Pointer,
+            MinWidth,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "pointer" => Ok(GeneratedField::Pointer),
+                            "minWidth" | "min_width" => Ok(GeneratedField::MinWidth),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = StudyRequiredDevice;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.StudyRequiredDevice")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<StudyRequiredDevice, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut pointer__ = None;
+                let mut min_width__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Pointer => {
+                            if pointer__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("pointer"));
+                            }
+                            pointer__ = Some(map_.next_value::<StudyPointer>()? as i32);
+                        }
+                        GeneratedField::MinWidth => {
+                            if min_width__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("minWidth"));
+                            }
+                            min_width__ = 
+                                Some(map_.next_value::<::pbjson::private::NumberDeserialize<_>>()?.0)
+                            ;
+                        }
+                    }
+                }
+                Ok(StudyRequiredDevice {
+                    pointer: pointer__.unwrap_or_default(),
+                    min_width: min_width__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.StudyRequiredDevice", FIELDS, GeneratedVisitor)
+    }
+}
 impl serde::Serialize for StudyScreenOut {
     #[allow(deprecated)]
     fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
@@ -41230,6 +41360,9 @@ impl serde::Serialize for StudySettings {
         if self.groups.is_some() {
             len += 1;
         }
+        if self.device.is_some() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudySettings", len)?;
         if !self.name.is_empty() {
             struct_ser.serialize_field("name", &self.name)?;
@@ -41292,6 +41425,9 @@ impl serde::Serialize for StudySettings {
         if let Some(v) = self.groups.as_ref() {
             struct_ser.serialize_field("groups", v)?;
         }
+        if let Some(v) = self.device.as_ref() {
+            struct_ser.serialize_field("device", v)?;
+        }
         struct_ser.end()
     }
 }
@@ -41324,6 +41460,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
             "deletes_at_ms",
             "deletesAtMs",
             "groups",
+            "device",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -41345,6 +41482,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
             Recruiting,
             DeletesAtMs,
             Groups,
+            Device,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -41383,6 +41521,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                             "recruiting" => Ok(GeneratedField::Recruiting),
                             "deletesAtMs" | "deletes_at_ms" => Ok(GeneratedField::DeletesAtMs),
                             "groups" => Ok(GeneratedField::Groups),
+                            "device" => Ok(GeneratedField::Device),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -41419,6 +41558,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                 let mut recruiting__ = None;
                 let mut deletes_at_ms__ = None;
                 let mut groups__ = None;
+                let mut device__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Name => {
@@ -41538,6 +41678,12 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                             }
                             groups__ = map_.next_value()?;
                         }
+                        GeneratedField::Device => {
+                            if device__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("device"));
+                            }
+                            device__ = map_.next_value()?;
+                        }
                     }
                 }
                 Ok(StudySettings {
@@ -41558,6 +41704,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                     recruiting: recruiting__,
                     deletes_at_ms: deletes_at_ms__.unwrap_or_default(),
                     groups: groups__,
+                    device: device__,
                 })
             }
         }

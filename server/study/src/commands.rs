@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use crate::Study;
 use crate::change::{Change, ConsentGiven, Joined};
-use crate::device::Device;
+use crate::device::{Device, Pointer, RequiredDevice};
 use crate::games::Phase;
 use crate::questionnaire::{AnswerProblem, ItemAnswer};
 use crate::settings::{MAX_PARTICIPANTS, MAX_TESTS};
@@ -35,6 +35,9 @@ pub enum Refusal {
     /// The participant has completed the study or left it.
     #[error("the participation is over")]
     Over,
+    /// The study needs another device.
+    #[error("{}", needed(*.0))]
+    WrongDevice(RequiredDevice),
     /// A newer session was opened.
     #[error("the study was opened again, here or on another device; use that page")]
     Superseded,
@@ -74,6 +77,19 @@ pub enum Refusal {
     /// Too many test participants.
     #[error("a study has at most {MAX_TESTS} test participants, with those who are done")]
     TooManyTests,
+}
+
+fn needed(RequiredDevice { pointer, min_width }: RequiredDevice) -> String {
+    let device = match pointer {
+        None | Some(Pointer::None) => "a device",
+        Some(Pointer::Fine) => "a computer with a mouse or touchpad",
+        Some(Pointer::Coarse) => "a phone or tablet",
+    };
+    let page = match min_width {
+        0 => String::new(),
+        _ => format!(" with a page at least {min_width} CSS pixels wide"),
+    };
+    format!("this study needs {device}{page}; open the link there")
 }
 
 fn no_whole_groups(size: u32) -> String {
@@ -211,9 +227,13 @@ impl Study {
     /// the request is repeated.
     ///
     /// # Errors
-    /// The study has no open link, is closed, full, or has too many participants; or the id at the
-    /// panel is refused or taken.
-    pub fn join(&self, joined: Joined) -> Result<(u32, Option<Change>), Refusal> {
+    /// The study has no open link, is closed, full, or has too many participants; the id at the panel
+    /// is refused or taken; or the study needs another device.
+    pub fn join(
+        &self,
+        joined: Joined,
+        device: Option<&Device>,
+    ) -> Result<(u32, Option<Change>), Refusal> {
         let recruiting = &self.settings().recruiting;
         if !recruiting.open_link {
             return Err(Refusal::Unknown);
@@ -233,6 +253,7 @@ impl Study {
         if !self.has_place(false, None) {
             return Err(Refusal::Full);
         }
+        self.check_device(device, false)?;
         if let Some(Change::Added { joined: how, .. }) = &mut change {
             *how = Some(joined);
         }
@@ -244,7 +265,7 @@ impl Study {
     /// the participant is asked for consent before its condition matters.
     ///
     /// # Errors
-    /// If the participant is unknown or cannot begin.
+    /// If the participant is unknown, cannot begin, or needs another device.
     pub fn open(
         &self,
         number: u32,
@@ -273,6 +294,7 @@ impl Study {
             }
             _ => return Ok(None),
         };
+        self.check_device(device.as_ref(), participant.test)?;
         if participant.session >= MAX_SESSIONS {
             return Err(Refusal::TooManySessions);
         }
@@ -282,6 +304,17 @@ impl Study {
             at_ms: now_ms,
             device,
         }))
+    }
+
+    /// Refuses a device on which nobody may take part. A test participant may be a program, without one.
+    fn check_device(&self, device: Option<&Device>, test: bool) -> Result<(), Refusal> {
+        let Some(required) = self.settings().device else {
+            return Ok(());
+        };
+        match device.map_or(test, |device| required.is_met_by(device)) {
+            true => Ok(()),
+            false => Err(Refusal::WrongDevice(required)),
+        }
     }
 
     /// The change by which a participant consents, and gets a slot if it has none.

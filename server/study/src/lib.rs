@@ -61,7 +61,7 @@ pub use assignment::Order;
 pub use change::{Change, ConsentGiven, Joined, Outcome, PlacedGame};
 pub use checks::SettingsProblem;
 pub use commands::{At, MAX_SAVES, MAX_SESSIONS, NewParticipants, Refusal};
-pub use device::{Device, DeviceSession, Pointer};
+pub use device::{Device, DeviceSession, Pointer, RequiredDevice};
 pub use games::{DueGame, MAX_ATTEMPTS};
 pub use item_kind::{Answer, AnswerSet, ItemKind, MAX_OPTIONS};
 pub use link::{ParticipantLink, SessionSecret};

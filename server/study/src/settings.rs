@@ -8,6 +8,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::assignment::Order;
 use crate::checks::{Checked, characters, identifier, refuse, unique, within};
+use crate::device::RequiredDevice;
 use crate::recruiting::Recruiting;
 use crate::stage::{MAX_BLOCK, MAX_STAGES, Stage, Step, Task, steps};
 use crate::templates::Language;
@@ -68,6 +69,8 @@ pub struct Settings {
     pub recruiting: Recruiting,
     /// Participants who play together, if any do.
     pub groups: Option<Groups>,
+    /// The device that participants need, if not any.
+    pub device: Option<RequiredDevice>,
 }
 
 /// How participants play together.
@@ -217,6 +220,7 @@ impl Settings {
         self.check_stages()?;
         self.check_groups()?;
         self.recruiting.check("recruiting")?;
+        self.device.unwrap_or_default().check("device")?;
         let away = self.drop_out_after_ms;
         within("drop_out_after_ms", away, 60_000..=604_800_000)?;
         for (field, at_ms) in [

@@ -37,6 +37,7 @@ pub fn settings() -> Settings {
         deletes_at_ms: None,
         recruiting: Recruiting::default(),
         groups: None,
+        device: None,
     }
 }
 

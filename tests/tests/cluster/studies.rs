@@ -253,6 +253,7 @@ async fn a_study_whose_owner_is_killed_goes_on_at_another_node() {
             open_link: study.open_link.clone(),
             panel_id: String::new(),
             request_id: vec![8; 32],
+            device: None,
         };
         let answer = settled(|| {
             let (mut service, request) = (service.clone(), request.clone());

@@ -41,10 +41,22 @@ async fn join(
     panel_id: &str,
     request: u8,
 ) -> Result<String, Status> {
+    join_on(service, open_link, panel_id, request, None).await
+}
+
+/// Joins as [`join`], on this device.
+async fn join_on(
+    service: &mut ParticipationServiceClient<Channel>,
+    open_link: &str,
+    panel_id: &str,
+    request: u8,
+    device: Option<v1::StudyDevice>,
+) -> Result<String, Status> {
     let request = v1::JoinStudyRequest {
         open_link: open_link.to_owned(),
         panel_id: panel_id.to_owned(),
         request_id: vec![request; 32],
+        device,
     };
     let joined = patiently("joining", service.join_study(request)).await?;
     Ok(joined.into_inner().link)
@@ -162,5 +174,93 @@ async fn people_of_a_panel_join_once_each_until_the_study_is_full() {
     let late = join(&mut service, &open_link, "cy", 4).await;
     assert_eq!(refusal(late, "url"), closed);
     let stopping = patiently("the server to stop", second.stop());
+    stopping.await.expect("a clean end");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_study_that_needs_a_computer_begins_on_no_other_device() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let server = host(folder.path()).await;
+    let channel = Channel::from_shared(server.url()).expect("a URL");
+    let channel = channel.connect().await.expect("the server listens");
+    let request = v1::CreateStudyRequest {
+        settings: Some(v1::StudySettings {
+            device: Some(v1::StudyRequiredDevice {
+                pointer: v1::StudyPointer::Fine.into(),
+                min_width: 1024,
+            }),
+            ..recruited()
+        }),
+        request_id: Vec::new(),
+    };
+    let created = StudyServiceClient::new(channel).create_study(request).await;
+    let created = created.expect("valid").into_inner();
+    let study = created.study.expect("a study");
+    let open_link = study.open_link;
+    let mut lab = Lab::connect(&server, (study.study_id, created.owner_token)).await;
+
+    let device = |pointer: v1::StudyPointer, width| v1::StudyDevice {
+        width,
+        height: 800,
+        pixels: 100,
+        pointer: pointer.into(),
+        time_zone: "Europe/Rome".to_owned(),
+    };
+    let phone = device(v1::StudyPointer::Coarse, 390);
+    let narrow = device(v1::StudyPointer::Fine, 1023);
+    let invalid = v1::StudyDevice {
+        time_zone: String::new(),
+        ..device(v1::StudyPointer::Fine, 1024)
+    };
+    let others = [None, Some(phone.clone()), Some(narrow), Some(invalid)];
+    let mut service = participants(&server.url()).await;
+    for other in others.clone() {
+        let refused = join_on(&mut service, &open_link, "ada", 1, other).await;
+        let info = refused.expect_err("refused").get_details_error_info();
+        let info = info.expect("error info");
+        assert_eq!(info.reason, "WRONG_DEVICE");
+        let language = "en".to_owned();
+        let said = ["pointer", "min_width", "language"].map(|key| info.metadata[key].clone());
+        assert_eq!(said, ["fine".to_owned(), "1024".to_owned(), language]);
+    }
+    assert_eq!(lab.participants().await, []);
+    let computer = Some(device(v1::StudyPointer::Fine, 1024));
+    let own = join_on(&mut service, &open_link, "ada", 1, computer.clone()).await;
+    let own = own.expect("a computer");
+    for other in others {
+        let request = v1::OpenStudyRequest {
+            link: own.clone(),
+            device: other,
+        };
+        let refused = service.open_study(request).await;
+        assert_eq!(refusal(refused, "pointer").0, "WRONG_DEVICE");
+    }
+    let invited = lab.participants().await;
+    let counts = invited.iter().map(|it| (it.state(), it.sessions, it.slot));
+    let expected = (v1::StudyParticipantState::Invited, 0, None);
+    assert_eq!(counts.collect::<Vec<_>>(), [expected]);
+
+    let request = v1::OpenStudyRequest {
+        link: own.clone(),
+        device: computer,
+    };
+    let opened = service.open_study(request).await.expect("a computer");
+    let session = opened.into_inner().session;
+    // The phone takes nothing over.
+    let request = v1::OpenStudyRequest {
+        link: own.clone(),
+        device: Some(phone),
+    };
+    let refused = service.open_study(request).await;
+    assert_eq!(refusal(refused, "min_width").0, "WRONG_DEVICE");
+    let consent = v1::GiveConsentRequest { session, step: 0 };
+    service.give_consent(consent).await.expect("a place");
+    // It can withdraw.
+    let request = v1::WithdrawFromStudyRequest {
+        link: own,
+        delete_data: true,
+    };
+    service.withdraw_from_study(request).await.expect("at once");
+    let stopping = patiently("the server to stop", server.stop());
     stopping.await.expect("a clean end");
 }

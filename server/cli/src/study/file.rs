@@ -15,8 +15,9 @@ use toml::de::{DeTable, DeValue};
 use crate::CommandError;
 
 /// Fields with values of enums, and the prefixes of their values.
-const ENUMS: [(&str, &str); 11] = [
+const ENUMS: [(&str, &str); 12] = [
     ("left_over", "STUDY_LEFT_OVER_"),
+    ("pointer", "STUDY_POINTER_"),
     ("order", "STUDY_ORDER_"),
     ("labels", "STUDY_LABELS_"),
     ("hide", "STUDY_HIDE_"),
@@ -145,6 +146,7 @@ mod tests {
             drop_out_after_ms = 60_000
             closes_at_ms = 2031-05-01T18:00:00.5+02:00
             groups = { size = 2, left_over = "agents" }
+            device = { pointer = "fine", min_width = 1024 }
             [[conditions]]
             id = "a"
             labels = "players"
@@ -168,6 +170,8 @@ mod tests {
         assert_eq!(settings.drop_out_after_ms, 60_000);
         let groups = settings.groups.as_ref().expect("they are set");
         assert_eq!(groups.left_over(), v1::StudyLeftOver::Agents);
+        let device = settings.device.as_ref().expect("it is set");
+        assert_eq!(device.pointer(), v1::StudyPointer::Fine);
         assert_eq!(settings.closes_at_ms, 1_935_417_600_500);
         let minutes = parse("closes_at_ms = 2031-05-01T18:00+02:00", Path::new(""));
         assert_eq!(minutes.expect("valid").closes_at_ms, 1_935_417_600_000);

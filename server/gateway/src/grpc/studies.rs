@@ -569,6 +569,7 @@ fn code_of(refusal: &StudyRefusal) -> (Code, &'static str) {
         StudyRefusal::Unknown => (Code::NotFound, "PARTICIPANT_UNKNOWN"),
         StudyRefusal::Closed => (Code::FailedPrecondition, "STUDY_CLOSED"),
         StudyRefusal::Full => (Code::FailedPrecondition, "STUDY_FULL"),
+        StudyRefusal::WrongDevice(_) => (Code::FailedPrecondition, "WRONG_DEVICE"),
         StudyRefusal::Over => (Code::FailedPrecondition, "PARTICIPATION_OVER"),
         StudyRefusal::Superseded => (Code::Aborted, "SESSION_SUPERSEDED"),
         StudyRefusal::StepOver => (Code::FailedPrecondition, "STEP_OVER"),

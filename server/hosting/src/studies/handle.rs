@@ -239,7 +239,12 @@ impl StudyHandle {
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
-    pub async fn join(&self, key: Key, joined: Joined) -> Result<Result<u32, NotAdded>, Stopped> {
+    pub async fn join(
+        &self,
+        key: Key,
+        joined: Joined,
+        device: Option<Device>,
+    ) -> Result<Result<u32, NotAdded>, Stopped> {
         // A repeated request takes no memory.
         if let Some(number) = self.committed().joined_by(&joined.request_sha256) {
             return Ok(Ok(number));
@@ -251,7 +256,7 @@ impl StudyHandle {
         };
         let data = Arc::clone(&self.shared.data);
         let added = self.command(move |study, _| {
-            let (number, change) = study.join(joined)?;
+            let (number, change) = study.join(joined, device.as_ref())?;
             if change.is_some() {
                 data.keep_participants(memory);
             }
@@ -261,7 +266,7 @@ impl StudyHandle {
     }
 
     /// Opens a session of a participant. Returns its number; 0 if there is only the end to show. The
-    /// device, for whose memory a caller is charged, is left out if there is none for it.
+    /// device, for whose memory a caller is charged, is not stored if there is none for it.
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
@@ -272,14 +277,15 @@ impl StudyHandle {
         device: Option<Device>,
     ) -> Result<Result<u32, Refusal>, Stopped> {
         let memory = (device.as_ref()).and_then(|device| self.shared.data.for_device(key, device));
-        let device = device.filter(|_| memory.is_some());
         let data = Arc::clone(&self.shared.data);
         self.command(move |study, now_ms| {
-            let Some(change) = study.open(number, device, now_ms)? else {
+            let Some(mut change) = study.open(number, device, now_ms)? else {
                 return Ok((Vec::new(), 0));
             };
-            if let Some(memory) = memory {
-                data.keep_device(number, memory);
+            match (memory, &mut change) {
+                (Some(memory), _) => data.keep_device(number, memory),
+                (None, Change::Opened { device, .. }) => *device = None,
+                (None, _) => {}
             }
             let before = study.participant(number).map_or(0, |it| it.session);
             Ok((vec![change], before + 1))

@@ -225,11 +225,17 @@ fn a_study_is_simulated_with_a_known_effect() {
     .assert_failed("multiple of 2");
 }
 
-/// Opens the study with a participant's link: from then on it is active.
+/// Opens the study with a participant's link, on a phone: from then on it is active.
 fn open(url: &str, link: &str) {
     let request = v1::OpenStudyRequest {
         link: link.into(),
-        ..Default::default()
+        device: Some(v1::StudyDevice {
+            width: 390,
+            height: 844,
+            pixels: 300,
+            pointer: v1::StudyPointer::Coarse.into(),
+            time_zone: "Europe/Rome".to_owned(),
+        }),
     };
     in_runtime(async {
         let client = Client::connect(url).await.unwrap();
@@ -324,6 +330,7 @@ const QUESTIONS: &str = r#"
 name = "questions"
 title = "Questions"
 participants = 2
+device = { pointer = "coarse" }
 
 [[conditions]]
 id = "one"

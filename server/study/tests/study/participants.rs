@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 
-use chefshat_study::testing::{settings, within};
-use chefshat_study::{At, Content, End, NewParticipants, Refusal, Settings, Status, Study};
+use chefshat_study::testing::{settings, text, within};
+use chefshat_study::{
+    At, Change, Content, Device, End, NewParticipants, Pointer, Refusal, RequiredDevice, Settings,
+    Stage, Status, Study, Task,
+};
 
-use super::support::{Lab, tests};
+use super::support::{Lab, device, tests};
 
 fn status(lab: &Lab, number: u32) -> Status {
     lab.study.participant(number).unwrap().status
@@ -80,6 +83,46 @@ fn the_newest_session_wins_and_repeated_commands_change_nothing() {
     let sessions = lab.study.participant(1).unwrap().session;
     lab.open(1).unwrap();
     assert_eq!(lab.study.participant(1).unwrap().session, sessions);
+}
+
+#[test]
+fn on_another_device_nothing_begins_and_nothing_is_taken() {
+    let required = RequiredDevice {
+        pointer: Some(Pointer::Coarse),
+        min_width: 0,
+    };
+    let mut lab = Lab::new(
+        Settings {
+            device: Some(required),
+            stages: vec![Stage::once(Task::Games { count: 1 }), Stage::once(text())],
+            ..settings()
+        },
+        1,
+    );
+    let added = lab.study.add(&tests(2)).unwrap();
+    lab.fold_all(added);
+    let with = |pointer| Device {
+        pointer: Some(pointer),
+        ..device()
+    };
+    let opened = |lab: &Lab, number, device| lab.study.open(number, device, lab.now_ms);
+    let refused = Err(Refusal::WrongDevice(required));
+    for device in [None, Some(with(Pointer::Fine))] {
+        assert_eq!(opened(&lab, 1, device), refused);
+    }
+    // The study gives slots when it is opened.
+    let change = opened(&lab, 1, Some(with(Pointer::Coarse))).unwrap();
+    assert!(matches!(change, Some(Change::Opened { slot: Some(0), .. })));
+    lab.fold_all(change);
+    // On another device it does not continue either, and the first session stays the newest.
+    assert_eq!(opened(&lab, 1, Some(with(Pointer::Fine))), refused);
+    assert_eq!(lab.study.participant(1).unwrap().session, 1);
+    lab.complete(1);
+    assert_eq!(opened(&lab, 1, None), Ok(None));
+
+    // A test participant is a program, or somebody who sees what others see.
+    assert!(opened(&lab, 2, None).unwrap().is_some());
+    assert_eq!(opened(&lab, 3, Some(with(Pointer::Fine))), refused);
 }
 
 #[test]

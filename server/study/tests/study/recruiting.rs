@@ -1,7 +1,9 @@
 //! The open link: who joins by it, and where participants go on at the end.
 
 use chefshat_study::testing::settings;
-use chefshat_study::{Change, Content, Device, End, Joined, Recruiting, Refusal, Settings, Study};
+use chefshat_study::{
+    Change, Content, Device, End, Joined, Recruiting, Refusal, RequiredDevice, Settings, Study,
+};
 
 use super::support::{Lab, device};
 
@@ -32,7 +34,7 @@ fn joining(request: u8, panel_id: &str) -> Joined {
 }
 
 fn join(study: &mut Study, request: u8, panel_id: &str) -> Result<u32, Refusal> {
-    let (number, change) = study.join(joining(request, panel_id))?;
+    let (number, change) = study.join(joining(request, panel_id), Some(&device()))?;
     if let Some(change) = change {
         study.fold(&change);
     }
@@ -82,6 +84,35 @@ fn nobody_joins_a_study_that_is_full_closed_or_has_no_open_link() {
 }
 
 #[test]
+fn on_another_device_nobody_joins() {
+    let required = RequiredDevice {
+        pointer: device().pointer,
+        min_width: device().width,
+    };
+    let mut study = Study::new(Settings {
+        device: Some(required),
+        ..recruited()
+    })
+    .unwrap();
+    let narrow = Device {
+        width: device().width - 1,
+        ..device()
+    };
+    for device in [None, Some(&narrow)] {
+        let refused = study.join(joining(1, "a"), device).unwrap_err();
+        assert_eq!(refused, Refusal::WrongDevice(required));
+    }
+    assert_eq!(join(&mut study, 1, "a"), Ok(1));
+    // Who has joined finds the link again, also there.
+    assert_eq!(study.join(joining(1, "a"), None), Ok((1, None)));
+    // Nobody is sent to another device when there is no place.
+    let close = study.close().expect("it is open");
+    study.fold(&close);
+    let late = study.join(joining(2, "b"), None);
+    assert_eq!(late.unwrap_err(), Refusal::Closed);
+}
+
+#[test]
 fn without_a_panel_an_id_is_not_kept() {
     let mut study = Study::new(Settings {
         recruiting: Recruiting {
@@ -120,7 +151,7 @@ fn participants_go_on_where_the_panel_says() {
 
 #[test]
 fn the_id_at_the_panel_is_deleted_with_the_data() {
-    let (_, added) = folded(&[]).join(joining(1, "secret")).unwrap();
+    let (_, added) = folded(&[]).join(joining(1, "secret"), None).unwrap();
     let mut changes = vec![added.unwrap()];
     changes.extend(folded(&changes).open(1, Some(device()), 1000).unwrap());
     changes.extend(folded(&changes).withdraw(1, true, 2000).unwrap());

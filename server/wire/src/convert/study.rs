@@ -13,8 +13,8 @@ use chefshat_room::policy::{Durability, Policy, Visibility};
 use chefshat_study::{
     AnswerSet, Arrival, Condition, Consent, Device, ExternalQuestionnaire, Factor, GROUP_SIZES,
     Groups, Hide, Item, ItemKind, Labels, Language, LeftOverPolicy, Order, Outcome, Part,
-    Participant, PlacedGame, PlayedGame, Pointer, Questionnaire, Recruiting, ScreenOut, Settings,
-    SettingsProblem, ShownIf, Stage, Status, Study, Task, Template, Text,
+    Participant, PlacedGame, PlayedGame, Pointer, Questionnaire, Recruiting, RequiredDevice,
+    ScreenOut, Settings, SettingsProblem, ShownIf, Stage, Status, Study, Task, Template, Text,
 };
 
 use super::agent::check_budget;
@@ -225,6 +225,7 @@ fn complete_questionnaire(
 /// The first invalid field.
 pub fn study_plan(message: &v1::StudySettings) -> Result<StudyPlan, SettingsProblem> {
     let groups = message.groups.as_ref().map(groups).transpose()?;
+    let device = message.device.as_ref().map(required_device).transpose()?;
     let group_size = groups.map_or(1, |groups| groups.size as usize);
     let mut plans = Vec::new();
     let mut conditions = Vec::new();
@@ -267,6 +268,7 @@ pub fn study_plan(message: &v1::StudySettings) -> Result<StudyPlan, SettingsProb
             deletes_at_ms: Some(message.deletes_at_ms).filter(|at_ms| *at_ms > 0),
             recruiting: recruiting(message.recruiting.clone().unwrap_or_default()),
             groups,
+            device,
         }),
         name: message.name.clone(),
         conditions: plans,
@@ -279,12 +281,7 @@ pub fn device_from_proto(message: v1::StudyDevice) -> Option<Device> {
         width: message.width.try_into().ok()?,
         height: message.height.try_into().ok()?,
         pixels: message.pixels.try_into().ok()?,
-        pointer: match message.pointer() {
-            v1::StudyPointer::Unspecified => None,
-            v1::StudyPointer::None => Some(Pointer::None),
-            v1::StudyPointer::Coarse => Some(Pointer::Coarse),
-            v1::StudyPointer::Fine => Some(Pointer::Fine),
-        },
+        pointer: pointer(message.pointer()),
         time_zone: message.time_zone,
     };
     device.is_valid().then_some(device)
@@ -316,6 +313,26 @@ fn recruiting(message: v1::StudyRecruiting) -> Recruiting {
         full_url: message.full_url,
         screened_out_url: message.screened_out_url,
         left_over_url: message.left_over_url,
+    }
+}
+
+fn required_device(message: &v1::StudyRequiredDevice) -> Result<RequiredDevice, SettingsProblem> {
+    Ok(RequiredDevice {
+        pointer: match v1::StudyPointer::try_from(message.pointer) {
+            Ok(needed) => pointer(needed),
+            Err(_) => return Err(problem("device.pointer", "choose FINE or COARSE")),
+        },
+        // The core refuses one that does not fit.
+        min_width: u16::try_from(message.min_width).unwrap_or(u16::MAX),
+    })
+}
+
+fn pointer(message: v1::StudyPointer) -> Option<Pointer> {
+    match message {
+        v1::StudyPointer::Unspecified => None,
+        v1::StudyPointer::None => Some(Pointer::None),
+        v1::StudyPointer::Coarse => Some(Pointer::Coarse),
+        v1::StudyPointer::Fine => Some(Pointer::Fine),
     }
 }
 

@@ -1,8 +1,8 @@
-//! The settings of a study: the languages there are, with those that have the texts of templates, and
-//! what groups need of conditions.
+//! The settings of a study: the languages there are, with those that have the texts of templates, what
+//! groups need of conditions, and the device that is needed.
 
 use chefshat_proto::v1::{self, study_stage};
-use chefshat_study::SettingsProblem;
+use chefshat_study::{Pointer, SettingsProblem};
 
 use super::{complete_settings, study_plan};
 
@@ -97,4 +97,25 @@ fn the_games_of_groups_are_played_to_their_ends() {
     three.groups.as_mut().unwrap().size = 3;
     let refused = study_plan(&three).unwrap_err();
     assert_eq!(refused.field, "conditions[0].seats");
+}
+
+#[test]
+fn a_device_that_is_needed_has_a_pointer_and_a_width() {
+    let complete = complete_settings(in_pairs(v1::RoomPolicy::default()), || [1; 32], true);
+    let complete = complete.unwrap();
+    assert_eq!(study_plan(&complete).unwrap().core.device, None);
+    let needed = |pointer: i32, min_width| {
+        let message = v1::StudySettings {
+            device: Some(v1::StudyRequiredDevice { pointer, min_width }),
+            ..complete.clone()
+        };
+        study_plan(&message).map(|plan| plan.core.device.expect("it is set"))
+    };
+    let device = needed(v1::StudyPointer::Fine.into(), 1024).unwrap();
+    assert_eq!(device.pointer, Some(Pointer::Fine));
+    assert_eq!(device.min_width, 1024);
+    assert_eq!(needed(0, 1).unwrap().pointer, None);
+    assert_eq!(needed(77, 0).unwrap_err().field, "device.pointer");
+    // A width that does not fit is none that fits: the core refuses it.
+    assert_eq!(needed(0, 65_536 + 1024).unwrap().min_width, u16::MAX);
 }

@@ -110,6 +110,7 @@ export const faults: Texts["faults"] = {
     SESSION_SUPERSEDED:
       "Die Studie wurde in einem anderen Fenster oder auf einem anderen Gerät geöffnet. Sie geht dort weiter.",
     STUDY_FULL: "Alle Plätze dieser Studie sind vergeben. Danke für Ihr Interesse.",
+    WRONG_DEVICE: "Diese Studie braucht ein anderes Gerät.",
     STUDY_CLOSED: "Diese Studie ist geschlossen. Danke für Ihr Interesse.",
     STUDY_RUNNING: "Einige sind mitten in dieser Studie. Warte, bis sie fertig sind, oder entferne sie.",
     STUDY_UNKNOWN: "Diese Studie gibt es nicht, oder der Schlüssel gehört nicht zu ihr.",

@@ -101,6 +101,7 @@ export const faults = {
     SESSION_UNKNOWN: "The connection to the study was interrupted. Open your link again.",
     SESSION_SUPERSEDED: "The study was opened in another window or on another device. It continues there.",
     STUDY_FULL: "All places in this study are taken. Thank you for your interest.",
+    WRONG_DEVICE: "This study needs another device.",
     STUDY_CLOSED: "This study is closed. Thank you for your interest.",
     STUDY_RUNNING: "Participants are in the middle of this study. Wait for them, or remove them.",
     STUDY_UNKNOWN: "This study does not exist, or the owner token does not belong to it.",

@@ -105,6 +105,7 @@ export const faults: Texts["faults"] = {
     SESSION_UNKNOWN: "La conexión con el estudio se ha interrumpido. Abra su enlace de nuevo.",
     SESSION_SUPERSEDED: "El estudio se ha abierto en otra ventana o en otro dispositivo. Continúa allí.",
     STUDY_FULL: "Todas las plazas de este estudio están ocupadas. Gracias por su interés.",
+    WRONG_DEVICE: "Este estudio necesita otro dispositivo.",
     STUDY_CLOSED: "Este estudio está cerrado. Gracias por su interés.",
     STUDY_RUNNING: "Hay participantes en mitad de este estudio. Espera a que terminen o quítalos.",
     STUDY_UNKNOWN: "Este estudio no existe, o la clave no le pertenece.",

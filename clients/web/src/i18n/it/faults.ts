@@ -101,6 +101,7 @@ export const faults: Texts["faults"] = {
     SESSION_UNKNOWN: "Il collegamento con lo studio si è interrotto. Apra di nuovo il Suo link.",
     SESSION_SUPERSEDED: "Lo studio è stato aperto in un’altra finestra o su un altro dispositivo, e continua lì.",
     STUDY_FULL: "Tutti i posti di questo studio sono occupati. Grazie per l’interesse.",
+    WRONG_DEVICE: "Questo studio richiede un altro dispositivo.",
     STUDY_CLOSED: "Questo studio è chiuso. Grazie per l’interesse.",
     STUDY_RUNNING: "Ci sono partecipanti a metà dello studio. Aspetta che finiscano, oppure rimuovili.",
     STUDY_UNKNOWN: "Questo studio non esiste, o la chiave non gli appartiene.",

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use chefshat_proto::v1::{self, participation_service_server::ParticipationService};
 use chefshat_record::convert::FieldProblem;
 use chefshat_study::{
-    At, ItemAnswer, Joined, ParticipantLink, Refusal as StudyRefusal, SessionSecret,
+    At, ItemAnswer, Joined, ParticipantLink, Pointer, Refusal as StudyRefusal, RequiredDevice,
+    SessionSecret,
 };
 use prost::Message as _;
 use sha2::{Digest as _, Sha256};
@@ -112,8 +113,11 @@ fn link_unknown() -> Status {
 }
 
 /// The status for somebody with this id at the panel who may not begin: it names where the page sends
-/// them.
+/// them, or the device that is needed.
 fn not_admitted(handle: &StudyHandle, panel_id: &str, refusal: StudyRefusal) -> Status {
+    if let StudyRefusal::WrongDevice(required) = refusal {
+        return wrong_device(handle, required);
+    }
     let is_late = matches!(
         refusal,
         StudyRefusal::Closed | StudyRefusal::Full | StudyRefusal::TooManyParticipants
@@ -125,6 +129,25 @@ fn not_admitted(handle: &StudyHandle, panel_id: &str, refusal: StudyRefusal) -> 
         }
         _ => refused(refusal),
     }
+}
+
+/// The status for a device on which nobody may take part, with what the page says about it.
+fn wrong_device(handle: &StudyHandle, required: RequiredDevice) -> Status {
+    let refusal = StudyRefusal::WrongDevice(required);
+    let (code, reason) = code_of(&refusal);
+    let pointer = match required.pointer {
+        None | Some(Pointer::None) => "",
+        Some(Pointer::Fine) => "fine",
+        Some(Pointer::Coarse) => "coarse",
+    };
+    let min_width = required.min_width.to_string();
+    let language = handle.read(|study| study.settings().language.code());
+    let metadata = [
+        ("pointer", pointer),
+        ("min_width", &min_width),
+        ("language", language),
+    ];
+    status(code, reason, refusal.to_string(), metadata)
 }
 
 /// What to show next.
@@ -170,7 +193,8 @@ impl ParticipationService for StudyCalls {
         self.calls.charge(key, COST_OF_ROOM);
         let rooms = self.studies.rooms();
         (rooms.may_store(key, panel_id.len())).map_err(Refusal::from)?;
-        let joined = handle.join(key, joined).await.map_err(stopped)?;
+        let device = request.device.and_then(convert::device_from_proto);
+        let joined = handle.join(key, joined, device).await.map_err(stopped)?;
         let number = joined.map_err(|problem| match problem {
             NotAdded::Study(refusal) => not_admitted(&handle, &panel_id, refusal),
             // Somebody from a panel does not wait until others have deleted their studies.

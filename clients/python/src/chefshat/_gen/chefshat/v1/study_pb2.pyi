@@ -1252,6 +1252,7 @@ class StudySettings(_message.Message):
     RECRUITING_FIELD_NUMBER: _builtins.int
     DELETES_AT_MS_FIELD_NUMBER: _builtins.int
     GROUPS_FIELD_NUMBER: _builtins.int
+    DEVICE_FIELD_NUMBER: _builtins.int
     name: _builtins.str
     """Name for researchers, 1..=64 characters. Participants never see it."""
     title: _builtins.str
@@ -1313,6 +1314,10 @@ class StudySettings(_message.Message):
     def groups(self) -> Global___StudyGroups:
         """Participants who play together; unset: everybody plays its own games."""
 
+    @_builtins.property
+    def device(self) -> Global___StudyRequiredDevice:
+        """The device that participants need; unset: any."""
+
     def __init__(
         self,
         *,
@@ -1333,14 +1338,46 @@ class StudySettings(_message.Message):
         recruiting: Global___StudyRecruiting | None = ...,
         deletes_at_ms: _builtins.int = ...,
         groups: Global___StudyGroups | None = ...,
+        device: Global___StudyRequiredDevice | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _typing.Literal["groups", b"groups", "recruiting", b"recruiting"]  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["device", b"device", "groups", b"groups", "recruiting", b"recruiting"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["assignment_seed", b"assignment_seed", "block_size", b"block_size", "closes_at_ms", b"closes_at_ms", "conditions", b"conditions", "deletes_at_ms", b"deletes_at_ms", "drop_out_after_ms", b"drop_out_after_ms", "factors", b"factors", "groups", b"groups", "language", b"language", "name", b"name", "order", b"order", "participants", b"participants", "recruiting", b"recruiting", "seeds", b"seeds", "stages", b"stages", "title", b"title", "traces", b"traces"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["assignment_seed", b"assignment_seed", "block_size", b"block_size", "closes_at_ms", b"closes_at_ms", "conditions", b"conditions", "deletes_at_ms", b"deletes_at_ms", "device", b"device", "drop_out_after_ms", b"drop_out_after_ms", "factors", b"factors", "groups", b"groups", "language", b"language", "name", b"name", "order", b"order", "participants", b"participants", "recruiting", b"recruiting", "seeds", b"seeds", "stages", b"stages", "title", b"title", "traces", b"traces"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___StudySettings: _TypeAlias = StudySettings  # noqa: Y015
+
+@_typing.final
+class StudyRequiredDevice(_message.Message):
+    """The device that participants need. On another one, or without StudyDevice, nobody can join or open
+    the study: nothing changes then, so that the same link can be opened on the right device. A test
+    participant needs no StudyDevice.
+    """
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    POINTER_FIELD_NUMBER: _builtins.int
+    MIN_WIDTH_FIELD_NUMBER: _builtins.int
+    pointer: Global___StudyPointer.ValueType
+    """Its most exact pointer: FINE for a computer, COARSE for a phone or tablet. UNSPECIFIED: any. Not
+    NONE.
+    """
+    min_width: _builtins.int
+    """Least width of the page, in CSS pixels, at most 3840; 0: any."""
+    def __init__(
+        self,
+        *,
+        pointer: Global___StudyPointer.ValueType = ...,
+        min_width: _builtins.int = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["min_width", b"min_width", "pointer", b"pointer"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___StudyRequiredDevice: _TypeAlias = StudyRequiredDevice  # noqa: Y015
 
 @_typing.final
 class StudyDevice(_message.Message):

@@ -665,6 +665,7 @@ class JoinStudyRequest(_message.Message):
     OPEN_LINK_FIELD_NUMBER: _builtins.int
     PANEL_ID_FIELD_NUMBER: _builtins.int
     REQUEST_ID_FIELD_NUMBER: _builtins.int
+    DEVICE_FIELD_NUMBER: _builtins.int
     open_link: _builtins.str
     """`open_link` of Study."""
     panel_id: _builtins.str
@@ -675,16 +676,21 @@ class JoinStudyRequest(_message.Message):
     """32 random bytes, which must be kept secret. A repeated call with the same ones, after a lost
     response, adds nobody and returns the same link.
     """
+    @_builtins.property
+    def device(self) -> _study_pb2.StudyDevice:
+        """The device of the person. An invalid one counts as none."""
+
     def __init__(
         self,
         *,
         open_link: _builtins.str = ...,
         panel_id: _builtins.str = ...,
         request_id: _builtins.bytes = ...,
+        device: _study_pb2.StudyDevice | None = ...,
     ) -> None: ...
-    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    _HasFieldArgType: _TypeAlias = _typing.Literal["device", b"device"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["open_link", b"open_link", "panel_id", b"panel_id", "request_id", b"request_id"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["device", b"device", "open_link", b"open_link", "panel_id", b"panel_id", "request_id", b"request_id"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -724,7 +730,7 @@ class OpenStudyRequest(_message.Message):
     """The secret of the link: `link` of StudyLink."""
     @_builtins.property
     def device(self) -> _study_pb2.StudyDevice:
-        """The device on which it is opened. An invalid one is ignored."""
+        """The device on which it is opened. An invalid one counts as none."""
 
     def __init__(
         self,

@@ -642,7 +642,9 @@ class ParticipationServiceServicer(object):
 
     def JoinStudy(self, request, context):
         """Adds a participant who has the open link (`open_link` of Study), and returns its own link for
-        OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+        OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL;
+        WRONG_DEVICE if `device` is not the StudyRequiredDevice, which it has as metadata: `pointer`,
+        "fine", "coarse" or empty, `min_width`, and `language` of the study; nothing has changed);
         INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
         RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
         study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
@@ -655,9 +657,9 @@ class ParticipationServiceServicer(object):
     def OpenStudy(self, request, context):
         """Opens the study on this device: the participant's earlier session ends. For a participant whose
         participation is over there is only the end to show, and no session. UNAUTHENTICATED
-        (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; LINK_OPEN for an open link, with the
-        metadata `id_parameter`: take part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS);
-        UNAVAILABLE (SHUTTING_DOWN).
+        (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; WRONG_DEVICE as JoinStudy, and an
+        earlier session does not end; LINK_OPEN for an open link, with the metadata `id_parameter`: take
+        part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS); UNAVAILABLE (SHUTTING_DOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')

@@ -310,7 +310,9 @@ class ParticipationServiceStub:
     def __new__(cls, channel: _aio.Channel) -> ParticipationServiceAsyncStub: ...
     JoinStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.JoinStudyRequest, _study_service_pb2.JoinStudyResponse]
     """Adds a participant who has the open link (`open_link` of Study), and returns its own link for
-    OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+    OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL;
+    WRONG_DEVICE if `device` is not the StudyRequiredDevice, which it has as metadata: `pointer`,
+    "fine", "coarse" or empty, `min_width`, and `language` of the study; nothing has changed);
     INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
     RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
     study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
@@ -319,9 +321,9 @@ class ParticipationServiceStub:
     OpenStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.OpenStudyRequest, _study_service_pb2.OpenStudyResponse]
     """Opens the study on this device: the participant's earlier session ends. For a participant whose
     participation is over there is only the end to show, and no session. UNAUTHENTICATED
-    (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; LINK_OPEN for an open link, with the
-    metadata `id_parameter`: take part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS);
-    UNAVAILABLE (SHUTTING_DOWN).
+    (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; WRONG_DEVICE as JoinStudy, and an
+    earlier session does not end; LINK_OPEN for an open link, with the metadata `id_parameter`: take
+    part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS); UNAVAILABLE (SHUTTING_DOWN).
     """
     FollowParticipation: _grpc.UnaryStreamMultiCallable[_study_service_pb2.FollowParticipationRequest, _study_service_pb2.FollowParticipationResponse]
     """Streams what to show, now and after every change; a message without a view is a heartbeat. The
@@ -374,7 +376,9 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
     def __init__(self, channel: _aio.Channel) -> None: ...
     JoinStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.JoinStudyRequest, _study_service_pb2.JoinStudyResponse]  # type: ignore[assignment]
     """Adds a participant who has the open link (`open_link` of Study), and returns its own link for
-    OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+    OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL;
+    WRONG_DEVICE if `device` is not the StudyRequiredDevice, which it has as metadata: `pointer`,
+    "fine", "coarse" or empty, `min_width`, and `language` of the study; nothing has changed);
     INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
     RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
     study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
@@ -383,9 +387,9 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
     OpenStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.OpenStudyRequest, _study_service_pb2.OpenStudyResponse]  # type: ignore[assignment]
     """Opens the study on this device: the participant's earlier session ends. For a participant whose
     participation is over there is only the end to show, and no session. UNAUTHENTICATED
-    (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; LINK_OPEN for an open link, with the
-    metadata `id_parameter`: take part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS);
-    UNAVAILABLE (SHUTTING_DOWN).
+    (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; WRONG_DEVICE as JoinStudy, and an
+    earlier session does not end; LINK_OPEN for an open link, with the metadata `id_parameter`: take
+    part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS); UNAVAILABLE (SHUTTING_DOWN).
     """
     FollowParticipation: _aio.UnaryStreamMultiCallable[_study_service_pb2.FollowParticipationRequest, _study_service_pb2.FollowParticipationResponse]  # type: ignore[assignment]
     """Streams what to show, now and after every change; a message without a view is a heartbeat. The
@@ -441,7 +445,9 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.JoinStudyResponse, _abc.Awaitable[_study_service_pb2.JoinStudyResponse]]:
         """Adds a participant who has the open link (`open_link` of Study), and returns its own link for
-        OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL);
+        OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL;
+        WRONG_DEVICE if `device` is not the StudyRequiredDevice, which it has as metadata: `pointer`,
+        "fine", "coarse" or empty, `min_width`, and `language` of the study; nothing has changed);
         INVALID_ARGUMENT (PANEL_ID_REFUSED, REQUEST_ID_REFUSED); ALREADY_EXISTS (PANEL_ID_TAKEN);
         RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
         study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
@@ -456,9 +462,9 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
     ) -> _typing.Union[_study_service_pb2.OpenStudyResponse, _abc.Awaitable[_study_service_pb2.OpenStudyResponse]]:
         """Opens the study on this device: the participant's earlier session ends. For a participant whose
         participation is over there is only the end to show, and no session. UNAUTHENTICATED
-        (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; LINK_OPEN for an open link, with the
-        metadata `id_parameter`: take part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS);
-        UNAVAILABLE (SHUTTING_DOWN).
+        (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; WRONG_DEVICE as JoinStudy, and an
+        earlier session does not end; LINK_OPEN for an open link, with the metadata `id_parameter`: take
+        part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS); UNAVAILABLE (SHUTTING_DOWN).
         """
 
     @_abc_1.abstractmethod
