@@ -17,6 +17,7 @@ import {
   type StudyParticipant,
   StudyParticipantSchema,
   StudyParticipantState,
+  StudyPointer,
   StudySchema,
 } from "../src/gen/chefshat/v1/study_pb";
 import {
@@ -101,6 +102,11 @@ test("the form makes the settings of a study, and says what is missing", async (
   const tomorrow = new Date(Date.now() + 86_400_000).toISOString().slice(0, 16);
   const dated = await settingsOf({ ...filled, closesAt: tomorrow, deletesAt: tomorrow });
   expect([dated.closesAtMs, dated.deletesAtMs]).toEqual(Array(2).fill(BigInt(Date.parse(tomorrow))));
+  expect(settings.device).toBe(undefined);
+  const onComputers = await settingsOf({ ...filled, device: "fine", minWidth: "1024" });
+  expect(onComputers.device).toEqual({ pointer: StudyPointer.FINE, minWidth: 1024 });
+  const wide = await settingsOf({ ...filled, minWidth: "600" });
+  expect(wide.device).toEqual({ pointer: StudyPointer.UNSPECIFIED, minWidth: 600 });
   const pairs = await settingsOf({ ...filled, people: "2", fill: true, within: true });
   expect(pairs.groups).toEqual({ size: 2, leftOver: StudyLeftOver.AGENTS });
   expect(pairs.conditions?.map(({ seats, policy }) => [seats?.length, policy?.substitute])).toEqual([
@@ -130,6 +136,8 @@ test.each([
 
 test.each([
   [{ participants: "0" }, "participants"],
+  [{ minWidth: "3841" }, "minWidth"],
+  [{ minWidth: "wide" }, "minWidth"],
   [{ games: "many" }, "games"],
   [{ people: "5" }, "people"],
   [{ participants: "25", people: "2" }, "participants"],
@@ -174,12 +182,17 @@ test.each([
 test("values of enums are written in short, as for the command", async () => {
   const text = `
     groups = { size = 2, left_over = "agents" }
+    device = { pointer = "fine", min_width = 1024 }
     [[conditions]]
     id = "A"
+    levels = { pointer = "shown" }
     policy = { abort = "never", reward_scheme = "paper", clocks = [{ kind = "human", decision_time_ms = 60_000 }] }
     rules = { opening = "golden", pass_scope = "turn" }
     seats = [{ reserved_for = "robot" }]`;
-  const { groups, conditions } = await settingsFrom(text, "study.toml");
+  const { groups, device, conditions } = await settingsFrom(text, "study.toml");
+  expect([device?.pointer, device?.minWidth]).toEqual([StudyPointer.FINE, 1024]);
+  // The name of a factor is no field.
+  expect(conditions[0]?.levels).toEqual({ pointer: "shown" });
   expect(groups?.leftOver).toBe(StudyLeftOver.AGENTS);
   expect(conditions[0]?.rules?.passScope).toBe(PassScope.TURN);
   expect(conditions[0]?.policy?.abort).toBe(AbortPolicy.NEVER);

@@ -326,6 +326,65 @@ test.each(["LINK_UNKNOWN", "STUDY_CLOSED", "STUDY_FULL"])("%s is said in words",
   expect(said.length).toBeGreaterThan(20);
 });
 
+test("on another device than the study needs, the page says which, and opens the study where the window fits", async () => {
+  const { sent } = fakeStudy([CONSENT]);
+  const needs = { pointer: "", min_width: "1200", language: "en" };
+  const open = vi.spyOn(participationApi, "openStudy");
+  const wrong = refused("WRONG_DEVICE", Code.FailedPrecondition, needs);
+  open.mockRejectedValueOnce(wrong).mockRejectedValueOnce(wrong);
+  await show();
+  expect(title()).toBe("This study needs another device");
+  expect(root.textContent).toContain(`at least 1200 pixels wide. Here it is ${window.innerWidth} pixels wide`);
+  expect(root.querySelector('[data-part="invite-link"]')?.textContent).toBe(location.href);
+  expect(root.querySelector('[aria-label="QR code of the link"]')).not.toBeNull();
+  await press("Try again");
+  expect([open.mock.calls.length, sent.length]).toEqual([2, 0]);
+  const resized = async (width: number) => {
+    vi.spyOn(window, "innerWidth", "get").mockReturnValue(width);
+    await act(() => void window.dispatchEvent(new Event("resize")));
+    await settled();
+  };
+  await resized(1199);
+  expect(open).toHaveBeenCalledTimes(2);
+  await resized(1200);
+  expect(title()).toBe("Before you begin");
+});
+
+test.each([
+  ["fine", "Sie läuft auf einem Computer mit Maus oder Touchpad.", 0],
+  ["coarse", "Sie läuft auf einem Smartphone oder Tablet.", 1],
+])(
+  "a study that needs a %s pointer says so in its language, and can be withdrawn from",
+  async (pointer, words, codes) => {
+    const { sent } = fakeStudy([CONSENT]);
+    const needs = { pointer, min_width: "0", language: "de" };
+    const wrong = refused("WRONG_DEVICE", Code.FailedPrecondition, needs);
+    vi.spyOn(participationApi, "openStudy").mockRejectedValue(wrong);
+    await show();
+    await vi.waitFor(() => expect(title()).toBe("Diese Studie braucht ein anderes Gerät"));
+    expect(root.textContent).toContain(words);
+    expect(root.textContent).not.toContain("Pixel breit");
+    expect(root.querySelectorAll('[aria-label="QR-Code des Links"]')).toHaveLength(codes);
+    await press("Teilnahme zurückziehen…");
+    await press("Jetzt zurückziehen");
+    expect(sent.map(({ call }) => call)).toEqual(["withdraw"]);
+    await vi.waitFor(() => expect(title()).toBe("The study is over for you"));
+  },
+);
+
+test("by an open link nobody joins on another device, and there is nothing to withdraw from", async () => {
+  fakeStudy([CONSENT]);
+  vi.spyOn(participationApi, "openStudy").mockRejectedValueOnce(refused("LINK_OPEN"));
+  const needs = { pointer: "fine", min_width: "0", language: "en" };
+  const join = vi
+    .spyOn(participationApi, "joinStudy")
+    .mockRejectedValue(refused("WRONG_DEVICE", Code.FailedPrecondition, needs));
+  await show();
+  expect(title()).toBe("This study needs another device");
+  expect(join.mock.calls[0]?.[0].device?.width).toBe(window.innerWidth);
+  expect(button("Withdraw")).toBeUndefined();
+});
+
 test("a game is prepared, and its room is asked for with the ticket alone", async () => {
   const game = { game: 1, games: 2, roomId: "ab".repeat(16), gameId: "cd".repeat(16), ticket: "ef".repeat(48) };
   const { streams } = fakeStudy([{ case: "game", value: { game: 1, games: 2 } }]);

@@ -21,8 +21,12 @@ import { participationApi } from "../src/studies/client";
 type Content = MessageInitShape<typeof StudyViewSchema>["content"];
 
 /** An error of the server with a reason. */
-export function refused(reason: string, code = Code.FailedPrecondition): ConnectError {
-  return new ConnectError(reason, code, undefined, [{ desc: ErrorInfoSchema, value: { reason } }]);
+export function refused(
+  reason: string,
+  code = Code.FailedPrecondition,
+  metadata: Record<string, string> = {},
+): ConnectError {
+  return new ConnectError(reason, code, undefined, [{ desc: ErrorInfoSchema, value: { reason, metadata } }]);
 }
 
 /** A view of a study with these stages. */

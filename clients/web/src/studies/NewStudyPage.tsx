@@ -88,6 +88,7 @@ function FromFile() {
 
 type PanelUrl = (typeof PANEL_URLS)[number];
 const LABELS: readonly ConditionForm["labels"][] = ["players", "kinds", "asTheyAre"];
+const DEVICES: readonly StudyForm["device"][] = ["any", "fine", "coarse"];
 
 function FromForm() {
   const words = t().studies.make;
@@ -127,7 +128,7 @@ function FromForm() {
       autoComplete="off"
     />
   );
-  const number = (name: "participants" | "people" | "games" | "shifts", label: string, hint?: string) => (
+  const number = (name: "participants" | "people" | "games" | "shifts" | "minWidth", label: string, hint?: string) => (
     <TextField
       label={label}
       hint={hint}
@@ -234,6 +235,15 @@ function FromForm() {
       {text("external", words.external, words.externalHint)}
       {long("debriefing", words.debriefing)}
       {check("traces", words.traces)}
+      <div class={css.fields}>
+        <SelectField
+          label={words.devices}
+          value={form.device}
+          options={DEVICES.map((value) => ({ value, label: words.device[value] }))}
+          onPick={(device) => change({ device })}
+        />
+        {number("minWidth", words.minWidth, words.minWidthHint)}
+      </div>
       <div class={css.fields}>
         {DATES.map((name) => (
           <TextField

@@ -32,6 +32,7 @@ import { StageTitle } from "./Stage";
 import css from "./Study.module.css";
 import { StudyGame } from "./StudyGame";
 import { safeAddress } from "./safe-address";
+import { WRONG_DEVICE, WrongDevice } from "./WrongDevice";
 
 /** How long after its date the data of a study are deleted, at most. */
 const DELETION_TAKES_MS = 7_200_000n;
@@ -71,6 +72,14 @@ export function Taking({ part }: { part: Participating }) {
       </section>
     );
   }
+  if (presence === "failed" && part.fault.value?.reason === WRONG_DEVICE) {
+    return (
+      <div class={css.study}>
+        <WrongDevice fault={part.fault.value} retry={part.open} />
+        {part.hasLink() && <Withdraw end={undefined} part={part} />}
+      </div>
+    );
+  }
   if (presence === "failed" && part.fault.value) {
     return (
       <section class={`sheet ${css.stage}`}>
@@ -94,7 +103,7 @@ export function Taking({ part }: { part: Participating }) {
       <Progress view={view} />
       {view.test && <TestNotice key={stageKey(view)} view={view} part={part} />}
       <Stage key={stageKey(view)} {...{ view, part }} />
-      <Withdraw view={view} part={part} />
+      <Withdraw end={view.content.case === "end" ? view.content.value.reason : undefined} part={part} />
     </div>
   );
 }
@@ -384,11 +393,10 @@ function End({ end: { reason, url, text }, pseudonym }: { end: StudyEnd; pseudon
   );
 }
 
-/** Withdraws; after the end it can still delete the data. */
-function Withdraw({ view, part }: { view: StudyView; part: Participating }) {
+/** Withdraws; after the end, for this reason, it can still delete the data. */
+function Withdraw({ end, part }: { end: StudyEndReason | undefined; part: Participating }) {
   const words = t().studies.withdraw;
   const [deleting, setDeleting] = useState(false);
-  const end = view.content.case === "end" ? view.content.value.reason : undefined;
   if (end === StudyEndReason.DATA_DELETED) return null;
   const withdraw = async (deleteData: boolean) => {
     await part.withdraw(deleteData);

@@ -6,6 +6,7 @@ import { faultOf } from "../api/faults";
 import { fromHex, hex } from "../hex";
 import { recallObject, remember, remembered } from "../store";
 import { participationApi } from "./client";
+import { thisDevice } from "./device";
 
 const STORED = "study-join.";
 const REQUEST_BYTES = 32;
@@ -25,7 +26,8 @@ export async function join(openLink: string, idParameter: string): Promise<strin
   };
   if (stored !== undefined && keptRequest(stored) === undefined) keep("");
   try {
-    const { link } = await participationApi.joinStudy({ openLink, panelId, requestId }, { timeoutMs: CALL_LIMIT_MS });
+    const request = { openLink, panelId, requestId, device: thisDevice() };
+    const { link } = await participationApi.joinStudy(request, { timeoutMs: CALL_LIMIT_MS });
     keep(link);
     return link;
   } catch (thrown) {
@@ -35,7 +37,14 @@ export async function join(openLink: string, idParameter: string): Promise<strin
 }
 
 /** Refusals after which nobody takes part by this request. */
-const FINAL = ["STUDY_FULL", "STUDY_CLOSED", "PANEL_ID_TAKEN", "PANEL_ID_REFUSED", "TOO_MANY_PARTICIPANTS"];
+const FINAL = [
+  "STUDY_FULL",
+  "STUDY_CLOSED",
+  "PANEL_ID_TAKEN",
+  "PANEL_ID_REFUSED",
+  "TOO_MANY_PARTICIPANTS",
+  "WRONG_DEVICE",
+];
 
 /** Forgets how the participant with this link of its own joined. */
 export function forgetJoined(link: string): void {

@@ -46,6 +46,8 @@ export interface Participating {
   readonly fault: Signal<Fault | undefined>;
   /** The state of the stream. */
   readonly link: Signal<Link>;
+  /** Whether the link is the participant's own, as far as it is known: not the open link of the study. */
+  hasLink(): boolean;
   /** Of the step that is shown. */
   progress(): Progress;
   /** Agrees to the text that is shown. */
@@ -72,6 +74,7 @@ const OUTDATED = ["STEP_OVER", "STEP_MISMATCH", "PARTICIPATION_OVER"];
 /** Takes part with the secret of a link: the participant's own, or the open link of the study. */
 export function startParticipating(given: string): Participating {
   let secret = given;
+  let isOpenLink = false;
   const presence = signal<Presence>("opening");
   const view = signal<StudyView | undefined>(undefined);
   const fault = signal<Fault | undefined>(undefined);
@@ -109,9 +112,11 @@ export function startParticipating(given: string): Participating {
   const joinFirst = async (thrown: unknown) => {
     const { reason, metadata } = faultOf(thrown);
     if (reason !== "LINK_OPEN") throw thrown;
+    isOpenLink = true;
     const own = await join(secret, metadata.id_parameter ?? "");
     if (!stopped) {
       secret = own;
+      isOpenLink = false;
       replaceAddress({ page: "study", link: own });
     }
     return openStudy(own);
@@ -202,6 +207,7 @@ export function startParticipating(given: string): Participating {
     view,
     fault,
     link,
+    hasLink: () => !isOpenLink,
     progress: () => {
       const step = view.peek()?.step ?? -1;
       if (progress.step !== step) progress = { step, reachedAtMs: performance.now(), saved: [] };

@@ -25,6 +25,7 @@ export function fileOf(settings: StudySettings): string {
 /** What the names of an enum's values begin with, by the field. */
 const ENUMS: Readonly<Record<string, string>> = {
   left_over: "STUDY_LEFT_OVER_",
+  pointer: "STUDY_POINTER_",
   order: "STUDY_ORDER_",
   labels: "STUDY_LABELS_",
   hide: "STUDY_HIDE_",
@@ -51,6 +52,8 @@ function inProtocolForm(value: JsonValue | Date, field = ""): JsonValue {
   // The labels of a scale are texts, too, but a list of them.
   if (Array.isArray(value)) return value.map((item) => inProtocolForm(item, field === "labels" ? "" : field));
   if (value instanceof Date) return timeOf(value, field);
+  // By the names of factors, which are not fields.
+  if (field === "levels") return value;
   if (typeof value === "object" && value !== null)
     return Object.fromEntries(Object.entries(value).map(([name, item]) => [name, inProtocolForm(item, name)]));
   if (typeof value !== "string") return value;

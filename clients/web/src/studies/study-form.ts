@@ -6,6 +6,7 @@ import {
   StudyLabels,
   StudyLeftOver,
   StudyOrder,
+  StudyPointer,
   type StudySettingsSchema,
   type StudyStageSchema,
 } from "../gen/chefshat/v1/study_pb";
@@ -41,6 +42,10 @@ export interface StudyForm {
   readonly external: string;
   readonly debriefing: string;
   readonly traces: boolean;
+  /** The device that participants need. */
+  readonly device: "any" | "fine" | "coarse";
+  /** Least width of the page, in CSS pixels, or empty. */
+  readonly minWidth: string;
   /** When the study closes and when it is deleted, as date fields have them: local time, or empty. */
   readonly closesAt: string;
   readonly deletesAt: string;
@@ -86,6 +91,8 @@ export function emptyForm(language: Language): StudyForm {
     external: "",
     debriefing: "",
     traces: false,
+    device: "any",
+    minWidth: "",
     closesAt: "",
     deletesAt: "",
     openLink: false,
@@ -104,6 +111,7 @@ const LABELS = {
 const MAX_PARTICIPANTS = 10_000;
 const MAX_GAMES = 100;
 const MAX_SHIFTS = 100;
+const MAX_WIDTH = 3840;
 const ID = /^[A-Za-z0-9_.-]{1,64}$/;
 /** Players of a game; participants have some of the seats. */
 const PLAYERS = 4;
@@ -117,7 +125,13 @@ export function faultsOf(form: StudyForm): StudyFaults {
   const faults: Record<string, string> = {};
   for (const field of ["name", "title", "consent", "version"] as const)
     if (form[field].trim() === "") faults[field] = words.missing;
-  const bounds = { participants: MAX_PARTICIPANTS, people: PLAYERS, games: MAX_GAMES, shifts: MAX_SHIFTS };
+  const bounds = {
+    participants: MAX_PARTICIPANTS,
+    people: PLAYERS,
+    games: MAX_GAMES,
+    shifts: MAX_SHIFTS,
+    ...(form.minWidth !== "" && { minWidth: MAX_WIDTH }),
+  };
   for (const [field, most] of Object.entries(bounds)) {
     const typed = form[field as keyof typeof bounds];
     if (!/^\d{1,6}$/.test(typed) || Number(typed) < 1 || Number(typed) > most) faults[field] = words.number(1, most);
@@ -185,11 +199,18 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
     deletesAtMs: millisecondsOf(form.deletesAt),
     ...(people > 1 && { groups: groupsOf(form) }),
     ...(form.openLink && { recruiting: recruitingOf(form) }),
+    ...((form.device !== "any" || form.minWidth !== "") && { device: deviceOf(form) }),
   };
 }
 
 function groupsOf({ people, fill }: StudyForm) {
   return { size: Number(people), leftOver: fill ? StudyLeftOver.AGENTS : StudyLeftOver.DISMISS };
+}
+
+const POINTERS = { any: StudyPointer.UNSPECIFIED, fine: StudyPointer.FINE, coarse: StudyPointer.COARSE };
+
+function deviceOf({ device, minWidth }: StudyForm) {
+  return { pointer: POINTERS[device], minWidth: Number(minWidth) };
 }
 
 /** A date field in milliseconds since the Unix epoch; 0 if it is empty. */

@@ -3,7 +3,7 @@
 
 import { readFileSync } from "node:fs";
 import { expect, test } from "vitest";
-import { StudyHide } from "../../src/gen/chefshat/v1/study_pb";
+import { StudyHide, StudyParticipantState, StudyPointer } from "../../src/gen/chefshat/v1/study_pb";
 import { inaccessible, PHONE, tooWide } from "./checks";
 import { agree, consent, expectNoSecretOn, expectNoSecretSent, newStudy, playGame } from "./participants";
 import { clientsOf } from "./rooms";
@@ -372,6 +372,45 @@ test("people of a panel take part by the open link, once each, and go on where t
   const rows = researcher.page.locator('[data-part~="participants"] tbody tr');
   await expect.poll(() => rows.allInnerTexts()).toHaveLength(3);
   expect((await rows.allInnerTexts()).join()).toMatch(/ada[\s\S]*completed/);
+});
+
+test("a study that needs a computer begins there, and on a phone says so", async () => {
+  const device = { pointer: StudyPointer.FINE, minWidth: 1024 };
+  const owned = await newStudy(server, { participants: 1, device });
+  const added = await clientsOf(server).studies.addStudyParticipants({ ...owned, count: 1 });
+  const address = `${server.url}/study/${added.links[0]?.link}`;
+  const begun = async () => {
+    const { participants } = await clientsOf(server).studies.getStudy(owned);
+    return participants.map(({ state, sessions }) => [state, sessions]);
+  };
+  const phone = await person(browser, { viewport: PHONE, hasTouch: true, isMobile: true });
+  await phone.page.goto(address);
+  const needed = phone.page.getByRole("heading", { name: "This study needs another device" });
+  await needed.waitFor();
+  await phone.page.getByText("It runs on a computer with a mouse or touchpad.").waitFor();
+  expect(await phone.page.locator('[data-part="invite-link"]').textContent()).toBe(address);
+  expect(await inaccessible(phone.page)).toEqual([]);
+  expect(await tooWide(phone.page)).toEqual([]);
+  expect(await begun()).toEqual([[StudyParticipantState.INVITED, 0]]);
+
+  // A window that is too narrow becomes wide enough.
+  const computer = await person(browser, { viewport: { width: 1000, height: 800 } });
+  await computer.page.goto(address);
+  await computer.page.getByText("Here it is 1000 pixels wide.").waitFor();
+  await computer.page.setViewportSize({ width: 1280, height: 800 });
+  await computer.page.getByRole("heading", { name: "Before you begin" }).waitFor();
+  expect(await begun()).toEqual([[StudyParticipantState.ACTIVE, 1]]);
+
+  // The phone takes nothing over, but can withdraw.
+  await phone.page.getByRole("button", { name: "Try again" }).click();
+  await needed.waitFor();
+  expect(await begun()).toEqual([[StudyParticipantState.ACTIVE, 1]]);
+  await agree(computer.page);
+  await phone.page.getByRole("button", { name: "Withdraw from the study…" }).click();
+  await phone.page.getByRole("button", { name: "Withdraw now" }).click();
+  await phone.page.getByText("You have withdrawn.").waitFor();
+  await computer.page.getByText("You have withdrawn.").waitFor();
+  expect([...phone.faults, ...computer.faults]).toEqual([]);
 });
 
 test("a date of which only a part is entered is no study without one", async () => {

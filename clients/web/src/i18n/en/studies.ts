@@ -14,6 +14,19 @@ export const studies = {
     text: "This study was opened in another window or on another device. It continues there. Nothing you did is lost.",
     here: "Continue here instead",
   },
+  device: {
+    title: "This study needs another device",
+    computer: "It runs on a computer with a mouse or touchpad.",
+    touch: "It runs on a phone or tablet.",
+    width: (needed: number, own: number) =>
+      `The page must be at least ${needed} pixels wide. Here it is ${own} pixels wide.`,
+    there: "Open this link there. Nothing has begun or changed here.",
+    wider:
+      "Make the window wider, turn the device, or open this link on a larger one. Nothing has begun or changed here.",
+    link: "Link",
+    qr: "QR code of the link",
+    retry: "Try again",
+  },
   consent: {
     title: "Before you begin",
     textLabel: "Consent text",
@@ -259,6 +272,10 @@ export const studies = {
     debriefing: "Text at the end",
     debriefingTitle: "About this study",
     traces: "Record interface traces (cards picked and put back, hover, focus)",
+    devices: "Device that participants need",
+    device: { any: "any", fine: "computer", coarse: "phone or tablet" },
+    minWidth: "Least width of the page, in pixels",
+    minWidthHint: "Leave it empty for any width.",
     closesAt: "The study closes on",
     deletesAt: "All data are deleted on",
     deletesAtHint: "Participants are told this date before they agree.",
