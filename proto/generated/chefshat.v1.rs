@@ -1589,8 +1589,7 @@ pub struct PruneRecordsResponse {
     /// Number of deleted games.
     #[prost(uint64, tag = "1")]
     pub games: u64,
-    /// Bytes that the database and the files of records take less; 0 in a cluster, whose database gives
-    /// the space back within minutes.
+    /// Bytes that the database and the files of records take less; 0 if nothing is free yet.
     #[prost(uint64, tag = "2")]
     pub freed_bytes: u64,
 }

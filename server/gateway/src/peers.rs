@@ -8,7 +8,6 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use chefshat_proto::v1;
 use futures::stream::FuturesUnordered;
 use futures::{Stream, StreamExt as _};
 use http::{Request, Response, Uri};
@@ -357,6 +356,7 @@ mod tests {
     use std::convert::Infallible;
     use std::path::Path;
 
+    use chefshat_proto::v1;
     use chefshat_proto::v1::server_service_server::{ServerService, ServerServiceServer};
     use futures::FutureExt as _;
     use tokio::io::AsyncReadExt as _;

@@ -94,7 +94,7 @@ pub struct IdentifyRequest {}
 /// The node that answers.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct IdentifyResponse {
-    /// Its name, unique in the cluster; empty if it has not joined yet, or has no lease.
+    /// Its name, unique in the cluster; empty if it has not joined yet.
     #[prost(string, tag = "1")]
     pub node: ::prost::alloc::string::String,
     /// The public key of the signatures of its records, 64 hexadecimal digits; empty if it signs none.

@@ -353,9 +353,7 @@ class PruneRecordsResponse(_message.Message):
     games: _builtins.int
     """Number of deleted games."""
     freed_bytes: _builtins.int
-    """Bytes that the database and the files of records take less; 0 in a cluster, whose database gives
-    the space back within minutes.
-    """
+    """Bytes that the database and the files of records take less; 0 if nothing is free yet."""
     def __init__(
         self,
         *,
