@@ -12,6 +12,10 @@ use crate::cluster::{Cluster, Leases};
 use crate::measure::{all_play, missed, rooms};
 
 const ROOMS: usize = 4;
+/// Rooms whose clients a balancer spreads.
+const BALANCED_ROOMS: usize = 12;
+/// After which time a cut is noticed on connections that it has silenced.
+const NOTICED: Duration = Duration::from_secs(8);
 /// Longer than a decision may take, answers that are on their way included.
 const CUT: Duration = Duration::from_secs(20);
 /// How long a room waits for seats that are away because of a node.
@@ -41,6 +45,20 @@ async fn a_cut_between_two_nodes_costs_nobody_a_decision() {
     tokio::join!(tokio::time::sleep(CUT), not_reached("1 1"));
     cluster.join(0, 1);
     not_reached("0 0").await;
+    assert_eq!(missed(&cluster, rooms).await, 0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn clients_come_to_nodes_that_reach_their_rooms() {
+    let cluster = Cluster::start(3, Leases::Steady).await;
+    let kinds = rooms(BALANCED_ROOMS, 1, 3_600_000, Duration::from_millis(50));
+    let rooms = BusyRooms::start(&cluster.url(), kinds);
+    all_play(&rooms).await;
+    cluster.separate(0, 1);
+    // Whose way is cut stands still now.
+    tokio::time::sleep(NOTICED).await;
+    rooms.all_go_on().await;
+    cluster.join(0, 1);
     assert_eq!(missed(&cluster, rooms).await, 0);
 }
 

@@ -311,8 +311,8 @@ async fn another_first_message_and_what_the_game_costs_are_said() {
     let arguments = ["--prompt", own, "--price", "0.5,2,0.1"];
     let played = play(honest, AMPLE, &arguments).await;
     let choices = played.choices();
-    let asked = played.asked.lock().expect("no panic");
-    let prompt = asked[1].body["messages"][0]["content"].as_str();
+    let asked = played.asked.lock().expect("no panic")[1].body.clone();
+    let prompt = asked["messages"][0]["content"].as_str();
     let prompt = prompt.expect("text");
     assert!(
         prompt.starts_with("Play like a thief.\nThe rules in short"),
