@@ -27,8 +27,8 @@ const PARTITION: usize = 262_144;
 const KEPT: usize = 1_000;
 /// Hours of a day.
 const HOURS: usize = 24;
-/// Decisions of an hour: of a thousand seats, each of which decides every twenty seconds.
-const OF_AN_HOUR: u64 = 180_000;
+/// Decisions of an hour: of 250 seats, each of which decides every twenty seconds.
+const OF_AN_HOUR: u64 = 45_000;
 /// Rooms that play them, as fast as they can.
 const FAST_ROOMS: usize = 64;
 /// Bytes of what a journal and its indexes take.
