@@ -177,7 +177,9 @@ impl Seats {
     fn write_tickets(&self, path: &Path) -> Result<(), WriteError> {
         let taken = self.taken();
         let seats = taken.values().map(|taken| &taken.seat);
-        let tickets = seats.filter(|seat| !seat.read(Live::is_over));
+        // A seat whose connection was given up, or that another program has, can be resumed.
+        let is_over = |live: &Live| live.view.end.is_some() || live.is_gone;
+        let tickets = seats.filter(|seat| !seat.read(is_over));
         let tickets: String = tickets.map(|seat| format!("{}\n", seat.ticket())).collect();
         let mut file = AtomicFile::create_private(path)?;
         file.write_all(tickets.as_bytes())?;
