@@ -10,7 +10,7 @@ import { useTab } from "../src/parts/tab";
 import { isOn, setPreference } from "../src/preferences";
 import { useAttention } from "../src/table/attention";
 import type { OpenDecision } from "../src/table/model/live";
-import { root } from "./mounted";
+import { eventually, root } from "./mounted";
 
 const TURN = { id: 7n } as unknown as OpenDecision;
 
@@ -96,7 +96,7 @@ test("a turn vibrates and keeps the screen on until the game ends; nothing is as
   expect(locked).toHaveBeenCalledTimes(1);
   expect(released).not.toHaveBeenCalled();
   await show(undefined, false);
-  await vi.waitFor(() => expect(released).toHaveBeenCalled());
+  await eventually(() => expect(released).toHaveBeenCalled());
   expect([asked.mock.calls, notified.mock.calls]).toEqual([[], []]);
 });
 
@@ -113,7 +113,7 @@ test("a notification comes only if it is switched on and the page is not seen", 
   await show(TURN);
   focused = false;
   await show({ ...TURN, id: 8n });
-  await vi.waitFor(() => expect(notified.mock.calls).toEqual([["Your turn"]]));
+  await eventually(() => expect(notified.mock.calls).toEqual([["Your turn"]]));
 });
 
 /** A service worker, with the open notifications by tag; the first registration waits for `registered`. */
@@ -140,11 +140,11 @@ test("each table has a notification of its own, which closes with its decision",
     </>
   );
   await act(() => render(two(TURN), root));
-  await vi.waitFor(() => expect(open.size).toBe(2));
+  await eventually(() => expect(open.size).toBe(2));
   const [first, second] = open.values();
   expect([first?.title, first?.path]).toEqual(["Your turn", location.pathname]);
   await act(() => render(two(undefined), root));
-  await vi.waitFor(() => expect([...open.values()]).toEqual([second]));
+  await eventually(() => expect([...open.values()]).toEqual([second]));
 });
 
 test("a decision that is over before its notification is shown has none", async () => {
@@ -160,7 +160,7 @@ test("a decision that is over before its notification is shown has none", async 
   await show(undefined);
   register();
   await show({ ...TURN, id: 8n });
-  await vi.waitFor(() => expect(shown.size).toBe(1));
+  await eventually(() => expect(shown.size).toBe(1));
   expect(set).toHaveBeenCalledTimes(1);
 });
 
@@ -170,7 +170,7 @@ test("a browser that refuses notifications of a page is left in peace", async ()
     throw new TypeError("Illegal constructor");
   });
   await show(TURN);
-  await vi.waitFor(() => expect(notified).toHaveBeenCalledTimes(1));
+  await eventually(() => expect(notified).toHaveBeenCalledTimes(1));
   await show(undefined);
 });
 
@@ -211,7 +211,7 @@ test.each([
   expect(asked).not.toHaveBeenCalled();
   const label = [...root.querySelectorAll("label")].find((one) => one.textContent === "Notify me on my turn");
   await act(() => root.querySelector<HTMLInputElement>(`#${CSS.escape(label?.htmlFor ?? "")}`)?.click());
-  await vi.waitFor(() => expect(isOn("notification")).toBe(on));
+  await eventually(() => expect(isOn("notification")).toBe(on));
   expect(asked).toHaveBeenCalledTimes(1);
   await act(() => undefined);
   expect(root.textContent?.includes("does not allow notifications")).toBe(!on);

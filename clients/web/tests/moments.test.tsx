@@ -14,7 +14,7 @@ import { applyEvents } from "../src/table/model/reduce";
 import { emptyTable, seatFromParticipant, type TableState } from "../src/table/model/state";
 import { Moment } from "../src/table/view/Moment";
 import { Travel } from "../src/table/view/Travel";
-import { root } from "./mounted";
+import { eventually, root } from "./mounted";
 import { RECORDS, recorded } from "./record";
 import { stateOf } from "./table-state";
 
@@ -133,7 +133,7 @@ test.each([
   await act(() => render(<Heard table={dealt} />, root));
   await act(() => render(<Heard table={played(dealt, ...kinds)} />, root));
   const heard = () => root.querySelector('[role="status"]')?.textContent ?? "";
-  await vi.waitFor(() => expect(heard()).toMatch(expected));
+  await eventually(() => expect(heard()).toMatch(expected));
   expect(heard().match(/\d points?/g)).toEqual(["5 points", "3 points", "1 point", "0 points"]);
 });
 
@@ -142,7 +142,7 @@ test("what a moment means is read out after who played", async () => {
   await act(() => render(<Heard table={dealt} />, root));
   await act(() => render(<Heard table={played(dealt, play(1, 11, 2, 15))} />, root));
   const heard = () => root.querySelector('[role="status"]')?.textContent;
-  await vi.waitFor(() => expect(heard()).toMatch(/^Bo plays .*\. It opens the Shift\.$/));
+  await eventually(() => expect(heard()).toMatch(/^Bo plays .*\. It opens the Shift\.$/));
 });
 
 test("a last card is no longer announced once it has been played", async () => {

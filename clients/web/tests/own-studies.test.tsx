@@ -41,7 +41,7 @@ import { createStudy, exportStudy, keepOwnerToken, ownerTokenOf } from "../src/s
 import { StudiesPage } from "../src/studies/StudiesPage";
 import { fileOf, settingsFrom } from "../src/studies/settings-file";
 import { emptyForm, faultsOf, settingsOf } from "../src/studies/study-form";
-import { root, settle } from "./mounted";
+import { eventually, root, settle } from "./mounted";
 import { refused } from "./study-fake";
 
 const ID = "5f0c6a4de2b14b7f8a3d9c1e7b60425d";
@@ -311,7 +311,7 @@ test("the page shows progress, adds participants, shows links, and asks before i
   expect(add.mock.calls[0]?.[0]).toMatchObject({ ownerToken: TOKEN, count: 0, pseudonyms: ["P10", "P11", "P12"] });
 
   await press("Show the links");
-  await vi.waitFor(() => {
+  await eventually(() => {
     expect(root.querySelector('[data-part="links"]')?.textContent).toContain(`/study/${link}`);
   });
 

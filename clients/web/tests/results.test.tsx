@@ -18,7 +18,7 @@ import { fileName } from "../src/parts/download";
 import { forgetAll } from "../src/store";
 import { certificatesOf } from "../src/tournaments/certificate";
 import { Results } from "../src/tournaments/ResultsPage";
-import { root } from "./mounted";
+import { eventually, root } from "./mounted";
 
 const CREATED_MS = Date.UTC(2026, 2, 14, 12);
 const NAMES = ["Ada", "Bo & Çem", "greedy", "Zoë", "Łucja 你好"];
@@ -75,7 +75,7 @@ afterEach(() => {
 
 test("the page has standings, date, settings and the games that count", async () => {
   await act(async () => render(<Results live={{ tournament: tournament(), standings, games: [] }} />, root));
-  await vi.waitFor(() => expect(root.textContent).toContain("1. Ada +3 · 2. Di +1"));
+  await eventually(() => expect(root.textContent).toContain("1. Ada +3 · 2. Di +1"));
   expect(root.textContent).toContain("2026");
   expect(root.textContent).toContain("Swiss");
   expect(root.querySelectorAll('[data-part~="standings"] tbody tr')).toHaveLength(NAMES.length);

@@ -27,7 +27,7 @@ import { startTracing, targetOf } from "../src/studies/tracing";
 import { startLive } from "../src/table/model/live";
 import { emptyTable, seatFromParticipant } from "../src/table/model/state";
 import { SeatPanel } from "../src/table/view/SeatPanel";
-import { root } from "./mounted";
+import { eventually, root } from "./mounted";
 import { fakeStudy, refused, viewOf } from "./study-fake";
 
 const LINK = "Xk3_abcdefghijklmnopqrstuvwxy1";
@@ -162,7 +162,7 @@ test("the study is shown in its own language, which is not stored", async () => 
     return make(OpenStudyResponseSchema, { session: "s", view: { ...view(), language: "it" } });
   });
   await show();
-  await vi.waitFor(() => expect(title()).toBe("Prima di cominciare"));
+  await eventually(() => expect(title()).toBe("Prima di cominciare"));
   expect(localStorage.getItem("chefshat.language")).not.toBe("it");
 });
 
@@ -361,14 +361,14 @@ test.each([
     const wrong = refused("WRONG_DEVICE", Code.FailedPrecondition, needs);
     vi.spyOn(participationApi, "openStudy").mockRejectedValue(wrong);
     await show();
-    await vi.waitFor(() => expect(title()).toBe("Diese Studie braucht ein anderes Gerät"));
+    await eventually(() => expect(title()).toBe("Diese Studie braucht ein anderes Gerät"));
     expect(root.textContent).toContain(words);
     expect(root.textContent).not.toContain("Pixel breit");
     expect(root.querySelectorAll('[aria-label="QR-Code des Links"]')).toHaveLength(codes);
     await press("Teilnahme zurückziehen…");
     await press("Jetzt zurückziehen");
     expect(sent.map(({ call }) => call)).toEqual(["withdraw"]);
-    await vi.waitFor(() => expect(title()).toBe("The study is over for you"));
+    await eventually(() => expect(title()).toBe("The study is over for you"));
   },
 );
 
