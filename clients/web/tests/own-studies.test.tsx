@@ -191,7 +191,7 @@ test("values of enums are written in short, as for the command", async () => {
     seats = [{ reserved_for = "robot" }]`;
   const { groups, device, conditions } = await settingsFrom(text, "study.toml");
   expect([device?.pointer, device?.minWidth]).toEqual([StudyPointer.FINE, 1024]);
-  // The name of a factor is no field.
+  // A name of a factor is not a field.
   expect(conditions[0]?.levels).toEqual({ pointer: "shown" });
   expect(groups?.leftOver).toBe(StudyLeftOver.AGENTS);
   expect(conditions[0]?.rules?.passScope).toBe(PassScope.TURN);

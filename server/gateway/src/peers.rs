@@ -239,9 +239,7 @@ impl Peers {
         *used = now;
         channel.clone()
     }
-}
 
-impl Peers {
     /// Asks other nodes to reach this one, which is called `own`. One that does is enough; those of an
     /// earlier version, which cannot say, are enough if none says that it does not.
     ///

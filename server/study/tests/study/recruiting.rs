@@ -105,7 +105,7 @@ fn on_another_device_nobody_joins() {
     assert_eq!(join(&mut study, 1, "a"), Ok(1));
     // Who has joined finds the link again, also there.
     assert_eq!(study.join(joining(1, "a"), None), Ok((1, None)));
-    // Nobody is sent to another device when there is no place.
+    // Without a place, another device would not help.
     let close = study.close().expect("it is open");
     study.fold(&close);
     let late = study.join(joining(2, "b"), None);
