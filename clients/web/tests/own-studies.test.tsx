@@ -40,7 +40,7 @@ import { OwnStudy } from "../src/studies/OwnStudyPage";
 import { createStudy, exportStudy, keepOwnerToken, ownerTokenOf } from "../src/studies/owning";
 import { StudiesPage } from "../src/studies/StudiesPage";
 import { fileOf, settingsFrom } from "../src/studies/settings-file";
-import { emptyForm, faultsOf, settingsOf } from "../src/studies/study-form";
+import { emptyForm, faultsOf, NEW_QUESTION, newCondition, type StudyForm, settingsOf } from "../src/studies/study-form";
 import { eventually, root, settle } from "./mounted";
 import { refused } from "./study-fake";
 
@@ -92,6 +92,7 @@ test("the form makes the settings of a study, and says what is missing", async (
     "text",
   ]);
   expect(settings.recruiting).toBe(undefined);
+  expect([settings.factors, settings.seeds, settings.conditions?.[0]?.policy?.hints]).toEqual([[], [], false]);
   const panel = { openLink: true, idParameter: "PROLIFIC_PID", fullUrl: "https://panel.example/full" };
   const recruited = await settingsOf({ ...filled, ...panel });
   expect(recruited.recruiting).toEqual({ ...panel, completedUrl: "", leftUrl: "" });
@@ -124,6 +125,73 @@ test("the form makes the settings of a study, and says what is missing", async (
   expect(within.stages?.map(({ stage }) => stage?.case)).toEqual(["consent", "practice", "perCondition", "text"]);
 });
 
+test("the form has factors, hints, robots, seeds and questions", async () => {
+  const condition = (id: string, robot: string) => ({
+    ...newCondition(id, "greedy"),
+    levels: { robot, forgotten: "x" },
+    hints: id === "A",
+    robot: true,
+    behaviour: `${robot} nods`,
+  });
+  const question = { ...NEW_QUESTION, text: " How was it? " };
+  const form: StudyForm = {
+    ...emptyForm("de"),
+    name: "Trust",
+    title: "Cooking",
+    consent: "We record.",
+    factors: "robot",
+    conditions: [condition("A", "warm"), condition("B", "cold"), condition("C", "warm")],
+    seeds: `${"0a".repeat(32)}\n\n${"0B".repeat(32)}\n`,
+    questions: [
+      question,
+      { ...question, when: "before", kind: "choice", options: "never\n often", optional: true },
+      { ...question, kind: "number" },
+      { ...question, when: "before", kind: "words" },
+    ],
+    within: true,
+  };
+  expect(faultsOf(form)).toEqual({});
+  const settings = await settingsOf(form);
+  expect(settings.factors).toEqual([{ name: "robot", levels: ["warm", "cold"] }]);
+  expect(settings.seeds).toEqual([new Uint8Array(32).fill(10), new Uint8Array(32).fill(11)]);
+  const robot = { filledBy: { case: "reservedFor", value: ParticipantKind.ROBOT } };
+  const agent = { filledBy: { case: "builtInAgent", value: "greedy" } };
+  expect(settings.conditions?.[1]).toMatchObject({
+    levels: { robot: "cold" },
+    policy: { hints: false },
+    robotBehaviour: "cold nods",
+    seats: [robot, agent, agent],
+  });
+  expect(settings.conditions?.map(({ policy }) => policy?.hints)).toEqual([true, false, false]);
+  const [, before, , block] = settings.stages?.map(({ stage }) => stage) ?? [];
+  expect(before).toEqual({
+    case: "questionnaire",
+    value: {
+      id: "before",
+      title: "Über Sie",
+      items: [
+        {
+          id: "q2",
+          text: "How was it?",
+          optional: true,
+          kind: { case: "choice", value: { options: ["never", "often"] } },
+        },
+        { id: "q4", text: "How was it?", optional: false, kind: { case: "freeText", value: { maxCharacters: 2000 } } },
+      ],
+    },
+  });
+  const after = block?.case === "perCondition" ? block.value.stages?.[1]?.stage : undefined;
+  const kinds = after?.case === "questionnaire" ? after.value.items?.map(({ kind }) => kind) : [];
+  expect(kinds).toEqual([
+    { case: "likert", value: { points: 7, labels: ["Stimme gar nicht zu", "Stimme völlig zu"] } },
+    { case: "number", value: { min: 0, max: 1_000_000 } },
+  ]);
+  // Without a seat for it there is no robot.
+  const four = await settingsOf({ ...form, people: "4" });
+  expect(four.conditions?.[0]).toMatchObject({ seats: [] });
+  expect(four.conditions?.[0]).not.toHaveProperty("robotBehaviour");
+});
+
 test.each([
   ["it", "Informazioni su questo studio", true],
   ["de", "Über diese Studie", false],
@@ -146,14 +214,19 @@ test.each([
   [{ closesAt: "2931-05-01T18:00", deletesAt: "2930-05-01T18:00" }, "deletesAt"],
   [
     {
-      conditions: [
-        { id: "A", agent: "greedy", labels: "kinds" as const },
-        { id: "A", agent: "random", labels: "kinds" as const },
-      ],
+      conditions: [newCondition("A", "greedy"), newCondition("A", "random")],
     },
     "condition.1",
   ],
-  [{ conditions: [{ id: "two words", agent: "greedy", labels: "kinds" as const }] }, "condition.0"],
+  [{ conditions: [newCondition("two words", "greedy")] }, "condition.0"],
+  [
+    { factors: "strength, strength", conditions: [{ ...newCondition("A", "greedy"), levels: { strength: "weak" } }] },
+    "factors",
+  ],
+  [{ factors: "strength", conditions: [newCondition("A", "greedy")] }, "level.0.strength"],
+  [{ seeds: "0a0b" }, "seeds"],
+  [{ questions: [NEW_QUESTION] }, "question.0"],
+  [{ questions: [{ ...NEW_QUESTION, text: "Which?", kind: "choice" as const, options: "one\none" }] }, "options.0"],
 ])("%j is refused", (changed, field) => {
   const form = { ...emptyForm("en"), name: "Trust", title: "Cooking", consent: "We record.", ...changed };
   expect(Object.keys(faultsOf(form))).toEqual([field]);

@@ -9,15 +9,19 @@ import { Button } from "../parts/Button";
 import { CheckField, Field, SelectField, TextField } from "../parts/Field";
 import { Notice } from "../parts/Notice";
 import { navigate } from "../router";
+import { ConditionFields, QuestionFields } from "./FormFields";
 import css from "./Own.module.css";
 import { createStudy } from "./owning";
 import { settingsFrom } from "./settings-file";
 import {
-  type ConditionForm,
   DATES,
   emptyForm,
+  factorsOf,
   faultsOf,
+  hasOtherSeats,
   hasTemplates,
+  NEW_QUESTION,
+  newCondition,
   PANEL_URLS,
   type StudyForm,
   settingsOf,
@@ -32,6 +36,16 @@ export function NewStudyPage() {
       <FromForm />
     </div>
   );
+}
+
+/** The list with one value changed. */
+function changedAt<Value>(list: readonly Value[], index: number, changed: Partial<Value>): readonly Value[] {
+  return list.map((one, at) => (at === index ? { ...one, ...changed } : one));
+}
+
+/** The list without one value. */
+function without<Value>(list: readonly Value[], index: number): readonly Value[] {
+  return list.filter((_, at) => at !== index);
 }
 
 /** An id for a request, so that one repeated after a lost answer creates no second study. */
@@ -87,7 +101,6 @@ function FromFile() {
 }
 
 type PanelUrl = (typeof PANEL_URLS)[number];
-const LABELS: readonly ConditionForm["labels"][] = ["players", "kinds", "asTheyAre"];
 const DEVICES: readonly StudyForm["device"][] = ["any", "fine", "coarse"];
 
 function FromForm() {
@@ -102,8 +115,6 @@ function FromForm() {
   const agents = offered ? agentsFor(offered, false, "") : ["greedy", "random"];
   const faults = tried ? faultsOf(form) : {};
   const change = (changed: Partial<StudyForm>) => setForm({ ...form, ...changed });
-  const changeCondition = (index: number, changed: Partial<ConditionForm>) =>
-    change({ conditions: form.conditions.map((one, at) => (at === index ? { ...one, ...changed } : one)) });
   const submit = (event: Event) => {
     event.preventDefault();
     setTried(true);
@@ -115,7 +126,7 @@ function FromForm() {
     run(async () => navigate({ page: "ownStudy", studyId: await createStudy(await settingsOf(form), requestId) }));
   };
   const text = (
-    name: "name" | "title" | "version" | "external" | "idParameter" | PanelUrl,
+    name: "name" | "title" | "factors" | "version" | "external" | "idParameter" | PanelUrl,
     label: string,
     hint?: string,
   ) => (
@@ -152,8 +163,8 @@ function FromForm() {
       onCheck={(checked) => change({ [name]: checked })}
     />
   );
-  const long = (name: "consent" | "debriefing", label: string) => (
-    <Field label={label} fault={faults[name]}>
+  const long = (name: "consent" | "debriefing" | "seeds", label: string, hint?: string) => (
+    <Field label={label} hint={hint} fault={faults[name]}>
       {(joined) => (
         <textarea
           {...joined}
@@ -183,53 +194,48 @@ function FromForm() {
       </div>
       <h3>{words.conditions}</h3>
       <p class="soft small">{words.conditionsHint}</p>
+      {text("factors", words.factors, words.factorsHint)}
       {form.conditions.map((condition, index) => (
         // The key of a condition is its index, since its name is being typed.
-        <div key={index} class={css.fields} data-part="condition">
-          <TextField
-            label={words.conditionId}
-            value={condition.id}
-            onText={(id) => changeCondition(index, { id })}
-            fault={faults[`condition.${index}`]}
-            autoComplete="off"
-          />
-          <SelectField
-            label={words.opponents}
-            value={condition.agent}
-            options={agents.map((value) => ({ value, label: value }))}
-            onPick={(agent) => changeCondition(index, { agent })}
-          />
-          <SelectField
-            label={words.labels}
-            value={condition.labels}
-            options={LABELS.map((value) => ({ value, label: words.label[value] }))}
-            onPick={(labels) => changeCondition(index, { labels })}
-          />
-          {form.conditions.length > 1 && (
-            <Button
-              look="quiet"
-              onClick={() => change({ conditions: form.conditions.filter((_, at) => at !== index) })}
-            >
-              {words.removeCondition}
-              <span class="visually-hidden"> {condition.id}</span>
-            </Button>
-          )}
-        </div>
+        <ConditionFields
+          key={index}
+          condition={condition}
+          index={index}
+          factors={factorsOf(form)}
+          agents={agents}
+          hasOtherSeats={hasOtherSeats(form)}
+          faults={faults}
+          onChange={(changed) => change({ conditions: changedAt(form.conditions, index, changed) })}
+          onRemove={
+            form.conditions.length > 1 ? () => change({ conditions: without(form.conditions, index) }) : undefined
+          }
+        />
       ))}
       <div>
-        <Button
-          onClick={() =>
-            change({ conditions: [...form.conditions, { id: "", agent: agents[0] ?? "greedy", labels: "players" }] })
-          }
-        >
+        <Button onClick={() => change({ conditions: [...form.conditions, newCondition("", agents[0] ?? "greedy")] })}>
           {words.addCondition}
         </Button>
       </div>
       {Number(form.people) > 1 && check("fill", words.fill)}
       {check("within", words.within)}
       {check("practice", words.practice)}
+      {long("seeds", words.seeds, words.seedsHint)}
       {long("consent", words.consent)}
       <div class={css.fields}>{text("version", words.version)}</div>
+      <h3>{words.questions}</h3>
+      {form.questions.map((question, index) => (
+        <QuestionFields
+          key={index}
+          question={question}
+          index={index}
+          faults={faults}
+          onChange={(changed) => change({ questions: changedAt(form.questions, index, changed) })}
+          onRemove={() => change({ questions: without(form.questions, index) })}
+        />
+      ))}
+      <div>
+        <Button onClick={() => change({ questions: [...form.questions, NEW_QUESTION] })}>{words.addQuestion}</Button>
+      </div>
       {template("godspeed", words.godspeed)}
       {template("nasaTlx", words.nasaTlx)}
       {text("external", words.external, words.externalHint)}

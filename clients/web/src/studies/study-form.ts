@@ -1,8 +1,10 @@
-// The form for the common study: conditions that differ in the opponents and what is said about
-// them, one block of games, questionnaires after it. Everything else needs a file.
+// The form for the common study: conditions that differ in the opponents, what is said about them,
+// and hints; questions before and after one block of games. Everything else needs a file.
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
+import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import {
+  type StudyItemSchema,
   StudyLabels,
   StudyLeftOver,
   StudyOrder,
@@ -10,6 +12,7 @@ import {
   type StudySettingsSchema,
   type StudyStageSchema,
 } from "../gen/chefshat/v1/study_pb";
+import { fromHex } from "../hex";
 import { type Language, t, textsIn } from "../i18n";
 
 /** A condition in the form. */
@@ -18,6 +21,24 @@ export interface ConditionForm {
   /** The built-in agent in all other seats, and in place of a participant who is missing. */
   readonly agent: string;
   readonly labels: "asTheyAre" | "kinds" | "players";
+  /** Its levels, by factor. */
+  readonly levels: Readonly<Record<string, string>>;
+  /** Whether participants may ask for hints. */
+  readonly hints: boolean;
+  /** Whether a robot or program of the researcher has one of the other seats. */
+  readonly robot: boolean;
+  /** The text for it. */
+  readonly behaviour: string;
+}
+
+/** A question in the form. */
+export interface QuestionForm {
+  readonly text: string;
+  readonly when: "before" | "after";
+  readonly kind: "agree" | "choice" | "number" | "words";
+  /** The options of a choice, one in each line. */
+  readonly options: string;
+  readonly optional: boolean;
 }
 
 /** The form, as typed. */
@@ -31,12 +52,17 @@ export interface StudyForm {
   /** Whether agents play in place of those who do not come. */
   readonly fill: boolean;
   readonly within: boolean;
+  /** Names of factors, separated by commas. */
+  readonly factors: string;
   readonly conditions: readonly ConditionForm[];
   readonly games: string;
   readonly shifts: string;
+  /** Seeds of the games in hexadecimal digits, one in each line. */
+  readonly seeds: string;
   readonly practice: boolean;
   readonly consent: string;
   readonly version: string;
+  readonly questions: readonly QuestionForm[];
   readonly godspeed: boolean;
   readonly nasaTlx: boolean;
   readonly external: string;
@@ -67,6 +93,27 @@ export function hasTemplates(language: Language): boolean {
   return language === "en" || language === "it";
 }
 
+/** A condition at first. */
+export function newCondition(id: string, agent: string): ConditionForm {
+  return { id, agent, labels: "players", levels: {}, hints: false, robot: false, behaviour: "" };
+}
+
+/** A question at first. */
+export const NEW_QUESTION: QuestionForm = { text: "", when: "after", kind: "agree", options: "", optional: false };
+
+/** The factors that are named. */
+export function factorsOf(form: StudyForm): readonly string[] {
+  return form.factors
+    .split(",")
+    .map((name) => name.trim())
+    .filter((name) => name !== "");
+}
+
+/** Whether participants leave a seat to others. */
+export function hasOtherSeats(form: StudyForm): boolean {
+  return Number(form.people) < PLAYERS;
+}
+
 /** The form at first. */
 export function emptyForm(language: Language): StudyForm {
   return {
@@ -77,15 +124,15 @@ export function emptyForm(language: Language): StudyForm {
     people: "1",
     fill: false,
     within: false,
-    conditions: [
-      { id: "A", agent: "greedy", labels: "players" },
-      { id: "B", agent: "random", labels: "players" },
-    ],
+    factors: "",
+    conditions: [newCondition("A", "greedy"), newCondition("B", "random")],
     games: "3",
     shifts: "3",
+    seeds: "",
     practice: true,
     consent: "",
     version: "1",
+    questions: [],
     godspeed: false,
     nasaTlx: false,
     external: "",
@@ -112,11 +159,21 @@ const MAX_PARTICIPANTS = 10_000;
 const MAX_GAMES = 100;
 const MAX_SHIFTS = 100;
 const MAX_WIDTH = 3840;
+const MAX_FACTORS = 8;
+const MAX_SEEDS = 1000;
+const MAX_OPTIONS = 50;
+/** Points of agreement. */
+const POINTS = 7;
+/** The highest number that a question can have as its answer. */
+const MAX_NUMBER = 1_000_000;
+/** Most characters of an answer in words. */
+const MAX_WORDS = 2000;
 const ID = /^[A-Za-z0-9_.-]{1,64}$/;
+const SEED = /^[0-9a-f]{64}$/i;
 /** Players of a game; participants have some of the seats. */
 const PLAYERS = 4;
 
-/** What is wrong, by field; that of a condition has its index. */
+/** What is wrong, by field; those of a condition and of a question have its index. */
 export type StudyFaults = Readonly<Record<string, string>>;
 
 /** What must be corrected before the study can be created. */
@@ -138,9 +195,21 @@ export function faultsOf(form: StudyForm): StudyFaults {
   }
   if (!faults.participants && !faults.people && Number(form.participants) % Number(form.people) !== 0)
     faults.participants = words.wholeGroups(Number(form.people));
-  form.conditions.forEach(({ id }, index) => {
+  const factors = factorsOf(form);
+  if (factors.length > MAX_FACTORS || new Set(factors).size < factors.length) faults.factors = words.factors;
+  else if (!factors.every((name) => ID.test(name))) faults.factors = words.id;
+  form.conditions.forEach(({ id, levels }, index) => {
     if (!ID.test(id)) faults[`condition.${index}`] = words.id;
     else if (form.conditions.findIndex((other) => other.id === id) < index) faults[`condition.${index}`] = words.twice;
+    for (const factor of factors) if (!ID.test(levels[factor] ?? "")) faults[`level.${index}.${factor}`] = words.id;
+  });
+  const seeds = linesOf(form.seeds);
+  if (seeds.length > MAX_SEEDS || !seeds.every((seed) => SEED.test(seed))) faults.seeds = words.seeds(MAX_SEEDS);
+  form.questions.forEach(({ text, kind, options }, index) => {
+    if (text.trim() === "") faults[`question.${index}`] = words.missing;
+    const offered = linesOf(options);
+    const areEnough = offered.length >= 2 && offered.length <= MAX_OPTIONS && new Set(offered).size === offered.length;
+    if (kind === "choice" && !areEnough) faults[`options.${index}`] = words.options(MAX_OPTIONS);
   });
   const addresses = ["external", ...(form.openLink ? PANEL_URLS : [])] as const;
   for (const field of addresses)
@@ -158,14 +227,23 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
   const words = (await textsIn(form.language)).studies.make;
   const templates = hasTemplates(form.language);
   type Stage = MessageInitShape<typeof StudyStageSchema>;
-  const inBlock: Stage[] = [{ stage: { case: "games", value: { count: Number(form.games) } } }];
+  const questions = await questionsOf(form);
+  const questionnaire = (id: QuestionForm["when"], title: string): Stage[] => {
+    const items = questions.filter(({ when }) => when === id).map(({ item }) => item);
+    return items.length === 0 ? [] : [{ stage: { case: "questionnaire", value: { id, title, items } } }];
+  };
+  const inBlock: Stage[] = [
+    { stage: { case: "games", value: { count: Number(form.games) } } },
+    ...questionnaire("after", words.afterTitle),
+  ];
   if (form.godspeed && templates) inBlock.push({ stage: { case: "questionnaire", value: { template: "godspeed" } } });
   if (form.nasaTlx && templates) inBlock.push({ stage: { case: "questionnaire", value: { template: "nasa_tlx" } } });
   const stages: Stage[] = [
     { stage: { case: "consent", value: { text: form.consent.trim(), version: form.version.trim() } } },
+    ...questionnaire("before", words.beforeTitle),
   ];
   if (form.practice) stages.push({ stage: { case: "practice", value: {} } });
-  const people = Number(form.people);
+  const [people, factors] = [Number(form.people), factorsOf(form)];
   if (people > 1) stages.push({ stage: { case: "arrival", value: {} } });
   if (form.within) stages.push({ stage: { case: "perCondition", value: { stages: inBlock } } });
   else stages.push(...inBlock);
@@ -183,15 +261,21 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
     language: form.language,
     participants: Number(form.participants),
     order: form.within ? StudyOrder.WITHIN : StudyOrder.BETWEEN,
-    factors: [],
-    conditions: form.conditions.map(({ id, agent, labels }) => ({
+    factors: factors.map((name) => ({ name, levels: levelsOf(form, name) })),
+    seeds: linesOf(form.seeds).map(fromHex),
+    conditions: form.conditions.map(({ id, agent, labels, levels, hints, robot, behaviour }) => ({
       id,
+      levels: Object.fromEntries(factors.map((name) => [name, levels[name] ?? ""])),
       rules: { preset: "paper", stop: { case: "targetShifts" as const, value: Number(form.shifts) } },
-      seats: Array.from({ length: PLAYERS - people }, () => ({
-        filledBy: { case: "builtInAgent" as const, value: agent },
+      seats: Array.from({ length: PLAYERS - people }, (_, index) => ({
+        filledBy:
+          robot && index === 0
+            ? { case: "reservedFor" as const, value: ParticipantKind.ROBOT }
+            : { case: "builtInAgent" as const, value: agent },
       })),
+      ...(robot && hasOtherSeats(form) && { robotBehaviour: behaviour }),
       labels: LABELS[labels],
-      ...(people > 1 && { policy: { substitute: agent } }),
+      policy: { hints, ...(people > 1 && { substitute: agent }) },
     })),
     stages,
     traces: form.traces,
@@ -201,6 +285,42 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
     ...(form.openLink && { recruiting: recruitingOf(form) }),
     ...((form.device !== "any" || form.minWidth !== "") && { device: deviceOf(form) }),
   };
+}
+
+/** The questions with the ids of their items, in the participants' language. */
+async function questionsOf(form: StudyForm) {
+  const words = (await textsIn(form.language)).studies.make;
+  type Item = MessageInitShape<typeof StudyItemSchema>;
+  const kindOf = ({ kind, options }: QuestionForm): NonNullable<Item["kind"]> => {
+    switch (kind) {
+      case "agree":
+        return { case: "likert", value: { points: POINTS, labels: [words.disagree, words.agree] } };
+      case "choice":
+        return { case: "choice", value: { options: linesOf(options) } };
+      case "number":
+        return { case: "number", value: { min: 0, max: MAX_NUMBER } };
+      case "words":
+        return { case: "freeText", value: { maxCharacters: MAX_WORDS } };
+    }
+  };
+  return form.questions.map((question, index) => {
+    const { when, text, optional } = question;
+    const item: Item = { id: `q${index + 1}`, text: text.trim(), optional, kind: kindOf(question) };
+    return { when, item };
+  });
+}
+
+/** The levels of a factor that conditions have, each once. */
+function levelsOf(form: StudyForm, factor: string): string[] {
+  return [...new Set(form.conditions.map(({ levels }) => levels[factor] ?? ""))];
+}
+
+/** The lines of a text that are not empty. */
+function linesOf(text: string): string[] {
+  return text
+    .split("\n")
+    .map((line) => line.trim())
+    .filter((line) => line !== "");
 }
 
 function groupsOf({ people, fill }: StudyForm) {

@@ -1,0 +1,144 @@
+// Fields of the form for a study: those of a condition and those of a question.
+
+import { t } from "../i18n";
+import { Button } from "../parts/Button";
+import { CheckField, Field, SelectField, TextField } from "../parts/Field";
+import css from "./Own.module.css";
+import type { ConditionForm, QuestionForm, StudyFaults } from "./study-form";
+
+/** Most characters of a text for a robot. */
+const MAX_BEHAVIOUR = 2000;
+/** Most characters of a question. */
+const MAX_QUESTION = 500;
+const LABELS: readonly ConditionForm["labels"][] = ["players", "kinds", "asTheyAre"];
+const TIMES: readonly QuestionForm["when"][] = ["before", "after"];
+const KINDS: readonly QuestionForm["kind"][] = ["agree", "choice", "number", "words"];
+
+interface Props<Form> {
+  /** Its place in the form, from 0. */
+  index: number;
+  faults: StudyFaults;
+  onChange: (changed: Partial<Form>) => void;
+  /** Removes it; unset if it cannot be removed. */
+  onRemove?: (() => void) | undefined;
+}
+
+/** The fields of a condition. */
+export function ConditionFields(
+  props: Props<ConditionForm> & {
+    condition: ConditionForm;
+    factors: readonly string[];
+    agents: readonly string[];
+    hasOtherSeats: boolean;
+  },
+) {
+  const words = t().studies.make;
+  const { condition, index, faults, onChange, onRemove, factors, agents, hasOtherSeats } = props;
+  return (
+    <div class={css.part} data-part="condition">
+      <div class={css.fields}>
+        <TextField
+          label={words.conditionId}
+          value={condition.id}
+          onText={(id) => onChange({ id })}
+          fault={faults[`condition.${index}`]}
+          autoComplete="off"
+        />
+        <SelectField
+          label={words.opponents}
+          value={condition.agent}
+          options={agents.map((value) => ({ value, label: value }))}
+          onPick={(agent) => onChange({ agent })}
+        />
+        <SelectField
+          label={words.labels}
+          value={condition.labels}
+          options={LABELS.map((value) => ({ value, label: words.label[value] }))}
+          onPick={(labels) => onChange({ labels })}
+        />
+        {factors.map((factor) => (
+          <TextField
+            key={factor}
+            label={words.level(factor)}
+            value={condition.levels[factor] ?? ""}
+            onText={(level) => onChange({ levels: { ...condition.levels, [factor]: level } })}
+            fault={faults[`level.${index}.${factor}`]}
+            autoComplete="off"
+          />
+        ))}
+      </div>
+      <CheckField label={words.hints} checked={condition.hints} onCheck={(hints) => onChange({ hints })} />
+      {hasOtherSeats && (
+        <CheckField label={words.robot} checked={condition.robot} onCheck={(robot) => onChange({ robot })} />
+      )}
+      {hasOtherSeats && condition.robot && (
+        <TextField
+          label={words.behaviour}
+          hint={words.behaviourHint}
+          value={condition.behaviour}
+          onText={(behaviour) => onChange({ behaviour })}
+          maxLength={MAX_BEHAVIOUR}
+          autoComplete="off"
+        />
+      )}
+      {onRemove && <Remove words={words.removeCondition} of={condition.id} onRemove={onRemove} />}
+    </div>
+  );
+}
+
+/** The fields of a question. */
+export function QuestionFields(props: Props<QuestionForm> & { question: QuestionForm }) {
+  const words = t().studies.make;
+  const { question, index, faults, onChange, onRemove } = props;
+  return (
+    <div class={css.part} data-part="question">
+      <TextField
+        label={words.question}
+        value={question.text}
+        onText={(text) => onChange({ text })}
+        fault={faults[`question.${index}`]}
+        maxLength={MAX_QUESTION}
+        autoComplete="off"
+      />
+      <div class={css.fields}>
+        <SelectField
+          label={words.kind}
+          value={question.kind}
+          options={KINDS.map((value) => ({ value, label: words.kinds[value] }))}
+          onPick={(kind) => onChange({ kind })}
+        />
+        <SelectField
+          label={words.when}
+          value={question.when}
+          options={TIMES.map((value) => ({ value, label: words.times[value] }))}
+          onPick={(when) => onChange({ when })}
+        />
+      </div>
+      {question.kind === "choice" && (
+        <Field label={words.options} fault={faults[`options.${index}`]}>
+          {(joined) => (
+            <textarea
+              {...joined}
+              rows={4}
+              value={question.options}
+              onInput={(event) => onChange({ options: event.currentTarget.value })}
+            />
+          )}
+        </Field>
+      )}
+      <CheckField label={words.optional} checked={question.optional} onCheck={(optional) => onChange({ optional })} />
+      {onRemove && <Remove words={words.removeQuestion} of={question.text} onRemove={onRemove} />}
+    </div>
+  );
+}
+
+function Remove({ words, of, onRemove }: { words: string; of: string; onRemove: () => void }) {
+  return (
+    <div>
+      <Button look="quiet" onClick={onRemove}>
+        {words}
+        <span class="visually-hidden"> {of}</span>
+      </Button>
+    </div>
+  );
+}
