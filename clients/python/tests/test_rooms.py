@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +20,8 @@ from tqdm import tqdm
 
 import chefshat
 from chefshat import Agent, Batch, ChefsHatError, Decision, SeatInfo, SeatResult, VectorEnv, pb
+from chefshat._async.rooms import AsyncRooms
+from chefshat.address import ServerAddress
 from chefshat.learn import network, rooms
 from chefshat.learn.evaluation import Evaluation, OneOpponent, Player, PolicyAgent, compare, evaluate, game_seeds
 from chefshat.learn.rooms import Command
@@ -380,5 +383,35 @@ def test_an_interrupt_ends_everything(
     assert playing.returncode == -signal.SIGINT
     assert "KeyboardInterrupt" in printed
     assert not is_running(int(pid.read_text()))
+    with chefshat.Client(real_address) as client:
+        assert [room for room in client.rooms.list() if room.state == pb.ROOM_STATE_WAITING] == []
+
+
+def test_a_room_that_is_created_while_the_games_end_is_closed(real_address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    create = AsyncRooms.create
+
+    async def interrupted() -> None:
+        created, answered = asyncio.Event(), asyncio.Event()
+
+        async def create_slowly(*args: Any, **named: Any) -> pb.CreateRoomResponse:
+            response = await create(*args, **named)
+            created.set()
+            await answered.wait()
+            return response
+
+        monkeypatch.setattr(AsyncRooms, "create", create_slowly)
+        seats = [rooms.Seat("", player) for player in (Lowest, "greedy", "greedy", "greedy")]
+        games = rooms._Games(seats, pb.RuleSet(), ServerAddress(real_address, token=""))
+        playing = asyncio.create_task(games.play([bytes(32)], 1, lambda: None))
+        await created.wait()
+        playing.cancel()
+        # The cancellation goes through all tasks before the answer arrives.
+        for _ in range(20):
+            await asyncio.sleep(0)
+        answered.set()
+        await playing
+
+    with pytest.raises(asyncio.CancelledError):
+        asyncio.run(interrupted())
     with chefshat.Client(real_address) as client:
         assert [room for room in client.rooms.list() if room.state == pb.ROOM_STATE_WAITING] == []

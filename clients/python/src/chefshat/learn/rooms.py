@@ -29,12 +29,14 @@ from chefshat.vector import LOCAL
 # Time for a decision, and for all players to take their seats: generous, because other games may slow them down.
 DECISION_TIME_MS = 300_000
 WAITING_TIME_MS = 600_000
-# Seconds a game may take to end after the process of its agent has ended well, and a call to clean up.
+# Seconds a game may take to end after the process of its agent has ended well.
 END_S = 5.0
 # The same, if the exit code says that the process has failed.
 FAILED_S = 0.5
 # Seconds a process may take to exit after its last game.
 EXIT_S = 10.0
+# Seconds a server may take to create a room that is no longer wanted, and to close it.
+CLOSE_S = 30.0
 # Seconds before each further attempt to read the record of a game that has just ended.
 RECORD_PAUSES_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 # Seconds between looks at a thread that begins.
@@ -223,16 +225,21 @@ class _Game:
     async def play(self) -> list[pb.ShiftEnded]:
         """Plays it to its end."""
         seats = [seat.player if isinstance(seat.player, str) else None for seat in self._games.seats]
-        created = await self._client.rooms.create(
-            f"game {self._number}", rules=self._games.rules, seats=seats, policy=_POLICY, game_seed=self._seed
+        creating = asyncio.ensure_future(
+            self._client.rooms.create(
+                f"game {self._number}", rules=self._games.rules, seats=seats, policy=_POLICY, game_seed=self._seed
+            )
         )
         try:
+            # When this is cancelled, the server may have the room, and only its answer says how to close it.
+            created = await asyncio.shield(creating)
             await _together([self._follow(created.room.room_id), self._fill(created.join_code)])
             return await self._shifts(created.room.game_id)
         except BaseException:
             # It would take a room of the server's for as long as it waits for its players.
             with contextlib.suppress(ChefsHatError, TimeoutError):
-                async with asyncio.timeout(END_S):
+                async with asyncio.timeout(CLOSE_S):
+                    created = await creating
                     await self._client.rooms.close(created.room.room_id, created.owner_token)
             raise
 
