@@ -18,7 +18,7 @@ use super::stops::Stops;
 use super::{CommandError, data_dir, lab, lan, say};
 use chefshat_server::access::{Access, AccessSettings, Mode, Role, TokenFile};
 use chefshat_server::cluster::LeaseTimes;
-use chefshat_server::config::{KeepGames, ServerConfig};
+use chefshat_server::config::{KeepGames, PaintingSettings, ServerConfig};
 use chefshat_server::limits::Shares;
 use chefshat_server::proxies::{TrustedProxies, TrustedProxy};
 use chefshat_server::scrape;
@@ -354,7 +354,7 @@ impl Serve {
             grace: Duration::from_secs(settings.grace),
             allowed_origins: without_empty(settings.allowed_origins),
             webhooks,
-            painter: lab::program(),
+            painter: lab::program().map(PaintingSettings::new),
             ..ServerConfig::default()
         };
         let server = match storage {

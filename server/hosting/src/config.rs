@@ -27,6 +27,8 @@ pub const MAX_COMMANDS_PER_MESSAGE: usize = 1_024;
 pub const MAX_COMMANDS_CONTESTED: usize = 64;
 /// How long a Play stream may stay silent before its first message.
 pub const FIRST_MESSAGE_TIMEOUT: Duration = Duration::from_secs(10);
+/// Longest time until a picture of a game is sent.
+pub const PICTURE_PATIENCE: Duration = Duration::from_secs(30);
 /// Messages that wait for one room.
 pub const ROOM_MAILBOX: usize = 256;
 /// Largest batch of a vector stream, bytes.
@@ -214,9 +216,27 @@ pub struct ServerConfig {
     pub allowed_origins: Vec<String>,
     /// Where webhooks go; `None`: there are none.
     pub webhooks: Option<WebhookSettings>,
-    /// The program `chefshat-lab`, which draws the pictures that chats show of a link to a replay;
-    /// `None`: there are no pictures.
-    pub painter: Option<PathBuf>,
+    /// What draws the pictures that chats show of a link to a replay; `None`: there are no pictures.
+    pub painter: Option<PaintingSettings>,
+}
+
+/// What draws pictures of games.
+#[derive(Debug, Clone)]
+pub struct PaintingSettings {
+    /// The program `chefshat-lab`. It gives way to games.
+    pub program: PathBuf,
+    /// Longest time until a picture is sent.
+    pub patience: Duration,
+}
+
+impl PaintingSettings {
+    /// Those of a program, with the default patience.
+    pub fn new(program: PathBuf) -> Self {
+        Self {
+            program,
+            patience: PICTURE_PATIENCE,
+        }
+    }
 }
 
 impl Default for ServerConfig {

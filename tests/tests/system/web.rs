@@ -8,11 +8,11 @@ use chefshat_proto::v1::{
     self, play_service_client::PlayServiceClient, room_service_client::RoomServiceClient,
     seat_update::Update,
 };
-use chefshat_server::config::ServerConfig;
+use chefshat_server::config::{PaintingSettings, ServerConfig};
 use chefshat_server::store::MemoryStore;
 use chefshat_tests::{
-    TestServer, attach_all, first_legal, one_shift, patiently, play_on, play_out, room_of_four,
-    set_up,
+    PATIENCE, TestServer, attach_all, first_legal, one_shift, patiently, play_on, play_out,
+    room_of_four, set_up,
 };
 use http_body_util::BodyExt as _;
 use hyper_util::client::legacy::Client as HttpClient;
@@ -162,7 +162,13 @@ async fn followed_until(
 #[tokio::test]
 async fn a_link_to_a_replay_has_a_title_and_a_picture_unless_the_game_is_private() {
     let lab = set_up("CHEFSHAT_BIN").with_file_name("chefshat-lab");
-    let painting = |config: &mut ServerConfig| config.painter = Some(lab);
+    let painting = |config: &mut ServerConfig| {
+        // A busy machine draws slowly, since games come first.
+        config.painter = Some(PaintingSettings {
+            program: lab,
+            patience: PATIENCE,
+        });
+    };
     let server = TestServer::with(painting, Arc::new(MemoryStore::default())).await;
     let client = server.client().await;
     for (visibility, is_shown) in [

@@ -11,7 +11,6 @@ mod preview;
 #[cfg(test)]
 mod tests;
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::task::{Context, Poll};
 
@@ -27,8 +26,9 @@ use calls::is_serving;
 use files::find;
 pub use origin::{OriginLayer, Origins};
 use preview::{Link, Previews, Unshown};
-pub use preview::{MAX_PREVIEWS, MAX_PREVIEWS_WAITING, PICTURE_PATIENCE};
+pub use preview::{MAX_PREVIEWS, MAX_PREVIEWS_WAITING};
 
+use chefshat_hosting::config::PaintingSettings;
 use chefshat_hosting::rooms::Rooms;
 
 /// Where proxies and monitors that speak no gRPC ask whether the server takes new clients.
@@ -48,14 +48,14 @@ pub struct PageLayer {
 
 impl PageLayer {
     /// Creates the page. `tls`: whether browsers reach this server with TLS. `rooms`: whose games it
-    /// previews. `painter`: `chefshat-lab`, which draws the previews.
+    /// previews. `painter`: what draws the previews.
     ///
     /// # Errors
     /// The operating system cannot start the thread that reads their records.
     pub fn new(
         tls: bool,
         rooms: Arc<Rooms>,
-        painter: Option<PathBuf>,
+        painter: Option<PaintingSettings>,
     ) -> Result<Self, ThreadPoolBuildError> {
         let previews = Arc::new(Previews::new(rooms, painter)?);
         Ok(Self { tls, previews })

@@ -6,7 +6,7 @@
 //! Records are large and pictures take long, so few are read at a time, for callers in turns, and
 //! what was made of a game is kept for those that ask next.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Stdio;
 use std::sync::Arc;
 use std::time::Duration;
@@ -34,14 +34,13 @@ use super::calls::{own_call, own_origin};
 use crate::connections::peer_address;
 use chefshat_admission::limits::{FairSemaphore, Key};
 use chefshat_base::threads::{Priority, Threads};
+use chefshat_hosting::config::PaintingSettings;
 use chefshat_hosting::rooms::Rooms;
 
 /// Most records that are in memory at a time, those being painted included.
 pub const MAX_PREVIEWS: usize = 2;
 /// Most requests that wait for that; further ones are refused.
 pub const MAX_PREVIEWS_WAITING: usize = 1_024;
-/// Longest time until a picture is sent.
-pub const PICTURE_PATIENCE: Duration = Duration::from_secs(30);
 /// Longest time until the document is sent, if necessary without tags: people wait for it.
 const DOCUMENT_PATIENCE: Duration = Duration::from_secs(1);
 /// Pictures that are kept, each some hundred kilobytes.
@@ -101,8 +100,7 @@ pub(super) struct Previews {
     places: Arc<FairSemaphore>,
     waiting: Arc<FairSemaphore>,
     threads: Threads,
-    /// The program that paints, `chefshat-lab`; without it there are no pictures.
-    painter: Option<PathBuf>,
+    painter: Option<PaintingSettings>,
     pictures: Cache<File>,
     titles: Cache<Title>,
 }
@@ -114,7 +112,7 @@ impl Previews {
     /// The operating system cannot start the thread.
     pub(super) fn new(
         rooms: Arc<Rooms>,
-        painter: Option<PathBuf>,
+        painter: Option<PaintingSettings>,
     ) -> Result<Self, ThreadPoolBuildError> {
         let shares = rooms.shares();
         Ok(Self {
@@ -143,11 +141,11 @@ impl Previews {
         S::Error: Into<BoxError>,
     {
         let painter = self.painter.clone().ok_or(Unshown::Unknown)?;
-        let (kept, patience) = (&self.pictures, PICTURE_PATIENCE);
+        let (kept, patience) = (&self.pictures, painter.patience);
         let runtime = Handle::current();
         let start = move |lines: &[v1::RecordLine]| {
             let _runtime = runtime.enter();
-            Some((started(&painter)?, jsonl::text(lines).ok()?))
+            Some((started(&painter.program)?, jsonl::text(lines).ok()?))
         };
         let paint =
             async |(child, record)| Some(File::new("image/png", painted(child, record).await?));

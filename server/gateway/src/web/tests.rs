@@ -17,7 +17,7 @@ use tower::service_fn;
 
 use super::*;
 use crate::connections::ForwardedClient;
-use chefshat_hosting::config::ServerConfig;
+use chefshat_hosting::config::{PICTURE_PATIENCE, ServerConfig};
 use chefshat_store::MemoryStore;
 
 /// Services that have one record for all games, and count how often it was asked for.
@@ -93,7 +93,12 @@ fn page() -> PageLayer {
 fn page_of(rooms: &Arc<Rooms>) -> PageLayer {
     // Its picture is the record.
     let painter = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/web/painter.sh");
-    PageLayer::new(false, Arc::clone(rooms), Some(painter)).expect("a thread")
+    PageLayer::new(
+        false,
+        Arc::clone(rooms),
+        Some(PaintingSettings::new(painter)),
+    )
+    .expect("a thread")
 }
 
 fn rooms() -> Arc<Rooms> {
