@@ -1,5 +1,5 @@
-//! The languages of the page, and established questionnaires in two of them. The English texts are
-//! those of their publications, item by item. The Italian ones are translations of this project, not
+//! The languages of the page, and established questionnaires, each in two of them. The texts are those
+//! of their authors, item by item, but for the Italian ones: translations of this project, not
 //! validated. In other languages there are none: a researcher lists the items of a validated
 //! translation.
 
@@ -39,18 +39,18 @@ impl Language {
     }
 }
 
-/// The texts of a template.
+/// The texts of a template: in English, or in the other language that it has.
 #[derive(Debug, Clone, Copy)]
 enum Texts {
     English,
-    Italian,
+    Other,
 }
 
 impl Texts {
-    fn choose<'t>(self, english: &'t str, italian: &'t str) -> &'t str {
+    fn choose<'t>(self, english: &'t str, other: &'t str) -> &'t str {
         match self {
             Self::English => english,
-            Self::Italian => italian,
+            Self::Other => other,
         }
     }
 }
@@ -65,17 +65,21 @@ pub enum Template {
     /// The six sliders of the NASA Task Load Index on workload (Hart and Staveland 1988), without
     /// the weighting of the scales ("raw").
     NasaTlx,
+    /// The short version of the User Experience Questionnaire: eight semantic differentials of seven
+    /// points in two scales (Schrepp, Hinderks and Thomaschewski 2017).
+    UeqS,
 }
 
 impl Template {
     /// All templates.
-    pub const ALL: [Self; 2] = [Self::Godspeed, Self::NasaTlx];
+    pub const ALL: [Self; 3] = [Self::Godspeed, Self::NasaTlx, Self::UeqS];
 
     /// The name in settings.
     pub fn name(self) -> &'static str {
         match self {
             Self::Godspeed => "godspeed",
             Self::NasaTlx => "nasa_tlx",
+            Self::UeqS => "ueq_s",
         }
     }
 
@@ -100,10 +104,18 @@ impl Template {
                  of empirical and theoretical research. Advances in Psychology 52, 139-183, 1988. \
                  doi:10.1016/S0166-4115(08)62386-9. Raw: without weights"
             }
+            Self::UeqS => {
+                "M. Schrepp, A. Hinderks, J. Thomaschewski: Design and evaluation of a short version \
+                 of the User Experience Questionnaire (UEQ-S). International Journal of Interactive \
+                 Multimedia and Artificial Intelligence 4(6), 103-108, 2017. \
+                 doi:10.9781/ijimai.2017.09.001. In German and English by its authors"
+            }
         };
-        let translation = match language {
-            Language::English | Language::German | Language::Spanish => "",
-            Language::Italian => ". Italian translation by the Chef's Hat project, not validated",
+        let translation = match (self, language) {
+            (Self::Godspeed | Self::NasaTlx, Language::Italian) => {
+                ". Italian translation by the Chef's Hat project, not validated"
+            }
+            _ => "",
         };
         format!("{publication}{translation}")
     }
@@ -111,10 +123,11 @@ impl Template {
     /// The questionnaire, with the template's name as its id. All items are required. `None` if it
     /// has no texts in this language.
     pub fn questionnaire(self, language: Language) -> Option<Questionnaire> {
-        let texts = match language {
-            Language::English => Texts::English,
-            Language::Italian => Texts::Italian,
-            Language::German | Language::Spanish => return None,
+        let texts = match (self, language) {
+            (_, Language::English) => Texts::English,
+            (Self::Godspeed | Self::NasaTlx, Language::Italian)
+            | (Self::UeqS, Language::German) => Texts::Other,
+            _ => return None,
         };
         let (instructions, items) = match self {
             Self::Godspeed => (
@@ -130,6 +143,13 @@ impl Template {
                     "Valuta il compito che hai appena svolto.",
                 ),
                 nasa_tlx(texts),
+            ),
+            Self::UeqS => (
+                texts.choose(
+                    "Please rate your impression of the game on these scales.",
+                    "Bitte bewerten Sie Ihren Eindruck vom Spiel auf diesen Skalen.",
+                ),
+                ueq_s(texts),
             ),
         };
         Some(Questionnaire {
@@ -214,6 +234,32 @@ fn nasa_tlx(texts: Texts) -> Vec<Item> {
         Item::new(id, texts.choose(text_en, text_it), kind)
     };
     rows(NASA_TLX).map(item).collect()
+}
+
+/// For each item its scale and id, its two words in English, and in German.
+const UEQ_S: &str = "\
+pragmatic_quality|supportive|Obstructive|Supportive|Behindernd|Unterstützend
+pragmatic_quality|easy|Complicated|Easy|Kompliziert|Einfach
+pragmatic_quality|efficient|Inefficient|Efficient|Ineffizient|Effizient
+pragmatic_quality|clear|Confusing|Clear|Verwirrend|Übersichtlich
+hedonic_quality|exciting|Boring|Exciting|Langweilig|Spannend
+hedonic_quality|interesting|Not interesting|Interesting|Uninteressant|Interessant
+hedonic_quality|inventive|Conventional|Inventive|Konventionell|Originell
+hedonic_quality|leading_edge|Usual|Leading edge|Herkömmlich|Neuartig";
+
+fn ueq_s(texts: Texts) -> Vec<Item> {
+    let item = |[scale, id, left_en, right_en, left_de, right_de]: [&str; 6]| {
+        let kind = ItemKind::SemanticDifferential {
+            points: 7,
+            left: texts.choose(left_en, left_de).to_owned(),
+            right: texts.choose(right_en, right_de).to_owned(),
+        };
+        Item {
+            scale: scale.to_owned(),
+            ..Item::new(id, "", kind)
+        }
+    };
+    rows(UEQ_S).map(item).collect()
 }
 
 /// The rows of a table above.
