@@ -8875,9 +8875,9 @@ pub struct StudyQuestionnaire {
     #[prost(string, tag = "1")]
     pub id: ::prost::alloc::string::String,
     /// An established questionnaire in the language of the study: "godspeed" (Bartneck, Kulić, Croft and
-    /// Zoghbi 2009) or "nasa_tlx" (Hart and Staveland 1988, without weights). Its items are used if
-    /// `items` is empty. They have texts in English and Italian; in other languages, `items` is
-    /// required.
+    /// Zoghbi 2009) or "nasa_tlx" (Hart and Staveland 1988, without weights), which have texts in English
+    /// and Italian, or "ueq_s" (Schrepp, Hinderks and Thomaschewski 2017), in English and German. Its items
+    /// are used if `items` is empty; in other languages, `items` is required.
     #[prost(string, tag = "2")]
     pub template: ::prost::alloc::string::String,
     /// Title, at most 128 characters; by default that of the template.
@@ -8921,8 +8921,8 @@ pub struct StudyText {
     #[prost(string, tag = "1")]
     pub title: ::prost::alloc::string::String,
     /// The text, 1..=20000 characters of Markdown (CommonMark): paragraphs, headings, lists, quotations,
-    /// emphasis, code and links. A page shows HTML in it as it is written, and the words of pictures. Of
-    /// questions, only the markup within paragraphs counts.
+    /// emphasis, code, links, and the pictures of the settings (StudyPicture). A page shows HTML in it as it
+    /// is written, and the words of other pictures. Of questions, only the markup within paragraphs counts.
     #[prost(string, tag = "2")]
     pub text: ::prost::alloc::string::String,
 }
@@ -9129,6 +9129,22 @@ pub struct StudySettings {
     /// The device that participants need; unset: any.
     #[prost(message, optional, tag = "18")]
     pub device: ::core::option::Option<StudyRequiredDevice>,
+    /// Pictures in texts, at most 16, together at most 524288 bytes.
+    #[prost(message, repeated, tag = "19")]
+    pub pictures: ::prost::alloc::vec::Vec<StudyPicture>,
+}
+/// A picture in texts of the study.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct StudyPicture {
+    /// Its name, 1..=64 lower-case letters, digits, `_`, `-` or `.`, of which the first is no dot, unique in
+    /// the study. Texts show the picture where they have `![two hands of cards](NAME)`, with what it shows
+    /// in words.
+    #[prost(string, tag = "1")]
+    pub name: ::prost::alloc::string::String,
+    /// A PNG, JPEG, GIF or WebP file, at most 262144 bytes. Of the responses that have the settings, only
+    /// GetStudy has it.
+    #[prost(bytes = "bytes", tag = "2")]
+    pub data: ::prost::bytes::Bytes,
 }
 /// The device that participants need. On another one, or without StudyDevice, nobody can join or open
 /// the study: nothing changes then, so that the same link can be opened on the right device. A test
@@ -10358,6 +10374,23 @@ pub struct RecordTracesRequest {
 /// The traces were recorded.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct RecordTracesResponse {}
+/// Requests a picture.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct GetStudyPictureRequest {
+    /// The secret of the link: `link` of StudyLink.
+    #[prost(string, tag = "1")]
+    pub link: ::prost::alloc::string::String,
+    /// `name` of StudyPicture, as the text has it.
+    #[prost(string, tag = "2")]
+    pub picture: ::prost::alloc::string::String,
+}
+/// The picture.
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct GetStudyPictureResponse {
+    /// A PNG, JPEG, GIF or WebP file.
+    #[prost(bytes = "bytes", tag = "1")]
+    pub data: ::prost::bytes::Bytes,
+}
 /// Requests to withdraw.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct WithdrawFromStudyRequest {
@@ -10497,7 +10530,7 @@ pub mod study_service_client {
                 .insert(GrpcMethod::new("chefshat.v1.StudyService", "CreateStudy"));
             self.inner.unary(req, path, codec).await
         }
-        /// Returns a study. NOT_FOUND (STUDY_UNKNOWN).
+        /// Returns a study, with its pictures. NOT_FOUND (STUDY_UNKNOWN).
         pub async fn get_study(
             &mut self,
             request: impl tonic::IntoRequest<super::GetStudyRequest>,
@@ -10689,7 +10722,7 @@ pub mod study_service_client {
                 .insert(GrpcMethod::new("chefshat.v1.StudyService", "CloseStudy"));
             self.inner.unary(req, path, codec).await
         }
-        /// Streams the data of a study as files: `study.json`, the tables `participants.csv`,
+        /// Streams the data of a study as files: `study.json`, its pictures under `pictures/`, the tables `participants.csv`,
         /// `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
         /// `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
         /// under `records/` and samples under `samples/`, and last what the columns of the tables mean,
@@ -10806,7 +10839,7 @@ pub mod study_service_server {
             tonic::Response<super::CreateStudyResponse>,
             tonic::Status,
         >;
-        /// Returns a study. NOT_FOUND (STUDY_UNKNOWN).
+        /// Returns a study, with its pictures. NOT_FOUND (STUDY_UNKNOWN).
         async fn get_study(
             &self,
             request: tonic::Request<super::GetStudyRequest>,
@@ -10887,7 +10920,7 @@ pub mod study_service_server {
             >
             + std::marker::Send
             + 'static;
-        /// Streams the data of a study as files: `study.json`, the tables `participants.csv`,
+        /// Streams the data of a study as files: `study.json`, its pictures under `pictures/`, the tables `participants.csv`,
         /// `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
         /// `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
         /// under `records/` and samples under `samples/`, and last what the columns of the tables mean,
@@ -11895,6 +11928,37 @@ pub mod participation_service_client {
                 );
             self.inner.unary(req, path, codec).await
         }
+        /// Returns a picture of the text that the participant is shown now. UNAUTHENTICATED (LINK_UNKNOWN);
+        /// NOT_FOUND (PICTURE_UNKNOWN).
+        pub async fn get_study_picture(
+            &mut self,
+            request: impl tonic::IntoRequest<super::GetStudyPictureRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::GetStudyPictureResponse>,
+            tonic::Status,
+        > {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = crate::codec::CallCodec::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/chefshat.v1.ParticipationService/GetStudyPicture",
+            );
+            let mut req = request.into_request();
+            req.extensions_mut()
+                .insert(
+                    GrpcMethod::new(
+                        "chefshat.v1.ParticipationService",
+                        "GetStudyPicture",
+                    ),
+                );
+            self.inner.unary(req, path, codec).await
+        }
         /// Withdraws, at any time, also after the end and from any device: the link is enough. A running
         /// game is closed, or played on by an agent for the others of a group. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
         pub async fn withdraw_from_study(
@@ -12041,6 +12105,15 @@ pub mod participation_service_server {
             request: tonic::Request<super::RecordTracesRequest>,
         ) -> std::result::Result<
             tonic::Response<super::RecordTracesResponse>,
+            tonic::Status,
+        >;
+        /// Returns a picture of the text that the participant is shown now. UNAUTHENTICATED (LINK_UNKNOWN);
+        /// NOT_FOUND (PICTURE_UNKNOWN).
+        async fn get_study_picture(
+            &self,
+            request: tonic::Request<super::GetStudyPictureRequest>,
+        ) -> std::result::Result<
+            tonic::Response<super::GetStudyPictureResponse>,
             tonic::Status,
         >;
         /// Withdraws, at any time, also after the end and from any device: the link is enough. A running
@@ -12495,6 +12568,55 @@ pub mod participation_service_server {
                     let inner = self.inner.clone();
                     let fut = async move {
                         let method = RecordTracesSvc(inner);
+                        let codec = crate::codec::CallCodec::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.unary(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
+                "/chefshat.v1.ParticipationService/GetStudyPicture" => {
+                    #[allow(non_camel_case_types)]
+                    struct GetStudyPictureSvc<T: ParticipationService>(pub Arc<T>);
+                    impl<
+                        T: ParticipationService,
+                    > tonic::server::UnaryService<super::GetStudyPictureRequest>
+                    for GetStudyPictureSvc<T> {
+                        type Response = super::GetStudyPictureResponse;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::Response>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<super::GetStudyPictureRequest>,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as ParticipationService>::get_study_picture(
+                                        &inner,
+                                        request,
+                                    )
+                                    .await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = GetStudyPictureSvc(inner);
                         let codec = crate::codec::CallCodec::default();
                         let mut grpc = tonic::server::Grpc::new(codec)
                             .apply_compression_config(

@@ -15572,6 +15572,209 @@ impl<'de> serde::Deserialize<'de> for GetStorageResponse {
         deserializer.deserialize_struct("chefshat.v1.GetStorageResponse", FIELDS, GeneratedVisitor)
     }
 }
+impl serde::Serialize for GetStudyPictureRequest {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if !self.link.is_empty() {
+            len += 1;
+        }
+        if !self.picture.is_empty() {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.GetStudyPictureRequest", len)?;
+        if !self.link.is_empty() {
+            struct_ser.serialize_field("link", &self.link)?;
+        }
+        if !self.picture.is_empty() {
+            struct_ser.serialize_field("picture", &self.picture)?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for GetStudyPictureRequest {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "link",
+            "picture",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Link,
+            Picture,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "link" => Ok(GeneratedField::Link),
+                            "picture" => Ok(GeneratedField::Picture),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = GetStudyPictureRequest;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.GetStudyPictureRequest")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<GetStudyPictureRequest, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut link__ = None;
+                let mut picture__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Link => {
+                            if link__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("link"));
+                            }
+                            link__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::Picture => {
+                            if picture__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("picture"));
+                            }
+                            picture__ = Some(map_.next_value()?);
+                        }
+                    }
+                }
+                Ok(GetStudyPictureRequest {
+                    link: link__.unwrap_or_default(),
+                    picture: picture__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.GetStudyPictureRequest", FIELDS, GeneratedVisitor)
+    }
+}
+impl serde::Serialize for GetStudyPictureResponse {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if !self.data.is_empty() {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.GetStudyPictureResponse", len)?;
+        if !self.data.is_empty() {
+            #[allow(clippy::needless_borrow)]
+            #[allow(clippy::needless_borrows_for_generic_args)]
+            struct_ser.serialize_field("data", pbjson::private::base64::encode(&self.data).as_str())?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for GetStudyPictureResponse {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "data",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Data,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "data" => Ok(GeneratedField::Data),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = GetStudyPictureResponse;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.GetStudyPictureResponse")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<GetStudyPictureResponse, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut data__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Data => {
+                            if data__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("data"));
+                            }
+                            data__ = 
+                                Some(map_.next_value::<::pbjson::private::BytesDeserialize<_>>()?.0)
+                            ;
+                        }
+                    }
+                }
+                Ok(GetStudyPictureResponse {
+                    data: data__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.GetStudyPictureResponse", FIELDS, GeneratedVisitor)
+    }
+}
 impl serde::Serialize for GetStudyRequest {
     #[allow(deprecated)]
     fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
@@ -39949,6 +40152,118 @@ impl<'de> serde::Deserialize<'de> for StudyParticipantState {
         deserializer.deserialize_any(GeneratedVisitor)
     }
 }
+impl serde::Serialize for StudyPicture {
+    #[allow(deprecated)]
+    fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
+    where
+        S: serde::Serializer,
+    {
+        use serde::ser::SerializeStruct;
+        let mut len = 0;
+        if !self.name.is_empty() {
+            len += 1;
+        }
+        if !self.data.is_empty() {
+            len += 1;
+        }
+        let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudyPicture", len)?;
+        if !self.name.is_empty() {
+            struct_ser.serialize_field("name", &self.name)?;
+        }
+        if !self.data.is_empty() {
+            #[allow(clippy::needless_borrow)]
+            #[allow(clippy::needless_borrows_for_generic_args)]
+            struct_ser.serialize_field("data", pbjson::private::base64::encode(&self.data).as_str())?;
+        }
+        struct_ser.end()
+    }
+}
+impl<'de> serde::Deserialize<'de> for StudyPicture {
+    #[allow(deprecated)]
+    fn deserialize<D>(deserializer: D) -> std::result::Result<Self, D::Error>
+    where
+        D: serde::Deserializer<'de>,
+    {
+        const FIELDS: &[&str] = &[
+            "name",
+            "data",
+        ];
+
+        #[allow(clippy::enum_variant_names)]
+        enum GeneratedField {
+            Name,
+            Data,
+        }
+        impl<'de> serde::Deserialize<'de> for GeneratedField {
+            fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
+            where
+                D: serde::Deserializer<'de>,
+            {
+                struct GeneratedVisitor;
+
+                impl serde::de::Visitor<'_> for GeneratedVisitor {
+                    type Value = GeneratedField;
+
+                    fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                        write!(formatter, "expected one of: {:?}", &FIELDS)
+                    }
+
+                    #[allow(unused_variables)]
+                    fn visit_str<E>(self, value: &str) -> std::result::Result<GeneratedField, E>
+                    where
+                        E: serde::de::Error,
+                    {
+                        match value {
+                            "name" => Ok(GeneratedField::Name),
+                            "data" => Ok(GeneratedField::Data),
+                            _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
+                        }
+                    }
+                }
+                deserializer.deserialize_identifier(GeneratedVisitor)
+            }
+        }
+        struct GeneratedVisitor;
+        impl<'de> serde::de::Visitor<'de> for GeneratedVisitor {
+            type Value = StudyPicture;
+
+            fn expecting(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.write_str("struct chefshat.v1.StudyPicture")
+            }
+
+            fn visit_map<V>(self, mut map_: V) -> std::result::Result<StudyPicture, V::Error>
+                where
+                    V: serde::de::MapAccess<'de>,
+            {
+                let mut name__ = None;
+                let mut data__ = None;
+                while let Some(k) = map_.next_key()? {
+                    match k {
+                        GeneratedField::Name => {
+                            if name__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("name"));
+                            }
+                            name__ = Some(map_.next_value()?);
+                        }
+                        GeneratedField::Data => {
+                            if data__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("data"));
+                            }
+                            data__ = 
+                                Some(map_.next_value::<::pbjson::private::BytesDeserialize<_>>()?.0)
+                            ;
+                        }
+                    }
+                }
+                Ok(StudyPicture {
+                    name: name__.unwrap_or_default(),
+                    data: data__.unwrap_or_default(),
+                })
+            }
+        }
+        deserializer.deserialize_struct("chefshat.v1.StudyPicture", FIELDS, GeneratedVisitor)
+    }
+}
 impl serde::Serialize for StudyPointer {
     #[allow(deprecated)]
     fn serialize<S>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error>
@@ -41363,6 +41678,9 @@ impl serde::Serialize for StudySettings {
         if self.device.is_some() {
             len += 1;
         }
+        if !self.pictures.is_empty() {
+            len += 1;
+        }
         let mut struct_ser = serializer.serialize_struct("chefshat.v1.StudySettings", len)?;
         if !self.name.is_empty() {
             struct_ser.serialize_field("name", &self.name)?;
@@ -41428,6 +41746,9 @@ impl serde::Serialize for StudySettings {
         if let Some(v) = self.device.as_ref() {
             struct_ser.serialize_field("device", v)?;
         }
+        if !self.pictures.is_empty() {
+            struct_ser.serialize_field("pictures", &self.pictures)?;
+        }
         struct_ser.end()
     }
 }
@@ -41461,6 +41782,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
             "deletesAtMs",
             "groups",
             "device",
+            "pictures",
         ];
 
         #[allow(clippy::enum_variant_names)]
@@ -41483,6 +41805,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
             DeletesAtMs,
             Groups,
             Device,
+            Pictures,
         }
         impl<'de> serde::Deserialize<'de> for GeneratedField {
             fn deserialize<D>(deserializer: D) -> std::result::Result<GeneratedField, D::Error>
@@ -41522,6 +41845,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                             "deletesAtMs" | "deletes_at_ms" => Ok(GeneratedField::DeletesAtMs),
                             "groups" => Ok(GeneratedField::Groups),
                             "device" => Ok(GeneratedField::Device),
+                            "pictures" => Ok(GeneratedField::Pictures),
                             _ => Err(serde::de::Error::unknown_field(value, FIELDS)),
                         }
                     }
@@ -41559,6 +41883,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                 let mut deletes_at_ms__ = None;
                 let mut groups__ = None;
                 let mut device__ = None;
+                let mut pictures__ = None;
                 while let Some(k) = map_.next_key()? {
                     match k {
                         GeneratedField::Name => {
@@ -41684,6 +42009,12 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                             }
                             device__ = map_.next_value()?;
                         }
+                        GeneratedField::Pictures => {
+                            if pictures__.is_some() {
+                                return Err(serde::de::Error::duplicate_field("pictures"));
+                            }
+                            pictures__ = Some(map_.next_value()?);
+                        }
                     }
                 }
                 Ok(StudySettings {
@@ -41705,6 +42036,7 @@ impl<'de> serde::Deserialize<'de> for StudySettings {
                     deletes_at_ms: deletes_at_ms__.unwrap_or_default(),
                     groups: groups__,
                     device: device__,
+                    pictures: pictures__.unwrap_or_default(),
                 })
             }
         }

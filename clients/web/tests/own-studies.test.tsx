@@ -38,6 +38,7 @@ import { byCondition } from "../src/studies/board";
 import { studyApi } from "../src/studies/client";
 import { OwnStudy } from "../src/studies/OwnStudyPage";
 import { createStudy, exportStudy, keepOwnerToken, ownerTokenOf } from "../src/studies/owning";
+import { areAllowed, pictureOf } from "../src/studies/picture-files";
 import { StudiesPage } from "../src/studies/StudiesPage";
 import { fileOf, settingsFrom } from "../src/studies/settings-file";
 import { emptyForm, faultsOf, NEW_QUESTION, newCondition, type StudyForm, settingsOf } from "../src/studies/study-form";
@@ -193,14 +194,18 @@ test("the form has factors, hints, robots, seeds and questions", async () => {
 });
 
 test.each([
-  ["it", "Informazioni su questo studio", true],
-  ["de", "Über diese Studie", false],
-] as const)("a study in %s has its texts in it, and templates that have texts in it", async (language, title, has) => {
-  const form = { ...emptyForm(language), debriefing: "…", nasaTlx: true };
-  const stages = (await settingsOf(form)).stages?.map(({ stage }) => stage);
-  expect(stages?.find((stage) => stage?.case === "text")?.value?.title).toBe(title);
-  expect(stages?.some((stage) => stage?.case === "questionnaire")).toBe(has);
-});
+  ["it", "Informazioni su questo studio", "nasa_tlx"],
+  ["de", "Über diese Studie", "ueq_s"],
+] as const)(
+  "a study in %s has its texts in it, and templates that have texts in it",
+  async (language, title, template) => {
+    const form = { ...emptyForm(language), debriefing: "…", nasaTlx: true, ueqS: true };
+    const stages = (await settingsOf(form)).stages?.map(({ stage }) => stage);
+    expect(stages?.find((stage) => stage?.case === "text")?.value?.title).toBe(title);
+    const questionnaires = stages?.flatMap((stage) => (stage?.case === "questionnaire" ? [stage.value.template] : []));
+    expect(questionnaires).toEqual([template]);
+  },
+);
 
 test.each([
   [{ participants: "0" }, "participants"],
@@ -307,6 +312,51 @@ test("the settings of a study make a file that gives the same ones", async () =>
   const settings = await settingsFrom(readFileSync(path, "utf8"), path);
   settings.seeds = [new Uint8Array(32).fill(7)];
   expect(await settingsFrom(fileOf(settings), "pairs-pilot.json")).toEqual(settings);
+});
+
+test("the device that a study needs is said", async () => {
+  const settings = { participants: 8, device: { pointer: StudyPointer.FINE, minWidth: 1024 } };
+  const needing = create(StudySchema, { studyId: ID, settings });
+  await act(() => render(<OwnStudy study={needing} participants={[]} />, root));
+  expect(root.textContent).toContain(
+    "Device that participants need: computer. Least width of the page, in pixels: 1024",
+  );
+});
+
+test("texts and pictures are read from the files that are chosen with the settings", async () => {
+  const text = `
+    [[conditions]]
+    id = "A"
+    [[pictures]]
+    name = "hand"
+    file = "pictures/hand.gif"
+    [[stages]]
+    consent = { version = "1", text_file = "consent.md" }`;
+  const bytes = (words: string) => new TextEncoder().encode(words);
+  const files = new Map([
+    ["hand.gif", bytes("GIF89a")],
+    ["consent.md", bytes("We record.\n")],
+  ]);
+  const settings = await settingsFrom(text, "study.toml", files);
+  expect(settings.pictures.map(({ name, data }) => [name, data])).toEqual([["hand", bytes("GIF89a")]]);
+  expect(settings.stages[0]?.stage.value).toMatchObject({ text: "We record.", version: "1" });
+  expect(await settingsFrom(fileOf(settings), "again.json")).toEqual(settings);
+  await expect(settingsFrom(text, "study.toml", new Map())).rejects.toThrow("choose hand.gif together");
+});
+
+test("pictures have names that texts can have", async () => {
+  const file = new File(["GIF89a"], ".Two Hands.GIF");
+  const picture = await pictureOf(file);
+  expect(picture.name).toBe("two-hands.gif");
+  expect(areAllowed([picture])).toBe(true);
+  expect(areAllowed([{ ...picture, data: new TextEncoder().encode("<svg/>") }])).toBe(false);
+  expect(areAllowed([{ ...picture, data: new Uint8Array(262_145) }])).toBe(false);
+  expect(areAllowed(Array(17).fill(picture))).toBe(false);
+  const form = { ...emptyForm("en"), name: "Trust", title: "Cooking", consent: "We record.", pictures: [picture] };
+  expect(faultsOf(form)).toEqual({});
+  expect((await settingsOf(form)).pictures).toEqual([picture]);
+  const faults = faultsOf({ ...form, pictures: Array(17).fill(picture) });
+  expect(faults.pictures).toContain("16 PNG, JPEG, GIF or WebP files, of 256 KiB each and 512 KiB together");
 });
 
 test("a time of TOML may be a date with its zone", async () => {

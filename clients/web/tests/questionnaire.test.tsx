@@ -6,9 +6,10 @@ import { act } from "preact/test-utils";
 import { afterEach, expect, test } from "vitest";
 import { StudyShownQuestionnaireSchema } from "../src/gen/chefshat/v1/study_pb";
 import { Formatted, FormattedQuestion, plainText } from "../src/studies/Formatted";
+import { WithPictures } from "../src/studies/Pictures";
 import type { ItemAnswer } from "../src/studies/participating";
 import { Questionnaire } from "../src/studies/Questionnaire";
-import { root } from "./mounted";
+import { eventually, root } from "./mounted";
 
 const LIKERT = { case: "likert" as const, value: { points: 5, labels: ["no", "yes"] } };
 const AGE = { case: "number" as const, value: { min: 18, max: 99, unit: "years" } };
@@ -154,6 +155,29 @@ test("a text is Markdown, in which nothing runs", async () => {
   expect(root.textContent).toContain('<img src="x" onerror="alert(1)">');
   expect(root.textContent).toContain("a card");
   expect(root.querySelector("blockquote")?.textContent).toBe("said");
+});
+
+test("a text has the pictures of the study, each asked for once, and the words of others", async () => {
+  const asked: string[] = [];
+  const load = async (name: string) => {
+    asked.push(name);
+    if (name === "lost.png") throw new Error("PICTURE_UNKNOWN");
+    return name === "card.gif" ? new TextEncoder().encode("GIF89a") : new TextEncoder().encode("<svg/>");
+  };
+  const text = "![a card](card.gif) ![again](card.gif) ![a chart](chart.svg)\n\n![lost][it]\n\n[it]: lost.png";
+  await show(
+    <WithPictures load={load}>
+      <Formatted text={text} />
+      <FormattedQuestion text="Which? ![the same](card.gif)" />
+    </WithPictures>,
+  );
+  await eventually(() => expect(root.querySelectorAll("img")).toHaveLength(3));
+  const pictures = [...root.querySelectorAll("img")];
+  expect(pictures.map(({ alt }) => alt)).toEqual(["a card", "again", "the same"]);
+  expect(new Set(pictures.map(({ src }) => src))).toEqual(new Set(["data:image/gif;base64,R0lGODlh"]));
+  expect(root.textContent).toContain("a chart");
+  expect(root.textContent).toContain("lost");
+  expect(asked.toSorted()).toEqual(["card.gif", "chart.svg", "lost.png"]);
 });
 
 test("a question has markup, and its field a name without", async () => {

@@ -115,6 +115,8 @@ fn messages(out: &Path, descriptors: FileDescriptorSet) -> Generated {
         .bytes(".chefshat.v1.EpisodeEndings")
         .bytes(".chefshat.v1.GameBeginnings")
         .bytes(".chefshat.v1.ShiftStatistics")
+        .bytes(".chefshat.v1.StudyPicture")
+        .bytes(".chefshat.v1.GetStudyPictureResponse")
         .boxed(".chefshat.v1.RunResponse.response.batch")
         .boxed(".chefshat.v1.RunRequest.request.setup")
         .compile_fds(descriptors)?;

@@ -43,6 +43,7 @@ mod games;
 mod groups;
 mod item_kind;
 mod link;
+mod picture;
 mod presence;
 mod questionnaire;
 mod recruiting;
@@ -65,6 +66,7 @@ pub use device::{Device, DeviceSession, Pointer, RequiredDevice};
 pub use games::{DueGame, MAX_ATTEMPTS};
 pub use item_kind::{Answer, AnswerSet, ItemKind, MAX_OPTIONS};
 pub use link::{ParticipantLink, SessionSecret};
+pub use picture::{Picture, PictureFormat};
 pub use questionnaire::{
     AnswerProblem, Item, ItemAnswer, MAX_ITEMS, MAX_SHOWN_IF, Questionnaire, ShownIf, ShownItemIf,
 };

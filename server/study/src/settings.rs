@@ -9,6 +9,7 @@ use sha2::{Digest as _, Sha256};
 use crate::assignment::Order;
 use crate::checks::{Checked, characters, identifier, refuse, unique, within};
 use crate::device::RequiredDevice;
+use crate::picture::{MAX_BYTES_IN_ALL, MAX_PICTURES, Picture};
 use crate::recruiting::Recruiting;
 use crate::stage::{MAX_BLOCK, MAX_STAGES, Stage, Step, Task, steps};
 use crate::templates::Language;
@@ -71,6 +72,8 @@ pub struct Settings {
     pub groups: Option<Groups>,
     /// The device that participants need, if not any.
     pub device: Option<RequiredDevice>,
+    /// Pictures in texts, at most 16, together at most 524288 bytes.
+    pub pictures: Vec<Picture>,
 }
 
 /// How participants play together.
@@ -221,6 +224,7 @@ impl Settings {
         self.check_groups()?;
         self.recruiting.check("recruiting")?;
         self.device.unwrap_or_default().check("device")?;
+        self.check_pictures()?;
         let away = self.drop_out_after_ms;
         within("drop_out_after_ms", away, 60_000..=604_800_000)?;
         for (field, at_ms) in [
@@ -276,6 +280,17 @@ impl Settings {
             return refuse("seeds", "empty, and a condition has no seeds of its own");
         }
         Ok(())
+    }
+
+    fn check_pictures(&self) -> Checked {
+        within("pictures", self.pictures.len(), 0..=MAX_PICTURES)?;
+        for (index, picture) in self.pictures.iter().enumerate() {
+            picture.check(&format!("pictures[{index}]"))?;
+        }
+        let names = self.pictures.iter().map(|picture| picture.name.as_str());
+        unique(names, |index| format!("pictures[{index}].name"))?;
+        let bytes: usize = self.pictures.iter().map(|picture| picture.bytes).sum();
+        within("pictures", bytes, 0..=MAX_BYTES_IN_ALL)
     }
 
     fn check_groups(&self) -> Checked {

@@ -38,6 +38,7 @@ pub fn settings() -> Settings {
         recruiting: Recruiting::default(),
         groups: None,
         device: None,
+        pictures: Vec::new(),
     }
 }
 

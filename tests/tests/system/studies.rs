@@ -950,3 +950,102 @@ async fn a_study_from_its_links_to_its_data() {
         assert!(!any(secret), "participants received {secret:?}");
     }
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn pictures_are_shown_with_the_texts_that_name_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let server = host(folder.path()).await;
+    let channel = Channel::from_shared(server.url()).expect("a URL");
+    let channel = channel.connect().await.expect("the server listens");
+    let mut service = StudyServiceClient::new(channel);
+    let file = |byte| [b"GIF89a".to_vec(), vec![byte; 200_000]].concat();
+    let picture = |name: &str, byte| v1::StudyPicture {
+        name: name.to_owned(),
+        data: file(byte).into(),
+    };
+    let text = |text: &str| {
+        stage(Stage::Text(v1::StudyText {
+            title: String::new(),
+            text: text.to_owned(),
+        }))
+    };
+    let pictures = vec![picture("first.gif", 1), picture("second.gif", 2)];
+    let request = v1::CreateStudyRequest {
+        settings: Some(v1::StudySettings {
+            stages: vec![text("![a hand](first.gif)"), text("![another](second.gif)")],
+            pictures: pictures.clone(),
+            ..settings()
+        }),
+        request_id: Vec::new(),
+    };
+    let created = service.create_study(request).await.expect("valid");
+    let created = created.into_inner();
+    let study = created.study.expect("a study");
+    let owner = (study.study_id, created.owner_token);
+
+    // The settings come without the files, unless somebody asks for this study.
+    let files = |study: &v1::Study| -> Vec<_> {
+        let settings = study.settings.as_ref().expect("settings");
+        settings.pictures.iter().map(|it| it.data.len()).collect()
+    };
+    let request = v1::ListStudiesRequest {
+        owner_tokens: vec![owner.1.clone()],
+    };
+    let listed = service.list_studies(request).await.expect("a list");
+    assert_eq!(files(&listed.into_inner().studies[0]), [0, 0]);
+    let request = v1::GetStudyRequest {
+        study_id: owner.0.clone(),
+        owner_token: owner.1.clone(),
+    };
+    let whole = service.get_study(request).await.expect("it exists");
+    let whole = whole.into_inner().study.expect("a study");
+    assert_eq!(whole.settings.expect("settings").pictures, pictures);
+
+    let mut lab = Lab::connect(&server, owner).await;
+    let links = lab.links(vec!["P1".to_owned()]).await;
+    let url = server.url();
+    let channel = Channel::from_shared(url).expect("a URL");
+    let mut service =
+        ParticipationServiceClient::new(channel.connect().await.expect("the server listens"));
+    let shown = async |service: &mut ParticipationServiceClient<Channel>, picture: &str| {
+        let request = v1::GetStudyPictureRequest {
+            link: links[0].clone(),
+            picture: picture.to_owned(),
+        };
+        let got = service.get_study_picture(request).await;
+        got.map(|got| got.into_inner().data)
+            .map_err(|status| reason(&status))
+    };
+    let unknown = Err("PICTURE_UNKNOWN".to_owned());
+    assert_eq!(
+        shown(&mut service, "first.gif").await,
+        unknown,
+        "it has not begun"
+    );
+    let request = v1::OpenStudyRequest {
+        link: links[0].clone(),
+        device: None,
+    };
+    let opened = service.open_study(request).await.expect("a place");
+    let session = opened.into_inner().session;
+    assert_eq!(shown(&mut service, "first.gif").await, Ok(file(1).into()));
+    assert_eq!(shown(&mut service, "second.gif").await, unknown);
+    let request = v1::ContinueStudyRequest { session, step: 0 };
+    service.continue_study(request).await.expect("it is a text");
+    assert_eq!(shown(&mut service, "first.gif").await, unknown);
+    assert_eq!(shown(&mut service, "second.gif").await, Ok(file(2).into()));
+
+    let exported = lab.export().await;
+    assert_eq!(exported["pictures/first.gif"], file(1));
+    let stopping = patiently("the server to stop", server.stop());
+    stopping.await.expect("a clean end");
+
+    // They are stored.
+    let server = host(folder.path()).await;
+    let channel = Channel::from_shared(server.url()).expect("a URL");
+    let mut service =
+        ParticipationServiceClient::new(channel.connect().await.expect("the server listens"));
+    assert_eq!(shown(&mut service, "second.gif").await, Ok(file(2).into()));
+    let stopping = patiently("the server to stop", server.stop());
+    stopping.await.expect("a clean end");
+}

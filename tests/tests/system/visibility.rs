@@ -974,7 +974,7 @@ const ASKED_ELSEWHERE: [(&str, &str); 4] = [
 ];
 
 /// The calls about a study, whose ids and secrets nobody else may know.
-const OF_STUDIES: [&str; 19] = [
+const OF_STUDIES: [&str; 20] = [
     "AddStudyParticipants",
     "AnswerQuestionnaire",
     "CloseStudy",
@@ -985,6 +985,7 @@ const OF_STUDIES: [&str; 19] = [
     "FollowParticipation",
     "FollowStudy",
     "GetStudy",
+    "GetStudyPicture",
     "GiveConsent",
     "JoinStudy",
     "ListStudies",
@@ -1173,6 +1174,10 @@ async fn asked_of_study(
     ask!(
         "OpenStudy",
         participant.open_study(OpenStudyRequest { link: link })
+    );
+    ask!(
+        "GetStudyPicture",
+        participant.get_study_picture(GetStudyPictureRequest { link: link })
     );
     ask!(
         "WithdrawFromStudy",

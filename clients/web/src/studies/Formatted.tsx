@@ -5,6 +5,7 @@ import { fromMarkdown } from "mdast-util-from-markdown";
 import type { ComponentChildren, JSX } from "preact";
 import { useMemo } from "preact/hooks";
 import css from "./Formatted.module.css";
+import { Picture } from "./Pictures";
 import { safeAddress } from "./safe-address";
 
 /** The text. */
@@ -105,8 +106,9 @@ function Node({ node, definitions }: NodeProps): JSX.Element | string | null {
     case "linkReference":
       return <Link address={definitions.get(node.identifier) ?? ""}>{within}</Link>;
     case "image":
+      return <Picture name={node.url} words={node.alt ?? ""} />;
     case "imageReference":
-      return node.alt ?? "";
+      return <Picture name={definitions.get(node.identifier) ?? ""} words={node.alt ?? ""} />;
     default:
       return null;
   }

@@ -12,19 +12,22 @@ import { navigate } from "../router";
 import { ConditionFields, QuestionFields } from "./FormFields";
 import css from "./Own.module.css";
 import { createStudy } from "./owning";
-import { settingsFrom } from "./settings-file";
+import { PictureFields } from "./PictureFields";
+import { PICTURES } from "./picture-files";
+import { hasSettings, settingsFrom } from "./settings-file";
 import {
   DATES,
   emptyForm,
   factorsOf,
   faultsOf,
   hasOtherSeats,
-  hasTemplates,
+  hasTexts,
   NEW_QUESTION,
   newCondition,
   PANEL_URLS,
   type StudyForm,
   settingsOf,
+  type Template,
 } from "./study-form";
 
 /** The page. */
@@ -60,14 +63,17 @@ function FromFile() {
   // Another file is another study.
   const [requestId, setRequestId] = useState(newRequestId);
   const { busy, fault, run, reset } = useAttempt();
-  const take = async (file: File | undefined) => {
+  const take = async (chosen: readonly File[]) => {
     setRead(null);
     setProblem("");
     reset();
+    const file = chosen.find(({ name }) => hasSettings(name)) ?? chosen[0];
     if (!file) return;
     setRequestId(newRequestId());
     try {
-      setRead(await settingsFrom(await file.text(), file.name));
+      const others = chosen.filter((other) => other !== file);
+      const contents = others.map(async (other) => [other.name, new Uint8Array(await other.arrayBuffer())] as const);
+      setRead(await settingsFrom(await file.text(), file.name, new Map(await Promise.all(contents))));
     } catch (thrown) {
       setProblem(words.unreadable(thrown instanceof Error ? thrown.message : String(thrown)));
     }
@@ -82,8 +88,9 @@ function FromFile() {
           <input
             {...joined}
             type="file"
-            accept=".json,.toml,application/json"
-            onChange={(event) => void take(event.currentTarget.files?.[0])}
+            multiple
+            accept={`.json,.toml,.md,.txt,application/json,${PICTURES}`}
+            onChange={(event) => void take([...(event.currentTarget.files ?? [])])}
           />
         )}
       </Field>
@@ -153,16 +160,19 @@ function FromForm() {
   const check = (name: "within" | "practice" | "traces" | "openLink" | "fill", label: string) => (
     <CheckField label={label} checked={form[name]} onCheck={(checked) => change({ [name]: checked })} />
   );
-  const inLanguage = hasTemplates(form.language);
-  const template = (name: "godspeed" | "nasaTlx", label: string) => (
-    <CheckField
-      label={label}
-      hint={inLanguage ? undefined : words.templateLanguages}
-      checked={form[name] && inLanguage}
-      disabled={!inLanguage}
-      onCheck={(checked) => change({ [name]: checked })}
-    />
-  );
+  const template = (name: Template, label: string) => {
+    const inLanguage = hasTexts(name, form.language);
+    const known = languages.filter(({ value }) => hasTexts(name, value)).map((one) => one.label);
+    return (
+      <CheckField
+        label={label}
+        hint={inLanguage ? undefined : words.templateLanguages(known.join(", "))}
+        checked={form[name] && inLanguage}
+        disabled={!inLanguage}
+        onCheck={(checked) => change({ [name]: checked })}
+      />
+    );
+  };
   const long = (name: "consent" | "debriefing" | "seeds", label: string, hint?: string) => (
     <Field label={label} hint={hint} fault={faults[name]}>
       {(joined) => (
@@ -238,8 +248,10 @@ function FromForm() {
       </div>
       {template("godspeed", words.godspeed)}
       {template("nasaTlx", words.nasaTlx)}
+      {template("ueqS", words.ueqS)}
       {text("external", words.external, words.externalHint)}
       {long("debriefing", words.debriefing)}
+      <PictureFields pictures={form.pictures} fault={faults.pictures} onChange={(pictures) => change({ pictures })} />
       {check("traces", words.traces)}
       <div class={css.fields}>
         <SelectField

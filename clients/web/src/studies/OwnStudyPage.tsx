@@ -5,7 +5,14 @@ import { type Signal, signal } from "@preact/signals";
 import { useEffect, useState } from "preact/hooks";
 import { faultOf, wordsOf } from "../api/faults";
 import { type Following, follow } from "../api/follow";
-import { type Study, type StudyLink, type StudyParticipant, StudyParticipantState } from "../gen/chefshat/v1/study_pb";
+import {
+  type Study,
+  type StudyLink,
+  type StudyParticipant,
+  StudyParticipantState,
+  StudyPointer,
+  type StudyRequiredDevice,
+} from "../gen/chefshat/v1/study_pb";
 import { hex } from "../hex";
 import { dateLocale, t } from "../i18n";
 import { CopyLine, QrCode } from "../lobby/Invite";
@@ -35,6 +42,7 @@ import {
   ownership,
   ownerTokenOf,
   removeFromStudy,
+  settingsOfStudy,
 } from "./owning";
 import { MAX_ADDED, participantsIn } from "./participants";
 import { fileOf } from "./settings-file";
@@ -132,6 +140,7 @@ export function OwnStudy({ study, participants }: FollowedStudy) {
       </header>
       {closed && <Notice kind="hint">{words.isClosed}</Notice>}
       {deletesAtMs > 0n && <Notice kind="hint">{words.deletes(momentOf(deletesAtMs))}</Notice>}
+      {settings?.device && <Notice kind="hint">{deviceWords(settings.device)}</Notice>}
       <Counts study={study} participants={participants} />
       {!closed && study.openLink && <OpenLink study={study} />}
       {!closed && <Add study={study} />}
@@ -143,22 +152,39 @@ export function OwnStudy({ study, participants }: FollowedStudy) {
         <CopyLine label={words.key} text={ownerTokenOf(studyId) ?? ""} mono />
         <CopyLine label={words.seeds} text={hex(study.seedsSha256)} mono />
       </details>
-      {settings && (
-        <div>
-          <Button
-            look="quiet"
-            onClick={() => download(fileOf(settings), `${fileName(settings.name)}.json`, "application/json")}
-          >
-            {words.settings}
-          </Button>
-        </div>
-      )}
+      <SettingsFile studyId={studyId} />
       {!closed && (
         <ConfirmButton label={words.close} confirm={words.closeDo} act={() => closeStudy(studyId).then(() => false)}>
           {words.closeText}
         </ConfirmButton>
       )}
       <Delete study={study} />
+    </div>
+  );
+}
+
+/** The device that participants need, in words. */
+function deviceWords({ pointer, minWidth }: StudyRequiredDevice): string {
+  const words = t().studies.make;
+  const device = pointer === StudyPointer.FINE ? "fine" : pointer === StudyPointer.COARSE ? "coarse" : "any";
+  const needed = `${words.devices}: ${words.device[device]}`;
+  return minWidth > 0 ? `${needed}. ${words.minWidth}: ${minWidth}` : needed;
+}
+
+/** The settings as a file; only a call for them has the pictures. */
+function SettingsFile({ studyId }: { studyId: string }) {
+  const { busy, fault, run } = useAttempt();
+  const save = async () => {
+    const settings = await settingsOfStudy(studyId);
+    if (settings) download(fileOf(settings), `${fileName(settings.name)}.json`, "application/json");
+    return false;
+  };
+  return (
+    <div class={css.export}>
+      <Button look="quiet" busy={busy} onClick={() => run(save)}>
+        {t().studies.own.settings}
+      </Button>
+      {fault && <Notice kind="fault">{fault}</Notice>}
     </div>
   );
 }

@@ -26,6 +26,7 @@ import { Notice } from "../parts/Notice";
 import { useTabMark } from "../parts/tab";
 import type { PageProps } from "../router";
 import { Formatted } from "./Formatted";
+import { WithPictures } from "./Pictures";
 import { type Participating, startParticipating } from "./participating";
 import { Questionnaire } from "./Questionnaire";
 import { StageTitle } from "./Stage";
@@ -102,7 +103,9 @@ export function Taking({ part }: { part: Participating }) {
       {part.link.value === "lost" && <Notice kind="fault">{words.lost}</Notice>}
       <Progress view={view} />
       {view.test && <TestNotice key={stageKey(view)} view={view} part={part} />}
-      <Stage key={stageKey(view)} {...{ view, part }} />
+      <WithPictures load={part.picture}>
+        <Stage key={stageKey(view)} {...{ view, part }} />
+      </WithPictures>
       <Withdraw end={view.content.case === "end" ? view.content.value.reason : undefined} part={part} />
     </div>
   );

@@ -2,7 +2,7 @@
 
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import { CALL_LIMIT_MS } from "../api/client";
-import type { Study, StudyLink, StudySettingsSchema } from "../gen/chefshat/v1/study_pb";
+import type { Study, StudyLink, StudySettings, StudySettingsSchema } from "../gen/chefshat/v1/study_pb";
 import { pathOf } from "../router";
 import { recallObject, remember, remembered } from "../store";
 import { studyApi } from "./client";
@@ -26,6 +26,11 @@ export async function ownStudies(signal: AbortSignal): Promise<Study[]> {
   const ids = [...remembered().keys()].flatMap((key) => (key.startsWith(STORED) ? key.slice(STORED.length) : []));
   const ownerTokens = ids.flatMap((id) => ownerTokenOf(id) ?? []).slice(0, MAX_TOKENS);
   return (await studyApi.listStudies({ ownerTokens }, { signal, timeoutMs: CALL_LIMIT_MS })).studies;
+}
+
+/** The settings of a study, with its pictures. */
+export async function settingsOfStudy(studyId: string): Promise<StudySettings | undefined> {
+  return (await studyApi.getStudy(ownership(studyId), call)).study?.settings;
 }
 
 /** Creates a study and stores its owner token; returns its id. */

@@ -58,6 +58,8 @@ export interface Participating {
   /** Continues from a text, another site or a game. */
   proceed(): Promise<void>;
   sendTraces(gameId: string, traces: Trace[]): Promise<void>;
+  /** The file of a picture of the text that is shown. */
+  picture(name: string): Promise<Uint8Array>;
   withdraw(deleteData: boolean): Promise<void>;
   /** Opens the study here, also if another device has it. */
   open(): void;
@@ -220,6 +222,7 @@ export function startParticipating(given: string): Participating {
       await participationApi.saveAnswers({ session, step, answers }, call);
     },
     proceed: () => act((at) => participationApi.continueStudy(at, call)),
+    picture: async (picture) => (await participationApi.getStudyPicture({ link: secret, picture }, call)).data,
     sendTraces: async (gameId, traces) => {
       await participationApi.recordTraces({ session, gameId, traces }, call);
     },

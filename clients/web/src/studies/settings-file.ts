@@ -1,18 +1,30 @@
 // Settings of a study from a file: TOML as docs/studies.md describes it, or JSON of the same form.
 // The names are those of StudySettings; values of enums may be short ("players"), seeds are in
-// hexadecimal digits, and times of TOML may be dates. The server checks the values.
+// hexadecimal digits, times of TOML may be dates, and texts and pictures may be in files that are chosen
+// with it. The server checks the values.
 
 import { fromJson, type JsonValue, toJson } from "@bufbuild/protobuf";
 import { base64Encode } from "@bufbuild/protobuf/wire";
 import { type StudySettings, StudySettingsSchema } from "../gen/chefshat/v1/study_pb";
 import { fromHex } from "../hex";
 
-/** Reads settings; throws an error that says what is wrong with the text. */
-export async function settingsFrom(text: string, name: string): Promise<StudySettings> {
+/** The contents of files, by name. */
+type Files = ReadonlyMap<string, Uint8Array>;
+
+/** Whether this is a file with settings, and none that it names. */
+export function hasSettings(name: string): boolean {
+  return /\.(toml|json)$/i.test(name);
+}
+
+/**
+ * Reads settings; throws an error that says what is wrong with the text. `files`: those that it may name,
+ * as `file` of a picture or `text_file`.
+ */
+export async function settingsFrom(text: string, name: string, files: Files = new Map()): Promise<StudySettings> {
   const value: unknown = name.toLowerCase().endsWith(".toml")
     ? (await import("smol-toml")).parse(text)
     : JSON.parse(text);
-  const settings = fromJson(StudySettingsSchema, inProtocolForm(value as JsonValue));
+  const settings = fromJson(StudySettingsSchema, inProtocolForm(withFiles(value as JsonValue, files)));
   if (settings.conditions.length === 0) throw new Error("it has no conditions");
   return settings;
 }
@@ -38,6 +50,25 @@ const ENUMS: Readonly<Record<string, string>> = {
   durability: "DURABILITY_",
 };
 const SEEDS = ["assignment_seed", "seeds"];
+
+/** The value with the contents of the files that it names. */
+function withFiles(value: JsonValue, files: Files): JsonValue {
+  if (Array.isArray(value)) return value.map((item) => withFiles(item, files));
+  if (typeof value !== "object" || value === null || value instanceof Date) return value;
+  const contents = (named: JsonValue | undefined) => {
+    // The browser gives the file, but not its folder.
+    const name = String(named).split("/").at(-1) ?? "";
+    const found = files.get(name);
+    if (!found) throw new Error(`choose ${name} together with this file`);
+    return found;
+  };
+  const fields = Object.entries(value).map(([name, item]): [string, JsonValue] => {
+    if (name === "file") return ["data", base64Encode(contents(item))];
+    if (name === "text_file") return ["text", new TextDecoder().decode(contents(item)).trim()];
+    return [name, withFiles(item ?? null, files)];
+  });
+  return Object.fromEntries(fields);
+}
 
 /** A date of TOML in milliseconds since the Unix epoch. */
 function timeOf(time: Date, field: string): string {

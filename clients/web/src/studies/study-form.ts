@@ -14,6 +14,7 @@ import {
 } from "../gen/chefshat/v1/study_pb";
 import { fromHex } from "../hex";
 import { type Language, t, textsIn } from "../i18n";
+import { areAllowed, MAX_BYTES_IN_ALL, MAX_PICTURE_BYTES, MAX_PICTURES, type PictureFile } from "./picture-files";
 
 /** A condition in the form. */
 export interface ConditionForm {
@@ -65,8 +66,10 @@ export interface StudyForm {
   readonly questions: readonly QuestionForm[];
   readonly godspeed: boolean;
   readonly nasaTlx: boolean;
+  readonly ueqS: boolean;
   readonly external: string;
   readonly debriefing: string;
+  readonly pictures: readonly PictureFile[];
   readonly traces: boolean;
   /** The device that participants need. */
   readonly device: "any" | "fine" | "coarse";
@@ -88,9 +91,18 @@ export const PANEL_URLS = ["completedUrl", "leftUrl", "fullUrl"] as const;
 /** The dates of a study. */
 export const DATES = ["closesAt", "deletesAt"] as const;
 
-/** Whether the questionnaires Godspeed and NASA-TLX have texts in this language. */
-export function hasTemplates(language: Language): boolean {
-  return language === "en" || language === "it";
+/** The questionnaires that the server has: their names there, and the languages of their texts. */
+export const TEMPLATES = {
+  godspeed: { name: "godspeed", languages: ["en", "it"] },
+  nasaTlx: { name: "nasa_tlx", languages: ["en", "it"] },
+  ueqS: { name: "ueq_s", languages: ["en", "de"] },
+} as const satisfies Record<string, { name: string; languages: readonly Language[] }>;
+
+export type Template = keyof typeof TEMPLATES;
+
+/** Whether a questionnaire has texts in this language. */
+export function hasTexts(template: Template, language: Language): boolean {
+  return TEMPLATES[template].languages.some((one) => one === language);
 }
 
 /** A condition at first. */
@@ -135,8 +147,10 @@ export function emptyForm(language: Language): StudyForm {
     questions: [],
     godspeed: false,
     nasaTlx: false,
+    ueqS: false,
     external: "",
     debriefing: "",
+    pictures: [],
     traces: false,
     device: "any",
     minWidth: "",
@@ -205,6 +219,8 @@ export function faultsOf(form: StudyForm): StudyFaults {
   });
   const seeds = linesOf(form.seeds);
   if (seeds.length > MAX_SEEDS || !seeds.every((seed) => SEED.test(seed))) faults.seeds = words.seeds(MAX_SEEDS);
+  if (!areAllowed(form.pictures))
+    faults.pictures = words.pictures(MAX_PICTURES, MAX_PICTURE_BYTES / 1024, MAX_BYTES_IN_ALL / 1024);
   form.questions.forEach(({ text, kind, options }, index) => {
     if (text.trim() === "") faults[`question.${index}`] = words.missing;
     const offered = linesOf(options);
@@ -225,7 +241,6 @@ export function faultsOf(form: StudyForm): StudyFaults {
 /** The settings of the study that the form describes, with texts in the participants' language. */
 export async function settingsOf(form: StudyForm): Promise<MessageInitShape<typeof StudySettingsSchema>> {
   const words = (await textsIn(form.language)).studies.make;
-  const templates = hasTemplates(form.language);
   type Stage = MessageInitShape<typeof StudyStageSchema>;
   const questions = await questionsOf(form);
   const questionnaire = (id: QuestionForm["when"], title: string): Stage[] => {
@@ -236,8 +251,9 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
     { stage: { case: "games", value: { count: Number(form.games) } } },
     ...questionnaire("after", words.afterTitle),
   ];
-  if (form.godspeed && templates) inBlock.push({ stage: { case: "questionnaire", value: { template: "godspeed" } } });
-  if (form.nasaTlx && templates) inBlock.push({ stage: { case: "questionnaire", value: { template: "nasa_tlx" } } });
+  for (const template of ["godspeed", "nasaTlx", "ueqS"] as const)
+    if (form[template] && hasTexts(template, form.language))
+      inBlock.push({ stage: { case: "questionnaire", value: { template: TEMPLATES[template].name } } });
   const stages: Stage[] = [
     { stage: { case: "consent", value: { text: form.consent.trim(), version: form.version.trim() } } },
     ...questionnaire("before", words.beforeTitle),
@@ -278,6 +294,7 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
       policy: { hints, ...(people > 1 && { substitute: agent }) },
     })),
     stages,
+    pictures: [...form.pictures],
     traces: form.traces,
     closesAtMs: millisecondsOf(form.closesAt),
     deletesAtMs: millisecondsOf(form.deletesAt),

@@ -431,3 +431,59 @@ test("a date of which only a part is entered is no study without one", async () 
   await page.getByText("The study is deleted with all its data on ").waitFor();
   expect(faults).toEqual([]);
 });
+
+/** A picture of one pixel. */
+const DOT = Buffer.from("R0lGODlhAQABAIAAAAAAAP///yH5BAEAAAAALAAAAAABAAEAAAIBRAA7", "base64");
+
+test("a study from the form has factors, hints, a robot's seat, pictures and questions", async () => {
+  const { page, faults } = await person(browser);
+  await page.goto(`${server.url}/studies/new`);
+  const form = page.locator('[data-part="study-form"]');
+  await form.getByLabel("Name for researchers").fill("made with the form");
+  await form.getByLabel("Title that participants see").fill("Cooking together");
+  await form.getByLabel("Factors of the design").fill("robot");
+  await form.getByLabel("Level of “robot”").nth(0).fill("warm");
+  await form.getByLabel("Level of “robot”").nth(1).fill("cold");
+  await form.getByLabel("Participants may ask for hints").nth(0).check();
+  await form.getByLabel("A robot or a program of yours").nth(1).check();
+  await form.getByLabel("Text for it").fill("nods");
+  await form.getByLabel("Pictures in texts").setInputFiles({ name: "A Dot.gif", mimeType: "image/gif", buffer: DOT });
+  await form.getByText("![what it shows](a-dot.gif)").waitFor();
+  await form.getByLabel("Consent text", { exact: true }).fill("We record this:\n\n![a dot](a-dot.gif)");
+  await form.getByRole("button", { name: "Add a question" }).click();
+  await form.getByLabel("Question or statement").fill("How often do you play?");
+  await form.getByLabel("When it is asked").selectOption("before the games");
+  await form.getByLabel("How it is answered").selectOption("one of several options");
+  await form.getByLabel("Options, one in each line").fill("never\noften");
+  expect(await inaccessible(page)).toEqual([]);
+  await form.getByRole("button", { name: "Create the study" }).click();
+  await page.locator('[data-part="own-study"]').waitFor();
+
+  const studyId = new URL(page.url()).pathname.split("/").at(-1) ?? "";
+  const stored = await page.evaluate((id) => localStorage.getItem(`chefshat.own-study.${id}`), studyId);
+  const { ownerToken } = JSON.parse(stored ?? "{}");
+  const owned = { studyId, ownerToken };
+  const { settings } = (await clientsOf(server).studies.getStudy(owned)).study ?? {};
+  expect(settings?.factors.map(({ name, levels }) => [name, levels])).toEqual([["robot", ["warm", "cold"]]]);
+  expect(settings?.conditions.map(({ policy }) => policy?.hints)).toEqual([true, false]);
+  expect(settings?.conditions.map(({ robotBehaviour }) => robotBehaviour)).toEqual(["", "nods"]);
+  expect(settings?.pictures.map(({ data }) => Buffer.from(data))).toEqual([DOT]);
+  const saved = page.waitForEvent("download");
+  await page.getByRole("button", { name: "Download the settings" }).click();
+  const file = await (await saved).path();
+  expect(JSON.parse(readFileSync(file, "utf8")).pictures).toEqual([
+    { name: "a-dot.gif", data: DOT.toString("base64") },
+  ]);
+
+  const added = await clientsOf(server).studies.addStudyParticipants({ ...owned, count: 1 });
+  const participant = await person(browser);
+  await participant.page.goto(`${server.url}/study/${added.links[0]?.link}`);
+  const picture = participant.page.getByRole("img", { name: "a dot" });
+  await picture.waitFor();
+  await until(() => picture.evaluate((shown: HTMLImageElement) => shown.naturalWidth === 1));
+  expect(await inaccessible(participant.page)).toEqual([]);
+  await agree(participant.page);
+  await participant.page.getByRole("heading", { name: "About you" }).waitFor();
+  await participant.page.getByRole("radio", { name: "often" }).waitFor();
+  expect([...faults, ...participant.faults]).toEqual([]);
+});

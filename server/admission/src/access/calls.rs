@@ -324,6 +324,12 @@ pub const CALLS: &[Call] = &[
     .forwarded()
     .takes(192 * KIB, 1_024, MIB),
     call(
+        "/chefshat.v1.ParticipationService/GetStudyPicture",
+        Player,
+        Refused,
+    )
+    .forwarded(),
+    call(
         "/chefshat.v1.ParticipationService/WithdrawFromStudy",
         Player,
         Refused,

@@ -1,6 +1,6 @@
 //! The TOML file of a study: the fields of `StudySettings` by their names in the protocol. Values of
-//! enums are written in short ("within"), seeds in hexadecimal digits, and long texts may be in
-//! files of their own (`text_file`).
+//! enums are written in short ("within"), seeds in hexadecimal digits. Long texts may be in files of
+//! their own (`text_file`), and pictures are (`file`).
 
 use std::fs;
 use std::path::Path;
@@ -65,6 +65,13 @@ fn object(table: &DeTable<'_>, folder: &Path) -> Result<Map<String, Value>, Stri
             let text = fs::read_to_string(folder.join(name))
                 .map_err(|error| format!("text_file {name:?}: {error}"))?;
             fields.insert("text".to_owned(), text.trim().into());
+            continue;
+        }
+        if key == "file" {
+            let name = value.as_str().ok_or("file: give the name of a picture")?;
+            let data =
+                fs::read(folder.join(name)).map_err(|error| format!("file {name:?}: {error}"))?;
+            fields.insert("data".to_owned(), STANDARD.encode(data).into());
             continue;
         }
         let value = convert(&key, value, folder)?;
@@ -184,6 +191,23 @@ mod tests {
     }
 
     #[test]
+    fn texts_and_pictures_are_in_files_beside_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join("hand.gif"), "GIF89a").expect("it is written");
+        fs::write(folder.path().join("consent.md"), "I agree.\n").expect("it is written");
+        let text = r#"
+            pictures = [{ name = "hand", file = "hand.gif" }]
+            stages = [{ consent = { text_file = "consent.md", version = "1" } }]
+        "#;
+        let settings = parse(text, folder.path()).expect("valid");
+        assert_eq!(settings.pictures[0].data, "GIF89a");
+        let Some(v1::study_stage::Stage::Consent(consent)) = &settings.stages[0].stage else {
+            panic!("it is a consent");
+        };
+        assert_eq!(consent.text, "I agree.");
+    }
+
+    #[test]
     fn the_examples_are_valid() {
         let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/studies");
         for (file, conditions) in [("example.toml", 2), ("pairs.toml", 4)] {
@@ -209,6 +233,7 @@ mod tests {
                 "stages = [{ text = { text_file = \"missing.md\" } }]",
                 "missing.md",
             ),
+            ("pictures = [{ file = \"missing.png\" }]", "missing.png"),
         ] {
             let problem = parse(text, Path::new("/nonexistent")).expect_err(text);
             assert!(problem.contains(expected), "{text}: {problem}");

@@ -171,7 +171,7 @@ impl StudyService for StudyCalls {
             .owned(&caller, &request.study_id, &request.owner_token)
             .await?;
         Ok(Response::new(v1::GetStudyResponse {
-            study: Some(handle.describe()),
+            study: Some(handle.describe_with_pictures()),
             participants: handle.participants(self.studies.rooms()),
         }))
     }

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, MutexGuard};
 
+use bytes::Bytes;
 use chefshat_proto::v1;
 use chefshat_study::{
     At, Change, Content, Device, ItemAnswer, Joined, NewParticipants, Participant, ParticipantLink,
@@ -88,6 +89,23 @@ impl StudyHandle {
             open_link,
             &study,
         )
+    }
+
+    /// The study as a message, with the files of its pictures.
+    pub fn describe_with_pictures(&self) -> v1::Study {
+        let mut study = self.describe();
+        if let Some(settings) = &mut study.settings {
+            settings.pictures.clone_from(&self.header.settings.pictures);
+        }
+        study
+    }
+
+    /// The file of a picture that a participant is shown now, by the name that the text has.
+    pub fn picture(&self, number: u32, name: &str) -> Option<Bytes> {
+        let pictures = &self.header.settings.pictures;
+        let picture = pictures.iter().find(|picture| picture.name == name)?;
+        let view = self.committed().view(number)?;
+        view.names(name).then(|| picture.data.clone())
     }
 
     /// A participant as a message, for researchers.

@@ -13,8 +13,9 @@ use chefshat_room::policy::{Durability, Policy, Visibility};
 use chefshat_study::{
     AnswerSet, Arrival, Condition, Consent, Device, ExternalQuestionnaire, Factor, GROUP_SIZES,
     Groups, Hide, Item, ItemKind, Labels, Language, LeftOverPolicy, Order, Outcome, Part,
-    Participant, PlacedGame, PlayedGame, Pointer, Questionnaire, Recruiting, RequiredDevice,
-    ScreenOut, Settings, SettingsProblem, ShownIf, Stage, Status, Study, Task, Template, Text,
+    Participant, Picture, PlacedGame, PlayedGame, Pointer, Questionnaire, Recruiting,
+    RequiredDevice, ScreenOut, Settings, SettingsProblem, ShownIf, Stage, Status, Study, Task,
+    Template, Text,
 };
 
 use super::agent::check_budget;
@@ -269,6 +270,9 @@ pub fn study_plan(message: &v1::StudySettings) -> Result<StudyPlan, SettingsProb
             recruiting: recruiting(message.recruiting.clone().unwrap_or_default()),
             groups,
             device,
+            pictures: (message.pictures.iter())
+                .map(|picture| Picture::new(picture.name.clone(), &picture.data))
+                .collect(),
         }),
         name: message.name.clone(),
         conditions: plans,
@@ -721,9 +725,13 @@ pub fn study_to_proto(
         }] += 1;
     }
     let [invited, active, completed, left] = counts;
+    let mut settings = settings.clone();
+    for picture in &mut settings.pictures {
+        picture.data.clear();
+    }
     v1::Study {
         study_id: id.to_string(),
-        settings: Some(settings.clone()),
+        settings: Some(settings),
         seeds_sha256: study.settings().seeds_sha256().to_vec(),
         created_at_ms,
         closed: study.is_closed(),

@@ -237,7 +237,8 @@ export const studies: Texts["studies"] = {
   make: {
     title: "Studie erstellen",
     fromFile: "Aus einer Datei",
-    fromFileText: "Die Einstellungen einer Studie als TOML oder JSON, wie für „chefshat study create“.",
+    fromFileText:
+      "Die Einstellungen einer Studie als TOML oder JSON, wie für „chefshat study create“. Wähle die Dateien, die sie nennt, zusammen mit ihr.",
     file: "Datei mit den Einstellungen",
     read: (name, conditions, stages) =>
       `„${name}“: ${plural(conditions, { one: "# Bedingung", other: "# Bedingungen" })}, ${plural(stages, { one: "# Schritt", other: "# Schritte" })}.`,
@@ -268,12 +269,18 @@ export const studies: Texts["studies"] = {
     version: "Version des Einwilligungstextes",
     godspeed: "Godspeed-Fragebogen nach den Partien",
     nasaTlx: "NASA-TLX nach den Partien",
-    templateLanguages: "Die Texte gibt es nur auf Englisch und Italienisch.",
+    ueqS: "UEQ-S (Erleben des Spiels) nach den Partien",
+    templateLanguages: (languages) => `Die Texte gibt es nur auf: ${languages}.`,
     external: "Adresse eines Fragebogens nach den Partien",
     externalHint: "https://…; {participant} wird durch den Code ersetzt.",
     externalText: "Bitte füllen Sie diesen Fragebogen aus.",
     debriefing: "Text am Ende",
     debriefingTitle: "Über diese Studie",
+    pictures: "Bilder in Texten",
+    picturesHint:
+      "PNG, JPEG, GIF oder WebP. Schreib das, was hier steht, in einen Text oder eine Frage, mit dem, was das Bild zeigt, in Worten.",
+    pictureWords: "was es zeigt",
+    removePicture: "Dieses Bild entfernen",
     traces: "Bedienung aufzeichnen (gewählte und zurückgelegte Karten, Mauszeiger, Fokus)",
     devices: "Gerät, das die Teilnehmer brauchen",
     device: { any: "beliebig", fine: "Computer", coarse: "Smartphone oder Tablet" },
@@ -321,6 +328,8 @@ export const studies: Texts["studies"] = {
     beforeTitle: "Über Sie",
     afterTitle: "Ihre Eindrücke",
     problems: {
+      pictures: (most, each, all) =>
+        `Höchstens ${most} Dateien (PNG, JPEG, GIF oder WebP), je ${each} KiB und zusammen ${all} KiB.`,
       factors: "Nenne jeden Faktor einmal, höchstens acht.",
       seeds: (most) => `Gib in jeder Zeile 64 hexadezimale Ziffern ein, höchstens ${most} Zeilen.`,
       options: (most) => `Gib 2 bis ${most} verschiedene Möglichkeiten ein.`,

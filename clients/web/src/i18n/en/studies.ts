@@ -234,7 +234,8 @@ export const studies = {
   make: {
     title: "Create a study",
     fromFile: "From a file",
-    fromFileText: "The settings of a study as TOML or JSON, as for “chefshat study create”.",
+    fromFileText:
+      "The settings of a study as TOML or JSON, as for “chefshat study create”. Choose the files that it names together with it.",
     file: "File with the settings",
     read: (name: string, conditions: number, stages: number) =>
       `“${name}”: ${plural(conditions, { one: "# condition", other: "# conditions" })}, ${plural(stages, { one: "# stage", other: "# stages" })}.`,
@@ -265,12 +266,18 @@ export const studies = {
     version: "Version of the consent text",
     godspeed: "Godspeed questionnaire after the games",
     nasaTlx: "NASA-TLX after the games",
-    templateLanguages: "Its texts exist in English and Italian only.",
+    ueqS: "UEQ-S (experience with the game) after the games",
+    templateLanguages: (languages: string) => `Its texts exist only in: ${languages}.`,
     external: "Address of a questionnaire after the games",
     externalHint: "https://…; {participant} is replaced by the code.",
     externalText: "Please fill in this questionnaire.",
     debriefing: "Text at the end",
     debriefingTitle: "About this study",
+    pictures: "Pictures in texts",
+    picturesHint:
+      "PNG, JPEG, GIF or WebP. Write what is shown here into a text or question, with what the picture shows in words.",
+    pictureWords: "what it shows",
+    removePicture: "Remove this picture",
     traces: "Record interface traces (cards picked and put back, hover, focus)",
     devices: "Device that participants need",
     device: { any: "any", fine: "computer", coarse: "phone or tablet" },
@@ -318,6 +325,8 @@ export const studies = {
     beforeTitle: "About you",
     afterTitle: "Your impressions",
     problems: {
+      pictures: (most: number, each: number, all: number) =>
+        `At most ${most} PNG, JPEG, GIF or WebP files, of ${each} KiB each and ${all} KiB together.`,
       factors: "Name each factor once, at most eight.",
       seeds: (most: number) => `Enter 64 hexadecimal digits in each line, at most ${most} lines.`,
       options: (most: number) => `Enter 2 to ${most} different options.`,

@@ -235,7 +235,8 @@ export const studies: Texts["studies"] = {
   make: {
     title: "Crear un estudio",
     fromFile: "Desde un archivo",
-    fromFileText: "Los ajustes de un estudio en TOML o JSON, como para «chefshat study create».",
+    fromFileText:
+      "Los ajustes de un estudio en TOML o JSON, como para «chefshat study create». Elige junto con él los archivos que nombra.",
     file: "Archivo con los ajustes",
     read: (name, conditions, stages) =>
       `«${name}»: ${plural(conditions, { one: "# condición", other: "# condiciones" })}, ${plural(stages, { one: "# fase", other: "# fases" })}.`,
@@ -266,12 +267,18 @@ export const studies: Texts["studies"] = {
     version: "Versión del texto del consentimiento",
     godspeed: "Cuestionario Godspeed después de las partidas",
     nasaTlx: "NASA-TLX después de las partidas",
-    templateLanguages: "Sus textos solo existen en inglés y en italiano.",
+    ueqS: "UEQ-S (experiencia con el juego) después de las partidas",
+    templateLanguages: (languages) => `Sus textos solo existen en: ${languages}.`,
     external: "Dirección de un cuestionario después de las partidas",
     externalHint: "https://…; {participant} se sustituye por el código.",
     externalText: "Rellene este cuestionario.",
     debriefing: "Texto al final",
     debriefingTitle: "Sobre este estudio",
+    pictures: "Imágenes en los textos",
+    picturesHint:
+      "PNG, JPEG, GIF o WebP. Escribe lo que aparece aquí en un texto o una pregunta, con lo que muestra la imagen en palabras.",
+    pictureWords: "lo que muestra",
+    removePicture: "Quitar esta imagen",
     traces: "Registrar el uso de la interfaz (cartas elegidas y devueltas, puntero, foco)",
     devices: "Dispositivo que necesitan los participantes",
     device: { any: "cualquiera", fine: "ordenador", coarse: "teléfono o tableta" },
@@ -319,6 +326,8 @@ export const studies: Texts["studies"] = {
     beforeTitle: "Sobre usted",
     afterTitle: "Sus impresiones",
     problems: {
+      pictures: (most, each, all) =>
+        `Como máximo ${most} archivos PNG, JPEG, GIF o WebP, de ${each} KiB cada uno y ${all} KiB en total.`,
       factors: "Escribe cada factor una vez, ocho como máximo.",
       seeds: (most) => `Escribe 64 dígitos hexadecimales en cada línea, ${most} líneas como máximo.`,
       options: (most) => `Escribe de 2 a ${most} opciones distintas.`,

@@ -235,7 +235,8 @@ export const studies: Texts["studies"] = {
   make: {
     title: "Crea uno studio",
     fromFile: "Da un file",
-    fromFileText: "Le impostazioni di uno studio in TOML o JSON, come per «chefshat study create».",
+    fromFileText:
+      "Le impostazioni di uno studio in TOML o JSON, come per «chefshat study create». Scegli insieme i file che nomina.",
     file: "File con le impostazioni",
     read: (name, conditions, stages) =>
       `«${name}»: ${plural(conditions, { one: "# condizione", other: "# condizioni" })}, ${plural(stages, { one: "# fase", other: "# fasi" })}.`,
@@ -266,12 +267,18 @@ export const studies: Texts["studies"] = {
     version: "Versione del testo del consenso",
     godspeed: "Questionario Godspeed dopo le partite",
     nasaTlx: "NASA-TLX dopo le partite",
-    templateLanguages: "I suoi testi esistono solo in inglese e in italiano.",
+    ueqS: "UEQ-S (esperienza con il gioco) dopo le partite",
+    templateLanguages: (languages) => `I suoi testi esistono solo in: ${languages}.`,
     external: "Indirizzo di un questionario dopo le partite",
     externalHint: "https://…; {participant} diventa il codice.",
     externalText: "Compili questo questionario.",
     debriefing: "Testo alla fine",
     debriefingTitle: "Informazioni su questo studio",
+    pictures: "Immagini nei testi",
+    picturesHint:
+      "PNG, JPEG, GIF o WebP. Scrivi ciò che appare qui in un testo o in una domanda, con quello che l’immagine mostra a parole.",
+    pictureWords: "che cosa mostra",
+    removePicture: "Togli questa immagine",
     traces: "Registra le tracce dell’interfaccia (carte prese e rimesse, puntatore, fuoco)",
     devices: "Dispositivo richiesto ai partecipanti",
     device: { any: "qualsiasi", fine: "computer", coarse: "telefono o tablet" },
@@ -319,6 +326,8 @@ export const studies: Texts["studies"] = {
     beforeTitle: "Su di Lei",
     afterTitle: "Le Sue impressioni",
     problems: {
+      pictures: (most, each, all) =>
+        `Al massimo ${most} file PNG, JPEG, GIF o WebP, di ${each} KiB ciascuno e ${all} KiB in tutto.`,
       factors: "Scrivi ogni fattore una volta, al massimo otto.",
       seeds: (most) => `Inserisci 64 cifre esadecimali in ogni riga, al massimo ${most} righe.`,
       options: (most) => `Inserisci da 2 a ${most} opzioni diverse.`,

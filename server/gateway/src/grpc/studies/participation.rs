@@ -348,6 +348,24 @@ impl ParticipationService for StudyCalls {
         Ok(Response::new(v1::RecordTracesResponse {}))
     }
 
+    async fn get_study_picture(
+        &self,
+        request: Request<v1::GetStudyPictureRequest>,
+    ) -> Result<Response<v1::GetStudyPictureResponse>, Status> {
+        let key = charged(request.extensions());
+        let request = request.into_inner();
+        let (handle, number) = self.of_link(&request.link, key).await?;
+        let data = handle.picture(number, &request.picture).ok_or_else(|| {
+            status(
+                Code::NotFound,
+                "PICTURE_UNKNOWN",
+                "what is shown now has no such picture",
+                [("field", "picture")],
+            )
+        })?;
+        Ok(Response::new(v1::GetStudyPictureResponse { data }))
+    }
+
     async fn withdraw_from_study(
         &self,
         request: Request<v1::WithdrawFromStudyRequest>,
@@ -461,7 +479,7 @@ mod tests {
                 waiting.push(method.output_type().to_owned());
             }
         }
-        assert_eq!(waiting.len(), 9);
+        assert_eq!(waiting.len(), 10);
         let mut seen = BTreeSet::new();
         while let Some(path) = waiting.pop() {
             if !seen.insert(path.clone()) {

@@ -68,7 +68,11 @@ impl<'s> File<'s> {
 
     async fn line(&mut self, text: &str) -> Result<(), ExportError> {
         self.buffer.extend_from_slice(text.as_bytes());
-        self.buffer.push(b'\n');
+        self.bytes(b"\n").await
+    }
+
+    async fn bytes(&mut self, bytes: &[u8]) -> Result<(), ExportError> {
+        self.buffer.extend_from_slice(bytes);
         self.send_full().await
     }
 
@@ -155,6 +159,16 @@ impl StudyHandle {
         study
     }
 
+    /// Sends the pictures of the study.
+    async fn pictures(&self, sender: &mpsc::Sender<ExportedFile>) -> Result<(), ExportError> {
+        for picture in &self.header.settings.pictures {
+            let mut file = File::new(format!("pictures/{}", picture.name), sender);
+            file.bytes(&picture.data).await?;
+            file.end().await?;
+        }
+        Ok(())
+    }
+
     /// Sends the data of the study, or those of its test participants, file by file.
     ///
     /// # Errors
@@ -170,6 +184,7 @@ impl StudyHandle {
         let people = people.filter(|(_, it)| it.test == test);
         let people: Vec<_> = people.map(|(number, it)| (*number, it)).collect();
         json_file("study.json", &self.publishable(), sender).await?;
+        self.pictures(sender).await?;
         let mut sheets = vec![participants(study, &people, sender).await?];
         sheets.push(sessions(study, &people, sender).await?);
         if study.settings().groups.is_some() {

@@ -813,9 +813,9 @@ class StudyQuestionnaire(_message.Message):
     """
     template: _builtins.str
     """An established questionnaire in the language of the study: "godspeed" (Bartneck, Kulić, Croft and
-    Zoghbi 2009) or "nasa_tlx" (Hart and Staveland 1988, without weights). Its items are used if
-    `items` is empty. They have texts in English and Italian; in other languages, `items` is
-    required.
+    Zoghbi 2009) or "nasa_tlx" (Hart and Staveland 1988, without weights), which have texts in English
+    and Italian, or "ueq_s" (Schrepp, Hinderks and Thomaschewski 2017), in English and German. Its items
+    are used if `items` is empty; in other languages, `items` is required.
     """
     title: _builtins.str
     """Title, at most 128 characters; by default that of the template."""
@@ -911,8 +911,8 @@ class StudyText(_message.Message):
     """Its title, at most 128 characters."""
     text: _builtins.str
     """The text, 1..=20000 characters of Markdown (CommonMark): paragraphs, headings, lists, quotations,
-    emphasis, code and links. A page shows HTML in it as it is written, and the words of pictures. Of
-    questions, only the markup within paragraphs counts.
+    emphasis, code, links, and the pictures of the settings (StudyPicture). A page shows HTML in it as it
+    is written, and the words of other pictures. Of questions, only the markup within paragraphs counts.
     """
     def __init__(
         self,
@@ -1253,6 +1253,7 @@ class StudySettings(_message.Message):
     DELETES_AT_MS_FIELD_NUMBER: _builtins.int
     GROUPS_FIELD_NUMBER: _builtins.int
     DEVICE_FIELD_NUMBER: _builtins.int
+    PICTURES_FIELD_NUMBER: _builtins.int
     name: _builtins.str
     """Name for researchers, 1..=64 characters. Participants never see it."""
     title: _builtins.str
@@ -1318,6 +1319,10 @@ class StudySettings(_message.Message):
     def device(self) -> Global___StudyRequiredDevice:
         """The device that participants need; unset: any."""
 
+    @_builtins.property
+    def pictures(self) -> _containers.RepeatedCompositeFieldContainer[Global___StudyPicture]:
+        """Pictures in texts, at most 16, together at most 524288 bytes."""
+
     def __init__(
         self,
         *,
@@ -1339,14 +1344,46 @@ class StudySettings(_message.Message):
         deletes_at_ms: _builtins.int = ...,
         groups: Global___StudyGroups | None = ...,
         device: Global___StudyRequiredDevice | None = ...,
+        pictures: _abc.Iterable[Global___StudyPicture] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["device", b"device", "groups", b"groups", "recruiting", b"recruiting"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["assignment_seed", b"assignment_seed", "block_size", b"block_size", "closes_at_ms", b"closes_at_ms", "conditions", b"conditions", "deletes_at_ms", b"deletes_at_ms", "device", b"device", "drop_out_after_ms", b"drop_out_after_ms", "factors", b"factors", "groups", b"groups", "language", b"language", "name", b"name", "order", b"order", "participants", b"participants", "recruiting", b"recruiting", "seeds", b"seeds", "stages", b"stages", "title", b"title", "traces", b"traces"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["assignment_seed", b"assignment_seed", "block_size", b"block_size", "closes_at_ms", b"closes_at_ms", "conditions", b"conditions", "deletes_at_ms", b"deletes_at_ms", "device", b"device", "drop_out_after_ms", b"drop_out_after_ms", "factors", b"factors", "groups", b"groups", "language", b"language", "name", b"name", "order", b"order", "participants", b"participants", "pictures", b"pictures", "recruiting", b"recruiting", "seeds", b"seeds", "stages", b"stages", "title", b"title", "traces", b"traces"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
 Global___StudySettings: _TypeAlias = StudySettings  # noqa: Y015
+
+@_typing.final
+class StudyPicture(_message.Message):
+    """A picture in texts of the study."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    NAME_FIELD_NUMBER: _builtins.int
+    DATA_FIELD_NUMBER: _builtins.int
+    name: _builtins.str
+    """Its name, 1..=64 lower-case letters, digits, `_`, `-` or `.`, of which the first is no dot, unique in
+    the study. Texts show the picture where they have `![two hands of cards](NAME)`, with what it shows
+    in words.
+    """
+    data: _builtins.bytes
+    """A PNG, JPEG, GIF or WebP file, at most 262144 bytes. Of the responses that have the settings, only
+    GetStudy has it.
+    """
+    def __init__(
+        self,
+        *,
+        name: _builtins.str = ...,
+        data: _builtins.bytes = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["data", b"data", "name", b"name"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___StudyPicture: _TypeAlias = StudyPicture  # noqa: Y015
 
 @_typing.final
 class StudyRequiredDevice(_message.Message):

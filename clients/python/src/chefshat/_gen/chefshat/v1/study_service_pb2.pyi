@@ -1089,6 +1089,54 @@ class RecordTracesResponse(_message.Message):
 Global___RecordTracesResponse: _TypeAlias = RecordTracesResponse  # noqa: Y015
 
 @_typing.final
+class GetStudyPictureRequest(_message.Message):
+    """Requests a picture."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    LINK_FIELD_NUMBER: _builtins.int
+    PICTURE_FIELD_NUMBER: _builtins.int
+    link: _builtins.str
+    """The secret of the link: `link` of StudyLink."""
+    picture: _builtins.str
+    """`name` of StudyPicture, as the text has it."""
+    def __init__(
+        self,
+        *,
+        link: _builtins.str = ...,
+        picture: _builtins.str = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["link", b"link", "picture", b"picture"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___GetStudyPictureRequest: _TypeAlias = GetStudyPictureRequest  # noqa: Y015
+
+@_typing.final
+class GetStudyPictureResponse(_message.Message):
+    """The picture."""
+
+    DESCRIPTOR: _descriptor.Descriptor
+
+    DATA_FIELD_NUMBER: _builtins.int
+    data: _builtins.bytes
+    """A PNG, JPEG, GIF or WebP file."""
+    def __init__(
+        self,
+        *,
+        data: _builtins.bytes = ...,
+    ) -> None: ...
+    _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+    def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["data", b"data"]  # noqa: Y015
+    def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+    def WhichOneof(self, oneof_group: _Never) -> None: ...
+
+Global___GetStudyPictureResponse: _TypeAlias = GetStudyPictureResponse  # noqa: Y015
+
+@_typing.final
 class WithdrawFromStudyRequest(_message.Message):
     """Requests to withdraw."""
 

@@ -109,7 +109,7 @@ class StudyServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def GetStudy(self, request, context):
-        """Returns a study. NOT_FOUND (STUDY_UNKNOWN).
+        """Returns a study, with its pictures. NOT_FOUND (STUDY_UNKNOWN).
         """
         context.set_code(grpc.StatusCode.UNIMPLEMENTED)
         context.set_details('Method not implemented!')
@@ -171,7 +171,7 @@ class StudyServiceServicer(object):
         raise NotImplementedError('Method not implemented!')
 
     def ExportStudy(self, request, context):
-        """Streams the data of a study as files: `study.json`, the tables `participants.csv`,
+        """Streams the data of a study as files: `study.json`, its pictures under `pictures/`, the tables `participants.csv`,
         `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
         `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
         under `records/` and samples under `samples/`, and last what the columns of the tables mean,
@@ -626,6 +626,11 @@ class ParticipationServiceStub(object):
                 request_serializer=chefshat_dot_v1_dot_study__service__pb2.RecordTracesRequest.SerializeToString,
                 response_deserializer=chefshat_dot_v1_dot_study__service__pb2.RecordTracesResponse.FromString,
                 _registered_method=True)
+        self.GetStudyPicture = channel.unary_unary(
+                '/chefshat.v1.ParticipationService/GetStudyPicture',
+                request_serializer=chefshat_dot_v1_dot_study__service__pb2.GetStudyPictureRequest.SerializeToString,
+                response_deserializer=chefshat_dot_v1_dot_study__service__pb2.GetStudyPictureResponse.FromString,
+                _registered_method=True)
         self.WithdrawFromStudy = channel.unary_unary(
                 '/chefshat.v1.ParticipationService/WithdrawFromStudy',
                 request_serializer=chefshat_dot_v1_dot_study__service__pb2.WithdrawFromStudyRequest.SerializeToString,
@@ -724,6 +729,14 @@ class ParticipationServiceServicer(object):
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def GetStudyPicture(self, request, context):
+        """Returns a picture of the text that the participant is shown now. UNAUTHENTICATED (LINK_UNKNOWN);
+        NOT_FOUND (PICTURE_UNKNOWN).
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def WithdrawFromStudy(self, request, context):
         """Withdraws, at any time, also after the end and from any device: the link is enough. A running
         game is closed, or played on by an agent for the others of a group. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
@@ -774,6 +787,11 @@ def add_ParticipationServiceServicer_to_server(servicer, server):
                     servicer.RecordTraces,
                     request_deserializer=chefshat_dot_v1_dot_study__service__pb2.RecordTracesRequest.FromString,
                     response_serializer=chefshat_dot_v1_dot_study__service__pb2.RecordTracesResponse.SerializeToString,
+            ),
+            'GetStudyPicture': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetStudyPicture,
+                    request_deserializer=chefshat_dot_v1_dot_study__service__pb2.GetStudyPictureRequest.FromString,
+                    response_serializer=chefshat_dot_v1_dot_study__service__pb2.GetStudyPictureResponse.SerializeToString,
             ),
             'WithdrawFromStudy': grpc.unary_unary_rpc_method_handler(
                     servicer.WithdrawFromStudy,
@@ -1001,6 +1019,33 @@ class ParticipationService(object):
             '/chefshat.v1.ParticipationService/RecordTraces',
             chefshat_dot_v1_dot_study__service__pb2.RecordTracesRequest.SerializeToString,
             chefshat_dot_v1_dot_study__service__pb2.RecordTracesResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def GetStudyPicture(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/chefshat.v1.ParticipationService/GetStudyPicture',
+            chefshat_dot_v1_dot_study__service__pb2.GetStudyPictureRequest.SerializeToString,
+            chefshat_dot_v1_dot_study__service__pb2.GetStudyPictureResponse.FromString,
             options,
             channel_credentials,
             insecure,

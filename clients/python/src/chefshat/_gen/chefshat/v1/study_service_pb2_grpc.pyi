@@ -42,7 +42,7 @@ class StudyServiceStub:
     the cluster reaches this one).
     """
     GetStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.GetStudyRequest, _study_service_pb2.GetStudyResponse]
-    """Returns a study. NOT_FOUND (STUDY_UNKNOWN)."""
+    """Returns a study, with its pictures. NOT_FOUND (STUDY_UNKNOWN)."""
     ListStudies: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.ListStudiesRequest, _study_service_pb2.ListStudiesResponse]
     """Lists the studies whose owner tokens the request has, and for the operator all, newest first."""
     AddStudyParticipants: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.AddStudyParticipantsRequest, _study_service_pb2.AddStudyParticipantsResponse]
@@ -74,7 +74,7 @@ class StudyServiceStub:
     (STUDY_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     ExportStudy: _grpc.UnaryStreamMultiCallable[_study_service_pb2.ExportStudyRequest, _study_service_pb2.ExportStudyResponse]
-    """Streams the data of a study as files: `study.json`, the tables `participants.csv`,
+    """Streams the data of a study as files: `study.json`, its pictures under `pictures/`, the tables `participants.csv`,
     `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
     `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
     under `records/` and samples under `samples/`, and last what the columns of the tables mean,
@@ -110,7 +110,7 @@ class StudyServiceAsyncStub(StudyServiceStub):
     the cluster reaches this one).
     """
     GetStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.GetStudyRequest, _study_service_pb2.GetStudyResponse]  # type: ignore[assignment]
-    """Returns a study. NOT_FOUND (STUDY_UNKNOWN)."""
+    """Returns a study, with its pictures. NOT_FOUND (STUDY_UNKNOWN)."""
     ListStudies: _aio.UnaryUnaryMultiCallable[_study_service_pb2.ListStudiesRequest, _study_service_pb2.ListStudiesResponse]  # type: ignore[assignment]
     """Lists the studies whose owner tokens the request has, and for the operator all, newest first."""
     AddStudyParticipants: _aio.UnaryUnaryMultiCallable[_study_service_pb2.AddStudyParticipantsRequest, _study_service_pb2.AddStudyParticipantsResponse]  # type: ignore[assignment]
@@ -142,7 +142,7 @@ class StudyServiceAsyncStub(StudyServiceStub):
     (STUDY_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
     """
     ExportStudy: _aio.UnaryStreamMultiCallable[_study_service_pb2.ExportStudyRequest, _study_service_pb2.ExportStudyResponse]  # type: ignore[assignment]
-    """Streams the data of a study as files: `study.json`, the tables `participants.csv`,
+    """Streams the data of a study as files: `study.json`, its pictures under `pictures/`, the tables `participants.csv`,
     `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
     `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
     under `records/` and samples under `samples/`, and last what the columns of the tables mean,
@@ -187,7 +187,7 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _study_service_pb2.GetStudyRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_study_service_pb2.GetStudyResponse, _abc.Awaitable[_study_service_pb2.GetStudyResponse]]:
-        """Returns a study. NOT_FOUND (STUDY_UNKNOWN)."""
+        """Returns a study, with its pictures. NOT_FOUND (STUDY_UNKNOWN)."""
 
     @_abc_1.abstractmethod
     def ListStudies(
@@ -261,7 +261,7 @@ class StudyServiceServicer(metaclass=_abc_1.ABCMeta):
         request: _study_service_pb2.ExportStudyRequest,
         context: _ServicerContext,
     ) -> _typing.Union[_abc.Iterator[_study_service_pb2.ExportStudyResponse], _abc.AsyncIterator[_study_service_pb2.ExportStudyResponse]]:
-        """Streams the data of a study as files: `study.json`, the tables `participants.csv`,
+        """Streams the data of a study as files: `study.json`, its pictures under `pictures/`, the tables `participants.csv`,
         `sessions.csv`, `groups.csv` if there are groups, `games.csv`, `items.csv`, `answers.csv` and
         `traces.csv`, `unreadable.csv` if the record of a game cannot be read, the records of its games
         under `records/` and samples under `samples/`, and last what the columns of the tables mean,
@@ -360,6 +360,10 @@ class ParticipationServiceStub:
     server was started; DISK_NEARLY_FULL); FAILED_PRECONDITION (PARTICIPATION_OVER);
     UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED); UNAVAILABLE (SHUTTING_DOWN).
     """
+    GetStudyPicture: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.GetStudyPictureRequest, _study_service_pb2.GetStudyPictureResponse]
+    """Returns a picture of the text that the participant is shown now. UNAUTHENTICATED (LINK_UNKNOWN);
+    NOT_FOUND (PICTURE_UNKNOWN).
+    """
     WithdrawFromStudy: _grpc.UnaryUnaryMultiCallable[_study_service_pb2.WithdrawFromStudyRequest, _study_service_pb2.WithdrawFromStudyResponse]
     """Withdraws, at any time, also after the end and from any device: the link is enough. A running
     game is closed, or played on by an agent for the others of a group. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
@@ -425,6 +429,10 @@ class ParticipationServiceAsyncStub(ParticipationServiceStub):
     (GAME_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_TRACES after 20000 in a game, counted since the
     server was started; DISK_NEARLY_FULL); FAILED_PRECONDITION (PARTICIPATION_OVER);
     UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED); UNAVAILABLE (SHUTTING_DOWN).
+    """
+    GetStudyPicture: _aio.UnaryUnaryMultiCallable[_study_service_pb2.GetStudyPictureRequest, _study_service_pb2.GetStudyPictureResponse]  # type: ignore[assignment]
+    """Returns a picture of the text that the participant is shown now. UNAUTHENTICATED (LINK_UNKNOWN);
+    NOT_FOUND (PICTURE_UNKNOWN).
     """
     WithdrawFromStudy: _aio.UnaryUnaryMultiCallable[_study_service_pb2.WithdrawFromStudyRequest, _study_service_pb2.WithdrawFromStudyResponse]  # type: ignore[assignment]
     """Withdraws, at any time, also after the end and from any device: the link is enough. A running
@@ -536,6 +544,16 @@ class ParticipationServiceServicer(metaclass=_abc_1.ABCMeta):
         (GAME_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_TRACES after 20000 in a game, counted since the
         server was started; DISK_NEARLY_FULL); FAILED_PRECONDITION (PARTICIPATION_OVER);
         UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED); UNAVAILABLE (SHUTTING_DOWN).
+        """
+
+    @_abc_1.abstractmethod
+    def GetStudyPicture(
+        self,
+        request: _study_service_pb2.GetStudyPictureRequest,
+        context: _ServicerContext,
+    ) -> _typing.Union[_study_service_pb2.GetStudyPictureResponse, _abc.Awaitable[_study_service_pb2.GetStudyPictureResponse]]:
+        """Returns a picture of the text that the participant is shown now. UNAUTHENTICATED (LINK_UNKNOWN);
+        NOT_FOUND (PICTURE_UNKNOWN).
         """
 
     @_abc_1.abstractmethod

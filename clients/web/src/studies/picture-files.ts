@@ -1,0 +1,43 @@
+// Files of pictures that a study can have; the server checks them again.
+
+/** What file fields offer. */
+export const PICTURES = "image/png,image/jpeg,image/gif,image/webp";
+/** Most pictures of a study. */
+export const MAX_PICTURES = 16;
+/** The largest file of a picture, bytes. */
+export const MAX_PICTURE_BYTES = 262_144;
+/** Most bytes of all pictures of a study. */
+export const MAX_BYTES_IN_ALL = 524_288;
+
+/** A picture of a study. */
+export interface PictureFile {
+  readonly name: string;
+  readonly data: Uint8Array<ArrayBuffer>;
+}
+
+/** The media type of a picture, by how its file begins; empty if a study cannot have it. */
+export function formatOf(file: Uint8Array): string {
+  const begins = (...bytes: number[]) => bytes.every((byte, index) => file[index] === byte);
+  if (begins(0x89, 0x50, 0x4e, 0x47)) return "image/png";
+  if (begins(0xff, 0xd8, 0xff)) return "image/jpeg";
+  if (begins(0x47, 0x49, 0x46, 0x38)) return "image/gif";
+  const isWebP = [0x57, 0x45, 0x42, 0x50].every((byte, index) => file[8 + index] === byte);
+  return begins(0x52, 0x49, 0x46, 0x46) && isWebP ? "image/webp" : "";
+}
+
+/** The file under a name that texts can have. */
+export async function pictureOf(file: File): Promise<PictureFile> {
+  const name = file.name
+    .toLowerCase()
+    .replaceAll(/[^a-z0-9_.-]/g, "-")
+    .replace(/^\.+/, "")
+    .slice(-64);
+  return { name, data: new Uint8Array(await file.arrayBuffer()) };
+}
+
+/** Whether a study can have these pictures. */
+export function areAllowed(pictures: readonly PictureFile[]): boolean {
+  const isAllowed = ({ data }: PictureFile) => data.length <= MAX_PICTURE_BYTES && formatOf(data) !== "";
+  const bytes = pictures.reduce((sum, { data }) => sum + data.length, 0);
+  return pictures.length <= MAX_PICTURES && bytes <= MAX_BYTES_IN_ALL && pictures.every(isAllowed);
+}

@@ -1,0 +1,167 @@
+//! Pictures in texts. Their files are kept elsewhere.
+
+use crate::checks::{Checked, identifier, refuse, within};
+use crate::view::{Content, View};
+
+/// Maximum number of pictures of a study.
+pub(crate) const MAX_PICTURES: usize = 16;
+/// Largest file of a picture, in bytes.
+const MAX_BYTES: usize = 262_144;
+/// Most bytes of all pictures of a study together.
+pub(crate) const MAX_BYTES_IN_ALL: usize = 524_288;
+
+/// A picture.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Picture {
+    /// Its name in texts.
+    pub name: String,
+    /// Length of its file, in bytes, at most 262144.
+    pub bytes: usize,
+    /// What its file is; `None` if that is none of the formats that every browser shows.
+    pub format: Option<PictureFormat>,
+}
+
+/// The format of a picture, as its file begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PictureFormat {
+    /// Portable Network Graphics.
+    Png,
+    /// JPEG.
+    Jpeg,
+    /// Graphics Interchange Format.
+    Gif,
+    /// WebP.
+    WebP,
+}
+
+impl Picture {
+    /// The picture of a file.
+    pub fn new(name: String, file: &[u8]) -> Self {
+        Self {
+            name,
+            bytes: file.len(),
+            format: PictureFormat::of(file),
+        }
+    }
+
+    pub(crate) fn check(&self, field: &str) -> Checked {
+        let name = format!("{field}.name");
+        identifier(&name, &self.name)?;
+        // Exported data have it as the name of a file.
+        if self.name.starts_with('.') || self.name.chars().any(|it| it.is_ascii_uppercase()) {
+            return refuse(name, "use lower-case letters, and no dot at the beginning");
+        }
+        let data = format!("{field}.data");
+        within(&data, self.bytes, 1..=MAX_BYTES)?;
+        match self.format {
+            Some(_) => Ok(()),
+            None => refuse(data, "it is no PNG, JPEG, GIF or WebP file"),
+        }
+    }
+}
+
+impl PictureFormat {
+    /// The format of a file.
+    fn of(file: &[u8]) -> Option<Self> {
+        match file {
+            [0x89, b'P', b'N', b'G', ..] => Some(Self::Png),
+            [0xff, 0xd8, 0xff, ..] => Some(Self::Jpeg),
+            [b'G', b'I', b'F', b'8', ..] => Some(Self::Gif),
+            [
+                b'R',
+                b'I',
+                b'F',
+                b'F',
+                _,
+                _,
+                _,
+                _,
+                b'W',
+                b'E',
+                b'B',
+                b'P',
+                ..,
+            ] => Some(Self::WebP),
+            _ => None,
+        }
+    }
+}
+
+impl View {
+    /// Whether a text that is shown names a picture.
+    pub fn names(&self, picture: &str) -> bool {
+        let texts: Vec<&str> = match &self.content {
+            Content::Consent(consent) => vec![&consent.text],
+            Content::Questionnaire(shown) => {
+                let questions = shown.items.iter().map(|item| item.text.as_str());
+                questions.chain([shown.instructions.as_str()]).collect()
+            }
+            Content::External(external) => vec![&external.text],
+            Content::Text(text) => vec![&text.text],
+            Content::Arrival(arrival) => vec![&arrival.text],
+            Content::End { text, .. } => vec![text],
+            Content::Game(_) => Vec::new(),
+        };
+        texts.iter().any(|text| text.contains(picture))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::{Settings, Study, testing};
+
+    #[test]
+    fn pictures_are_refused_by_what_is_wrong_with_them() {
+        let picture = |name: &str, bytes| Picture {
+            name: name.to_owned(),
+            bytes,
+            format: Some(PictureFormat::Png),
+        };
+        let hand = picture("hand.png", MAX_BYTES);
+        let unknown = Picture::new("hand.svg".to_owned(), b"<svg/>");
+        for (pictures, field) in [
+            (vec![picture("two hands", 1)], "pictures[0].name"),
+            (vec![picture("Hand", 1)], "pictures[0].name"),
+            (vec![picture("..", 1)], "pictures[0].name"),
+            (vec![hand.clone(), hand.clone()], "pictures[1].name"),
+            (vec![picture("hand", 0)], "pictures[0].data"),
+            (vec![picture("hand", MAX_BYTES + 1)], "pictures[0].data"),
+            (vec![unknown], "pictures[0].data"),
+            (
+                ["a", "b", "c"].map(|name| picture(name, MAX_BYTES)).into(),
+                "pictures",
+            ),
+            (vec![hand.clone(); MAX_PICTURES + 1], "pictures"),
+        ] {
+            let settings = Settings {
+                pictures,
+                ..testing::settings()
+            };
+            let refused = Study::new(Arc::new(settings)).expect_err(field);
+            assert_eq!(refused.field, field, "{refused}");
+        }
+        let settings = Settings {
+            pictures: vec![hand, picture("2_hands.png", MAX_BYTES)],
+            ..testing::settings()
+        };
+        Study::new(Arc::new(settings)).expect("they are as large as pictures may be");
+    }
+
+    #[test]
+    fn files_are_known_by_how_they_begin() {
+        for (file, expected) in [
+            (&b"\x89PNG\r\n\x1a\n"[..], Some(PictureFormat::Png)),
+            (b"\xff\xd8\xff\xe0", Some(PictureFormat::Jpeg)),
+            (b"GIF89a", Some(PictureFormat::Gif)),
+            (b"RIFF\x10\0\0\0WEBPVP8 ", Some(PictureFormat::WebP)),
+            (b"RIFF\x10\0\0\0WAVEfmt ", None),
+            (b"<svg xmlns='http://www.w3.org/2000/svg'>", None),
+            (b"", None),
+        ] {
+            assert_eq!(Picture::new("p".to_owned(), file).format, expected);
+        }
+    }
+}
