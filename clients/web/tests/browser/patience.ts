@@ -3,4 +3,4 @@
 /**
  * Milliseconds after which a state that was waited for counts as missing, on the busiest machine.
  */
-export const PATIENCE_MS = 120_000;
+export const PATIENCE_MS = 300_000;
