@@ -40,7 +40,7 @@ use chefshat_hosting::config::{
 };
 use chefshat_hosting::rooms::Rooms;
 use chefshat_hosting::studies::{
-    CreateProblem, ExportError, ExportedFile, NotAdded, Stopped, Studies, StudyHandle,
+    CreateProblem, ExportError, ExportedFile, NotDeleted, NotDone, Studies, StudyHandle,
 };
 use chefshat_room::ids::{Id, RequestKey, StudyId};
 use chefshat_store::StoreError;
@@ -242,8 +242,7 @@ impl StudyService for StudyCalls {
             test: request.test,
             together: request.together,
         };
-        let added = handle.add(key, new).await.map_err(stopped)?;
-        let first = added.map_err(not_added)?;
+        let first = handle.add(key, new).await.map_err(not_done)?;
         Ok(Response::new(v1::AddStudyParticipantsResponse {
             links: self.links(&handle, first, count),
         }))
@@ -316,7 +315,7 @@ impl StudyService for StudyCalls {
             .owned(&caller, &request.study_id, &request.owner_token)
             .await?;
         let removed = handle.remove(key, request.number, request.replace).await;
-        let added = removed.map_err(stopped)?.map_err(not_added)?;
+        let added = removed.map_err(not_done)?;
         Ok(Response::new(v1::RemoveStudyParticipantResponse {
             participant: handle.participant(request.number, self.studies.rooms()),
             replacement: (added > 0).then(|| handle.link(added)),
@@ -332,7 +331,7 @@ impl StudyService for StudyCalls {
         let handle = self
             .owned(&caller, &request.study_id, &request.owner_token)
             .await?;
-        handle.close().await.map_err(stopped)?;
+        handle.close().await.map_err(not_done)?;
         let study = Some(handle.describe());
         Ok(Response::new(v1::CloseStudyResponse { study }))
     }
@@ -398,7 +397,7 @@ impl StudyService for StudyCalls {
         self.calls
             .charge(Key::of_caller(&caller), COST_OF_TOURNAMENT);
         let deleted = handle.withdraw(request.number, true).await;
-        deleted.map_err(stopped)?.map_err(refused)?;
+        deleted.map_err(not_done)?;
         let participant = handle.participant(request.number, self.studies.rooms());
         let games = participant.as_ref().map_or(0, |it| it.games.len());
         Ok(Response::new(v1::DeleteStudyParticipantResponse {
@@ -417,7 +416,7 @@ impl StudyService for StudyCalls {
             .owned(&caller, &request.study_id, &request.owner_token)
             .await?;
         let deleted = self.studies.delete(handle, request.force).await;
-        let (participants, games) = deleted.map_err(stopped)?.map_err(study_running)?;
+        let (participants, games) = deleted.map_err(not_deleted)?;
         Ok(Response::new(v1::DeleteStudyResponse {
             participants: convert::number(participants),
             games: convert::number(games),
@@ -516,19 +515,17 @@ fn study_unknown() -> Status {
     )
 }
 
-fn study_running(active: usize) -> Status {
-    status(
-        Code::FailedPrecondition,
-        "STUDY_RUNNING",
-        format!(
-            "{active} participants are in the middle of the study; wait for them, or set `force` to remove them"
+/// The status for a study that is not deleted.
+fn not_deleted(problem: NotDeleted) -> Status {
+    match problem {
+        NotDeleted::Running(active) => status(
+            Code::FailedPrecondition,
+            "STUDY_RUNNING",
+            format!("{problem}; wait for them, or set `force` to remove them"),
+            [("participants", &active.to_string())],
         ),
-        [("participants", &active.to_string())],
-    )
-}
-
-fn stopped(_: Stopped) -> Status {
-    shutting_down()
+        NotDeleted::Stopped(_) => shutting_down(),
+    }
 }
 
 fn settings_refused(problem: SettingsProblem) -> Status {
@@ -540,11 +537,12 @@ fn settings_refused(problem: SettingsProblem) -> Status {
     )
 }
 
-/// The status for a command that would have added to a study.
-fn not_added(problem: NotAdded) -> Status {
+/// The status for what a study did not do.
+fn not_done(problem: NotDone) -> Status {
     match problem {
-        NotAdded::Study(refusal) => refused(refusal),
-        NotAdded::Memory(refusal) => Refusal::from(refusal).into(),
+        NotDone::Study(refusal) => refused(refusal),
+        NotDone::Memory(refusal) => Refusal::from(refusal).into(),
+        NotDone::Stopped(_) => shutting_down(),
     }
 }
 

@@ -41,8 +41,8 @@ use chefshat_hosting::config::{
     MAX_LEADERBOARD_LINES,
 };
 use chefshat_hosting::tournaments::{
-    CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem, TournamentHandle,
-    Tournaments,
+    BeginRefusal, CreateProblem, Entry, JoinRefusal, Leaderboard, Stopped, TableProblem,
+    TournamentHandle, Tournaments,
 };
 use chefshat_room::ids::{RequestKey, Token, TournamentId, normal_code, random_bytes};
 use chefshat_room::journal::ParticipantKind;
@@ -330,11 +330,7 @@ impl TournamentService for TournamentCalls {
             at_table: false,
             request_id: request_id(&request.request_id, &caller)?,
         };
-        let (participant, ticket) = handle
-            .join(entry)
-            .await
-            .map_err(stopped)?
-            .map_err(join_refused)?;
+        let (participant, ticket) = handle.join(entry).await.map_err(join_refused)?;
         Ok(Response::new(v1::JoinTournamentResponse {
             tournament: Some(handle.describe()),
             participant: convert::number(participant),
@@ -364,8 +360,7 @@ impl TournamentService for TournamentCalls {
             at_table: true,
             request_id: request_id(&request.request_id, &caller)?,
         };
-        let joined = handle.join(entry).await.map_err(stopped)?;
-        let (participant, _) = joined.map_err(join_refused)?;
+        let (participant, _) = handle.join(entry).await.map_err(join_refused)?;
         Ok(Response::new(v1::AddTableParticipantResponse {
             tournament: Some(handle.describe()),
             participant: convert::number(participant),
@@ -401,13 +396,13 @@ impl TournamentService for TournamentCalls {
         let request = request.into_inner();
         let (id, owner) = (&request.tournament_id, &request.owner_token);
         let handle = self.find_owned(&caller, id, owner).await?;
-        let started = handle.begin().await.map_err(stopped)?;
-        started.map_err(|problem| {
-            let reason = match problem {
-                BeginProblem::TooFew { .. } => "TOO_FEW_PARTICIPANTS",
-                BeginProblem::Started => "TOURNAMENT_STARTED",
+        handle.begin().await.map_err(|refusal| {
+            let reason = match refusal {
+                BeginRefusal::Rules(BeginProblem::TooFew { .. }) => "TOO_FEW_PARTICIPANTS",
+                BeginRefusal::Rules(BeginProblem::Started) => "TOURNAMENT_STARTED",
+                BeginRefusal::Stopped(problem) => return stopped(problem),
             };
-            status(Code::FailedPrecondition, reason, problem.to_string(), [])
+            status(Code::FailedPrecondition, reason, refusal.to_string(), [])
         })?;
         let tournament = Some(handle.describe());
         Ok(Response::new(v1::StartTournamentResponse { tournament }))
@@ -618,6 +613,7 @@ fn join_refused(refusal: JoinRefusal) -> Status {
     match refusal {
         JoinRefusal::Rules(problem) => join_problem(problem),
         JoinRefusal::RequestIdUsed => request_id_used(&refusal.to_string()),
+        JoinRefusal::Stopped(problem) => stopped(problem),
     }
 }
 

@@ -136,7 +136,8 @@ pub(crate) struct New<U: Journaled> {
 }
 
 /// The task of a unit has stopped because the server ends, or another node has it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the server is shutting down")]
 pub struct Stopped;
 
 /// A unit of this server.

@@ -729,12 +729,9 @@ async fn a_tournament_changes_hands_with_its_rooms() {
             at_table: true,
             request_id: None,
         };
-        soon(old.join(entry))
-            .await
-            .expect("it runs")
-            .expect("joined");
+        soon(old.join(entry)).await.expect("joined");
     }
-    soon(old.begin()).await.expect("it runs").expect("begun");
+    soon(old.begin()).await.expect("begun");
     let playing = async {
         while first.rooms.open_count() == 0 {
             sleep(Duration::from_millis(10)).await;

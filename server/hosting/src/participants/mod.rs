@@ -23,7 +23,7 @@ pub use files::Skipped;
 use chefshat_room::ids::{GameId, StudyId};
 
 use crate::rooms::Rooms;
-use crate::studies::Studies;
+use crate::studies::{NotDone, Studies};
 use crate::tournaments::Tournaments;
 use chefshat_store::{ForgetError, StoreError};
 
@@ -91,9 +91,10 @@ impl Participants {
             let id = stored.header.id;
             match self.studies.get(id).filter(|study| !study.is_stopped()) {
                 Some(study) => {
-                    let withdrawn = study.withdraw(number, true).await;
-                    // Only an unknown participant is refused.
-                    drop(withdrawn.map_err(|_| DataError::ShuttingDown)?);
+                    // Besides, only an unknown participant is refused.
+                    if let Err(NotDone::Stopped(_)) = study.withdraw(number, true).await {
+                        return Err(DataError::ShuttingDown);
+                    }
                 }
                 None => elsewhere.delete_participant(id, number).await?,
             }

@@ -1,6 +1,7 @@
 //! The handle of one study: what others can read of it, and messages to its task.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::slice;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, MutexGuard};
 
@@ -46,17 +47,34 @@ pub enum TraceRefusal {
     /// The session may not act.
     #[error(transparent)]
     Session(#[from] Refusal),
+    /// The store failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
 }
 
-/// Why a study does not grow.
+/// Why a study does not do what it is asked for.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum NotAdded {
-    /// The study does not admit it.
+pub enum NotDone {
+    /// The study refuses it.
     #[error(transparent)]
     Study(#[from] Refusal),
     /// The server has no memory for it.
     #[error(transparent)]
     Memory(#[from] Refused),
+    /// The server ends, or its store failed.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+}
+
+/// Why a study is not deleted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NotDeleted {
+    /// This number of participants is in the middle of it.
+    #[error("{0} participants are in the middle of the study")]
+    Running(usize),
+    /// The server ends, or its store failed.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 /// A study of this server.
@@ -231,25 +249,18 @@ impl StudyHandle {
     /// Adds participants, and charges a caller for their memory. Returns the number of the first.
     ///
     /// # Errors
-    /// The server ends, or (inner result) the request is refused.
-    pub async fn add(
-        &self,
-        key: Key,
-        new: NewParticipants,
-    ) -> Result<Result<u32, NotAdded>, Stopped> {
-        let memory = match self.shared.data.for_participants(key, &new.pseudonyms) {
-            Ok(memory) => memory,
-            Err(refused) => return Ok(Err(refused.into())),
-        };
+    /// See [`NotDone`].
+    pub async fn add(&self, key: Key, new: NewParticipants) -> Result<u32, NotDone> {
         let data = Arc::clone(&self.shared.data);
-        let added = self.command(move |study, _| {
+        let memory = data.for_participants(key, &new.pseudonyms)?;
+        self.command(move |study, _| {
             let first = study.next_number();
             let changes = study.add(&new)?;
             // Here, because the caller may go before it gets its answer.
             data.keep_participants(memory);
             Ok((changes, first))
-        });
-        Ok(added.await?.map_err(NotAdded::from))
+        })
+        .await
     }
 
     /// Adds a participant who joins by the open link, unless the request is repeated, and charges a
@@ -262,25 +273,21 @@ impl StudyHandle {
         key: Key,
         joined: Joined,
         device: Option<Device>,
-    ) -> Result<Result<u32, NotAdded>, Stopped> {
+    ) -> Result<u32, NotDone> {
         // A repeated request takes no memory.
         if let Some(number) = self.committed().joined_by(&joined.request_sha256) {
-            return Ok(Ok(number));
+            return Ok(number);
         }
-        let names = [joined.panel_id.clone()];
-        let memory = match self.shared.data.for_participants(key, &names) {
-            Ok(memory) => memory,
-            Err(refused) => return Ok(Err(refused.into())),
-        };
         let data = Arc::clone(&self.shared.data);
-        let added = self.command(move |study, _| {
+        let memory = data.for_participants(key, slice::from_ref(&joined.panel_id))?;
+        self.command(move |study, _| {
             let (number, change) = study.join(joined, device.as_ref())?;
             if change.is_some() {
                 data.keep_participants(memory);
             }
             Ok((Vec::from_iter(change), number))
-        });
-        Ok(added.await?.map_err(NotAdded::from))
+        })
+        .await
     }
 
     /// Opens a session of a participant. Returns its number; 0 if there is only the end to show. The
@@ -293,7 +300,7 @@ impl StudyHandle {
         key: Key,
         number: u32,
         device: Option<Device>,
-    ) -> Result<Result<u32, Refusal>, Stopped> {
+    ) -> Result<u32, NotDone> {
         let memory = (device.as_ref()).and_then(|device| self.shared.data.for_device(key, device));
         let data = Arc::clone(&self.shared.data);
         self.command(move |study, now_ms| {
@@ -315,7 +322,7 @@ impl StudyHandle {
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
-    pub async fn consent(&self, at: At) -> Result<Result<u32, Refusal>, Stopped> {
+    pub async fn consent(&self, at: At) -> Result<u32, NotDone> {
         self.command(move |study, now_ms| Ok((vec![study.consent(at, now_ms)?], 0)))
             .await
     }
@@ -324,12 +331,7 @@ impl StudyHandle {
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
-    pub async fn answer(
-        &self,
-        key: Key,
-        at: At,
-        answers: Vec<ItemAnswer>,
-    ) -> Result<Result<u32, NotAdded>, Stopped> {
+    pub async fn answer(&self, key: Key, at: At, answers: Vec<ItemAnswer>) -> Result<u32, NotDone> {
         let change = move |study: &Study, answers, now_ms| study.answer(at, answers, now_ms);
         self.keep(key, at.number, answers, change, StudyData::keep_answers)
             .await
@@ -339,12 +341,7 @@ impl StudyHandle {
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
-    pub async fn save(
-        &self,
-        key: Key,
-        at: At,
-        answers: Vec<ItemAnswer>,
-    ) -> Result<Result<u32, NotAdded>, Stopped> {
+    pub async fn save(&self, key: Key, at: At, answers: Vec<ItemAnswer>) -> Result<u32, NotDone> {
         let change = move |study: &Study, answers, _| study.save(at, answers);
         self.keep(
             key,
@@ -368,19 +365,16 @@ impl StudyHandle {
         + Sync
         + 'static,
         kept: fn(&StudyData, u32, Permit),
-    ) -> Result<Result<u32, NotAdded>, Stopped> {
-        let memory = match self.shared.data.for_answers(key, &answers) {
-            Ok(memory) => memory,
-            Err(refused) => return Ok(Err(refused.into())),
-        };
+    ) -> Result<u32, NotDone> {
         let data = Arc::clone(&self.shared.data);
-        let changed = self.command(move |study, now_ms| {
+        let memory = data.for_answers(key, &answers)?;
+        self.command(move |study, now_ms| {
             let change = change(study, answers, now_ms)?;
             // Here, because the caller may go before it gets its answer.
             kept(&data, number, memory);
             Ok((vec![change], 0))
-        });
-        Ok(changed.await?.map_err(NotAdded::from))
+        })
+        .await
     }
 
     /// What a participant has entered at its step so far, and how long ago it reached the step, in
@@ -403,17 +397,17 @@ impl StudyHandle {
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
-    pub async fn proceed(&self, at: At, rooms: &Rooms) -> Result<Result<u32, Refusal>, Stopped> {
+    pub async fn proceed(&self, at: At, rooms: &Rooms) -> Result<u32, NotDone> {
         let command = self.command(move |study, now_ms| Ok((vec![study.proceed(at, now_ms)?], 0)));
-        let proceeded = command.await?;
-        if proceeded != Err(Refusal::GameNotOver) {
-            return Ok(proceeded);
+        let proceeded = command.await;
+        if proceeded != Err(NotDone::Study(Refusal::GameNotOver)) {
+            return proceeded;
         }
         if let Some(room) = self.read(|study| study.room_of_test(at.number))
             && let Some(room) = rooms.get(RoomId::from_bytes(room))
         {
             room.close_without_token().await;
-            return Ok(Ok(0));
+            return Ok(0);
         }
         self.command(move |study, now_ms| {
             let late = study.without_late(at.number, now_ms);
@@ -430,29 +424,23 @@ impl StudyHandle {
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
-    pub async fn withdraw(
-        &self,
-        number: u32,
-        delete_data: bool,
-    ) -> Result<Result<(), Refusal>, Stopped> {
-        let withdrawn = self.command(move |study, now_ms| {
+    pub async fn withdraw(&self, number: u32, delete_data: bool) -> Result<(), NotDone> {
+        self.command(move |study, now_ms| {
             let change = study.withdraw(number, delete_data, now_ms)?;
             Ok((Vec::from_iter(change), 0))
-        });
-        if let Err(refusal) = withdrawn.await? {
-            return Ok(Err(refusal));
-        }
+        })
+        .await?;
         if self.read(|study| study.plays_with_others(number)) {
-            return Ok(Ok(()));
+            return Ok(());
         }
         let mut changes = self.changes();
         while delete_data && self.lock_deleting().contains(&number) {
             tokio::select! {
                 changed = changes.changed() => changed.map_err(|_| Stopped)?,
-                () = self.stopped() => return Err(Stopped),
+                () = self.stopped() => return Err(Stopped.into()),
             }
         }
-        Ok(Ok(()))
+        Ok(())
     }
 
     /// Removes a participant, and adds another one if wanted, for whose memory a caller is charged.
@@ -460,19 +448,13 @@ impl StudyHandle {
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
-    pub async fn remove(
-        &self,
-        key: Key,
-        number: u32,
-        replace: bool,
-    ) -> Result<Result<u32, NotAdded>, Stopped> {
-        let memory = match replace.then(|| self.shared.data.for_participants(key, &[String::new()]))
-        {
-            Some(Err(refused)) => return Ok(Err(refused.into())),
-            memory => memory.and_then(Result::ok),
-        };
+    pub async fn remove(&self, key: Key, number: u32, replace: bool) -> Result<u32, NotDone> {
         let data = Arc::clone(&self.shared.data);
-        let removed = self.command(move |study, now_ms| {
+        let memory = match replace {
+            true => Some(data.for_participants(key, &[String::new()])?),
+            false => None,
+        };
+        self.command(move |study, now_ms| {
             let mut changes = Vec::from_iter(study.remove(number, now_ms)?);
             let Some(memory) = memory else {
                 return Ok((changes, 0));
@@ -481,15 +463,15 @@ impl StudyHandle {
             changes.extend(study.replacement(number)?);
             data.keep_participants(memory);
             Ok((changes, next))
-        });
-        Ok(removed.await?.map_err(NotAdded::from))
+        })
+        .await
     }
 
     /// Closes the study.
     ///
     /// # Errors
     /// As [`StudyHandle::add`].
-    pub async fn close(&self) -> Result<(), Stopped> {
+    pub async fn close(&self) -> Result<(), NotDone> {
         let closed = self.command(|study, _| Ok((Vec::from_iter(study.close()), 0)));
         closed.await.map(drop)
     }
@@ -498,47 +480,45 @@ impl StudyHandle {
     /// in the middle of it are removed if `force` is set.
     ///
     /// # Errors
-    /// The server ends or its store failed, or (inner result) somebody is in the middle of it: how
-    /// many.
-    pub(super) async fn delete(&self, force: bool) -> Result<Result<usize, usize>, Stopped> {
-        self.ask(|reply| Message::Delete { force, reply }).await
+    /// See [`NotDeleted`].
+    pub(super) async fn delete(&self, force: bool) -> Result<usize, NotDeleted> {
+        let deleted = self.ask(|reply| Message::Delete { force, reply }).await?;
+        deleted.map_err(NotDeleted::Running)
     }
 
     /// Records interface traces of a participant's game.
     ///
     /// # Errors
-    /// The store failed, or (inner result) the traces are refused.
+    /// See [`TraceRefusal`].
     pub async fn record_traces(
         &self,
         (number, session): (u32, u32),
         game: GameId,
         traces: Vec<v1::StudyTrace>,
         rooms: &Rooms,
-    ) -> Result<Result<(), TraceRefusal>, StoreError> {
-        if let Err(problem) = check_traces(&traces) {
-            return Ok(Err(TraceRefusal::Invalid(problem)));
-        }
+    ) -> Result<(), TraceRefusal> {
+        check_traces(&traces).map_err(TraceRefusal::Invalid)?;
         // Deletion waits for it, so that nothing is added after the data were deleted.
         let mut counts = Arc::clone(&self.shared.traces).lock_owned().await;
         {
             let study = self.committed();
             let participant = study.participant(number).filter(|it| !it.data_deleted);
             let Some(participant) = participant else {
-                return Ok(Err(Refusal::Over.into()));
+                return Err(Refusal::Over.into());
             };
             if participant.session != session {
-                return Ok(Err(Refusal::Superseded.into()));
+                return Err(Refusal::Superseded.into());
             }
             if !(participant.games.iter()).any(|played| played.placed.game == *game.bytes()) {
-                return Ok(Err(TraceRefusal::GameUnknown));
+                return Err(TraceRefusal::GameUnknown);
             }
             if !study.settings().traces || traces.is_empty() {
-                return Ok(Ok(()));
+                return Ok(());
             }
         }
         let count = counts.entry((number, game)).or_default();
         if *count + traces.len() > MAX_TRACES_OF_GAME {
-            return Ok(Err(TraceRefusal::TooMany));
+            return Err(TraceRefusal::TooMany);
         }
         *count += traces.len();
         let traces = StoredTraces {
@@ -557,9 +537,7 @@ impl StudyHandle {
             written
         }));
         let written = writing.await;
-        written
-            .unwrap_or_else(|error| Err(StoreError::Failed(error.to_string())))
-            .map(Ok)
+        Ok(written.unwrap_or_else(|error| Err(StoreError::Failed(error.to_string())))?)
     }
 
     /// Adds a stream that shows the study to a participant. While the value lives, the participant
@@ -620,9 +598,9 @@ impl StudyHandle {
     async fn command(
         &self,
         command: impl FnOnce(&Study, u64) -> Result<(Vec<Change>, u32), Refusal> + Send + Sync + 'static,
-    ) -> Result<Result<u32, Refusal>, Stopped> {
+    ) -> Result<u32, NotDone> {
         let command: Command = Box::new(command);
-        self.ask(|reply| Message::Command(command, reply)).await
+        Ok(self.ask(|reply| Message::Command(command, reply)).await??)
     }
 }
 

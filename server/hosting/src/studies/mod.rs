@@ -19,12 +19,12 @@ use chefshat_study::{SettingsProblem, Study};
 use tokio_util::task::TaskTracker;
 
 pub use export::{ExportError, ExportedFile};
-pub use handle::{MAX_TRACES, MAX_TRACES_OF_GAME, NotAdded, Presence, StudyHandle, TraceRefusal};
-
-pub use crate::journaled::Stopped;
+pub use handle::{
+    MAX_TRACES, MAX_TRACES_OF_GAME, NotDeleted, NotDone, Presence, StudyHandle, TraceRefusal,
+};
 
 use crate::config::{MAX_STUDY_DATA, MAX_STUDY_MEMORY};
-use crate::journaled::{self, Folded, Journaled as _, New, Registry, owner_of};
+use crate::journaled::{self, Folded, Journaled as _, New, Registry, Stopped, owner_of};
 use crate::rooms::Rooms;
 use chefshat_admission::limits::{FairSemaphore, Key, Refused};
 use chefshat_base::clock::{TimeOfDay, since_epoch_ms};
@@ -140,28 +140,24 @@ impl Studies {
     /// Deletes a study with all its data. Returns the numbers of its participants and games.
     ///
     /// # Errors
-    /// The server ends or its store failed, or (inner result) somebody is in the middle of it: how
-    /// many.
+    /// See [`NotDeleted`].
     pub async fn delete(
         self: &Arc<Self>,
         handle: Arc<StudyHandle>,
         force: bool,
-    ) -> Result<Result<(usize, usize), usize>, Stopped> {
+    ) -> Result<(usize, usize), NotDeleted> {
         let studies = Arc::clone(self);
         // Runs to completion even if the caller is cancelled.
         let deleting = self
             .tracker
             .spawn(short("one tournament or study", async move {
-                let games = match handle.delete(force).await? {
-                    Ok(games) => games,
-                    Err(active) => return Ok(Err(active)),
-                };
+                let games = handle.delete(force).await?;
                 studies.forget_one(handle.id());
                 let participants = handle.read(|study| {
                     let participants = study.participants().values();
                     participants.filter(|it| !it.test).count()
                 });
-                Ok(Ok((participants, games)))
+                Ok((participants, games))
             }));
         deleting.await.map_err(|_| Stopped)?
     }

@@ -18,16 +18,16 @@ impl TournamentHandle {
     /// Changes the tournament by hand. Returns the ticket of a new participant who connects.
     ///
     /// # Errors
-    /// The server ends, or (inner result) the change is refused.
+    /// See [`ByHandRefusal`].
     pub async fn change_by_hand(
         &self,
         what: ByHand,
-    ) -> Result<Result<Option<TournamentToken>, ByHandRefusal>, Stopped> {
+    ) -> Result<Option<TournamentToken>, ByHandRefusal> {
         let over = match &what {
             // A repeated request is answered in every state of the tournament.
             ByHand::Replace { participant, by } => {
                 if let Some(answer) = self.replaced_before(*participant, by) {
-                    return Ok(answer);
+                    return answer;
                 }
                 ByHandProblem::Over
             }
@@ -37,8 +37,8 @@ impl TournamentHandle {
             }
         };
         match self.ask(|reply| Message::ByHand(what, reply)).await {
-            Err(Stopped) if self.is_over() => Ok(Err(over.into())),
-            changed => changed,
+            Err(Stopped) if self.is_over() => Err(over.into()),
+            changed => changed?,
         }
     }
 

@@ -8,7 +8,7 @@ use chefshat_tournament::{BeginProblem, Entrant, GameState, JoinProblem, Tournam
 use sha2::{Digest as _, Sha256};
 use tokio::sync::mpsc;
 
-use super::message::{Call, Connection, Entry, JoinRefusal, Message};
+use super::message::{BeginRefusal, Call, Connection, Entry, JoinRefusal, Message};
 use super::state::TournamentState;
 use super::task::TournamentTask;
 use crate::journaled::{Handle, Stopped};
@@ -73,22 +73,19 @@ impl TournamentHandle {
     /// Joins; returns the participant's number and its ticket.
     ///
     /// # Errors
-    /// The server ends, or (inner result) the request is refused.
-    pub async fn join(
-        &self,
-        entry: Entry,
-    ) -> Result<Result<(usize, TournamentToken), JoinRefusal>, Stopped> {
+    /// See [`JoinRefusal`].
+    pub async fn join(&self, entry: Entry) -> Result<(usize, TournamentToken), JoinRefusal> {
         // A repeated request is answered in every state of the tournament.
         let repeated = entry.request_id.and_then(|_| {
             let ticket = self.ticket_of(&entry);
             self.committed().joined_before(&entry, ticket)
         });
         if let Some(answer) = repeated {
-            return Ok(answer);
+            return answer;
         }
         match self.ask(|reply| Message::Join(entry, reply)).await {
-            Err(Stopped) if self.is_over() => Ok(Err(JoinProblem::Started.into())),
-            joined => joined,
+            Err(Stopped) if self.is_over() => Err(JoinProblem::Started.into()),
+            joined => joined?,
         }
     }
 
@@ -115,11 +112,11 @@ impl TournamentHandle {
     /// Starts it.
     ///
     /// # Errors
-    /// The server ends, or (inner result) it cannot start.
-    pub async fn begin(&self) -> Result<Result<(), BeginProblem>, Stopped> {
+    /// See [`BeginRefusal`].
+    pub async fn begin(&self) -> Result<(), BeginRefusal> {
         match self.ask(Message::Begin).await {
-            Err(Stopped) if self.is_over() => Ok(Err(BeginProblem::Started)),
-            started => started,
+            Err(Stopped) if self.is_over() => Err(BeginProblem::Started.into()),
+            started => Ok(started??),
         }
     }
 

@@ -6,6 +6,7 @@ use chefshat_agents::NamedAgent;
 use chefshat_tournament::{BeginProblem, ByHandProblem, Entrant, JoinProblem, MAX_GAMES_AT_A_TIME};
 use tokio::sync::{mpsc, oneshot};
 
+use crate::journaled::Stopped;
 use crate::room::Supersedes;
 use chefshat_admission::limits::Key;
 use chefshat_room::ids::{RoomId, SecretHash, TournamentToken};
@@ -95,6 +96,20 @@ pub enum JoinRefusal {
         "this request id was used with another name, kind, number of games or statelessness; draw a new one"
     )]
     RequestIdUsed,
+    /// The server ends.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+}
+
+/// Why a tournament does not begin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum BeginRefusal {
+    /// The rules of the tournament refuse it.
+    #[error(transparent)]
+    Rules(#[from] BeginProblem),
+    /// The server ends.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 /// A change by hand.
@@ -228,6 +243,9 @@ pub enum ByHandRefusal {
     /// No participant has the ticket (any more).
     #[error("no participant of this tournament has this ticket")]
     TicketUnknown,
+    /// The server ends.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
 }
 
 /// A message to the task of a tournament.

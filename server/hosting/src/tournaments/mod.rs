@@ -25,7 +25,9 @@ use tokio_util::task::TaskTracker;
 
 pub use handle::{TableProblem, TournamentHandle};
 pub use leaderboard::{Leaderboard, finish};
-pub use message::{ByHand, ByHandRefusal, Call, Connection, Entry, JoinRefusal, Newcomer, Who};
+pub use message::{
+    BeginRefusal, ByHand, ByHandRefusal, Call, Connection, Entry, JoinRefusal, Newcomer, Who,
+};
 pub use shared::ComputeError;
 
 pub use crate::journaled::Stopped;

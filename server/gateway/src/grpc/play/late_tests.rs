@@ -84,7 +84,7 @@ impl Server {
             at_table: false,
             request_id: None,
         };
-        let joined = tournament.join(entry).await.expect("it runs");
+        let joined = tournament.join(entry).await;
         let (_participant, ticket) = joined.expect("it is open");
         attachment(&ticket.to_text())
     }

@@ -15,7 +15,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Request, Response, Status};
 
-use super::{Responses, StudyCalls, code_of, not_added, refused, stopped};
+use super::{Responses, StudyCalls, code_of, not_done, refused};
 use crate::grpc::follow::{changed, end};
 use crate::grpc::limits::charged;
 use crate::grpc::status::{Refusal, field, shutting_down, status, store_failed};
@@ -25,7 +25,7 @@ use chefshat_base::metrics::StreamKind;
 use chefshat_base::tasks::{LongTask, named};
 use chefshat_hosting::config::FOLLOW_SEND_TIMEOUT;
 use chefshat_hosting::rooms::Rooms;
-use chefshat_hosting::studies::{NotAdded, Studies, StudyHandle, TraceRefusal};
+use chefshat_hosting::studies::{NotDone, Studies, StudyHandle, TraceRefusal};
 use chefshat_room::ids::Id;
 use chefshat_wire::convert;
 
@@ -114,7 +114,10 @@ fn link_unknown() -> Status {
 
 /// The status for somebody with this id at the panel who may not begin: it names where the page sends
 /// them, or the device that is needed.
-fn not_admitted(handle: &StudyHandle, panel_id: &str, refusal: StudyRefusal) -> Status {
+fn not_admitted(handle: &StudyHandle, panel_id: &str, problem: NotDone) -> Status {
+    let NotDone::Study(refusal) = problem else {
+        return not_done(problem);
+    };
     if let StudyRefusal::WrongDevice(required) = refusal {
         return wrong_device(handle, required);
     }
@@ -194,13 +197,13 @@ impl ParticipationService for StudyCalls {
         let rooms = self.studies.rooms();
         (rooms.may_store(key, panel_id.len())).map_err(Refusal::from)?;
         let device = request.device.and_then(convert::device_from_proto);
-        let joined = handle.join(key, joined, device).await.map_err(stopped)?;
+        let joined = handle.join(key, joined, device).await;
         let number = joined.map_err(|problem| match problem {
-            NotAdded::Study(refusal) => not_admitted(&handle, &panel_id, refusal),
             // Somebody from a panel does not wait until others have deleted their studies.
-            NotAdded::Memory(_) => {
-                not_admitted(&handle, &panel_id, StudyRefusal::TooManyParticipants)
+            NotDone::Memory(_) => {
+                not_admitted(&handle, &panel_id, StudyRefusal::TooManyParticipants.into())
             }
+            problem => not_admitted(&handle, &panel_id, problem),
         })?;
         let link = handle.link(number).link;
         Ok(Response::new(v1::JoinStudyResponse { link }))
@@ -222,7 +225,7 @@ impl ParticipationService for StudyCalls {
             ));
         };
         let device = request.device.and_then(convert::device_from_proto);
-        let opened = handle.open(key, number, device).await.map_err(stopped)?;
+        let opened = handle.open(key, number, device).await;
         let session = opened.map_err(|it| not_admitted(&handle, &handle.panel_id(number), it))?;
         let (saved_answers, step_age_ms) = handle.progress(number, since_epoch_ms());
         Ok(Response::new(v1::OpenStudyResponse {
@@ -278,8 +281,7 @@ impl ParticipationService for StudyCalls {
         let request = request.into_inner();
         let (handle, number, session) = self.of_session(&request.session, key).await?;
         let given = handle.consent(at(number, session, request.step)).await;
-        (given.map_err(stopped)?)
-            .map_err(|it| not_admitted(&handle, &handle.panel_id(number), it))?;
+        given.map_err(|it| not_admitted(&handle, &handle.panel_id(number), it))?;
         let view = Some(view_of(&handle, number, self.studies.rooms())?);
         Ok(Response::new(v1::GiveConsentResponse { view }))
     }
@@ -293,7 +295,7 @@ impl ParticipationService for StudyCalls {
         let (handle, number, session) = self.of_session(&request.session, key).await?;
         let answers = self.answers(request.answers, key)?;
         let answered = handle.answer(key, at(number, session, request.step), answers);
-        answered.await.map_err(stopped)?.map_err(not_added)?;
+        answered.await.map_err(not_done)?;
         let view = Some(view_of(&handle, number, self.studies.rooms())?);
         Ok(Response::new(v1::AnswerQuestionnaireResponse { view }))
     }
@@ -307,7 +309,7 @@ impl ParticipationService for StudyCalls {
         let (handle, number, session) = self.of_session(&request.session, key).await?;
         let answers = self.answers(request.answers, key)?;
         let saved = handle.save(key, at(number, session, request.step), answers);
-        saved.await.map_err(stopped)?.map_err(not_added)?;
+        saved.await.map_err(not_done)?;
         Ok(Response::new(v1::SaveAnswersResponse {}))
     }
 
@@ -320,7 +322,7 @@ impl ParticipationService for StudyCalls {
         let (handle, number, session) = self.of_session(&request.session, key).await?;
         let at = at(number, session, request.step);
         let continued = handle.proceed(at, self.studies.rooms()).await;
-        continued.map_err(stopped)?.map_err(refused)?;
+        continued.map_err(not_done)?;
         let view = Some(view_of(&handle, number, self.studies.rooms())?);
         Ok(Response::new(v1::ContinueStudyResponse { view }))
     }
@@ -340,11 +342,7 @@ impl ParticipationService for StudyCalls {
             .sum();
         rooms.may_store(key, bytes).map_err(Refusal::from)?;
         let recorded = handle.record_traces((number, session), game, request.traces, rooms);
-        let recorded = recorded.await.map_err(|error| {
-            tracing::error!(%error, "interface traces could not be stored");
-            store_failed()
-        })?;
-        recorded.map_err(traces_refused)?;
+        recorded.await.map_err(traces_refused)?;
         Ok(Response::new(v1::RecordTracesResponse {}))
     }
 
@@ -378,7 +376,7 @@ impl ParticipationService for StudyCalls {
             self.calls.charge(key, COST_OF_TOURNAMENT);
         }
         let withdrawn = handle.withdraw(number, request.delete_data).await;
-        withdrawn.map_err(stopped)?.map_err(refused)?;
+        withdrawn.map_err(not_done)?;
         let view = Some(view_of(&handle, number, self.studies.rooms())?);
         Ok(Response::new(v1::WithdrawFromStudyResponse { view }))
     }
@@ -430,6 +428,10 @@ fn traces_refused(refusal: TraceRefusal) -> Status {
             return field("TRACES_REFUSED", &FieldProblem::new("traces", problem));
         }
         TraceRefusal::Session(refusal) => return refused(refusal),
+        TraceRefusal::Store(error) => {
+            tracing::error!(%error, "interface traces could not be stored");
+            return store_failed();
+        }
     };
     status(code, reason, refusal.to_string(), [])
 }

@@ -184,11 +184,12 @@ async fn change(
     handle: &TournamentHandle,
     what: ByHand,
 ) -> Result<Option<TournamentToken>, Status> {
-    let changed = handle.change_by_hand(what).await.map_err(stopped)?;
+    let changed = handle.change_by_hand(what).await;
     changed.map_err(|refusal| match refusal {
         ByHandRefusal::Rules(problem) => by_hand_problem(problem),
         ByHandRefusal::RequestIdUsed => request_id_used(&refusal.to_string()),
         ByHandRefusal::TicketUnknown => ticket_unknown(),
+        ByHandRefusal::Stopped(problem) => stopped(problem),
     })
 }
 
