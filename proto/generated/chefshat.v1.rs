@@ -9136,9 +9136,9 @@ pub struct StudySettings {
 /// A picture in texts of the study.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
 pub struct StudyPicture {
-    /// Its name, 1..=64 lower-case letters, digits, `_`, `-` or `.`, of which the first is no dot, unique in
-    /// the study. Texts show the picture where they have `![two hands of cards](NAME)`, with what it shows
-    /// in words.
+    /// Its name, 1..=64 lower-case letters, digits, `_`, `-` or `.` (the first is not a dot), unique in the
+    /// study. Texts show the picture where they have `![two hands of cards](NAME)`, with what it shows in
+    /// words, and the name without escapes.
     #[prost(string, tag = "1")]
     pub name: ::prost::alloc::string::String,
     /// A PNG, JPEG, GIF or WebP file, at most 262144 bytes. Of the responses that have the settings, only

@@ -17,6 +17,8 @@ use tonic::Code;
 
 use crate::{Ledger, PATIENCE, patiently};
 
+/// Most decisions of the games that run when no others are begun, in all rooms.
+const MOST_LEFT: u64 = 100_000;
 /// Pause before repeating a call that did not reach the server.
 const AGAIN_AFTER: Duration = Duration::from_millis(10);
 /// How agents reconnect unless a test says otherwise: fast, and as long as a test waits.
@@ -132,8 +134,9 @@ impl BusyRooms {
     pub async fn finish(mut self) -> Vec<String> {
         self.leaving.send_replace(true);
         let (mut progress, mut games) = (self.progress(), Vec::new());
+        let most: u64 = progress.borrow().iter().sum::<u64>() + MOST_LEFT;
         loop {
-            // Long games take their time on a busy machine: they must only go on.
+            // On a busy machine long games take longer than the patience: it counts from each decision.
             let next = async {
                 tokio::select! {
                     ended = self.rooms.join_next() => Some(ended),
@@ -143,7 +146,10 @@ impl BusyRooms {
             match patiently("the last games to go on, or to end", next).await {
                 Some(Some(played)) => games.extend(played.expect("no panic")),
                 Some(None) => break,
-                None => {}
+                None => {
+                    let decided = progress.borrow_and_update().iter().sum::<u64>();
+                    assert!(decided < most, "the games do not end");
+                }
             }
         }
         self.ledger.assert_nothing_unexpected();

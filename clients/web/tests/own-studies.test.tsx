@@ -38,7 +38,7 @@ import { byCondition } from "../src/studies/board";
 import { studyApi } from "../src/studies/client";
 import { OwnStudy } from "../src/studies/OwnStudyPage";
 import { createStudy, exportStudy, keepOwnerToken, ownerTokenOf } from "../src/studies/owning";
-import { areAllowed, pictureOf } from "../src/studies/picture-files";
+import { areAllowed, pictureOf, withPicture } from "../src/studies/picture-files";
 import { StudiesPage } from "../src/studies/StudiesPage";
 import { fileOf, settingsFrom } from "../src/studies/settings-file";
 import { emptyForm, faultsOf, NEW_QUESTION, newCondition, type StudyForm, settingsOf } from "../src/studies/study-form";
@@ -159,7 +159,7 @@ test("the form has factors, hints, robots, seeds and questions", async () => {
   const agent = { filledBy: { case: "builtInAgent", value: "greedy" } };
   expect(settings.conditions?.[1]).toMatchObject({
     levels: { robot: "cold" },
-    policy: { hints: false },
+    policy: { hints: false, substitute: "greedy" },
     robotBehaviour: "cold nods",
     seats: [robot, agent, agent],
   });
@@ -327,6 +327,7 @@ test("texts and pictures are read from the files that are chosen with the settin
   const text = `
     [[conditions]]
     id = "A"
+    levels = { file = "weak" }
     [[pictures]]
     name = "hand"
     file = "pictures/hand.gif"
@@ -340,8 +341,19 @@ test("texts and pictures are read from the files that are chosen with the settin
   const settings = await settingsFrom(text, "study.toml", files);
   expect(settings.pictures.map(({ name, data }) => [name, data])).toEqual([["hand", bytes("GIF89a")]]);
   expect(settings.stages[0]?.stage.value).toMatchObject({ text: "We record.", version: "1" });
+  // A name of a factor is not a field.
+  expect(settings.conditions[0]?.levels).toEqual({ file: "weak" });
   expect(await settingsFrom(fileOf(settings), "again.json")).toEqual(settings);
   await expect(settingsFrom(text, "study.toml", new Map())).rejects.toThrow("choose hand.gif together");
+});
+
+test("pictures of the same name get different ones, and the same picture is there once", async () => {
+  const picture = (bytes: string) => pictureOf(new File([bytes], "手.png"));
+  const [first, second] = await Promise.all([picture("GIF89a"), picture("GIF87a")]);
+  const both = withPicture(withPicture([], first), second);
+  expect(both.map(({ name }) => name)).toEqual(["-.png", "2--.png"]);
+  expect(withPicture(both, second)).toEqual([...both]);
+  expect((await pictureOf(new File(["GIF89a"], `${"x".repeat(10)}${".".repeat(63)}a`))).name).toBe("a");
 });
 
 test("pictures have names that texts can have", async () => {

@@ -1,6 +1,7 @@
 // A questionnaire: items that depend on answers, numbers, statements as a table, and texts in Markdown.
 
 import { create } from "@bufbuild/protobuf";
+import { Code } from "@connectrpc/connect";
 import { type ComponentChild, render } from "preact";
 import { act } from "preact/test-utils";
 import { afterEach, expect, test } from "vitest";
@@ -10,6 +11,7 @@ import { WithPictures } from "../src/studies/Pictures";
 import type { ItemAnswer } from "../src/studies/participating";
 import { Questionnaire } from "../src/studies/Questionnaire";
 import { eventually, root } from "./mounted";
+import { refused } from "./study-fake";
 
 const LIKERT = { case: "likert" as const, value: { points: 5, labels: ["no", "yes"] } };
 const AGE = { case: "number" as const, value: { min: 18, max: 99, unit: "years" } };
@@ -161,7 +163,9 @@ test("a text has the pictures of the study, each asked for once, and the words o
   const asked: string[] = [];
   const load = async (name: string) => {
     asked.push(name);
-    if (name === "lost.png") throw new Error("PICTURE_UNKNOWN");
+    if (name === "lost.png") throw refused("PICTURE_UNKNOWN", Code.NotFound);
+    // The server is away for a moment.
+    if (name === "card.gif" && asked.length === 1) throw refused("SHUTTING_DOWN", Code.Unavailable);
     return name === "card.gif" ? new TextEncoder().encode("GIF89a") : new TextEncoder().encode("<svg/>");
   };
   const text = "![a card](card.gif) ![again](card.gif) ![a chart](chart.svg)\n\n![lost][it]\n\n[it]: lost.png";
@@ -177,7 +181,7 @@ test("a text has the pictures of the study, each asked for once, and the words o
   expect(new Set(pictures.map(({ src }) => src))).toEqual(new Set(["data:image/gif;base64,R0lGODlh"]));
   expect(root.textContent).toContain("a chart");
   expect(root.textContent).toContain("lost");
-  expect(asked.toSorted()).toEqual(["card.gif", "chart.svg", "lost.png"]);
+  expect(asked.toSorted()).toEqual(["card.gif", "card.gif", "chart.svg", "lost.png"]);
 });
 
 test("a question has markup, and its field a name without", async () => {

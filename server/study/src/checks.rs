@@ -61,12 +61,16 @@ pub(crate) fn has_control_characters(text: &str) -> bool {
 
 /// An identifier becomes a value or a column of exported data.
 pub(crate) fn identifier(field: &str, text: &str) -> Checked {
-    let is_allowed = |letter: char| letter.is_ascii_alphanumeric() || "_-.".contains(letter);
-    if (1..=MAX_IDENTIFIER).contains(&text.len()) && text.chars().all(is_allowed) {
+    if (1..=MAX_IDENTIFIER).contains(&text.len()) && text.chars().all(is_of_identifier) {
         return Ok(());
     }
     let problem = format!("{text:?} is not 1..={MAX_IDENTIFIER} letters, digits, `_`, `-`, `.`");
     refuse(field, problem)
+}
+
+/// Whether identifiers have this character.
+pub(crate) fn is_of_identifier(letter: char) -> bool {
+    letter.is_ascii_alphanumeric() || "_-.".contains(letter)
 }
 
 /// Names must differ. `field_of` has the field of the name with this index.

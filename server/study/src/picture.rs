@@ -1,6 +1,6 @@
 //! Pictures in texts. Their files are kept elsewhere.
 
-use crate::checks::{Checked, identifier, refuse, within};
+use crate::checks::{Checked, identifier, is_of_identifier, refuse, within};
 use crate::view::{Content, View};
 
 /// Maximum number of pictures of a study.
@@ -55,7 +55,7 @@ impl Picture {
         within(&data, self.bytes, 1..=MAX_BYTES)?;
         match self.format {
             Some(_) => Ok(()),
-            None => refuse(data, "it is no PNG, JPEG, GIF or WebP file"),
+            None => refuse(data, "it is not a PNG, JPEG, GIF or WebP file"),
         }
     }
 }
@@ -102,8 +102,19 @@ impl View {
             Content::End { text, .. } => vec![text],
             Content::Game(_) => Vec::new(),
         };
-        texts.iter().any(|text| text.contains(picture))
+        texts.iter().any(|text| names(text, picture))
     }
+}
+
+/// Whether a text has a name that is no part of a longer one.
+fn names(text: &str, name: &str) -> bool {
+    text.match_indices(name).any(|(start, _)| {
+        let (before, after) = (
+            text[..start].chars().next_back(),
+            text[start + name.len()..].chars().next(),
+        );
+        ![before, after].into_iter().flatten().any(is_of_identifier)
+    })
 }
 
 #[cfg(test)]
@@ -148,6 +159,19 @@ mod tests {
             ..testing::settings()
         };
         Study::new(Arc::new(settings)).expect("they are as large as pictures may be");
+    }
+
+    #[test]
+    fn a_text_names_a_picture_by_its_whole_name() {
+        for (text, expected) in [
+            ("![one](1.png)", true),
+            ("![it][p]\n\n[p]: 1.png", true),
+            ("![eleven](11.png) ![more](1.png.gif)", false),
+            ("![eleven](11.png) ![one](1.png)", true),
+            ("", false),
+        ] {
+            assert_eq!(names(text, "1.png"), expected, "{text}");
+        }
     }
 
     #[test]

@@ -35,7 +35,8 @@ export function ConditionFields(
   const words = t().studies.make;
   const { condition, index, faults, onChange, onRemove, factors, agents, hasOtherSeats } = props;
   return (
-    <div class={css.part} data-part="condition">
+    <fieldset class={css.group} data-part="condition">
+      <legend>{words.conditionNumber(index + 1)}</legend>
       <div class={css.fields}>
         <TextField
           label={words.conditionId}
@@ -81,8 +82,14 @@ export function ConditionFields(
           autoComplete="off"
         />
       )}
-      {onRemove && <Remove words={words.removeCondition} of={condition.id} onRemove={onRemove} />}
-    </div>
+      {onRemove && (
+        <Remove
+          words={words.removeCondition}
+          of={condition.id || words.conditionNumber(index + 1)}
+          onRemove={onRemove}
+        />
+      )}
+    </fieldset>
   );
 }
 
@@ -91,7 +98,8 @@ export function QuestionFields(props: Props<QuestionForm> & { question: Question
   const words = t().studies.make;
   const { question, index, faults, onChange, onRemove } = props;
   return (
-    <div class={css.part} data-part="question">
+    <fieldset class={css.group} data-part="question">
+      <legend>{words.questionNumber(index + 1)}</legend>
       <TextField
         label={words.question}
         value={question.text}
@@ -127,8 +135,14 @@ export function QuestionFields(props: Props<QuestionForm> & { question: Question
         </Field>
       )}
       <CheckField label={words.optional} checked={question.optional} onCheck={(optional) => onChange({ optional })} />
-      {onRemove && <Remove words={words.removeQuestion} of={question.text} onRemove={onRemove} />}
-    </div>
+      {onRemove && (
+        <Remove
+          words={words.removeQuestion}
+          of={question.text || words.questionNumber(index + 1)}
+          onRemove={onRemove}
+        />
+      )}
+    </fieldset>
   );
 }
 

@@ -121,7 +121,7 @@ function FromForm() {
   const { busy, fault, run } = useAttempt();
   const agents = offered ? agentsFor(offered, false, "") : ["greedy", "random"];
   const faults = tried ? faultsOf(form) : {};
-  const change = (changed: Partial<StudyForm>) => setForm({ ...form, ...changed });
+  const change = (changed: Partial<StudyForm>) => setForm((now) => ({ ...now, ...changed }));
   const submit = (event: Event) => {
     event.preventDefault();
     setTried(true);
@@ -251,7 +251,11 @@ function FromForm() {
       {template("ueqS", words.ueqS)}
       {text("external", words.external, words.externalHint)}
       {long("debriefing", words.debriefing)}
-      <PictureFields pictures={form.pictures} fault={faults.pictures} onChange={(pictures) => change({ pictures })} />
+      <PictureFields
+        pictures={form.pictures}
+        fault={faults.pictures}
+        onChange={(changed) => setForm((now) => ({ ...now, pictures: changed(now.pictures) }))}
+      />
       {check("traces", words.traces)}
       <div class={css.fields}>
         <SelectField

@@ -1,27 +1,37 @@
 // The pictures of a study in its form: chosen from files, with what a text has to say to show them.
 
+import { useState } from "preact/hooks";
 import { t } from "../i18n";
 import { Button } from "../parts/Button";
 import { Field } from "../parts/Field";
 import css from "./Own.module.css";
-import { PICTURES, type PictureFile, pictureOf } from "./picture-files";
+import { PICTURES, type PictureFile, pictureOf, withPicture } from "./picture-files";
 
 interface Props {
   pictures: readonly PictureFile[];
   fault: string | undefined;
-  onChange: (pictures: readonly PictureFile[]) => void;
+  /** Changes the pictures as they are then: files take time to read. */
+  onChange: (change: (pictures: readonly PictureFile[]) => readonly PictureFile[]) => void;
 }
 
-/** The fields. A file of the same name as another one takes its place. */
+/** The fields. */
 export function PictureFields({ pictures, fault, onChange }: Props) {
   const words = t().studies.make;
+  const [unreadable, setUnreadable] = useState("");
   const add = async (files: readonly File[]) => {
-    const added = await Promise.all(files.map(pictureOf));
-    onChange([...new Map([...pictures, ...added].map((picture) => [picture.name, picture])).values()]);
+    setUnreadable("");
+    for (const file of files) {
+      try {
+        const added = await pictureOf(file);
+        onChange((now) => withPicture(now, added));
+      } catch (thrown) {
+        setUnreadable(words.unreadable(`${file.name}: ${thrown instanceof Error ? thrown.message : thrown}`));
+      }
+    }
   };
   return (
     <div class={css.part} data-part="pictures">
-      <Field label={words.pictures} hint={words.picturesHint} fault={fault}>
+      <Field label={words.pictures} hint={words.picturesHint} fault={unreadable || fault}>
         {(joined) => (
           <input
             {...joined}
@@ -36,19 +46,21 @@ export function PictureFields({ pictures, fault, onChange }: Props) {
           />
         )}
       </Field>
-      {pictures.length > 0 && (
-        <ul class={css.pictures}>
-          {pictures.map(({ name }) => (
-            <li key={name}>
-              <code>{`![${words.pictureWords}](${name})`}</code>
-              <Button look="quiet" onClick={() => onChange(pictures.filter((picture) => picture.name !== name))}>
-                {words.removePicture}
-                <span class="visually-hidden"> {name}</span>
-              </Button>
-            </li>
-          ))}
-        </ul>
-      )}
+      <div role="status">
+        {pictures.length > 0 && (
+          <ul class={css.pictures}>
+            {pictures.map(({ name }) => (
+              <li key={name}>
+                <code>{`![${words.pictureWords}](${name})`}</code>
+                <Button look="quiet" onClick={() => onChange((now) => now.filter((picture) => picture.name !== name))}>
+                  {words.removePicture}
+                  <span class="visually-hidden"> {name}</span>
+                </Button>
+              </li>
+            ))}
+          </ul>
+        )}
+      </div>
     </div>
   );
 }

@@ -3,13 +3,17 @@
 import { base64Encode } from "@bufbuild/protobuf/wire";
 import { type ComponentChildren, createContext, type JSX } from "preact";
 import { useContext, useEffect, useMemo, useState } from "preact/hooks";
+import { faultOf } from "../api/faults";
 import css from "./Formatted.module.css";
 import { formatOf } from "./picture-files";
 
-/** The address of a picture, or empty if there is none of this name. */
-type FindPicture = (name: string) => Promise<string>;
+/** The address of a picture, or empty if the text has none of this name. */
+type FindPicture = (name: string, signal: AbortSignal) => Promise<string>;
 
 const Found = createContext<FindPicture>(async () => "");
+
+const SHORTEST_WAIT_MS = 500;
+const LONGEST_WAIT_MS = 8_000;
 
 /** Texts inside show the pictures whose files `load` returns. */
 export function WithPictures(props: { load: (name: string) => Promise<Uint8Array>; children: ComponentChildren }) {
@@ -18,24 +22,26 @@ export function WithPictures(props: { load: (name: string) => Promise<Uint8Array
   return <Found.Provider value={find}>{children}</Found.Provider>;
 }
 
-/** Asks for each picture once. */
+/** Asks for each picture once, and again as long as the server does not answer. */
 function finding(load: (name: string) => Promise<Uint8Array>): FindPicture {
   const addresses = new Map<string, Promise<string>>();
-  const address = async (name: string) => {
-    try {
-      const file = await load(name);
-      const format = formatOf(file);
-      return format ? `data:${format};base64,${base64Encode(file)}` : "";
-    } catch {
-      // The words stand for it, until it is asked for again.
-      addresses.delete(name);
-      return "";
-    }
+  const asked = async (name: string) => {
+    const file = await load(name);
+    const format = formatOf(file);
+    return format ? `data:${format};base64,${base64Encode(file)}` : "";
   };
-  return (name) => {
-    const known = addresses.get(name) ?? address(name);
-    addresses.set(name, known);
-    return known;
+  return async (name, signal) => {
+    for (let waitMs = SHORTEST_WAIT_MS; ; waitMs = Math.min(LONGEST_WAIT_MS, 2 * waitMs)) {
+      const asking = addresses.get(name) ?? asked(name);
+      addresses.set(name, asking);
+      try {
+        return await asking;
+      } catch (thrown) {
+        if (faultOf(thrown).reason === "PICTURE_UNKNOWN" || signal.aborted) return "";
+        await new Promise((resolve) => setTimeout(resolve, waitMs));
+        if (addresses.get(name) === asking) addresses.delete(name);
+      }
+    }
   };
 }
 
@@ -44,13 +50,11 @@ export function Picture({ name, words }: { name: string; words: string }): JSX.E
   const find = useContext(Found);
   const [address, setAddress] = useState("");
   useEffect(() => {
-    let gone = false;
-    void find(name).then((found) => {
-      if (!gone) setAddress(found);
+    const gone = new AbortController();
+    void find(name, gone.signal).then((found) => {
+      if (!gone.signal.aborted) setAddress(found);
     });
-    return () => {
-      gone = true;
-    };
+    return () => gone.abort();
   }, [find, name]);
   return address === "" ? words : <img class={css.picture} src={address} alt={words} />;
 }

@@ -25,14 +25,29 @@ export function formatOf(file: Uint8Array): string {
   return begins(0x52, 0x49, 0x46, 0x46) && isWebP ? "image/webp" : "";
 }
 
-/** The file under a name that texts can have. */
+/** A file under a name that texts can have. One that is too large is not read. */
 export async function pictureOf(file: File): Promise<PictureFile> {
   const name = file.name
     .toLowerCase()
     .replaceAll(/[^a-z0-9_.-]/g, "-")
-    .replace(/^\.+/, "")
-    .slice(-64);
-  return { name, data: new Uint8Array(await file.arrayBuffer()) };
+    .slice(-64)
+    .replace(/^\.+/, "");
+  const read = file.size <= MAX_PICTURE_BYTES ? await file.arrayBuffer() : new ArrayBuffer(MAX_PICTURE_BYTES + 1);
+  return { name, data: new Uint8Array(read) };
+}
+
+/** The pictures with one more; it gets another name if a different one has its name. */
+export function withPicture(pictures: readonly PictureFile[], added: PictureFile): readonly PictureFile[] {
+  const isSame = ({ data }: PictureFile) =>
+    data.length === added.data.length && data.every((byte, index) => byte === added.data[index]);
+  const named = (name: string) => pictures.find((one) => one.name === name);
+  let { name } = added;
+  for (let number = 2; ; number += 1) {
+    const other = named(name);
+    if (!other) return [...pictures, { ...added, name }];
+    if (isSame(other)) return pictures;
+    name = `${number}-${added.name}`.slice(0, 64);
+  }
 }
 
 /** Whether a study can have these pictures. */

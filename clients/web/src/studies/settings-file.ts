@@ -63,6 +63,8 @@ function withFiles(value: JsonValue, files: Files): JsonValue {
     return found;
   };
   const fields = Object.entries(value).map(([name, item]): [string, JsonValue] => {
+    // By the names of factors, which are not fields.
+    if (name === "levels") return [name, item];
     if (name === "file") return ["data", base64Encode(contents(item))];
     if (name === "text_file") return ["text", new TextDecoder().decode(contents(item)).trim()];
     return [name, withFiles(item ?? null, files)];

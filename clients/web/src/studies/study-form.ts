@@ -19,14 +19,14 @@ import { areAllowed, MAX_BYTES_IN_ALL, MAX_PICTURE_BYTES, MAX_PICTURES, type Pic
 /** A condition in the form. */
 export interface ConditionForm {
   readonly id: string;
-  /** The built-in agent in all other seats, and in place of a participant who is missing. */
+  /** The built-in agent in all other seats, and in place of a participant or robot that is missing. */
   readonly agent: string;
   readonly labels: "asTheyAre" | "kinds" | "players";
   /** Its levels, by factor. */
   readonly levels: Readonly<Record<string, string>>;
   /** Whether participants may ask for hints. */
   readonly hints: boolean;
-  /** Whether a robot or program of the researcher has one of the other seats. */
+  /** Whether a robot has one of the other seats. */
   readonly robot: boolean;
   /** The text for it. */
   readonly behaviour: string;
@@ -291,7 +291,7 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
       })),
       ...(robot && hasOtherSeats(form) && { robotBehaviour: behaviour }),
       labels: LABELS[labels],
-      policy: { hints, ...(people > 1 && { substitute: agent }) },
+      policy: { hints, substitute: agent },
     })),
     stages,
     pictures: [...form.pictures],

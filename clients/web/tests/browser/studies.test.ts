@@ -445,7 +445,7 @@ test("a study from the form has factors, hints, a robot's seat, pictures and que
   await form.getByLabel("Level of “robot”").nth(0).fill("warm");
   await form.getByLabel("Level of “robot”").nth(1).fill("cold");
   await form.getByLabel("Participants may ask for hints").nth(0).check();
-  await form.getByLabel("A robot or a program of yours").nth(1).check();
+  await form.getByLabel("A robot has one of the other seats").nth(1).check();
   await form.getByLabel("Text for it").fill("nods");
   await form.getByLabel("Pictures in texts").setInputFiles({ name: "A Dot.gif", mimeType: "image/gif", buffer: DOT });
   await form.getByText("![what it shows](a-dot.gif)").waitFor();

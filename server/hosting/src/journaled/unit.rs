@@ -135,9 +135,9 @@ pub(crate) struct New<U: Journaled> {
     pub(crate) shared: U::Shared,
 }
 
-/// The task of a unit has stopped because the server ends, or another node has it.
+/// The task of a unit has stopped because the server ends, its store failed, or another node has it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the server is shutting down")]
+#[error("it has stopped here: the server ends, its store failed, or another node has it")]
 pub struct Stopped;
 
 /// A unit of this server.

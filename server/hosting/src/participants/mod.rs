@@ -91,7 +91,7 @@ impl Participants {
             let id = stored.header.id;
             match self.studies.get(id).filter(|study| !study.is_stopped()) {
                 Some(study) => {
-                    // Besides, only an unknown participant is refused.
+                    // It needs no memory, and refuses only unknown participants, who have no data.
                     if let Err(NotDone::Stopped(_)) = study.withdraw(number, true).await {
                         return Err(DataError::ShuttingDown);
                     }

@@ -61,7 +61,7 @@ pub enum NotDone {
     /// The server has no memory for it.
     #[error(transparent)]
     Memory(#[from] Refused),
-    /// The server ends, or its store failed.
+    /// It has stopped.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
@@ -72,7 +72,7 @@ pub enum NotDeleted {
     /// This number of participants is in the middle of it.
     #[error("{0} participants are in the middle of the study")]
     Running(usize),
-    /// The server ends, or its store failed.
+    /// It has stopped.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }

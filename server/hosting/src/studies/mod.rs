@@ -14,6 +14,7 @@ mod tests;
 
 use std::sync::Arc;
 
+use bytes::Bytes;
 use chefshat_proto::v1;
 use chefshat_study::{SettingsProblem, Study};
 use tokio_util::task::TaskTracker;
@@ -171,7 +172,11 @@ impl Studies {
 }
 
 fn check(settings: v1::StudySettings, durable: bool) -> Result<Checked, SettingsProblem> {
-    let settings = convert::complete_settings(settings, random_bytes, durable)?;
+    let mut settings = convert::complete_settings(settings, random_bytes, durable)?;
+    for picture in &mut settings.pictures {
+        // A part of the request would keep all of it in memory.
+        picture.data = Bytes::copy_from_slice(&picture.data);
+    }
     let plan = convert::study_plan(&settings)?;
     let core = Study::new(Arc::clone(&plan.core))?;
     let memory = memory_of(&settings);

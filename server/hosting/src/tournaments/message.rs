@@ -96,7 +96,7 @@ pub enum JoinRefusal {
         "this request id was used with another name, kind, number of games or statelessness; draw a new one"
     )]
     RequestIdUsed,
-    /// The server ends.
+    /// It has stopped.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
@@ -107,7 +107,7 @@ pub enum BeginRefusal {
     /// The rules of the tournament refuse it.
     #[error(transparent)]
     Rules(#[from] BeginProblem),
-    /// The server ends.
+    /// It has stopped.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
@@ -243,7 +243,7 @@ pub enum ByHandRefusal {
     /// No participant has the ticket (any more).
     #[error("no participant of this tournament has this ticket")]
     TicketUnknown,
-    /// The server ends.
+    /// It has stopped.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }

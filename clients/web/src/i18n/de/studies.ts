@@ -238,7 +238,7 @@ export const studies: Texts["studies"] = {
     title: "Studie erstellen",
     fromFile: "Aus einer Datei",
     fromFileText:
-      "Die Einstellungen einer Studie als TOML oder JSON, wie für „chefshat study create“. Wähle die Dateien, die sie nennt, zusammen mit ihr.",
+      "Die Einstellungen einer Studie als TOML oder JSON, wie für „chefshat study create“. Wähle die Dateien, die darin genannt sind, gleich mit aus.",
     file: "Datei mit den Einstellungen",
     read: (name, conditions, stages) =>
       `„${name}“: ${plural(conditions, { one: "# Bedingung", other: "# Bedingungen" })}, ${plural(stages, { one: "# Schritt", other: "# Schritte" })}.`,
@@ -278,7 +278,7 @@ export const studies: Texts["studies"] = {
     debriefingTitle: "Über diese Studie",
     pictures: "Bilder in Texten",
     picturesHint:
-      "PNG, JPEG, GIF oder WebP. Schreib das, was hier steht, in einen Text oder eine Frage, mit dem, was das Bild zeigt, in Worten.",
+      "PNG, JPEG, GIF oder WebP. Jedes Bild bekommt unten eine Zeile: Kopiere sie in einen Text oder eine Frage, und ersetze „was es zeigt“ durch eine Beschreibung.",
     pictureWords: "was es zeigt",
     removePicture: "Dieses Bild entfernen",
     traces: "Bedienung aufzeichnen (gewählte und zurückgelegte Karten, Mauszeiger, Fokus)",
@@ -303,7 +303,7 @@ export const studies: Texts["studies"] = {
       "Namen mit Kommas dazwischen, zum Beispiel „staerke, roboter“. Ohne Faktoren unterscheiden sich Bedingungen nur durch ihre Namen.",
     level: (factor) => `Stufe von „${factor}“`,
     hints: "Die Teilnehmer dürfen nach Tipps fragen",
-    robot: "Ein Roboter oder ein eigenes Programm hat einen der anderen Plätze",
+    robot: "Ein Roboter hat einen der anderen Plätze",
     behaviour: "Text für ihn",
     behaviourHint: "Er liest ihn, wenn er beitritt, zum Beispiel, wie der Roboter sich verhält.",
     seeds: "Seeds der Partien",
@@ -321,6 +321,8 @@ export const studies: Texts["studies"] = {
     },
     options: "Möglichkeiten, eine in jeder Zeile",
     optional: "Darf unbeantwortet bleiben",
+    questionNumber: (number) => `Frage ${number}`,
+    conditionNumber: (number) => `Bedingung ${number}`,
     addQuestion: "Frage hinzufügen",
     removeQuestion: "Diese Frage entfernen",
     disagree: "Stimme gar nicht zu",

@@ -235,7 +235,7 @@ export const studies = {
     title: "Create a study",
     fromFile: "From a file",
     fromFileText:
-      "The settings of a study as TOML or JSON, as for “chefshat study create”. Choose the files that it names together with it.",
+      "The settings of a study as TOML or JSON, as for “chefshat study create”. Also choose the files that are named there.",
     file: "File with the settings",
     read: (name: string, conditions: number, stages: number) =>
       `“${name}”: ${plural(conditions, { one: "# condition", other: "# conditions" })}, ${plural(stages, { one: "# stage", other: "# stages" })}.`,
@@ -275,7 +275,7 @@ export const studies = {
     debriefingTitle: "About this study",
     pictures: "Pictures in texts",
     picturesHint:
-      "PNG, JPEG, GIF or WebP. Write what is shown here into a text or question, with what the picture shows in words.",
+      "PNG, JPEG, GIF or WebP. Each picture gets a line below: copy it into a text or question, and replace “what it shows” by a description.",
     pictureWords: "what it shows",
     removePicture: "Remove this picture",
     traces: "Record interface traces (cards picked and put back, hover, focus)",
@@ -300,7 +300,7 @@ export const studies = {
       "Names with commas between them, for example “strength, robot”. Without factors, conditions differ only by their names.",
     level: (factor: string) => `Level of “${factor}”`,
     hints: "Participants may ask for hints",
-    robot: "A robot or a program of yours has one of the other seats",
+    robot: "A robot has one of the other seats",
     behaviour: "Text for it",
     behaviourHint: "It reads this when it joins, for example how the robot behaves.",
     seeds: "Seeds of the games",
@@ -318,6 +318,8 @@ export const studies = {
     },
     options: "Options, one in each line",
     optional: "May be left unanswered",
+    questionNumber: (number: number) => `Question ${number}`,
+    conditionNumber: (number: number) => `Condition ${number}`,
     addQuestion: "Add a question",
     removeQuestion: "Remove this question",
     disagree: "Strongly disagree",

@@ -236,7 +236,7 @@ export const studies: Texts["studies"] = {
     title: "Crear un estudio",
     fromFile: "Desde un archivo",
     fromFileText:
-      "Los ajustes de un estudio en TOML o JSON, como para «chefshat study create». Elige junto con él los archivos que nombra.",
+      "Los ajustes de un estudio en TOML o JSON, como para «chefshat study create». Elige a la vez los archivos que se nombran en ellos.",
     file: "Archivo con los ajustes",
     read: (name, conditions, stages) =>
       `«${name}»: ${plural(conditions, { one: "# condición", other: "# condiciones" })}, ${plural(stages, { one: "# fase", other: "# fases" })}.`,
@@ -276,7 +276,7 @@ export const studies: Texts["studies"] = {
     debriefingTitle: "Sobre este estudio",
     pictures: "Imágenes en los textos",
     picturesHint:
-      "PNG, JPEG, GIF o WebP. Escribe lo que aparece aquí en un texto o una pregunta, con lo que muestra la imagen en palabras.",
+      "PNG, JPEG, GIF o WebP. Cada imagen tiene abajo una línea: cópiala en un texto o una pregunta y sustituye «lo que muestra» por una descripción.",
     pictureWords: "lo que muestra",
     removePicture: "Quitar esta imagen",
     traces: "Registrar el uso de la interfaz (cartas elegidas y devueltas, puntero, foco)",
@@ -301,7 +301,7 @@ export const studies: Texts["studies"] = {
       "Nombres separados por comas, por ejemplo «fuerza, robot». Sin factores, las condiciones solo se distinguen por su nombre.",
     level: (factor) => `Nivel de «${factor}»`,
     hints: "Los participantes pueden pedir pistas",
-    robot: "Un robot o un programa propio tiene uno de los otros asientos",
+    robot: "Un robot tiene uno de los otros asientos",
     behaviour: "Texto para él",
     behaviourHint: "Lo lee al unirse; por ejemplo, cómo se comporta el robot.",
     seeds: "Semillas de las partidas",
@@ -319,6 +319,8 @@ export const studies: Texts["studies"] = {
     },
     options: "Opciones, una en cada línea",
     optional: "Puede quedar sin responder",
+    questionNumber: (number) => `Pregunta ${number}`,
+    conditionNumber: (number) => `Condición ${number}`,
     addQuestion: "Añadir una pregunta",
     removeQuestion: "Quitar esta pregunta",
     disagree: "Totalmente en desacuerdo",

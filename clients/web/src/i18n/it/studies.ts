@@ -236,7 +236,7 @@ export const studies: Texts["studies"] = {
     title: "Crea uno studio",
     fromFile: "Da un file",
     fromFileText:
-      "Le impostazioni di uno studio in TOML o JSON, come per «chefshat study create». Scegli insieme i file che nomina.",
+      "Le impostazioni di uno studio in TOML o JSON, come per «chefshat study create». Scegli insieme anche i file che vi sono indicati.",
     file: "File con le impostazioni",
     read: (name, conditions, stages) =>
       `«${name}»: ${plural(conditions, { one: "# condizione", other: "# condizioni" })}, ${plural(stages, { one: "# fase", other: "# fasi" })}.`,
@@ -276,7 +276,7 @@ export const studies: Texts["studies"] = {
     debriefingTitle: "Informazioni su questo studio",
     pictures: "Immagini nei testi",
     picturesHint:
-      "PNG, JPEG, GIF o WebP. Scrivi ciò che appare qui in un testo o in una domanda, con quello che l’immagine mostra a parole.",
+      "PNG, JPEG, GIF o WebP. Ogni immagine ha sotto una riga: copiala in un testo o in una domanda e sostituisci «che cosa mostra» con una descrizione.",
     pictureWords: "che cosa mostra",
     removePicture: "Togli questa immagine",
     traces: "Registra le tracce dell’interfaccia (carte prese e rimesse, puntatore, fuoco)",
@@ -301,7 +301,7 @@ export const studies: Texts["studies"] = {
       "Nomi separati da virgole, per esempio «forza, robot». Senza fattori le condizioni si distinguono solo per il nome.",
     level: (factor) => `Livello di «${factor}»`,
     hints: "I partecipanti possono chiedere suggerimenti",
-    robot: "Un robot o un tuo programma ha uno degli altri posti",
+    robot: "Un robot ha uno degli altri posti",
     behaviour: "Testo per lui",
     behaviourHint: "Lo legge quando si unisce; per esempio, come si comporta il robot.",
     seeds: "Semi delle partite",
@@ -319,6 +319,8 @@ export const studies: Texts["studies"] = {
     },
     options: "Opzioni, una per riga",
     optional: "Può restare senza risposta",
+    questionNumber: (number) => `Domanda ${number}`,
+    conditionNumber: (number) => `Condizione ${number}`,
     addQuestion: "Aggiungi una domanda",
     removeQuestion: "Togli questa domanda",
     disagree: "Per niente d’accordo",

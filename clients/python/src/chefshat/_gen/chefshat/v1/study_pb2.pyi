@@ -1363,9 +1363,9 @@ class StudyPicture(_message.Message):
     NAME_FIELD_NUMBER: _builtins.int
     DATA_FIELD_NUMBER: _builtins.int
     name: _builtins.str
-    """Its name, 1..=64 lower-case letters, digits, `_`, `-` or `.`, of which the first is no dot, unique in
-    the study. Texts show the picture where they have `![two hands of cards](NAME)`, with what it shows
-    in words.
+    """Its name, 1..=64 lower-case letters, digits, `_`, `-` or `.` (the first is not a dot), unique in the
+    study. Texts show the picture where they have `![two hands of cards](NAME)`, with what it shows in
+    words, and the name without escapes.
     """
     data: _builtins.bytes
     """A PNG, JPEG, GIF or WebP file, at most 262144 bytes. Of the responses that have the settings, only
