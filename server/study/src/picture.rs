@@ -1,7 +1,6 @@
 //! Pictures in texts. Their files are kept elsewhere.
 
 use crate::checks::{Checked, identifier, is_of_identifier, refuse, within};
-use crate::view::{Content, View};
 
 /// Maximum number of pictures of a study.
 pub(crate) const MAX_PICTURES: usize = 16;
@@ -87,27 +86,8 @@ impl PictureFormat {
     }
 }
 
-impl View {
-    /// Whether a text that is shown names a picture.
-    pub fn names(&self, picture: &str) -> bool {
-        let texts: Vec<&str> = match &self.content {
-            Content::Consent(consent) => vec![&consent.text],
-            Content::Questionnaire(shown) => {
-                let questions = shown.items.iter().map(|item| item.text.as_str());
-                questions.chain([shown.instructions.as_str()]).collect()
-            }
-            Content::External(external) => vec![&external.text],
-            Content::Text(text) => vec![&text.text],
-            Content::Arrival(arrival) => vec![&arrival.text],
-            Content::End { text, .. } => vec![text],
-            Content::Game(_) => Vec::new(),
-        };
-        texts.iter().any(|text| names(text, picture))
-    }
-}
-
 /// Whether a text has a name that is no part of a longer one.
-fn names(text: &str, name: &str) -> bool {
+pub(crate) fn names(text: &str, name: &str) -> bool {
     text.match_indices(name).any(|(start, _)| {
         let (before, after) = (
             text[..start].chars().next_back(),

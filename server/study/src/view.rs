@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 use crate::Study;
 use crate::games::Phase;
 use crate::item_kind::ItemKind;
+use crate::picture::names;
 use crate::questionnaire::{Questionnaire, ShownItemIf};
 use crate::recruiting::Recruiting;
 use crate::settings::{Hide, Labels};
@@ -140,6 +141,25 @@ pub enum End {
     ScreenedOut,
     /// Its group was not complete in time.
     LeftOver,
+}
+
+impl View {
+    /// Whether a text that is shown names a picture.
+    pub fn names(&self, picture: &str) -> bool {
+        let texts: Vec<&str> = match &self.content {
+            Content::Consent(consent) => vec![&consent.text],
+            Content::Questionnaire(shown) => {
+                let questions = shown.items.iter().map(|item| item.text.as_str());
+                questions.chain([shown.instructions.as_str()]).collect()
+            }
+            Content::External(external) => vec![&external.text],
+            Content::Text(text) => vec![&text.text],
+            Content::Arrival(arrival) => vec![&arrival.text],
+            Content::End { text, .. } => vec![text],
+            Content::Game(_) => Vec::new(),
+        };
+        texts.iter().any(|text| names(text, picture))
+    }
 }
 
 impl Study {
