@@ -5,8 +5,8 @@ import { useEffect, useState } from "preact/hooks";
 import { wordsOf } from "../api/faults";
 import { TableStage } from "../gen/chefshat/v1/table_service_pb";
 import { t } from "../i18n";
-import { HostInvite } from "../lobby/HostInvite";
 import { CopyLine, QrCode, ThisMachine } from "../lobby/Invite";
+import { RoomInvite } from "../lobby/RoomInvite";
 import { isForAgents, isOpen } from "../lobby/rooms";
 import { ErrorPage } from "../parts/ErrorPage";
 import type { PageProps } from "../router";
@@ -64,7 +64,7 @@ function Attended({ roomId, ticket, attending }: AttendedProps) {
         report={attending.report}
         trouble={link.value === "lost" ? t().table.link.lost : trouble}
       />
-      {isOpen(room) && <HostInvite roomId={roomId} forAgents={isForAgents(room.seats)} />}
+      {isOpen(room) && <RoomInvite roomId={roomId} forAgents={isForAgents(room.seats)} />}
       <details class={`${css.link} sheet`} open={early} data-part="attendant-link">
         <summary>
           <h2>{t().attend.link.title}</h2>

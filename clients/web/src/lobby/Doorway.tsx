@@ -12,10 +12,10 @@ import { ConfirmButton } from "../parts/ConfirmButton";
 import { Notice } from "../parts/Notice";
 import { pathOf } from "../router";
 import css from "./Doorway.module.css";
-import { HostInvite } from "./HostInvite";
 import { NameForm } from "./Join";
 import { JoinForm } from "./JoinForm";
 import { RoomStateChip, rulesInShort } from "./RoomCard";
+import { RoomInvite } from "./RoomInvite";
 import { freeForPeople, isForAgents, isOpen } from "./rooms";
 import { Seats } from "./Seats";
 import { closeRoom, hostedRoom } from "./seat";
@@ -78,7 +78,7 @@ function WayIn({ room }: { room: Room }) {
           {hosted ? <NameForm code={hosted.joinCode} room={room} /> : <JoinForm />}
         </section>
       )}
-      {isOpen(room) && <HostInvite roomId={room.roomId} forAgents={isForAgents(room.seats)} />}
+      {isOpen(room) && <RoomInvite roomId={room.roomId} forAgents={isForAgents(room.seats)} />}
     </>
   );
 }

@@ -152,6 +152,11 @@ function codesOf(roomId: string): string[] {
   return [...remembered()].flatMap(([name, value]) => (name.startsWith(CODE) && value === roomId ? name : []));
 }
 
+/** The join code with which this device took its seat in a room, if it has one. */
+export function codeOf(roomId: string): string | undefined {
+  return heldSeat(roomId) ? codesOf(roomId)[0]?.slice(CODE.length) : undefined;
+}
+
 /** A join code as the server writes it: capitals without separators. */
 export function canonical(code: string): string {
   return code.replaceAll(/[\s-]/g, "").toUpperCase();

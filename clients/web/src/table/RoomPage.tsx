@@ -8,9 +8,9 @@ import { ParticipantKind } from "../gen/chefshat/v1/room_pb";
 import { t } from "../i18n";
 import { Again } from "../lobby/Again";
 import { Doorway } from "../lobby/Doorway";
-import { HostInvite } from "../lobby/HostInvite";
 import { LeaveButton, LeaveDialog } from "../lobby/Leaving";
 import { MoveButton, MoveDialog } from "../lobby/MoveToDevice";
+import { RoomInvite } from "../lobby/RoomInvite";
 import { decideSeat, giveUpSeat, type HeldSeat, heldSeat, linkToSeat, seatFromLink } from "../lobby/seat";
 import { WhichOne } from "../lobby/WhichOne";
 import { Button } from "../parts/Button";
@@ -149,7 +149,7 @@ function Held({ session, held }: { session: Session; held: HeldSeat }) {
         }
         below={
           <>
-            <HostInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />
+            <RoomInvite roomId={roomId} forAgents={table.seats.some(isForAgent)} />
             {move}
             {leave}
           </>

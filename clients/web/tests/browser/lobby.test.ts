@@ -34,6 +34,10 @@ test("a room is created, and a guest with its invitation takes the seat reserved
   await guest.page.getByRole("button", { name: "Sit down" }).click();
   await guest.page.waitForURL(/\/rooms\//);
 
+  // Who has a seat can invite others, too.
+  await guest.page.getByRole("img", { name: "QR code of the address" }).waitFor();
+  expect(await guest.page.locator('[data-part~="invite-link"]').textContent()).toBe(invitation);
+
   // The seat appears on the host's page without a reload, labelled as a person's.
   const seat = host.page.getByRole("listitem").filter({ hasText: "Rosa" });
   await seat.getByText("person", { exact: true }).waitFor();
