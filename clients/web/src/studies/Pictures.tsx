@@ -3,7 +3,7 @@
 import { base64Encode } from "@bufbuild/protobuf/wire";
 import { type ComponentChildren, createContext, type JSX } from "preact";
 import { useContext, useEffect, useMemo, useState } from "preact/hooks";
-import { faultOf } from "../api/faults";
+import { faultOf, isPassing } from "../api/faults";
 import css from "./Formatted.module.css";
 import { formatOf } from "./picture-files";
 
@@ -22,7 +22,7 @@ export function WithPictures(props: { load: (name: string) => Promise<Uint8Array
   return <Found.Provider value={find}>{children}</Found.Provider>;
 }
 
-/** Asks for each picture once, and again as long as the server does not answer. */
+/** Asks for each picture once, and again while the server is away or too busy. */
 function finding(load: (name: string) => Promise<Uint8Array>): FindPicture {
   const addresses = new Map<string, Promise<string>>();
   const asked = async (name: string) => {
@@ -37,7 +37,7 @@ function finding(load: (name: string) => Promise<Uint8Array>): FindPicture {
       try {
         return await asking;
       } catch (thrown) {
-        if (faultOf(thrown).reason === "PICTURE_UNKNOWN" || signal.aborted) return "";
+        if (!isPassing(faultOf(thrown)) || signal.aborted) return "";
         await new Promise((resolve) => setTimeout(resolve, waitMs));
         if (addresses.get(name) === asking) addresses.delete(name);
       }
