@@ -29,6 +29,7 @@ const WITHOUT_TEXT: Record<string, readonly string[]> = {
     "TOO_MANY_TRACES",
     "TRACES_REFUSED",
   ],
+  "the page of a study shows the words of the picture": ["PICTURE_UNKNOWN"],
   "the page repeats the request": ["FOLLOWER_TOO_SLOW", "SPECTATOR_TOO_SLOW"],
   "the page sends no such value": [
     "COMMAND_MISSING",
