@@ -187,7 +187,7 @@ test("the form has factors, hints, robots, seeds and questions", async () => {
     { case: "likert", value: { points: 7, labels: ["Stimme gar nicht zu", "Stimme völlig zu"] } },
     { case: "number", value: { min: 0, max: 1_000_000 } },
   ]);
-  // Without a seat for it there is no robot.
+  // A robot needs a seat that no person has.
   const four = await settingsOf({ ...form, people: "4" });
   expect(four.conditions?.[0]).toMatchObject({ seats: [] });
   expect(four.conditions?.[0]).not.toHaveProperty("robotBehaviour");

@@ -86,7 +86,7 @@ impl PictureFormat {
     }
 }
 
-/// Whether a text has a name that is no part of a longer one.
+/// Whether a text has the whole name, not only within a longer one.
 pub(crate) fn names(text: &str, name: &str) -> bool {
     text.match_indices(name).any(|(start, _)| {
         let (before, after) = (

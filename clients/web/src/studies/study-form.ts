@@ -115,10 +115,7 @@ export const NEW_QUESTION: QuestionForm = { text: "", when: "after", kind: "agre
 
 /** The factors that are named. */
 export function factorsOf(form: StudyForm): readonly string[] {
-  return form.factors
-    .split(",")
-    .map((name) => name.trim())
-    .filter((name) => name !== "");
+  return partsOf(form.factors, ",");
 }
 
 /** Whether participants leave a seat to others. */
@@ -242,7 +239,7 @@ export function faultsOf(form: StudyForm): StudyFaults {
 export async function settingsOf(form: StudyForm): Promise<MessageInitShape<typeof StudySettingsSchema>> {
   const words = (await textsIn(form.language)).studies.make;
   type Stage = MessageInitShape<typeof StudyStageSchema>;
-  const questions = await questionsOf(form);
+  const questions = questionsOf(form, words);
   const questionnaire = (id: QuestionForm["when"], title: string): Stage[] => {
     const items = questions.filter(({ when }) => when === id).map(({ item }) => item);
     return items.length === 0 ? [] : [{ stage: { case: "questionnaire", value: { id, title, items } } }];
@@ -251,7 +248,7 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
     { stage: { case: "games", value: { count: Number(form.games) } } },
     ...questionnaire("after", words.afterTitle),
   ];
-  for (const template of ["godspeed", "nasaTlx", "ueqS"] as const)
+  for (const template of Object.keys(TEMPLATES) as Template[])
     if (form[template] && hasTexts(template, form.language))
       inBlock.push({ stage: { case: "questionnaire", value: { template: TEMPLATES[template].name } } });
   const stages: Stage[] = [
@@ -304,9 +301,8 @@ export async function settingsOf(form: StudyForm): Promise<MessageInitShape<type
   };
 }
 
-/** The questions with the ids of their items, in the participants' language. */
-async function questionsOf(form: StudyForm) {
-  const words = (await textsIn(form.language)).studies.make;
+/** The questions with their items. `words`: those of the participants' language. */
+function questionsOf(form: StudyForm, words: { disagree: string; agree: string }) {
   type Item = MessageInitShape<typeof StudyItemSchema>;
   const kindOf = ({ kind, options }: QuestionForm): NonNullable<Item["kind"]> => {
     switch (kind) {
@@ -334,10 +330,15 @@ function levelsOf(form: StudyForm, factor: string): string[] {
 
 /** The lines of a text that are not empty. */
 function linesOf(text: string): string[] {
+  return partsOf(text, "\n");
+}
+
+/** The parts of a text between separators that are not empty. */
+function partsOf(text: string, separator: string): string[] {
   return text
-    .split("\n")
-    .map((line) => line.trim())
-    .filter((line) => line !== "");
+    .split(separator)
+    .map((part) => part.trim())
+    .filter((part) => part !== "");
 }
 
 function groupsOf({ people, fill }: StudyForm) {
