@@ -14,7 +14,7 @@ from fake_server import FakeServer
 from proxy import Proxy
 
 import chefshat
-from chefshat import Backoff, ChefsHatError, aio
+from chefshat import Backoff, ChefsHatError, aio, channels
 from chefshat.errors import exit_code
 
 
@@ -110,6 +110,18 @@ def test_a_closed_client_says_so_in_every_thread(fake: FakeServer, silent: str) 
     waiting.close()
     thread.join()
     assert errors[0].reason in ("CLIENT_CLOSED", "CANCELLED")
+
+
+@pytest.mark.parametrize("kind", ["unary_unary", "unary_stream"])
+def test_a_client_that_is_closed_while_a_call_begins_says_so(silent: str, kind: str) -> None:
+    channel = channels.channel(chefshat.ServerAddress(silent))
+
+    def closing(_: object) -> bytes:
+        channel.close()
+        return b""
+
+    with pytest.raises(ChefsHatError, match="CLIENT_CLOSED"):
+        getattr(channel, kind)("/service/Call", request_serializer=closing)(None)
 
 
 def test_a_client_of_asyncio_that_is_closed_during_a_call_says_so(silent: str) -> None:

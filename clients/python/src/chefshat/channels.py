@@ -169,7 +169,13 @@ class _Calling:
         def call(*inputs: object) -> object:
             if self._closed:
                 raise closed()
-            begun = method(*inputs, metadata=self._metadata or None, timeout=timeout)
+            try:
+                begun = method(*inputs, metadata=self._metadata or None, timeout=timeout)
+            except ValueError:
+                # What gRPC raises if another thread has closed the channel just now.
+                if self._closed:
+                    raise closed() from None
+                raise
             return _Stream(begun) if isinstance(begun, Iterator) else begun
 
         return call
