@@ -53,9 +53,13 @@ beforeAll(async () => {
   physicalId = physical.roomId;
   await seated.goto(`${server.url}/rooms/${physicalId}/table#ticket=${physical.tableTicket}`);
   await seated.locator('[data-part~="entry"]').waitFor();
+  // Each is waited for: a seat whose holder has never been there is free again after two minutes.
   await sitDown(seated, server, waiting.code, "Rosa");
+  await seated.locator('[data-part~="waiting-seat"]').filter({ hasText: "Rosa" }).filter({ hasText: "✓" }).waitFor();
   await sitDown(seated, server, table.code, "Rosa");
+  await nextDecision(seated);
   await sitDown(seated, server, `${wizard.code}?as=robot`, "Robo");
+  await nextDecision(seated);
   await seated.goto(`${server.url}/tournaments/new`);
   await seated.getByLabel("Name of the tournament").fill("My league");
   await seated.getByLabel("greedy", { exact: true }).fill("2");
