@@ -1,12 +1,13 @@
 //! What tournaments and studies have in common. A unit is a value that changes by the entries of its
 //! journal, and one task (`actor`) that commits entries before it publishes them or acts on them.
 //! Others reach it through its handle (`unit`), which the `registry` of all units of a kind finds.
-//! What the entries of a unit bring about (streams of participants, rooms of games) is in its own
-//! module.
+//! Rooms for its games are created in one way (`games`); what else the entries of a unit bring about
+//! is in its own module.
 //!
 //! A room is not such a unit: its task decides on answers in microseconds (`room/`).
 
 mod actor;
+mod games;
 mod registry;
 mod table;
 mod unit;

@@ -2,17 +2,22 @@
 //! handle, and what its task has.
 
 use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
 
 use tokio::sync::{Notify, mpsc, oneshot, watch};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
+use tracing::warn;
 
-use crate::rooms::Rooms;
+use crate::rooms::{CreateError, Rooms};
 use chefshat_admission::limits::{Key, Permit, Refused};
 use chefshat_base::tasks::LongTask;
 use chefshat_room::ids::{Id, RoomId, RoomToken, SecretHash, Token};
 use chefshat_store::StoreError;
 use chefshat_store::units::{StoredKind, StoredUnit, UnitKind, UnitRow, UnitWrite};
+
+/// When rooms that could not be created are tried again.
+const CREATION_RETRY: Duration = Duration::from_secs(1);
 
 /// What a unit is from its creation on.
 pub trait UnitHeader: Send + Sync {
@@ -274,6 +279,8 @@ pub struct Unit<U: Journaled> {
     replies: Vec<Box<dyn FnOnce() + Send + Sync>>,
     /// Notified when one of its games has ended or a room of it has stopped.
     pub(super) games: Arc<Notify>,
+    /// When rooms of its games whose creation failed are tried again.
+    pub(crate) retry: Retry,
     /// Its place among its creator's units.
     _place: Permit,
 }
@@ -291,6 +298,7 @@ impl<U: Journaled> Unit<U> {
             pending: Vec::new(),
             replies: Vec::new(),
             games,
+            retry: Retry::default(),
             _place: place,
         }
     }
@@ -348,5 +356,45 @@ impl<U: Journaled> Unit<U> {
 impl<U: Journaled> Drop for Unit<U> {
     fn drop(&mut self) {
         self.rooms.stop_notifying(self.id().unit(), &self.games);
+    }
+}
+
+/// When rooms that a unit needs and could not create are tried again.
+#[derive(Debug, Default)]
+pub(crate) struct Retry {
+    at: Option<Instant>,
+    /// Whether the log says that games wait.
+    is_known: bool,
+}
+
+impl Retry {
+    /// When that is, if rooms wait for it.
+    pub(crate) fn at(&self) -> Option<Instant> {
+        self.at
+    }
+
+    /// Returns whether rooms are to be created now: some are `needed`, and none waits. Forgets what waits
+    /// if none is needed any more.
+    pub(crate) fn take(&mut self, needed: bool) -> bool {
+        if !needed {
+            *self = Self::default();
+            return false;
+        }
+        let is_due = self.at.is_none_or(|at| at <= Instant::now());
+        if is_due {
+            self.at = None;
+        }
+        is_due
+    }
+
+    /// Notes that a room could not be created. Says so once, unless the server stops: the game gets its
+    /// room when it has restarted.
+    pub(super) fn again(&mut self, of: UnitKind, id: impl std::fmt::Display, error: &CreateError) {
+        self.at = Some(Instant::now() + CREATION_RETRY);
+        if !matches!(error, CreateError::ShuttingDown)
+            && !std::mem::replace(&mut self.is_known, true)
+        {
+            warn!(%of, %id, %error, "games wait for rooms");
+        }
     }
 }

@@ -7,8 +7,6 @@ use std::time::Duration;
 
 use chefshat_agents::RecordedPlayer;
 use chefshat_engine::{RULES_VERSION, RuleSet, Seat, SeedPlan};
-use tokio::time::Instant;
-use tracing::warn;
 
 use super::table::{CreateError, Entry};
 use super::{CODES_TRIED, Rooms};
@@ -30,8 +28,6 @@ use chefshat_store::StoreError;
 
 /// When it is worth trying again to create a room.
 const RETRY_ROOMS: Duration = Duration::from_secs(30);
-/// When a tournament or study tries again to create rooms.
-const CREATION_RETRY: Duration = Duration::from_secs(1);
 
 /// The settings of a new room.
 #[derive(Debug)]
@@ -87,46 +83,6 @@ impl NewRoom {
             request: None,
             charged: Key::Local,
             creator: None,
-        }
-    }
-}
-
-/// When a tournament or study tries again to create rooms that it needs.
-#[derive(Debug, Default)]
-pub(crate) struct Retry {
-    at: Option<Instant>,
-    /// Whether the log says that games wait.
-    is_known: bool,
-}
-
-impl Retry {
-    /// When to try again, if rooms wait for that.
-    pub(crate) fn at(&self) -> Option<Instant> {
-        self.at
-    }
-
-    /// Whether to try now, and then begins to.
-    pub(crate) fn begin(&mut self) -> bool {
-        let is_due = self.at.is_none_or(|at| at <= Instant::now());
-        if is_due {
-            self.at = None;
-        }
-        is_due
-    }
-
-    /// No room waits.
-    pub(crate) fn clear(&mut self) {
-        *self = Self::default();
-    }
-
-    /// A room could not be created. Says so once, unless the server stops: the game gets its room when it
-    /// has restarted.
-    pub(crate) fn again(&mut self, of: &str, id: impl std::fmt::Display, error: &CreateError) {
-        self.at = Some(Instant::now() + CREATION_RETRY);
-        if !matches!(error, CreateError::ShuttingDown)
-            && !std::mem::replace(&mut self.is_known, true)
-        {
-            warn!(of, %id, %error, "games wait for rooms");
         }
     }
 }

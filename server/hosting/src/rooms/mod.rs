@@ -31,7 +31,6 @@ use chefshat_room::ids::{GameId, RoomId, SeriesId, TournamentId, UnitId, normal_
 use chefshat_room::journal::{GameHeader, TournamentGame};
 use chefshat_store::samples::Samples;
 use chefshat_store::{Store, StoreError};
-pub(crate) use creation::Retry;
 pub use creation::{Created, NewRoom, PartOf, Seating};
 pub use table::CreateError;
 use table::{Entry, LockedTable, Table};

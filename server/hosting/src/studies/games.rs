@@ -8,11 +8,10 @@ use std::time::Duration;
 
 use chefshat_engine::Seat;
 use chefshat_study::{Outcome, Participant, PlayedGame, Status};
-use tracing::error;
 
 use super::task::StudyTask;
 use crate::room::GameEnd;
-use crate::rooms::{CreateError, NewRoom, PartOf, Seating};
+use crate::rooms::{NewRoom, PartOf, Seating};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{GameId, RoomId};
 use chefshat_room::journal::{Change, Fill, GameStart, SeatedParticipant, StudyGame, StudyMember};
@@ -96,20 +95,21 @@ impl StudyTask {
                 GameEnd::Aborted(_) | GameEnd::NotDealt => Outcome::Aborted,
             }));
         }
-        let id = convert::game_of(&game.placed);
-        let stored = match self.unit.rooms.store().finished(id).await {
-            Err(StoreError::Unreadable(problem)) => {
-                error!(game = %id, problem, "a game of a study cannot be read, and counts as broken off");
-                return Ok(Some(Outcome::Aborted));
+        let read = |stored| match stored {
+            StoredGame::Hosted(_, entries, _) => {
+                let is_abort = |change: &Change| matches!(change, Change::Aborted(_));
+                let was_aborted = entries.iter().any(|it| is_abort(&it.change));
+                Some(match was_aborted {
+                    true => Outcome::Aborted,
+                    false => Outcome::Finished,
+                })
             }
-            stored => stored?,
+            _ => None,
         };
-        if let Some(StoredGame::Hosted(_, entries, _)) = stored {
-            let was_aborted = (entries.iter()).any(|it| matches!(it.change, Change::Aborted(_)));
-            return Ok(Some(match was_aborted {
-                true => Outcome::Aborted,
-                false => Outcome::Finished,
-            }));
+        let id = convert::game_of(&game.placed);
+        let found = self.unit.read_record(id, Outcome::Aborted, read).await?;
+        if found.is_some() {
+            return Ok(found);
         }
         // A game that was aborted before it began has no record.
         let had_room = self
@@ -122,37 +122,24 @@ impl StudyTask {
 
     /// Creates the rooms of placed games.
     pub(super) async fn make_rooms(&mut self) -> Result<(), StoreError> {
-        if self.without_room.is_empty() {
-            // What waited for a room may have ended without one.
-            self.retry.clear();
+        // What waited for a room may have ended without one.
+        if !self.unit.retry.take(!self.without_room.is_empty()) {
             return Ok(());
         }
-        if !self.retry.begin() {
-            return Ok(());
+        let without_room = self.without_room.iter().copied();
+        let wanted = without_room.filter_map(|number| Some((number, self.new_room(number)?)));
+        let made = self.unit.create_rooms(wanted).await;
+        let made = self.unit.note_rooms(made)?;
+        for number in made.created {
+            self.without_room.remove(&number);
+            self.unit.handle.notify_participant(number);
         }
-        for number in self.without_room.clone() {
-            let Some(new) = self.new_room(number) else {
-                continue;
-            };
-            match self.unit.rooms.create(new).await {
-                Ok(_) => {
-                    self.without_room.remove(&number);
-                    self.unit.handle.notify_participant(number);
-                    self.unit.has_changed = true;
-                }
-                // The game was aborted before it began, and then the server was restarted; or its
-                // id is taken by another one.
-                Err(CreateError::Store(StoreError::Taken(_))) => {
-                    let participant = self.unit.state.participant(number);
-                    if let Some(game) = participant.and_then(|it| it.games.last()).cloned() {
-                        self.end_game(number, &game, Outcome::Aborted);
-                    }
-                }
-                Err(CreateError::Store(error)) => return Err(error),
-                Err(error) => {
-                    let id = self.unit.handle.id();
-                    self.retry.again("study", id, &error);
-                }
+        // The game was aborted before it began, and then the server was restarted; or its id is taken by
+        // another one.
+        for number in made.taken {
+            let participant = self.unit.state.participant(number);
+            if let Some(game) = participant.and_then(|it| it.games.last()).cloned() {
+                self.end_game(number, &game, Outcome::Aborted);
             }
         }
         Ok(())

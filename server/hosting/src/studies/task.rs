@@ -14,7 +14,6 @@ use super::message::{Command, Message};
 use super::state::{Budgets, StudyShared};
 use crate::config::{MAX_STUDIES, STUDY_MAILBOX};
 use crate::journaled::{Folded, Journaled, Unit, UnitHeader};
-use crate::rooms::Retry;
 use chefshat_admission::limits::{Key, Refused};
 use chefshat_base::clock::TimeOfDay;
 use chefshat_base::tasks::LongTask;
@@ -58,8 +57,6 @@ pub struct StudyTask {
     pub(super) closing: BTreeSet<RoomId>,
     /// Rooms that were asked to give up the seat of a participant.
     pub(super) retired: BTreeSet<(RoomId, u32)>,
-    /// When rooms whose creation failed are tried again.
-    pub(super) retry: Retry,
     /// Those who wait for the deletion of the study, once that is requested.
     deletion: Vec<oneshot::Sender<Result<usize, usize>>>,
 }
@@ -146,7 +143,6 @@ impl Journaled for StudyTask {
             began: Instant::now(),
             closing: BTreeSet::new(),
             retired: BTreeSet::new(),
-            retry: Retry::default(),
             deletion: Vec::new(),
         }
     }
@@ -340,7 +336,8 @@ impl Journaled for StudyTask {
     fn wake_at(&self) -> Option<Instant> {
         let by_core = self.unit.state.wake_in((self.now)(), self.elapsed_ms());
         let by_core = by_core.map(|wait_ms| Instant::now() + Duration::from_millis(wait_ms));
-        by_core.into_iter().chain(self.retry.at()).min()
+        let by_rooms = self.unit.retry.at();
+        by_core.into_iter().chain(by_rooms).min()
     }
 }
 

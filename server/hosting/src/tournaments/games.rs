@@ -7,15 +7,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use chefshat_engine::Seat;
 use chefshat_proto::v1;
-use chefshat_record::outcome::{Gathering, Outcome, OutcomeError};
+use chefshat_record::outcome::{Gathering, Outcome};
 use chefshat_tournament::Ended;
-use futures::future::join_all;
-use tracing::{error, warn};
+use tracing::warn;
 
 use super::message::Call;
 use super::task::TournamentTask;
 use crate::room::GameEnd;
-use crate::rooms::{CreateError, NewRoom, PartOf, Seating, Withheld};
+use crate::rooms::{NewRoom, PartOf, Seating, Withheld};
 use chefshat_base::tasks::short;
 use chefshat_room::ids::{GameId, Id, RoomId};
 use chefshat_room::journal::{AbortReason, Fill, GameStart, SeatedParticipant, TournamentGame};
@@ -101,35 +100,17 @@ impl TournamentTask {
         room: RoomId,
         game_id: GameId,
     ) -> Result<Option<Ended>, StoreError> {
-        // An imported record with this id is not the tournament's game.
-        let is_ours = |game: &StoredGame| {
-            (game.tournament()).is_some_and(|game| game.tournament == self.unit.handle.id())
+        let id = self.unit.handle.id();
+        let read = move |stored: StoredGame| {
+            // An imported record with this id is not the tournament's game.
+            let is_ours = (stored.tournament()).is_some_and(|game| game.tournament == id);
+            is_ours.then(|| ended_in(&stored, game_id))
         };
-        let background = self.unit.rooms.background();
-        // Before it is read: the record of a long game takes much time and memory.
-        let slice = background.slice(self.unit.handle.charged).await;
-        let stored = match self.unit.rooms.store().finished(game_id).await {
-            Err(StoreError::Unreadable(problem)) => {
-                error!(%game_id, problem, "a game of a tournament cannot be read, and counts as broken off");
-                return Ok(Some(Ended::Aborted));
-            }
-            stored => stored?,
-        };
-        if let Some(stored) = stored.filter(is_ours) {
-            let reading = background.run(move || read(&stored));
-            let (outcome, reason) = (reading.await)
-                .ok_or_else(|| StoreError::Failed("reading a record failed".into()))?;
-            drop(slice);
-            return Ok(match (outcome, reason) {
-                (Ok(outcome), _) => Some(played(&outcome)),
-                (Err(_), Some(v1::AbortReason::Shutdown)) => None,
-                (Err(problem), _) => {
-                    warn!(%game_id, %problem, "a game of a tournament has no result");
-                    Some(Ended::Aborted)
-                }
-            });
+        let unreadable = Some(Ended::Aborted);
+        match self.unit.read_record(game_id, unreadable, read).await? {
+            Some(ended) => Ok(ended),
+            None => Ok(self.without_deal(game, room).await),
         }
-        Ok(self.without_deal(game, room).await)
     }
 
     /// The result of a game that ended before the deal; `None` if it must be played again.
@@ -153,39 +134,24 @@ impl TournamentTask {
 
     /// Creates the rooms of called games and notifies their participants.
     pub(super) async fn make_rooms(&mut self) -> Result<(), StoreError> {
-        // What waited for a room may have ended without one; what still does has not begun.
-        if self.without_room.is_empty() || self.unit.state.core.is_paused() {
-            self.retry.clear();
+        // What still waits for a room has not begun, and does not in a pause.
+        let needed = !self.without_room.is_empty() && !self.unit.state.core.is_paused();
+        if !self.unit.retry.take(needed) {
             return Ok(());
         }
-        if !self.retry.begin() {
-            return Ok(());
+        let without_room = self.without_room.iter().copied();
+        let wanted = without_room.map(|game| (game, self.new_room(game)));
+        let made = self.unit.create_rooms(wanted).await;
+        let made = self.unit.note_rooms(made)?;
+        for game in made.created {
+            self.without_room.remove(&game);
+            self.seen.insert(game);
+            self.call(game);
         }
-        let without_room: Vec<usize> = self.without_room.iter().copied().collect();
-        let creating = without_room.iter().map(|game| {
-            let new = self.new_room(*game);
-            let rooms = &self.unit.rooms;
-            async move { (*game, rooms.create(new).await) }
-        });
-        for (game, made) in join_all(creating).await {
-            match made {
-                Ok(_) => {
-                    self.without_room.remove(&game);
-                    self.seen.insert(game);
-                    self.unit.has_changed = true;
-                    self.call(game);
-                }
-                // It gets new ids.
-                Err(CreateError::Store(StoreError::Taken(id))) => {
-                    warn!(tournament = %self.unit.handle.id(), %id, "the id of a game is taken");
-                    self.place(game);
-                }
-                Err(CreateError::Store(error)) => return Err(error),
-                Err(error) => {
-                    let id = self.unit.handle.id();
-                    self.retry.again("tournament", id, &error);
-                }
-            }
+        // They get new ids.
+        for game in made.taken {
+            warn!(tournament = %self.unit.handle.id(), game, "the id of a game is taken");
+            self.place(game);
         }
         Ok(())
     }
@@ -321,8 +287,8 @@ fn played(outcome: &Outcome) -> Ended {
     }
 }
 
-/// The outcome of a game that has ended, and why it was aborted, if it was.
-fn read(stored: &StoredGame) -> (Result<Outcome, OutcomeError>, Option<v1::AbortReason>) {
+/// The result of a game as its record says; `None` if it must be played again.
+fn ended_in(stored: &StoredGame, id: GameId) -> Option<Ended> {
     let (mut gathering, mut reason) = (Gathering::default(), None);
     stored.each_line(|line| {
         gathering.add(&line);
@@ -332,5 +298,12 @@ fn read(stored: &StoredGame) -> (Result<Outcome, OutcomeError>, Option<v1::Abort
             reason = Some(aborted.reason());
         }
     });
-    (gathering.outcome(), reason)
+    match (gathering.outcome(), reason) {
+        (Ok(outcome), _) => Some(played(&outcome)),
+        (Err(_), Some(v1::AbortReason::Shutdown)) => None,
+        (Err(problem), _) => {
+            warn!(game = %id, %problem, "a game of a tournament has no result");
+            Some(Ended::Aborted)
+        }
+    }
 }

@@ -13,7 +13,7 @@ use super::message::{Call, Connection, Entry, JoinRefusal, Message};
 use super::state::{Common, TournamentShared, TournamentState, restored};
 use crate::config::{MAX_TOURNAMENTS, TOURNAMENT_MAILBOX, TOURNAMENT_OPEN_TIME, TOURNAMENT_PAUSE};
 use crate::journaled::{Folded, Handle, Journaled, Unit, UnitHeader};
-use crate::rooms::{Retry, Rooms, Withheld};
+use crate::rooms::{Rooms, Withheld};
 use chefshat_admission::limits::{Key, Refused};
 use chefshat_base::clock::{RoomClock, since_epoch_ms};
 use chefshat_base::tasks::LongTask;
@@ -69,8 +69,6 @@ pub struct TournamentTask {
     start_at: Option<Instant>,
     /// When it was paused, or the server was started.
     paused_at: Option<Instant>,
-    /// When rooms whose creation failed are tried again.
-    pub(super) retry: Retry,
     /// Times of the core: a pause of the process makes no participant late.
     clock: RoomClock,
 }
@@ -163,7 +161,6 @@ impl Journaled for TournamentTask {
             joined_at: now,
             start_at: start_in.map(|time| now + Duration::from_millis(time)),
             paused_at: unit.state.core.is_paused().then_some(now),
-            retry: Retry::default(),
             clock: RoomClock::of_age(Duration::ZERO, unit.rooms.process_clock()),
             unit,
         }
@@ -257,7 +254,7 @@ impl Journaled for TournamentTask {
         let core = self.unit.state.core.wake_at();
         let core = core.map(|ms| self.clock.instant(Duration::from_millis(ms)));
         core.into_iter()
-            .chain(self.retry.at())
+            .chain(self.unit.retry.at())
             .chain(self.open_until())
             .chain(self.start_at.filter(|_| self.unit.state.core.can_begin()))
             .chain(self.paused_until())

@@ -1,0 +1,83 @@
+//! The games of a unit: their rooms, which it creates once their ids are committed, and their records.
+
+use futures::StreamExt as _;
+use tracing::error;
+
+use super::unit::{Journaled, Unit};
+use crate::rooms::{CreateError, Created, NewRoom};
+use chefshat_room::ids::GameId;
+use chefshat_store::{StoreError, StoredGame};
+
+/// Rooms of a unit that are created at a time.
+const ROOMS_AT_ONCE: usize = 32;
+
+/// What has come of the rooms that games need; the others are to be tried again.
+pub(crate) struct Made<G> {
+    /// Games that have a room now.
+    pub(crate) created: Vec<G>,
+    /// Games whose id is that of another one.
+    pub(crate) taken: Vec<G>,
+}
+
+impl<U: Journaled> Unit<U> {
+    /// Creates rooms for games, [`ROOMS_AT_ONCE`] of them at a time.
+    pub(crate) async fn create_rooms<G>(
+        &self,
+        wanted: impl Iterator<Item = (G, NewRoom)> + Send,
+    ) -> Vec<(G, Result<Created, CreateError>)> {
+        let creating = wanted.map(|(game, new)| async { (game, self.rooms.create(new).await) });
+        (futures::stream::iter(creating).buffered(ROOMS_AT_ONCE))
+            .collect()
+            .await
+    }
+
+    /// Notes what has come of rooms, and when to try again.
+    ///
+    /// # Errors
+    /// The store failed.
+    pub(crate) fn note_rooms<G>(
+        &mut self,
+        made: Vec<(G, Result<Created, CreateError>)>,
+    ) -> Result<Made<G>, StoreError> {
+        let (mut created, mut taken) = (Vec::new(), Vec::new());
+        let id = self.id();
+        for (game, made) in made {
+            match made {
+                Ok(_) => created.push(game),
+                Err(CreateError::Store(StoreError::Taken(_))) => taken.push(game),
+                Err(CreateError::Store(error)) => return Err(error),
+                Err(error) => self.retry.again(U::KIND, id, &error),
+            }
+        }
+        self.has_changed |= !created.is_empty();
+        Ok(Made { created, taken })
+    }
+
+    /// What `read` finds in the record of a game that has ended, if it has one; `unreadable` if this
+    /// version cannot read it. Waits for its turn among long computations.
+    ///
+    /// # Errors
+    /// The store failed.
+    pub(crate) async fn read_record<T: Send + 'static>(
+        &self,
+        game: GameId,
+        unreadable: T,
+        read: impl FnOnce(StoredGame) -> Option<T> + Send + 'static,
+    ) -> Result<Option<T>, StoreError> {
+        let background = self.rooms.background();
+        // Before it is read: the record of a long game takes much time and memory.
+        let _slice = background.slice(self.handle.charged).await;
+        let stored = match self.rooms.store().finished(game).await {
+            Err(StoreError::Unreadable(problem)) => {
+                error!(of = %U::KIND, id = %self.id(), %game, problem, "a game cannot be read, and counts as broken off");
+                return Ok(Some(unreadable));
+            }
+            stored => stored?,
+        };
+        let Some(stored) = stored else {
+            return Ok(None);
+        };
+        (background.run(move || read(stored)).await)
+            .ok_or_else(|| StoreError::Failed("reading a record failed".into()))
+    }
+}
