@@ -10,6 +10,7 @@ use chefshat_engine::{ActionId, Decision, Event, Mask, MetricsRecorder, Observat
 use chefshat_proto::v1::{self, game_event::Kind, record_line::Line};
 use chefshat_record::convert::rules_to_proto;
 use chefshat_record::jsonl::Record;
+use chefshat_record::language_model::ModelUsage;
 use chefshat_record::outcome::{Identity, has_choice, is_by_fallback};
 use chefshat_record::replay::{ReplayError, walk_file};
 use chefshat_record::signature::{PublicKey, TextHash};
@@ -79,6 +80,8 @@ pub struct GameScore {
     pub fallback_decisions: u64,
     /// Its invalid attempts.
     pub invalid_attempts: u64,
+    /// Tokens and cost of a language model, by its own account; `None` for other agents.
+    pub language_model: Option<ModelUsage>,
     /// Decision times that were measured, in microseconds.
     pub decision_times_us: Vec<u64>,
     /// Whose key signed the record.
@@ -134,11 +137,15 @@ pub fn check(task: &Task, deal: usize, record: &Record) -> Result<GameScore, Pro
         choices: 0,
         fallback_decisions: 0,
         invalid_attempts: 0,
+        language_model: None,
         decision_times_us: Vec::new(),
         signed_by: replayed.signed_by,
         record: record.text,
     };
     let own = (decisions.into_iter()).filter(|decision| decision.seat as usize == seat);
+    let choices = own.clone().filter(|decision| has_choice(decision));
+    let said = choices.map(|decision| decision.annotations.as_ref());
+    score.language_model = ModelUsage::of_game(said);
     for decision in own {
         score.decisions += 1;
         score.invalid_attempts += decision.invalid_attempts.len() as u64;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use chefshat_record::language_model::ModelUsage;
 use chefshat_record::outcome::Identity;
 use chefshat_tournament::statistics::{Moments, wilson95};
 use serde::{Deserialize, Serialize};
@@ -102,6 +103,9 @@ pub struct TaskResult {
     pub fallback_decisions: u64,
     /// Its invalid attempts.
     pub invalid_attempts: u64,
+    /// Tokens and cost of a language model in all games, by its own account; absent for other agents.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub language_model: Option<ModelUsage>,
     /// Median and 99th percentile of its decision times in milliseconds; null if none was measured.
     pub decision_ms: Option<[f64; 2]>,
     /// The keys of the servers that signed records, and "unsigned".
@@ -156,6 +160,7 @@ impl TaskResult {
             choices,
             fallback_decisions,
             invalid_attempts: sum(|game| game.invalid_attempts),
+            language_model: ModelUsage::sum(games.iter().map(|game| game.language_model)),
             decision_ms: times(&games),
             signed_by: distinct(signed_by),
             records_sha256: {

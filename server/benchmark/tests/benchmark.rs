@@ -6,6 +6,7 @@ use chefshat_benchmark::{
 };
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::jsonl::{self, Record};
+use chefshat_record::language_model::ModelUsage;
 use chefshat_record::outcome::{FALLBACK, Identity};
 use chefshat_record::signature::TextHash;
 use sha2::{Digest as _, Sha256};
@@ -280,6 +281,7 @@ fn a_result_counts_with_all_deals_and_its_own_decisions() {
             choices: 100,
             fallback_decisions,
             invalid_attempts: 0,
+            language_model: None,
             decision_times_us: vec![1000, 3000],
             signed_by: None,
             record: TextHash::default(),
@@ -291,6 +293,20 @@ fn a_result_counts_with_all_deals_and_its_own_decisions() {
     };
     let result = |games: &[Option<GameScore>]| TaskResult::of(&task, AgentInfo::default(), games);
     let better = result(&[game(5, 0), game(3, 0), game(5, 1), game(3, 0)]);
+    assert_eq!(better.language_model, None);
+    let by_model = [100, 200, 300, 400].map(|tokens| {
+        let cost = Some(tokens as f64 / 100.0);
+        let language_model = Some(ModelUsage { tokens, cost });
+        Some(GameScore {
+            language_model,
+            ..game(1, 0).expect("it has a score")
+        })
+    });
+    let (tokens, cost) = (1_000, Some(10.0));
+    assert_eq!(
+        result(&by_model).language_model,
+        Some(ModelUsage { tokens, cost })
+    );
     assert!(better.is_valid(), "{:?}", better.problems);
     assert_eq!(better.points_per_shift.mean, 4.0);
     assert_eq!(better.decision_ms, Some([1.0, 3.0]));

@@ -8,6 +8,7 @@ pub mod convert;
 pub mod files;
 pub mod import;
 pub mod jsonl;
+pub mod language_model;
 pub mod outcome;
 pub mod players;
 pub mod private;

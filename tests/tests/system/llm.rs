@@ -338,8 +338,22 @@ async fn another_first_message_and_what_the_game_costs_are_said() {
         }
         _ => honest(number, messages),
     };
-    let played = play(silent, AMPLE, &["--price", "0.5,2"]).await;
+    let arguments = ["--price", "0.5,2", "--keep-answers"];
+    let played = play(silent, AMPLE, &arguments).await;
     assert_eq!(played.result.get("cost"), None);
+    // Of the decision whose tokens are not known in parts, the record has no parts.
+    let choices = played.choices();
+    let usages = choices
+        .iter()
+        .filter(|(_, said)| said.contains_key("usage"));
+    assert_eq!(usages.count() + 1, choices.len());
+    for (decision, said) in &choices {
+        let answers: Vec<String> = serde_json::from_str(said["answers"]).expect("JSON");
+        let [answer] = &*answers else {
+            panic!("one question: {answers:?}");
+        };
+        assert!(answer.contains(&decision.action.to_string()), "{answer}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -772,6 +786,7 @@ async fn benchmark(script: Script) -> Value {
     command.args(["--name", "test-1", "--out", out, "--", program]);
     command.args(["agent", "llm", "--server", "{url}", "--code", "{code}"]);
     command.args(["--endpoint", &url, "--model", "ada/test-1"]);
+    command.args(["--price", "0.5,2"]);
     let output = patiently("two games", command.output()).await;
     let output = output.expect("it runs");
     let problems = String::from_utf8_lossy(&output.stderr);
@@ -789,6 +804,12 @@ async fn a_model_has_a_result_in_the_benchmark_only_if_it_decides() {
     assert_eq!(honest["played_by"], json!(["test-1"]));
     assert_eq!(honest["fallback_decisions"], 0);
     assert_eq!(honest["problems"], json!(["2 of 100 deals"]));
+    let choices = honest["choices"].as_u64().expect("a number");
+    let taken = &honest["language_model"];
+    assert_eq!(taken["tokens"], 500 * choices);
+    let expected = choices as f64 * (492.0 * 0.5 + 8.0 * 2.0) / 1e6;
+    let cost = taken["cost"].as_f64().expect("a number");
+    assert!((cost - expected).abs() < 1e-9, "{cost} {expected}");
     let silent = benchmark(|asked, messages| match asked {
         // The question before each game.
         _ if messages.len() == 1 => Said::Text("{\"action\": 1}".into(), 10),

@@ -2,10 +2,10 @@
 //! messages, and a text with the tokens it took.
 
 use std::fmt;
-use std::ops::AddAssign;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use chefshat_record::language_model::Usage;
 use chefshat_server::post::{Answer, PostError, Target};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -66,36 +66,10 @@ pub(super) struct Completion {
     pub(super) text: String,
     /// Tokens of the question and the answer.
     pub(super) tokens: u64,
-    /// The same in parts, as the server reports them.
-    pub(super) used: Used,
+    /// The same in parts, if the server reports them.
+    pub(super) usage: Option<Usage>,
     /// Whether it ends because it may not be longer.
     pub(super) cut: bool,
-}
-
-/// Tokens by what they are for, as a server reports them.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub(super) struct Used {
-    /// Of questions.
-    pub(super) prompt: u64,
-    /// Of those, which the server had kept from earlier ones.
-    pub(super) cached: u64,
-    /// Of answers.
-    pub(super) completion: u64,
-    /// Of those, which the model thought with.
-    pub(super) reasoning: u64,
-}
-
-impl AddAssign for Used {
-    fn add_assign(&mut self, more: Self) {
-        for (sum, more) in [
-            (&mut self.prompt, more.prompt),
-            (&mut self.cached, more.cached),
-            (&mut self.completion, more.completion),
-            (&mut self.reasoning, more.reasoning),
-        ] {
-            *sum = sum.saturating_add(more);
-        }
-    }
 }
 
 /// Why there is no completion.
@@ -129,7 +103,7 @@ struct Answered {
     #[serde(default)]
     choices: Vec<Choice>,
     #[serde(default)]
-    usage: Option<Usage>,
+    usage: Option<Reported>,
 }
 
 #[derive(Deserialize)]
@@ -192,7 +166,7 @@ impl Said {
 }
 
 #[derive(Deserialize)]
-struct Usage {
+struct Reported {
     #[serde(default)]
     total_tokens: Option<u64>,
     #[serde(default)]
@@ -217,17 +191,18 @@ struct CompletionDetails {
     reasoning_tokens: Option<u64>,
 }
 
-impl Usage {
-    fn parts(&self) -> Used {
+impl Reported {
+    fn parts(&self) -> Option<Usage> {
         let (prompt, completion) = (&self.prompt_tokens_details, &self.completion_tokens_details);
         let cached = prompt.as_ref().and_then(|it| it.cached_tokens);
         let reasoning = completion.as_ref().and_then(|it| it.reasoning_tokens);
-        Used {
+        let usage = Usage {
             prompt: self.prompt_tokens.unwrap_or(0),
             cached: cached.unwrap_or(0),
             completion: self.completion_tokens.unwrap_or(0),
             reasoning: reasoning.unwrap_or(0),
-        }
+        };
+        (usage != Usage::default()).then_some(usage)
     }
 }
 
@@ -315,13 +290,13 @@ impl Endpoint {
         let choice = choice.ok_or_else(|| lasting("the answer has no choice"))?;
         let cut = choice.finish_reason.as_deref() == Some("length");
         let text = choice.message.text();
-        let used = (answered.usage.as_ref()).map_or_else(Used::default, Usage::parts);
+        let usage = answered.usage.as_ref().and_then(Reported::parts);
         let reported = answered.usage.and_then(|usage| usage.total_tokens);
         let tokens = reported.unwrap_or(0).max(at_least(asked + text.len()));
         Ok(Completion {
             text,
             tokens,
-            used,
+            usage,
             cut,
         })
     }

@@ -4,7 +4,6 @@
 //! decides, and the record says so; or nobody does, and the server decides when the time is over.
 
 mod endpoint;
-mod price;
 mod reply;
 
 use std::fs::File;
@@ -15,8 +14,13 @@ use std::time::Duration;
 use chefshat_agents::{AgentKind, NamedAgent};
 use chefshat_client::v1::{self, seat_update::Update};
 use chefshat_client::{ActionId, Agent, Outcome, is_legal, legal_count};
+use chefshat_engine::limits::{MAX_ANNOTATION_BYTES, MAX_ANNOTATION_BYTES_PER_GAME};
+use chefshat_record::language_model::{
+    ANSWERS, ENDPOINT, MODEL, PRICE, PROMPT, Price, SAMPLING, TOKENS, USAGE, Usage,
+};
 use chefshat_record::outcome::FALLBACK;
 use clap::Args;
+use prost::Message as _;
 use serde_json::{Map, Value};
 use sha2::{Digest as _, Sha256};
 use tokio::runtime::Handle;
@@ -29,8 +33,7 @@ use crate::language::{self, RULES, cards, text};
 use crate::narration::view::GameView;
 use crate::remote::{RemoteAgent, named_agent};
 pub(crate) use endpoint::Endpoint;
-use endpoint::{EndpointError, Message, Used};
-use price::Price;
+use endpoint::{EndpointError, Message};
 use reply::Reply;
 
 /// The name of the agent on the command line.
@@ -46,17 +49,13 @@ const RESERVE_RANGE: (Duration, Duration) = (Duration::from_millis(100), Duratio
 /// Shift.
 const MAX_SILENT: u32 = 3;
 
-/// Keys of annotations.
-const MODEL: &str = "model";
-const TOKENS: &str = "tokens";
-/// A JSON object of the tokens in parts.
-const USAGE: &str = "usage";
-/// Of the first decision of a game: where the model is asked, with what first message and what else,
-/// and what that costs.
-const ENDPOINT: &str = "endpoint";
-const PROMPT: &str = "prompt";
-const SAMPLING: &str = "sampling";
-const PRICE: &str = "price";
+/// Maximum bytes of the answers that are recorded with a decision, in JSON.
+const MAX_ANSWERS_BYTES: usize = 2_048;
+/// Bytes of these answers in a message besides their text, at most.
+const ANSWERS_KEY_BYTES: usize = 32;
+/// Maximum bytes of all annotations of a game after which answers are left out: beyond
+/// [`MAX_ANNOTATION_BYTES_PER_GAME`] the server would keep no more annotations.
+const MAX_ANSWERED_BYTES: usize = MAX_ANNOTATION_BYTES_PER_GAME / 2;
 
 /// What follows an answer without an action.
 const UNREADABLE: &str = "Your answer has no action. Answer with one JSON object: {\"action\": \"ID\", \"reason\": \"…\"}";
@@ -111,6 +110,10 @@ pub(crate) struct LlmArgs {
     /// tokens.
     #[arg(long, value_name = "PRICES")]
     price: Option<Price>,
+    /// For llm: record the model's answers with each decision, at most 2,048 bytes. Everyone who may
+    /// read annotations sees them.
+    #[arg(long)]
+    keep_answers: bool,
     /// For llm: the share of decisions with a choice that the fallback may take, 0 to 1. A game with
     /// more is reported as not the model's, and the exit code is 1.
     #[arg(long, value_name = "SHARE", default_value_t = 0.1, value_parser = share)]
@@ -227,6 +230,7 @@ impl LlmArgs {
             budget: self.budget,
             first_message: self.prompt.clone(),
             price: self.price,
+            keep_answers: self.keep_answers,
             max_fallbacks: self.max_fallbacks,
             retries: self.retries,
             fallback: self.fallback,
@@ -237,10 +241,12 @@ impl LlmArgs {
             live: Live::new(GameView::default(), None),
             spent: Spent::default(),
             before: 0,
-            used: Used::default(),
+            usage: Some(Usage::default()),
+            answers: Vec::new(),
             answered: None,
             silent: 0,
             said: v1::Annotations::default(),
+            annotated: 0,
         }
     }
 }
@@ -255,7 +261,7 @@ pub(crate) struct Spent {
     /// Those of them without a usable answer of the model: the fallback's, or the server's.
     pub(crate) fallbacks: u64,
     /// Tokens in parts.
-    used: Used,
+    usage: Usage,
     /// Whether some have no parts: of questions without an answer, or as the endpoint reports them.
     has_more: bool,
 }
@@ -267,6 +273,7 @@ pub(crate) struct LanguageModel {
     budget: u64,
     first_message: Option<FirstMessage>,
     price: Option<Price>,
+    keep_answers: bool,
     max_fallbacks: f64,
     retries: u32,
     fallback: Fallback,
@@ -281,8 +288,10 @@ pub(crate) struct LanguageModel {
     spent: Spent,
     /// Tokens spent before this decision.
     before: u64,
-    /// Tokens of this decision in parts.
-    used: Used,
+    /// Tokens of this decision in parts; `None` if some have no parts.
+    usage: Option<Usage>,
+    /// The beginnings of the answers to the questions of this decision, if they are recorded.
+    answers: Vec<String>,
     /// The decision that was answered last, while the server may refuse the answer: with that answer,
     /// and those before it that could not be used with what was said about them.
     answered: Option<(u64, Vec<Message>)>,
@@ -290,6 +299,8 @@ pub(crate) struct LanguageModel {
     silent: u32,
     /// To be recorded with the last decision.
     said: v1::Annotations,
+    /// Bytes of the annotations of this game.
+    annotated: usize,
 }
 
 impl LanguageModel {
@@ -301,8 +312,12 @@ impl LanguageModel {
     /// What the last game has cost, if prices are given, and the endpoint has reported the tokens of all
     /// questions and answers.
     pub(crate) fn cost(&self) -> Option<f64> {
-        let Spent { used, has_more, .. } = self.spent;
-        self.price.filter(|_| !has_more).map(|price| price.of(used))
+        let Spent {
+            usage, has_more, ..
+        } = self.spent;
+        self.price
+            .filter(|_| !has_more)
+            .map(|price| price.of(usage))
     }
 
     /// Whether the fallback has taken so few decisions of the last game that it is the model's.
@@ -384,8 +399,9 @@ impl LanguageModel {
             let completion = match self.endpoint.complete(&messages, left).await {
                 Ok(completion) => completion,
                 Err((error, tokens)) => {
-                    self.spent.tokens = self.spent.tokens.saturating_add(tokens);
-                    self.spent.has_more |= tokens > 0;
+                    if tokens > 0 {
+                        self.spend(tokens, None);
+                    }
                     problem = error.to_string();
                     let EndpointError::Passing { pause, .. } = error else {
                         break;
@@ -397,10 +413,11 @@ impl LanguageModel {
                     continue;
                 }
             };
-            self.spent.tokens = self.spent.tokens.saturating_add(completion.tokens);
-            self.used += completion.used;
-            self.spent.used += completion.used;
-            self.spent.has_more |= completion.used == Used::default();
+            self.spend(completion.tokens, completion.usage);
+            if self.keep_answers {
+                let most = completion.text.floor_char_boundary(MAX_ANSWERS_BYTES);
+                self.answers.push(completion.text[..most].to_owned());
+            }
             let by_cards = |cards: &str| cards::option_of(self.live.space(), request, cards);
             let Some(reply) = reply::parse(&completion.text, by_cards) else {
                 problem = match completion.cut {
@@ -423,6 +440,17 @@ impl LanguageModel {
             return Ok(reply);
         }
         Err(problem)
+    }
+
+    /// Counts the tokens of a question and its answer.
+    fn spend(&mut self, tokens: u64, usage: Option<Usage>) {
+        self.spent.tokens = self.spent.tokens.saturating_add(tokens);
+        self.spent.has_more |= usage.is_none();
+        self.spent.usage += usage.unwrap_or_default();
+        self.usage = self.usage.zip(usage).map(|(mut sum, usage)| {
+            sum += usage;
+            sum
+        });
     }
 
     fn check_budget(&self) -> Result<(), String> {
@@ -467,6 +495,25 @@ impl LanguageModel {
     }
 }
 
+/// Answers as they are recorded: a JSON array of at most `most` bytes, in which long ones are cut to the
+/// same length. `None` if there are none, or there is no space for them.
+fn recorded(answers: &[String], most: usize) -> Option<String> {
+    let cut_to = |bytes: usize| {
+        let cut = answers.iter();
+        let cut: Vec<&str> = cut.map(|it| &it[..it.floor_char_boundary(bytes)]).collect();
+        serde_json::to_string(&cut).unwrap_or_default()
+    };
+    let (mut fits, mut longest) = (0, most);
+    while fits < longest {
+        let middle = (fits + longest).div_ceil(2);
+        match cut_to(middle).len() <= most {
+            true => fits = middle,
+            false => longest = middle - 1,
+        }
+    }
+    (fits > 0 && !answers.is_empty()).then(|| cut_to(fits))
+}
+
 impl Agent for LanguageModel {
     fn decide(&mut self, request: &v1::DecisionRequest) -> ActionId {
         let decided = self.try_decide(request);
@@ -496,7 +543,8 @@ impl Agent for LanguageModel {
         if !again {
             self.spent.decisions += 1;
             self.before = self.spent.tokens;
-            self.used = Used::default();
+            self.usage = Some(Usage::default());
+            self.answers.clear();
         }
         // With the first decision that it answers, as often as it is asked for that.
         if *self.described.get_or_insert(id) == id {
@@ -505,9 +553,8 @@ impl Agent for LanguageModel {
         self.say(MODEL, self.endpoint.model().to_owned());
         let asked = tokio::task::block_in_place(|| Handle::current().block_on(self.ask(request)));
         self.say(TOKENS, (self.spent.tokens - self.before).to_string());
-        if self.used != Used::default() {
-            let used = serde_json::to_string(&self.used).unwrap_or_default();
-            self.say(USAGE, used);
+        if let Some(usage) = self.usage.filter(|usage| *usage != Usage::default()) {
+            self.say(USAGE, serde_json::to_string(&usage).unwrap_or_default());
         }
         match asked {
             Ok(Reply { action, reason }) => {
@@ -521,8 +568,19 @@ impl Agent for LanguageModel {
     }
 
     fn annotate(&mut self) -> Option<v1::Annotations> {
-        let said = std::mem::take(&mut self.said);
-        (!said.extra.is_empty()).then_some(said)
+        let mut said = std::mem::take(&mut self.said);
+        if said.extra.is_empty() {
+            return None;
+        }
+        let bytes = said.encoded_len() + ANSWERS_KEY_BYTES;
+        let left = MAX_ANNOTATION_BYTES.saturating_sub(bytes);
+        let left_in_game = MAX_ANSWERED_BYTES.saturating_sub(self.annotated + bytes);
+        let most = MAX_ANSWERS_BYTES.min(left).min(left_in_game);
+        if let Some(answers) = recorded(&self.answers, most) {
+            said.extra.insert(ANSWERS.to_owned(), answers);
+        }
+        self.annotated += said.encoded_len();
+        Some(said)
     }
 
     fn on_attached(&mut self, attached: &v1::Attached) {
@@ -538,7 +596,7 @@ impl Agent for LanguageModel {
                 self.live = Live::new(GameView::default(), self.live.me);
                 self.spent = Spent::default();
                 (self.answered, self.left_open, self.described) = (None, None, None);
-                self.silent = 0;
+                (self.silent, self.annotated) = (0, 0);
             }
             Some(v1::game_event::Kind::ShiftStarted(_)) => self.silent = 0,
             _ => {}
@@ -568,5 +626,70 @@ impl Agent for LanguageModel {
 
     fn on_game_over(&mut self, outcome: &Outcome) {
         self.at_once.on_game_over(outcome);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Line {
+        #[arg(long, id = "agent")]
+        _agent: Option<String>,
+        #[command(flatten)]
+        llm: LlmArgs,
+    }
+
+    #[test]
+    fn answers_leave_space_for_all_other_annotations_of_a_game() {
+        let address = ["--endpoint", "http://127.0.0.1:1/v1", "--model", "m"];
+        let line = ["llm", "--keep-answers"].into_iter().chain(address);
+        let line = Line::parse_from(line);
+        let endpoint = line.llm.endpoint(None).expect("an address");
+        let mut model = line.llm.agent(endpoint, [0; 32]);
+        let (mut bytes, mut with_answers) = (0, 0);
+        for _ in 0..500 {
+            model.answers = vec!["a".repeat(3_000)];
+            model.say(TOKENS, "500".to_owned());
+            let said = model.annotate().expect("it has said something");
+            assert_eq!(said.extra[TOKENS], "500");
+            bytes += said.encoded_len();
+            with_answers += usize::from(said.extra.contains_key(ANSWERS));
+        }
+        assert!((50..100).contains(&with_answers), "{with_answers}");
+        assert!(bytes < MAX_ANNOTATION_BYTES_PER_GAME, "{bytes}");
+    }
+
+    #[test]
+    fn long_answers_are_cut_to_what_a_record_takes() {
+        let of = |answers: &[&str], most| {
+            let answers: Vec<String> = answers.iter().map(|it| (*it).to_owned()).collect();
+            recorded(&answers, most)
+        };
+        assert_eq!(of(&[], 2_048), None);
+        assert_eq!(
+            of(&["a \"b\"", ""], 2_048).as_deref(),
+            Some(r#"["a \"b\"",""]"#)
+        );
+        let long = "é".repeat(3_000);
+        for most in [20, 100, 2_048] {
+            // A control character takes six bytes in JSON.
+            for answers in [
+                &[long.as_str(), &long][..],
+                &["\u{1}".repeat(5_000).as_str()],
+            ] {
+                let text = of(answers, most).expect("a part of it fits");
+                assert!(text.len() <= most, "{}", text.len());
+                // Of a whole character of each.
+                assert!(text.len() + 12 > most, "{}", text.len());
+                let read: Vec<String> = serde_json::from_str(&text).expect("JSON");
+                assert_eq!(read.len(), answers.len());
+                assert!(read.iter().all(|it| !it.is_empty()));
+            }
+        }
+        assert_eq!(of(&[&long], 3), None);
     }
 }

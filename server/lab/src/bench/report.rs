@@ -52,6 +52,13 @@ fn text(result: &TaskResult) -> String {
             counted(result.invalid_attempts, "invalid attempt")
         ),
     );
+    if let Some((tokens, cost)) = tokens_and_cost(result) {
+        let cost = cost.as_deref().unwrap_or("unknown");
+        line(
+            &mut text,
+            &format!("a game takes {tokens} tokens; its cost is {cost}"),
+        );
+    }
     if let Some([median, most]) = result.decision_ms {
         line(
             &mut text,
@@ -80,6 +87,14 @@ fn of_figure(figure: &MeanWithInterval) -> [String; 2] {
         number(figure.mean),
         format!("{} … {}", number(low), number(high)),
     ]
+}
+
+/// Mean tokens of a language model's game, and its mean cost if that is known; `None` for other agents.
+fn tokens_and_cost(result: &TaskResult) -> Option<(String, Option<String>)> {
+    let games = result.deals.max(1);
+    let usage = result.language_model?;
+    let cost = usage.cost.map(|cost| format!("{:.4}", cost / games as f64));
+    Some((grouped(usage.tokens / games as u64), cost))
 }
 
 /// Prints the results by task, each beside its difference from the agent in `versus`.
@@ -121,7 +136,7 @@ pub(super) fn table_text(results: &[TaskResult], versus: &[TaskResult]) -> Strin
     for (versus, rows) in by_task(results, versus) {
         heading(&mut text, &format!("{BENCHMARK} {}", versus.task));
         let against = format!("against {}\nin its place", versus.agent.name);
-        let header = [
+        let mut header = vec![
             "",
             "Deals",
             "Points\na Shift",
@@ -130,6 +145,10 @@ pub(super) fn table_text(results: &[TaskResult], versus: &[TaskResult]) -> Strin
             &against,
             "95 % interval",
         ];
+        let has_models = rows.iter().any(|row| row.language_model.is_some());
+        if has_models {
+            header.extend(["Tokens\na game", "Cost\na game"]);
+        }
         let invalid: Vec<&TaskResult> = rows.iter().copied().filter(|it| !it.is_valid()).collect();
         let rows = rows.into_iter().map(|row| {
             let [mean, interval] = of_figure(&row.points_per_shift);
@@ -146,6 +165,10 @@ pub(super) fn table_text(results: &[TaskResult], versus: &[TaskResult]) -> Strin
                     let [low, high] = figure.interval95.map(signed);
                     cells.extend([signed(figure.mean), format!("{low} … {high}")]);
                 }
+            }
+            if has_models {
+                let (tokens, cost) = tokens_and_cost(row).unwrap_or_default();
+                cells.extend([tokens, cost.unwrap_or_default()]);
             }
             cells
         });
@@ -173,6 +196,7 @@ pub(super) fn table_json(results: &[TaskResult], versus: &[TaskResult]) -> Value
                 "place": row.place,
                 "difference": difference.map(|it| it.points_per_shift),
                 "common_deals": difference.map(|it| it.deals),
+                "language_model": row.language_model,
                 "records_sha256": row.records_sha256,
             })
         });
@@ -183,4 +207,58 @@ pub(super) fn table_json(results: &[TaskResult], versus: &[TaskResult]) -> Value
         })
     });
     json!({"benchmark": BENCHMARK, "tasks": tasks.collect::<Vec<_>>()})
+}
+
+#[cfg(test)]
+mod tests {
+    use chefshat_benchmark::{AgentInfo, Task};
+    use chefshat_record::language_model::ModelUsage;
+
+    use super::*;
+
+    #[test]
+    fn a_table_has_what_games_of_language_models_cost() {
+        let task = Task::named("language_model").expect("it is one of them");
+        let result = |name: &str, language_model| {
+            let agent = AgentInfo {
+                name: name.to_owned(),
+                ..AgentInfo::default()
+            };
+            TaskResult {
+                language_model,
+                deals: 10,
+                records_sha256: name.to_owned(),
+                ..TaskResult::of(task, agent, &[])
+            }
+        };
+        let usage = |tokens, cost| Some(ModelUsage { tokens, cost });
+        let results = [
+            result("greedy", None),
+            result("priced", usage(123_450, Some(0.5))),
+            result("unpriced", usage(67_890, None)),
+        ];
+        let table = table_text(&results, &results[..1]);
+        let row = |name: &str| {
+            let row = table.lines().find(|line| line.trim().starts_with(name));
+            let row = row.unwrap_or_else(|| panic!("{name}: {table}"));
+            row.split_whitespace()
+                .map(str::to_owned)
+                .collect::<Vec<_>>()
+        };
+        assert!(table.contains("Tokens"), "{table}");
+        assert_eq!(
+            row("priced")[row("priced").len() - 2..],
+            ["12,345", "0.0500"]
+        );
+        assert_eq!(row("unpriced").last().map(String::as_str), Some("6,789"));
+        assert!(text(&results[1]).contains("a game takes 12,345 tokens; its cost is 0.0500"));
+        assert!(text(&results[2]).contains("its cost is unknown"));
+        assert!(!text(&results[0]).contains("tokens"));
+        let only_greedy = table_text(&results[..1], &results[..1]);
+        assert!(!only_greedy.contains("Tokens"), "{only_greedy}");
+        let json = table_json(&results, &results[..1]);
+        let of_model = |row: usize| json["tasks"][0]["rows"][row]["language_model"].clone();
+        assert_eq!(of_model(0), Value::Null);
+        assert_eq!(of_model(1), json!({"tokens": 123_450, "cost": 0.5}));
+    }
 }
