@@ -5,15 +5,21 @@ import { play, soundOf } from "../src/table/sounds";
 
 /** When each tone began, seconds. */
 let begun: number[] = [];
+/** The tones that have not ended. */
+const tones: Node[] = [];
 const NOW_S = 10;
+const resume = vi.fn(() => Promise.resolve());
+const suspend = vi.fn(() => Promise.resolve());
 
 class Node {
+  onended = () => {};
   readonly gain = { setValueAtTime() {}, linearRampToValueAtTime() {}, exponentialRampToValueAtTime() {} };
   connect(next: unknown) {
     return next;
   }
   start(at: number) {
     begun.push(at - NOW_S);
+    tones.push(this);
   }
   stop() {}
 }
@@ -24,7 +30,8 @@ beforeEach(() => {
     "AudioContext",
     class {
       readonly currentTime = NOW_S;
-      readonly state = "running";
+      readonly resume = resume;
+      readonly suspend = suspend;
     },
   );
   vi.stubGlobal("OscillatorNode", Node);
@@ -32,6 +39,8 @@ beforeEach(() => {
   Object.defineProperty(navigator, "userActivation", { configurable: true, value: { hasBeenActive: true } });
 });
 afterEach(() => {
+  for (const tone of tones.splice(0)) tone.onended();
+  vi.clearAllMocks();
   vi.unstubAllGlobals();
   Reflect.deleteProperty(navigator, "userActivation");
 });
@@ -56,4 +65,18 @@ test("a deal is heard as several cards, the start of a game not at all", () => {
   expect(begun.length).toBeGreaterThan(3);
   expect(begun).toEqual(begun.toSorted((one, other) => one - other));
   expect(soundOf({ entry: { kind: "gameStarted" }, sequence: 2 })).toBeUndefined();
+});
+
+test("between sounds nothing is computed", () => {
+  play("play");
+  expect(tones.length).toBe(2);
+  expect(resume).toHaveBeenCalledOnce();
+  tones.shift()?.onended();
+  play("pass");
+  tones.shift()?.onended();
+  expect(suspend).not.toHaveBeenCalled();
+  tones.shift()?.onended();
+  expect(suspend).toHaveBeenCalledOnce();
+  play("pass");
+  expect(resume).toHaveBeenCalledTimes(3);
 });

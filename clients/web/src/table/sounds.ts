@@ -57,9 +57,14 @@ const SOUNDS = {
 export type Sound = keyof typeof SOUNDS;
 
 let context: AudioContext | undefined;
+/** The browser refuses to resume, for example during a call on a phone: then nothing is heard. */
+const unheard = () => {};
+/** How many tones sound or are about to. */
+let sounding = 0;
 
 /**
  * Plays a sound, if sounds are on and the reader has clicked or typed: browsers allow none before.
+ * Between sounds the context is suspended: a running one computes silence, and keeps a phone awake.
  */
 export function play(sound: Sound): void {
   if (!soundOn.peek() || typeof AudioContext === "undefined" || !navigator.userActivation?.hasBeenActive) return;
@@ -67,7 +72,8 @@ export function play(sound: Sound): void {
   const audio = context;
   const moves = !matchMedia("(prefers-reduced-motion: reduce)").matches;
   const begin = audio.currentTime + (sound === "play" && moves ? LAID_S : 0);
-  if (audio.state === "suspended") void audio.resume();
+  // Also if it is running: it may be about to be suspended.
+  audio.resume().catch(unheard);
   for (const { hertz, at, length, loud, wave } of SOUNDS[sound]) {
     const start = begin + at;
     const oscillator = new OscillatorNode(audio, { type: wave, frequency: hertz });
@@ -75,6 +81,11 @@ export function play(sound: Sound): void {
     gain.gain.setValueAtTime(0, start);
     gain.gain.linearRampToValueAtTime(loud * 0.5, start + 0.008);
     gain.gain.exponentialRampToValueAtTime(0.0001, start + length);
+    sounding += 1;
+    oscillator.onended = () => {
+      sounding -= 1;
+      if (sounding === 0) audio.suspend().catch(unheard);
+    };
     oscillator.connect(gain).connect(audio.destination);
     oscillator.start(start);
     oscillator.stop(start + length + 0.02);
