@@ -3,6 +3,8 @@
 //! and a drain, and counts how often each is polled. In every test, a task that does not sleep while
 //! the clock stands still ends the process of the tests.
 
+use std::pin::Pin;
+
 macro_rules! long_tasks {
     ($($(#[$doc:meta])* $name:ident,)*) => {
         /// A task that lives long.
@@ -76,16 +78,20 @@ long_tasks! {
     Sharing,
 }
 
+/// A future to spawn, boxed so that spawning is compiled once for each type of output, not once for each
+/// task.
+pub type Task<T> = Pin<Box<dyn Future<Output = T> + Send>>;
+
 /// Names a task that is about to be spawned.
 #[cfg(not(any(test, feature = "testing")))]
-pub fn named<F: Future>(_: LongTask, future: F) -> F {
-    future
+pub fn named<T>(_: LongTask, future: impl Future<Output = T> + Send + 'static) -> Task<T> {
+    Box::pin(future)
 }
 
 /// Marks a task that is about to be spawned and ends by itself. `_does`: what it does.
 #[cfg(not(any(test, feature = "testing")))]
-pub fn short<F: Future>(_does: &'static str, future: F) -> F {
-    future
+pub fn short<T>(_does: &'static str, future: impl Future<Output = T> + Send + 'static) -> Task<T> {
+    Box::pin(future)
 }
 
 #[cfg(any(test, feature = "testing"))]
@@ -101,13 +107,13 @@ mod counting {
 
     use tokio::time::Instant;
 
-    use super::LongTask;
+    use super::{LongTask, Task};
 
     /// A task that is polled more often at one instant of a stopped clock never sleeps.
     const SPINNING: u64 = 20_000;
 
     #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-    enum Task {
+    enum Name {
         Long(LongTask),
         /// What it does.
         Short(&'static str),
@@ -115,84 +121,90 @@ mod counting {
 
     std::thread_local! {
         /// How often the tasks of this thread, which are those of one test, were polled.
-        static POLLS: RefCell<BTreeMap<Task, u64>> = const { RefCell::new(BTreeMap::new()) };
+        static POLLS: RefCell<BTreeMap<Name, u64>> = const { RefCell::new(BTreeMap::new()) };
         /// The task that this test expects to spin.
-        static MAY_SPIN: Cell<Option<Task>> = const { Cell::new(None) };
+        static MAY_SPIN: Cell<Option<Name>> = const { Cell::new(None) };
     }
 
     /// Names a task that is about to be spawned, and counts its polls. If it spins, the process of
     /// the tests ends: the clock of its test would stand still for ever.
-    pub fn named<F: Future>(task: LongTask, future: F) -> impl Future<Output = F::Output> {
-        counted(Task::Long(task), future)
+    pub fn named<T: 'static>(
+        task: LongTask,
+        future: impl Future<Output = T> + Send + 'static,
+    ) -> Task<T> {
+        counted(Name::Long(task), Box::pin(future))
     }
 
     /// The same of a task that ends by itself.
-    pub fn short<F: Future>(does: &'static str, future: F) -> impl Future<Output = F::Output> {
-        counted(Task::Short(does), future)
+    pub fn short<T: 'static>(
+        does: &'static str,
+        future: impl Future<Output = T> + Send + 'static,
+    ) -> Task<T> {
+        counted(Name::Short(does), Box::pin(future))
     }
 
-    fn counted<F: Future>(task: Task, future: F) -> Counted<F> {
-        Counted {
-            task,
-            future: Box::pin(future),
+    fn counted<T: 'static>(name: Name, future: Task<T>) -> Task<T> {
+        Box::pin(Counted {
+            name,
+            future,
             at: None,
-        }
+        })
     }
 
-    struct Counted<F> {
-        task: Task,
-        future: Pin<Box<F>>,
+    struct Counted<T> {
+        name: Name,
+        future: Task<T>,
         /// When it was polled last, and how often at that instant.
         at: Option<(Instant, u64)>,
     }
 
-    impl<F: Future> Future for Counted<F> {
-        type Output = F::Output;
+    impl<T> Future for Counted<T> {
+        type Output = T;
 
-        fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<F::Output> {
-            let (task, now) = (self.task, Instant::now());
-            POLLS.with_borrow_mut(|polls| *polls.entry(task).or_default() += 1);
+        fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<T> {
+            let (name, now) = (self.name, Instant::now());
+            POLLS.with_borrow_mut(|polls| *polls.entry(name).or_default() += 1);
             let (at, count) = self.at.filter(|(at, _)| *at == now).unwrap_or((now, 0));
             self.at = Some((at, count + 1));
             if count >= SPINNING {
-                spins(task);
+                spins(name);
                 return Poll::Pending;
             }
             self.future.as_mut().poll(context)
         }
     }
 
-    fn spins(task: Task) {
-        if MAY_SPIN.replace(None) == Some(task) {
+    fn spins(name: Name) {
+        if MAY_SPIN.replace(None) == Some(name) {
             return;
         }
         // Not by a panic, which the runtime catches, nor by a macro, whose output a test captures.
         let thread = std::thread::current();
         let test = thread.name().unwrap_or("a test");
-        let message = format!("{test}: {task:?} never sleeps although nothing is due\n");
+        let message = format!("{test}: {name:?} never sleeps although nothing is due\n");
         let _ = std::io::stderr().write_all(message.as_bytes());
         std::process::exit(101);
     }
 
     /// How often the tasks of this test that live long have been polled.
     pub fn polls() -> BTreeMap<LongTask, u64> {
-        let of = |(task, polls): (&Task, &u64)| match task {
-            Task::Long(task) => Some((*task, *polls)),
-            Task::Short(_) => None,
+        let of = |(name, polls): (&Name, &u64)| match name {
+            Name::Long(task) => Some((*task, *polls)),
+            Name::Short(_) => None,
         };
         POLLS.with_borrow(|polls| polls.iter().filter_map(of).collect())
     }
 
     /// How often the others have been polled.
     pub fn short_polls() -> u64 {
-        let is_short = |(task, _): &(&Task, &u64)| matches!(task, Task::Short(_));
+        let is_short = |(name, _): &(&Name, &u64)| matches!(name, Name::Short(_));
         POLLS.with_borrow(|polls| polls.iter().filter(is_short).map(|(_, polls)| polls).sum())
     }
 
     #[cfg(test)]
     #[tokio::test(start_paused = true)]
     async fn a_task_that_never_sleeps_is_noticed() {
-        MAY_SPIN.set(Some(Task::Short("one record")));
+        MAY_SPIN.set(Some(Name::Short("one record")));
         let sleeping = tokio::spawn(named(LongTask::Retention, async {
             for _ in 0..2 * SPINNING {
                 tokio::time::sleep(std::time::Duration::from_millis(1)).await;
