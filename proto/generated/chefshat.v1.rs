@@ -1983,59 +1983,58 @@ pub mod admin_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with AdminServiceServer.
-    #[async_trait]
     pub trait AdminService: std::marker::Send + std::marker::Sync + 'static {
         /// Lists the connected clients, longest connected first.
-        async fn list_clients(
+        fn list_clients(
             &self,
             request: tonic::Request<super::ListClientsRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::ListClientsResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Closes the connection of a client, which may connect again. NOT_FOUND (CLIENT_UNKNOWN).
-        async fn disconnect_client(
+        fn disconnect_client(
             &self,
             request: tonic::Request<super::DisconnectClientRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::DisconnectClientResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Closes a room without its owner token; a running game is aborted. NOT_FOUND (ROOM_UNKNOWN);
         /// UNAVAILABLE (ROOM_GONE).
-        async fn close_room(
+        fn close_room(
             &self,
             request: tonic::Request<super::AdminServiceCloseRoomRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::AdminServiceCloseRoomResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Closes a tournament without its owner token, with its rooms. NOT_FOUND (TOURNAMENT_UNKNOWN);
         /// UNAVAILABLE (SHUTTING_DOWN).
-        async fn close_tournament(
+        fn close_tournament(
             &self,
             request: tonic::Request<super::AdminServiceCloseTournamentRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::AdminServiceCloseTournamentResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Returns how much is stored.
-        async fn get_storage(
+        fn get_storage(
             &self,
             request: tonic::Request<super::GetStorageRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::GetStorageResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Deletes finished games with their records, oldest first, and gives their disk space back. Never
         /// the newest game, nor games of tournaments that are not over. UNAVAILABLE (STORE_FAILED).
-        async fn prune_records(
+        fn prune_records(
             &self,
             request: tonic::Request<super::PruneRecordsRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::PruneRecordsResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Server streaming response type for the ExportParticipant method.
         type ExportParticipantStream: tonic::codegen::tokio_stream::Stream<
                 Item = std::result::Result<
@@ -2049,13 +2048,13 @@ pub mod admin_service_server {
         /// decisions and expressions, its tournaments, and its answers in studies. INVALID_ARGUMENT
         /// (NAME_REFUSED if the name is empty or the fingerprint malformed); NOT_FOUND
         /// (PARTICIPANT_UNKNOWN); UNAVAILABLE (STORE_FAILED).
-        async fn export_participant(
+        fn export_participant(
             &self,
             request: tonic::Request<super::ExportParticipantRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<Self::ExportParticipantStream>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Deletes the data of a participant, known by its name: a pseudonym replaces the name in games,
         /// records, tournaments and ratings, and its expressions and annotations are dropped. In studies
         /// it withdraws, and its data there are deleted as by DeleteStudyParticipant, in every study that
@@ -2065,13 +2064,13 @@ pub mod admin_service_server {
         /// over: nothing was changed); UNAVAILABLE (STORE_FAILED, SHUTTING_DOWN, OWNER_UNREACHABLE: a
         /// server that runs a study with the participant, or may still show the name, cannot be reached;
         /// repeat the call when it can).
-        async fn delete_participant(
+        fn delete_participant(
             &self,
             request: tonic::Request<super::DeleteParticipantRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::DeleteParticipantResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
     }
     /// Operates a server: its clients, what others created, its storage, and participants' data. Every
     /// call needs the role ADMIN.
@@ -3894,7 +3893,6 @@ pub mod analysis_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with AnalysisServiceServer.
-    #[async_trait]
     pub trait AnalysisService: std::marker::Send + std::marker::Sync + 'static {
         /// Server streaming response type for the Evaluate method.
         type EvaluateStream: tonic::codegen::tokio_stream::Stream<
@@ -3907,18 +3905,18 @@ pub mod analysis_service_server {
         /// it. The work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED,
         /// RULE_SET_REFUSED), NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING, SERIES_OPEN),
         /// RESOURCE_EXHAUSTED (TOO_MANY_ANALYSES), UNAVAILABLE (SHUTTING_DOWN).
-        async fn evaluate(
+        fn evaluate(
             &self,
             request: tonic::Request<super::EvaluateRequest>,
-        ) -> std::result::Result<tonic::Response<Self::EvaluateStream>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<Self::EvaluateStream>, tonic::Status>> + std::marker::Send;
         /// The legal actions of a decision of a recorded game. Errors as for Evaluate.
-        async fn legal_actions(
+        fn legal_actions(
             &self,
             request: tonic::Request<super::LegalActionsRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::LegalActionsResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
     }
     /// Estimates and legal actions at decisions.
     #[derive(Debug)]
@@ -4737,19 +4735,18 @@ pub mod instrument_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with InstrumentServiceServer.
-    #[async_trait]
     pub trait InstrumentService: std::marker::Send + std::marker::Sync + 'static {
         /// Puts a marker into the record of the room. Nobody but the owner learns of it. INVALID_ARGUMENT
         /// (MARKER_REFUSED) names the field; PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
         /// (ROOM_UNKNOWN); FAILED_PRECONDITION (GAME_OVER); RESOURCE_EXHAUSTED (TOO_MANY_MARKERS: 10000 in
         /// a game, or 50 a second and 200 at once; metadata `limit` says which; DISK_NEARLY_FULL).
-        async fn add_marker(
+        fn add_marker(
             &self,
             request: tonic::Request<super::AddMarkerRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::AddMarkerResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Server streaming response type for the FollowMarkers method.
         type FollowMarkersStream: tonic::codegen::tokio_stream::Stream<
                 Item = std::result::Result<super::FollowMarkersResponse, tonic::Status>,
@@ -4759,13 +4756,13 @@ pub mod instrument_service_server {
         /// Streams the markers of the room, those it has and then each that is added, until the game is
         /// over. A message without markers is a heartbeat. PERMISSION_DENIED (OWNER_TOKEN_WRONG);
         /// NOT_FOUND (ROOM_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS: 16 streams for a room).
-        async fn follow_markers(
+        fn follow_markers(
             &self,
             request: tonic::Request<super::FollowMarkersRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<Self::FollowMarkersStream>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Records samples of a seat, for instance thirty a second of affect, beside the game: they are in
         /// no event and not in the record, and reach nobody. `chefshat export` exports them from the
         /// server's data directory. Sent from the start of the game until the room is no longer listed.
@@ -4775,13 +4772,13 @@ pub mod instrument_service_server {
         /// (GAME_NOT_STARTED; SAMPLES_OFF: the server has no data directory, or shares its games with
         /// other servers); RESOURCE_EXHAUSTED (TOO_MANY_SAMPLES: 16 streams, or 67108864 bytes of a seat;
         /// DISK_NEARLY_FULL).
-        async fn add_samples(
+        fn add_samples(
             &self,
             request: tonic::Request<super::AddSamplesRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::AddSamplesResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
     }
     /// The recording of a room: markers of its owner, and streams of samples of its seats. The owner of a
     /// study is the owner of the rooms of its games.
@@ -5638,7 +5635,6 @@ pub mod play_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with PlayServiceServer.
-    #[async_trait]
     pub trait PlayService: std::marker::Send + std::marker::Sync + 'static {
         /// Server streaming response type for the Play method.
         type PlayStream: tonic::codegen::tokio_stream::Stream<
@@ -5653,10 +5649,10 @@ pub mod play_service_server {
         /// UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are
         /// unfinished, or (CALLS_NOT_TAKEN, UPDATES_NOT_TAKEN) if you do not read what it sends: reconnect
         /// and attach again. Do so too if it ends with OK, but you have not half-closed.
-        async fn play(
+        fn play(
             &self,
             request: tonic::Request<tonic::Streaming<super::PlayRequest>>,
-        ) -> std::result::Result<tonic::Response<Self::PlayStream>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<Self::PlayStream>, tonic::Status>> + std::marker::Send;
         /// Server streaming response type for the Watch method.
         type WatchStream: tonic::codegen::tokio_stream::Stream<
                 Item = std::result::Result<
@@ -5670,18 +5666,18 @@ pub mod play_service_server {
         /// client cancels. A message without updates is a heartbeat. Answer with Act. If no ticket is
         /// known, the stream ends after the Refused of each. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE
         /// as for Play.
-        async fn watch(
+        fn watch(
             &self,
             request: tonic::Request<super::PlayServiceWatchRequest>,
-        ) -> std::result::Result<tonic::Response<Self::WatchStream>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<Self::WatchStream>, tonic::Status>> + std::marker::Send;
         /// One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
         /// INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED, REQUEST_ID_REFUSED); FAILED_PRECONDITION
         /// (GAME_OVER, CHAT_OFF, HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS,
         /// TOO_MANY_HINTS; DISK_NEARLY_FULL for an expression).
-        async fn act(
+        fn act(
             &self,
             request: tonic::Request<super::ActRequest>,
-        ) -> std::result::Result<tonic::Response<super::ActResponse>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<super::ActResponse>, tonic::Status>> + std::marker::Send;
     }
     /// Playing on seats, authorised by their tickets.
     #[derive(Debug)]
@@ -6344,19 +6340,18 @@ pub mod record_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with RecordServiceServer.
-    #[async_trait]
     pub trait RecordService: std::marker::Send + std::marker::Sync + 'static {
         /// Lists the records of the server, by default oldest first. Those of games that are not public
         /// are listed only for callers who show a secret of them (`Visibility`). A page may have fewer
         /// records than requested without being the last. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED,
         /// FILTER_REFUSED).
-        async fn list_records(
+        fn list_records(
             &self,
             request: tonic::Request<super::ListRecordsRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::ListRecordsResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Server streaming response type for the GetRecord method.
         type GetRecordStream: tonic::codegen::tokio_stream::Stream<
                 Item = std::result::Result<super::GetRecordResponse, tonic::Status>,
@@ -6369,10 +6364,10 @@ pub mod record_service_server {
         /// the owner token, receive everything; others no record-only expressions, markers, annotations
         /// and media.
         /// The record of a private game is complete only for its owner and the operator.
-        async fn get_record(
+        fn get_record(
             &self,
             request: tonic::Request<super::GetRecordRequest>,
-        ) -> std::result::Result<tonic::Response<Self::GetRecordStream>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<Self::GetRecordStream>, tonic::Status>> + std::marker::Send;
         /// Server streaming response type for the StreamRecords method.
         type StreamRecordsStream: tonic::codegen::tokio_stream::Stream<
                 Item = std::result::Result<super::StreamRecordsResponse, tonic::Status>,
@@ -6383,25 +6378,25 @@ pub mod record_service_server {
         /// cannot be read is named in its place (`StreamRecordsResponse.unreadable`), and the others
         /// follow. INVALID_ARGUMENT (FILTER_REFUSED); NOT_FOUND (GAME_UNKNOWN) if `after` is not in the
         /// list.
-        async fn stream_records(
+        fn stream_records(
             &self,
             request: tonic::Request<super::StreamRecordsRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<Self::StreamRecordsStream>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Adds the record of a game played elsewhere: on another server, or at a physical table. Verifies
         /// it first. INVALID_ARGUMENT (RECORD_REFUSED) names the first invalid line; ALREADY_EXISTS
         /// (GAME_KNOWN); RESOURCE_EXHAUSTED (RECORD_TOO_LARGE, DISK_NEARLY_FULL); DEADLINE_EXCEEDED
         /// (IMPORT_TOO_SLOW); PERMISSION_DENIED (IMPORT_OFF) unless the server was started with
         /// --allow-import.
-        async fn import_record(
+        fn import_record(
             &self,
             request: tonic::Request<tonic::Streaming<super::ImportRecordRequest>>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::ImportRecordResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
     }
     /// The records of a server.
     #[derive(Debug)]
@@ -7216,83 +7211,82 @@ pub mod room_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with RoomServiceServer.
-    #[async_trait]
     pub trait RoomService: std::marker::Send + std::marker::Sync + 'static {
         /// Creates a room. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SEATS_REFUSED,
         /// SEED_REFUSED, NAME_REFUSED, SCRIPT_REFUSED, BRANCH_REFUSED) names the field; the errors of
         /// GetRecord for a recorded game in the request, which the caller must be allowed to read;
         /// RESOURCE_EXHAUSTED (TOO_MANY_ROOMS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN,
         /// STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
-        async fn create_room(
+        fn create_room(
             &self,
             request: tonic::Request<super::CreateRoomRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::CreateRoomResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// One room, by its id or its join code. NOT_FOUND (ROOM_UNKNOWN), also for the id of a private
         /// room without a secret of it (`Visibility`); PERMISSION_DENIED
         /// (JOIN_CODE_WRONG).
-        async fn get_room(
+        fn get_room(
             &self,
             request: tonic::Request<super::GetRoomRequest>,
-        ) -> std::result::Result<tonic::Response<super::GetRoomResponse>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<super::GetRoomResponse>, tonic::Status>> + std::marker::Send;
         /// Lists the rooms of the server, newest first. Later pages do not include rooms created after the
         /// first. Page tokens are valid until the server restarts. A page may have fewer rooms than
         /// requested without being the last. Rooms that are not public are listed only for callers who
         /// show a secret of them. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
-        async fn list_rooms(
+        fn list_rooms(
             &self,
             request: tonic::Request<super::ListRoomsRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::ListRoomsResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Takes a seat and returns its ticket. One client may take several seats with one join code,
         /// unless the policy says otherwise (`one_seat_per_client`). PERMISSION_DENIED (JOIN_CODE_WRONG);
         /// RESOURCE_EXHAUSTED (ROOM_FULL, TOO_MANY_SEATINGS); FAILED_PRECONDITION (SEAT_TAKEN,
         /// KIND_NOT_ADMITTED, CLIENT_HAS_SEAT, GAME_STARTED, GAME_OVER); INVALID_ARGUMENT (NO_SUCH_SEAT,
         /// NAME_REFUSED, NAME_KEY_REFUSED, KIND_REFUSED); NOT_FOUND (ROOM_UNKNOWN); UNAVAILABLE
         /// (SHUTTING_DOWN).
-        async fn join_room(
+        fn join_room(
             &self,
             request: tonic::Request<super::JoinRoomRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::JoinRoomResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Gives a seat back before the game begins: the seat is free, its ticket is invalid, and a stream
         /// attached to it receives Detached (REQUESTED). UNAUTHENTICATED (TICKET_UNKNOWN);
         /// FAILED_PRECONDITION (GAME_STARTED, GAME_OVER; SEAT_ASSIGNED for the seat of a study's
         /// participant, who withdraws from the study instead).
-        async fn leave_room(
+        fn leave_room(
             &self,
             request: tonic::Request<super::LeaveRoomRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::LeaveRoomResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Closes a room. Aborts its game. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND
         /// (ROOM_UNKNOWN).
-        async fn close_room(
+        fn close_room(
             &self,
             request: tonic::Request<super::CloseRoomRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::CloseRoomResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Sets the join code of the room in which the participants of a room play again
         /// (`Room.next_join_code`). The owner's replaces an earlier one. A participant's does so only if
         /// nobody can join the earlier one any more: the first offer counts. FAILED_PRECONDITION
         /// (NEXT_ROOM_SET); PERMISSION_DENIED (OWNER_TOKEN_WRONG; JOIN_CODE_WRONG if it is no join code);
         /// UNAUTHENTICATED (TICKET_UNKNOWN); NOT_FOUND (ROOM_UNKNOWN).
-        async fn set_next_room(
+        fn set_next_room(
             &self,
             request: tonic::Request<super::SetNextRoomRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::SetNextRoomResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
     }
     /// Rooms of a server.
     #[derive(Debug)]
@@ -8013,36 +8007,35 @@ pub mod server_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with ServerServiceServer.
-    #[async_trait]
     pub trait ServerService: std::marker::Send + std::marker::Sync + 'static {
         /// Returns version, limits, presets and built-in agents.
-        async fn get_server_info(
+        fn get_server_info(
             &self,
             request: tonic::Request<super::GetServerInfoRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::GetServerInfoResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Returns the texts of all actions. INVALID_ARGUMENT (FACES_OUT_OF_RANGE).
-        async fn get_action_table(
+        fn get_action_table(
             &self,
             request: tonic::Request<super::GetActionTableRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::GetActionTableResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Reads the server's clocks, so that a client can relate them to its own as in NTP. With t0 and t3
         /// the client's times of sending the request and receiving the response, the server's clock is ahead
         /// by ((received - t0) + (sent - t3)) / 2, give or take half the round trip (t3 - t0) - (sent -
         /// received). Repeat it and keep the reading with the shortest round trip. NOT_FOUND (ROOM_UNKNOWN),
         /// also for a private room without a secret of it (`Visibility`).
-        async fn get_clock(
+        fn get_clock(
             &self,
             request: tonic::Request<super::GetClockRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::GetClockResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
     }
     /// Information about a server.
     #[derive(Debug)]
@@ -8471,7 +8464,6 @@ pub mod spectator_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with SpectatorServiceServer.
-    #[async_trait]
     pub trait SpectatorService: std::marker::Send + std::marker::Sync + 'static {
         /// Server streaming response type for the Watch method.
         type WatchStream: tonic::codegen::tokio_stream::Stream<
@@ -8489,10 +8481,10 @@ pub mod spectator_service_server {
         /// (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
         /// (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
         /// last one received.
-        async fn watch(
+        fn watch(
             &self,
             request: tonic::Request<super::SpectatorServiceWatchRequest>,
-        ) -> std::result::Result<tonic::Response<Self::WatchStream>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<Self::WatchStream>, tonic::Status>> + std::marker::Send;
     }
     /// Watching rooms.
     #[derive(Debug)]
@@ -10826,55 +10818,54 @@ pub mod study_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with StudyServiceServer.
-    #[async_trait]
     pub trait StudyService: std::marker::Send + std::marker::Sync + 'static {
         /// Creates a study without participants. INVALID_ARGUMENT (SETTINGS_REFUSED names the field,
         /// REQUEST_ID_REFUSED); ALREADY_EXISTS (REQUEST_ID_USED); RESOURCE_EXHAUSTED (TOO_MANY_STUDIES,
         /// DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of
         /// the cluster reaches this one).
-        async fn create_study(
+        fn create_study(
             &self,
             request: tonic::Request<super::CreateStudyRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::CreateStudyResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Returns a study, with its pictures. NOT_FOUND (STUDY_UNKNOWN).
-        async fn get_study(
+        fn get_study(
             &self,
             request: tonic::Request<super::GetStudyRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::GetStudyResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Lists the studies whose owner tokens the request has, and for the operator all, newest first.
-        async fn list_studies(
+        fn list_studies(
             &self,
             request: tonic::Request<super::ListStudiesRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::ListStudiesResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Adds participants and returns their links. More than `participants` of the settings may be
         /// added: a link opened, or a consent given, when all slots are taken is refused (STUDY_FULL). NOT_FOUND (STUDY_UNKNOWN);
         /// FAILED_PRECONDITION (STUDY_CLOSED); ALREADY_EXISTS (NAME_TAKEN); INVALID_ARGUMENT (NAME_REFUSED,
         /// COUNT_REFUSED); RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS); UNAVAILABLE (SHUTTING_DOWN).
-        async fn add_study_participants(
+        fn add_study_participants(
             &self,
             request: tonic::Request<super::AddStudyParticipantsRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::AddStudyParticipantsResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Returns the links of all participants whose participation is not over. NOT_FOUND
         /// (STUDY_UNKNOWN).
-        async fn list_study_links(
+        fn list_study_links(
             &self,
             request: tonic::Request<super::ListStudyLinksRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::ListStudyLinksResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Server streaming response type for the FollowStudy method.
         type FollowStudyStream: tonic::codegen::tokio_stream::Stream<
                 Item = std::result::Result<super::FollowStudyResponse, tonic::Status>,
@@ -10885,35 +10876,35 @@ pub mod study_service_server {
         /// until the study is closed and nobody but test participants is active; in between heartbeats.
         /// NOT_FOUND (STUDY_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the
         /// client does not read a message within 30 seconds).
-        async fn follow_study(
+        fn follow_study(
             &self,
             request: tonic::Request<super::FollowStudyRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<Self::FollowStudyStream>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Removes a participant, whose slot is free again, and adds another in its place if requested. Its
         /// running game is closed; its data are kept. In a group, an agent plays on in its place, and the slots
         /// are free again when all have left. The other is planned to play with the same, if these wait for it;
         /// otherwise it plays with whom it arrives. Repeating the call without `replace` changes nothing.
         /// NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION (PARTICIPATION_OVER if it
         /// has withdrawn, STUDY_CLOSED); UNAVAILABLE (SHUTTING_DOWN).
-        async fn remove_study_participant(
+        fn remove_study_participant(
             &self,
             request: tonic::Request<super::RemoveStudyParticipantRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::RemoveStudyParticipantResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Closes a study: nobody may begin any more, and those who have begun continue. NOT_FOUND
         /// (STUDY_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
-        async fn close_study(
+        fn close_study(
             &self,
             request: tonic::Request<super::CloseStudyRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::CloseStudyResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Server streaming response type for the ExportStudy method.
         type ExportStudyStream: tonic::codegen::tokio_stream::Stream<
                 Item = std::result::Result<super::ExportStudyResponse, tonic::Status>,
@@ -10926,37 +10917,37 @@ pub mod study_service_server {
         /// under `records/` and samples under `samples/`, and last what the columns of the tables mean,
         /// `codebook.csv` for people and `datapackage.json` for programs.
         /// NOT_FOUND (STUDY_UNKNOWN); UNAVAILABLE (STORE_FAILED).
-        async fn export_study(
+        fn export_study(
             &self,
             request: tonic::Request<super::ExportStudyRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<Self::ExportStudyStream>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Deletes the data of a participant: its pseudonym, id at the panel, devices, answers, interface
         /// traces, and its games with their records, also those that it played with others of its group. What
         /// stays is that a participant with this number took part, when, in which conditions, and that it
         /// consented. It counts as withdrawn from then on. Returns when the data are deleted; at once, if
         /// others still play its game: the data are deleted when that is over. NOT_FOUND (STUDY_UNKNOWN, PARTICIPANT_UNKNOWN); UNAVAILABLE
         /// (SHUTTING_DOWN, STORE_FAILED).
-        async fn delete_study_participant(
+        fn delete_study_participant(
             &self,
             request: tonic::Request<super::DeleteStudyParticipantRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::DeleteStudyParticipantResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Deletes a study with all its data: settings, participants, answers, interface traces, and games
         /// with their records. Its links are unknown from then on. Returns when all is deleted. NOT_FOUND
         /// (STUDY_UNKNOWN); FAILED_PRECONDITION (STUDY_RUNNING if somebody is in the middle of it, unless
         /// `force` is set); UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED).
-        async fn delete_study(
+        fn delete_study(
             &self,
             request: tonic::Request<super::DeleteStudyRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::DeleteStudyResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
     }
     /// Studies, for researchers. Studies survive restarts of the server. Every call but CreateStudy and
     /// ListStudies takes the owner token of the study; STUDY_UNKNOWN is also the answer to a wrong one.
@@ -12004,7 +11995,6 @@ pub mod participation_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with ParticipationServiceServer.
-    #[async_trait]
     pub trait ParticipationService: std::marker::Send + std::marker::Sync + 'static {
         /// Adds a participant who has the open link (`open_link` of Study), and returns its own link for
         /// OpenStudy. UNAUTHENTICATED (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL;
@@ -12014,25 +12004,25 @@ pub mod participation_service_server {
         /// RESOURCE_EXHAUSTED (TOO_MANY_PARTICIPANTS, DISK_NEARLY_FULL); UNAVAILABLE (SHUTTING_DOWN). If the
         /// study has a `full_url`, STUDY_CLOSED, STUDY_FULL and TOO_MANY_PARTICIPANTS have it as the metadata
         /// `url`, also of OpenStudy and GiveConsent.
-        async fn join_study(
+        fn join_study(
             &self,
             request: tonic::Request<super::JoinStudyRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::JoinStudyResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Opens the study on this device: the participant's earlier session ends. For a participant whose
         /// participation is over there is only the end to show, and no session. UNAUTHENTICATED
         /// (LINK_UNKNOWN); FAILED_PRECONDITION (STUDY_CLOSED, STUDY_FULL; WRONG_DEVICE as JoinStudy, and an
         /// earlier session does not end; LINK_OPEN for an open link, with the metadata `id_parameter`: take
         /// part with JoinStudy); RESOURCE_EXHAUSTED (TOO_MANY_SESSIONS); UNAVAILABLE (SHUTTING_DOWN).
-        async fn open_study(
+        fn open_study(
             &self,
             request: tonic::Request<super::OpenStudyRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::OpenStudyResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Server streaming response type for the FollowParticipation method.
         type FollowParticipationStream: tonic::codegen::tokio_stream::Stream<
                 Item = std::result::Result<
@@ -12046,85 +12036,85 @@ pub mod participation_service_server {
         /// participant counts as present while a stream of its newest session is open. Ends after a view
         /// with `end`, and with ABORTED (SESSION_SUPERSEDED) when the study is opened again.
         /// UNAUTHENTICATED (SESSION_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
-        async fn follow_participation(
+        fn follow_participation(
             &self,
             request: tonic::Request<super::FollowParticipationRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<Self::FollowParticipationStream>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Agrees to the text of the step. UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED);
         /// FAILED_PRECONDITION (STEP_OVER, STEP_MISMATCH, PARTICIPATION_OVER): show the newest view;
         /// FAILED_PRECONDITION (STUDY_FULL) if it gives a slot and none is free; UNAVAILABLE (SHUTTING_DOWN).
-        async fn give_consent(
+        fn give_consent(
             &self,
             request: tonic::Request<super::GiveConsentRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::GiveConsentResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Answers the questionnaire of the step. INVALID_ARGUMENT (ANSWER_REFUSED; metadata `item`);
         /// RESOURCE_EXHAUSTED (TOO_MANY_ANSWERS if the answers of all studies, or of this caller, take too
         /// much memory; DISK_NEARLY_FULL); else as GiveConsent.
-        async fn answer_questionnaire(
+        fn answer_questionnaire(
             &self,
             request: tonic::Request<super::AnswerQuestionnaireRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::AnswerQuestionnaireResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Keeps what was entered in the questionnaire of the step so far, for a reload or another device: it
         /// replaces what was kept before, and is forgotten when the questionnaire is answered. Not every item
         /// needs an answer. RESOURCE_EXHAUSTED (TOO_MANY_SAVES after 1000); else as AnswerQuestionnaire.
-        async fn save_answers(
+        fn save_answers(
             &self,
             request: tonic::Request<super::SaveAnswersRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::SaveAnswersResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Continues from a text, a questionnaire on another site, or a game that has ended. A test participant
         /// continues from a questionnaire, too, without answers, and from its arrival, as a group of its own; a
         /// game of its that runs is closed first, and the view says when it has ended; those for whom its game
         /// waits drop out.
         /// FAILED_PRECONDITION (GAME_NOT_OVER); else as GiveConsent.
-        async fn continue_study(
+        fn continue_study(
             &self,
             request: tonic::Request<super::ContinueStudyRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::ContinueStudyResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Records interface traces of a game of this participant. They are dropped if the study records
         /// none. INVALID_ARGUMENT (TRACES_REFUSED for more than 500 or invalid ones); NOT_FOUND
         /// (GAME_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_TRACES after 20000 in a game, counted since the
         /// server was started; DISK_NEARLY_FULL); FAILED_PRECONDITION (PARTICIPATION_OVER);
         /// UNAUTHENTICATED (SESSION_UNKNOWN); ABORTED (SESSION_SUPERSEDED); UNAVAILABLE (SHUTTING_DOWN).
-        async fn record_traces(
+        fn record_traces(
             &self,
             request: tonic::Request<super::RecordTracesRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::RecordTracesResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Returns a picture of the text that the participant is shown now. UNAUTHENTICATED (LINK_UNKNOWN);
         /// NOT_FOUND (PICTURE_UNKNOWN).
-        async fn get_study_picture(
+        fn get_study_picture(
             &self,
             request: tonic::Request<super::GetStudyPictureRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::GetStudyPictureResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Withdraws, at any time, also after the end and from any device: the link is enough. A running
         /// game is closed, or played on by an agent for the others of a group. UNAUTHENTICATED (LINK_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
-        async fn withdraw_from_study(
+        fn withdraw_from_study(
             &self,
             request: tonic::Request<super::WithdrawFromStudyRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::WithdrawFromStudyResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
     }
     /// Taking part in a study. A link's secret opens a session; the newest session of a participant is
     /// the only one that can act. Nothing here reveals a condition. LINK_UNKNOWN is the answer to every
@@ -13384,7 +13374,6 @@ pub mod table_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with TableServiceServer.
-    #[async_trait]
     pub trait TableService: std::marker::Send + std::marker::Sync + 'static {
         /// Reports something that happened at the table. UNAUTHENTICATED (TICKET_UNKNOWN);
         /// INVALID_ARGUMENT (REPORT_REFUSED) names the field of a malformed report; ALREADY_EXISTS
@@ -13396,10 +13385,10 @@ pub mod table_service_server {
         /// from a refused report. A report that the rules or the cards do not allow is not an error: see
         /// `verdict`. If nothing is reported for 12 hours, also while the game is paused, or with the
         /// 20000th report, the game is aborted.
-        async fn report(
+        fn report(
             &self,
             request: tonic::Request<super::ReportRequest>,
-        ) -> std::result::Result<tonic::Response<super::ReportResponse>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<super::ReportResponse>, tonic::Status>> + std::marker::Send;
         /// Server streaming response type for the Watch method.
         type WatchStream: tonic::codegen::tokio_stream::Stream<
                 Item = std::result::Result<
@@ -13412,10 +13401,10 @@ pub mod table_service_server {
         /// Streams the state of the table: at once, and after each change. A message without a state is a
         /// heartbeat. UNAUTHENTICATED (TICKET_UNKNOWN); RESOURCE_EXHAUSTED (TOO_MANY_SPECTATORS);
         /// UNAVAILABLE (ROOM_GONE). Ends when the game is over.
-        async fn watch(
+        fn watch(
             &self,
             request: tonic::Request<super::TableServiceWatchRequest>,
-        ) -> std::result::Result<tonic::Response<Self::WatchStream>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<Self::WatchStream>, tonic::Status>> + std::marker::Send;
     }
     /// The table of a physical room. Several clients with the table's ticket may report and watch at the
     /// same time: a camera, and an attendant on the page.
@@ -14796,94 +14785,93 @@ pub mod tournament_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with TournamentServiceServer.
-    #[async_trait]
     pub trait TournamentService: std::marker::Send + std::marker::Sync + 'static {
         /// Creates a tournament. INVALID_ARGUMENT (RULE_SET_REFUSED, POLICY_REFUSED, SETTINGS_REFUSED,
         /// NAME_REFUSED) names the field of the settings, which may be `rules` or `policy`; the message
         /// names the inner field; RESOURCE_EXHAUSTED (TOO_MANY_TOURNAMENTS, DISK_NEARLY_FULL); UNAVAILABLE
         /// (SHUTTING_DOWN, STORE_FAILED, NODE_NOT_REACHED: no other node of the cluster reaches this one).
-        async fn create_tournament(
+        fn create_tournament(
             &self,
             request: tonic::Request<super::CreateTournamentRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::CreateTournamentResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Returns a tournament, by its id or its join code. NOT_FOUND (TOURNAMENT_UNKNOWN);
         /// PERMISSION_DENIED (JOIN_CODE_WRONG).
-        async fn get_tournament(
+        fn get_tournament(
             &self,
             request: tonic::Request<super::GetTournamentRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::GetTournamentResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Lists the tournaments of the server, newest first. Those that are not public are listed only
         /// for callers who show a secret of them. A page may have fewer tournaments than requested without
         /// being the last. Later pages do not include tournaments created after the first. Page tokens are
         /// valid until the server restarts. INVALID_ARGUMENT (PAGE_TOKEN_REFUSED, STATE_REFUSED).
-        async fn list_tournaments(
+        fn list_tournaments(
             &self,
             request: tonic::Request<super::ListTournamentsRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::ListTournamentsResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Joins, and returns a ticket. Attached to a Play or Watch stream, it makes the server attach the
         /// participant to each of its games. PERMISSION_DENIED (JOIN_CODE_WRONG); RESOURCE_EXHAUSTED
         /// (TOURNAMENT_FULL); FAILED_PRECONDITION (KIND_NOT_ADMITTED, NAME_TAKEN, NAME_RESERVED for names
         /// of fillers, NOT_STATELESS, TOURNAMENT_STARTED); INVALID_ARGUMENT (NAME_REFUSED,
         /// NAME_KEY_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
         /// (SHUTTING_DOWN).
-        async fn join_tournament(
+        fn join_tournament(
             &self,
             request: tonic::Request<super::JoinTournamentRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::JoinTournamentResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Adds a participant who plays at a physical table with real cards. Nobody connects for it: what
         /// it does is reported (TableService). PERMISSION_DENIED (OWNER_TOKEN_WRONG); RESOURCE_EXHAUSTED
         /// (TOURNAMENT_FULL); FAILED_PRECONDITION (NO_PHYSICAL_TABLES, NAME_TAKEN, NAME_RESERVED,
         /// TOURNAMENT_STARTED);
         /// INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE
         /// (SHUTTING_DOWN).
-        async fn add_table_participant(
+        fn add_table_participant(
             &self,
             request: tonic::Request<super::AddTableParticipantRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::AddTableParticipantResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Returns what the organiser needs for a physical game in progress: the table's ticket for an
         /// attendant or a camera. The same at each call, also after a restart of the server, as long as
         /// the game has this room. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION
         /// (GAME_NOT_PHYSICAL, GAME_NOT_STARTED, GAME_OVER); NOT_FOUND (TOURNAMENT_UNKNOWN, GAME_UNKNOWN).
-        async fn get_physical_table(
+        fn get_physical_table(
             &self,
             request: tonic::Request<super::GetPhysicalTableRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::GetPhysicalTableResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Starts it. PERMISSION_DENIED (OWNER_TOKEN_WRONG); FAILED_PRECONDITION (TOO_FEW_PARTICIPANTS,
         /// TOURNAMENT_STARTED); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
-        async fn start_tournament(
+        fn start_tournament(
             &self,
             request: tonic::Request<super::StartTournamentRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::StartTournamentResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Closes it: aborts the games in progress and keeps the counted ones. PERMISSION_DENIED
         /// (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN); UNAVAILABLE (SHUTTING_DOWN).
-        async fn close_tournament(
+        fn close_tournament(
             &self,
             request: tonic::Request<super::CloseTournamentRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::CloseTournamentResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Withdraws a participant, with its ticket or by the owner. Before the start somebody else can
         /// join instead of it, and its ticket ends. After that a substitute plays its games in progress to
         /// their end, it forfeits all others without being waited for, and its ticket only shows the
@@ -14892,24 +14880,24 @@ pub mod tournament_service_server {
         /// (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
         /// (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); RESOURCE_EXHAUSTED (TOO_MANY_CHANGES); UNAVAILABLE
         /// (SHUTTING_DOWN).
-        async fn withdraw_participant(
+        fn withdraw_participant(
             &self,
             request: tonic::Request<super::WithdrawParticipantRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::WithdrawParticipantResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Removes a participant: as WithdrawParticipant, but its ticket ends in every case, also if it
         /// has withdrawn before. Repeating the call changes nothing. PERMISSION_DENIED
         /// (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN, PARTICIPANT_UNKNOWN); FAILED_PRECONDITION
         /// (TOURNAMENT_OVER, PARTICIPANT_IS_FILLER); UNAVAILABLE (SHUTTING_DOWN).
-        async fn remove_participant(
+        fn remove_participant(
             &self,
             request: tonic::Request<super::RemoveParticipantRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::RemoveParticipantResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Gives the place of a participant, also of one who withdrew or of a filler, to a built-in agent
         /// or to somebody else, with all its results. The former participant's ticket ends; games in
         /// progress are played to their end by a substitute. PERMISSION_DENIED (OWNER_TOKEN_WRONG);
@@ -14917,46 +14905,46 @@ pub mod tournament_service_server {
         /// NAME_TAKEN, NAME_RESERVED, NOT_STATELESS, KIND_NOT_ADMITTED, REPLACED_TOO_OFTEN);
         /// INVALID_ARGUMENT (NAME_REFUSED, KIND_REFUSED, MAX_GAMES_REFUSED, SETTINGS_REFUSED for
         /// `built_in_agent`); UNAVAILABLE (SHUTTING_DOWN).
-        async fn replace_participant(
+        fn replace_participant(
             &self,
             request: tonic::Request<super::ReplaceParticipantRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::ReplaceParticipantResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Pauses the tournament: until it is resumed, no game is called, no round is drawn, and it does
         /// not end. Games in progress continue. After a week it resumes by itself. Repeating the call
         /// changes nothing. PERMISSION_DENIED (OWNER_TOKEN_WRONG); NOT_FOUND (TOURNAMENT_UNKNOWN);
         /// FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING); UNAVAILABLE (SHUTTING_DOWN).
-        async fn pause_tournament(
+        fn pause_tournament(
             &self,
             request: tonic::Request<super::PauseTournamentRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::PauseTournamentResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Resumes a paused tournament. The wait for absent participants restarts. Repeating the call
         /// changes nothing. Errors as PauseTournament.
-        async fn resume_tournament(
+        fn resume_tournament(
             &self,
             request: tonic::Request<super::ResumeTournamentRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::ResumeTournamentResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Postpones a game that is not in progress: it moves to the end of the queue, its wait for absent
         /// participants restarts, and this costs no call. The owner may do so at any time, a participant
         /// of the game, with its ticket, at most `max_calls` times for each game. UNAUTHENTICATED
         /// (TICKET_UNKNOWN); PERMISSION_DENIED (OWNER_TOKEN_WRONG, NOT_IN_GAME); NOT_FOUND
         /// (TOURNAMENT_UNKNOWN, GAME_UNKNOWN); FAILED_PRECONDITION (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE,
         /// POSTPONED_TOO_OFTEN); UNAVAILABLE (SHUTTING_DOWN).
-        async fn postpone_game(
+        fn postpone_game(
             &self,
             request: tonic::Request<super::PostponeGameRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::PostponeGameResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Calls a game before all others, with as many calls as at first: one that is due, also after it
         /// was postponed, or one that is void. A void game is then due again, with a new deal if its
         /// participants may have seen the old one, and counts if it is played. That is possible while the
@@ -14966,13 +14954,13 @@ pub mod tournament_service_server {
         /// (TOURNAMENT_NOT_PLAYING, GAME_NOT_DUE; NOBODY_LEFT: all its participants have withdrawn, so
         /// that it would be void again); RESOURCE_EXHAUSTED (TOO_MANY_CHANGES); UNAVAILABLE
         /// (SHUTTING_DOWN).
-        async fn call_game(
+        fn call_game(
             &self,
             request: tonic::Request<super::CallGameRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::CallGameResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Server streaming response type for the FollowTournament method.
         type FollowTournamentStream: tonic::codegen::tokio_stream::Stream<
                 Item = std::result::Result<
@@ -14986,43 +14974,43 @@ pub mod tournament_service_server {
         /// is over; in between heartbeats without a tournament. NOT_FOUND (TOURNAMENT_UNKNOWN);
         /// RESOURCE_EXHAUSTED (TOO_MANY_FOLLOWERS; FOLLOWER_TOO_SLOW if the client does not read a message
         /// within 30 seconds).
-        async fn follow_tournament(
+        fn follow_tournament(
             &self,
             request: tonic::Request<super::FollowTournamentRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<Self::FollowTournamentStream>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Returns standings, ratings and the confidence of their order; final when the tournament is
         /// over. NOT_FOUND (TOURNAMENT_UNKNOWN).
-        async fn get_tournament_results(
+        fn get_tournament_results(
             &self,
             request: tonic::Request<super::GetTournamentResultsRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::GetTournamentResultsResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Lists the games of a tournament, in order. NOT_FOUND (TOURNAMENT_UNKNOWN); INVALID_ARGUMENT
         /// (PAGE_TOKEN_REFUSED).
-        async fn list_tournament_games(
+        fn list_tournament_games(
             &self,
             request: tonic::Request<super::ListTournamentGamesRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::ListTournamentGamesResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
         /// Returns all who have played a rated game on this server, best first. A game is rated if it
         /// finished, was public, was dealt by this server from its own seed, and different participants
         /// played all seats without substitutes and without hints. Participants choose their names; a key
         /// (`JoinRoomRequest.name_key`) makes a name theirs. The games of the last seconds may be missing.
         /// INVALID_ARGUMENT (KIND_REFUSED).
-        async fn get_leaderboard(
+        fn get_leaderboard(
             &self,
             request: tonic::Request<super::GetLeaderboardRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::GetLeaderboardResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
     }
     /// Tournaments of a server. Tournaments survive restarts of the server. TOURNAMENT_UNKNOWN is also
     /// the answer for a private tournament without a secret of it (`Visibility`). The calls from
@@ -16899,7 +16887,6 @@ pub mod vector_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with VectorServiceServer.
-    #[async_trait]
     pub trait VectorService: std::marker::Send + std::marker::Sync + 'static {
         /// Server streaming response type for the Run method.
         type RunStream: tonic::codegen::tokio_stream::Stream<
@@ -16920,10 +16907,10 @@ pub mod vector_service_server {
         /// ServerService.GetServerInfo. A batch has at most max_vector_batch_bytes: allow your client to
         /// receive that much. A request that takes more than 512 KiB once it is decoded counts as several
         /// calls of the client, and waits until the client may make another call.
-        async fn run(
+        fn run(
             &self,
             request: tonic::Request<tonic::Streaming<super::RunRequest>>,
-        ) -> std::result::Result<tonic::Response<Self::RunStream>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<Self::RunStream>, tonic::Status>> + std::marker::Send;
     }
     /// Games stepped in batches.
     #[derive(Debug)]

@@ -197,7 +197,6 @@ pub(crate) async fn connect(address: SocketAddr) -> Client {
     Client::connect(address.to_string()).await.unwrap()
 }
 
-#[tonic::async_trait]
 impl play_service_server::PlayService for Fake {
     type PlayStream = ReceiverStream<Result<v1::PlayResponse, Status>>;
     type WatchStream = tokio_stream::Empty<Result<v1::PlayServiceWatchResponse, Status>>;
@@ -232,7 +231,6 @@ impl play_service_server::PlayService for Fake {
     }
 }
 
-#[tonic::async_trait]
 impl spectator_service_server::SpectatorService for Fake {
     type WatchStream =
         tokio_stream::Iter<std::vec::IntoIter<Result<v1::SpectatorServiceWatchResponse, Status>>>;
@@ -250,7 +248,6 @@ impl spectator_service_server::SpectatorService for Fake {
 }
 
 /// A table whose state is sent on every stream, which then ends.
-#[tonic::async_trait]
 impl table_service_server::TableService for Fake {
     type WatchStream = tokio_stream::Once<Result<v1::TableServiceWatchResponse, Status>>;
 

@@ -46,7 +46,6 @@ impl Guarded {
     }
 }
 
-#[tonic::async_trait]
 impl ServerService for Guarded {
     async fn get_server_info(
         &self,

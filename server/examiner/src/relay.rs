@@ -177,7 +177,6 @@ struct Rooms {
     desk: Arc<Desk>,
 }
 
-#[tonic::async_trait]
 impl RoomService for Rooms {
     async fn create_room(
         &self,
@@ -246,7 +245,6 @@ impl Play {
     }
 }
 
-#[tonic::async_trait]
 impl PlayService for Play {
     type PlayStream = ReceiverStream<Result<v1::PlayResponse, Status>>;
     type WatchStream = Streaming<v1::PlayServiceWatchResponse>;

@@ -383,7 +383,6 @@ mod tests {
     /// A node that signs with a key.
     struct Other(&'static str);
 
-    #[tonic::async_trait]
     impl ServerService for Other {
         async fn get_server_info(
             &self,
@@ -440,7 +439,6 @@ mod tests {
     #[derive(Clone)]
     struct Asked(&'static str);
 
-    #[tonic::async_trait]
     impl PeerService for Asked {
         type PlayStream = futures::stream::Empty<Result<Updates, Status>>;
 

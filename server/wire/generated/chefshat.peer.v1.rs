@@ -308,7 +308,6 @@ pub mod peer_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with PeerServiceServer.
-    #[async_trait]
     pub trait PeerService: std::marker::Send + std::marker::Sync + 'static {
         /// Server streaming response type for the Play method.
         type PlayStream: tonic::codegen::tokio_stream::Stream<
@@ -321,31 +320,31 @@ pub mod peer_service_server {
         /// reaches. After `left`, a half-close detaches the seats and ends the stream. If the stream ends
         /// otherwise, the gateway ends the client's stream with UNAVAILABLE, and the client attaches its
         /// seats again.
-        async fn play(
+        fn play(
             &self,
             request: tonic::Request<tonic::Streaming<super::PlayRequest>>,
-        ) -> std::result::Result<tonic::Response<Self::PlayStream>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<Self::PlayStream>, tonic::Status>> + std::marker::Send;
         /// Tells how many spectators share a stream of a room that this node watches for them, now and
         /// whenever that changes. They count among the room's spectators until the call ends.
-        async fn share(
+        fn share(
             &self,
             request: tonic::Request<tonic::Streaming<super::ShareRequest>>,
-        ) -> std::result::Result<tonic::Response<super::ShareResponse>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<super::ShareResponse>, tonic::Status>> + std::marker::Send;
         /// Reaches the node that asks, which has just joined and creates nothing and takes nothing over until
         /// another node does. NOT_FOUND if no such node is known here (yet). An older version answers
         /// UNIMPLEMENTED.
-        async fn reach(
+        fn reach(
             &self,
             request: tonic::Request<super::ReachRequest>,
-        ) -> std::result::Result<tonic::Response<super::ReachResponse>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<super::ReachResponse>, tonic::Status>> + std::marker::Send;
         /// Says which node this is.
-        async fn identify(
+        fn identify(
             &self,
             request: tonic::Request<super::IdentifyRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<super::IdentifyResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
     }
     /// Streams between nodes.
     #[derive(Debug)]

@@ -161,7 +161,6 @@ pub mod analysis_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with AnalysisServiceServer.
-    #[async_trait]
     pub trait AnalysisService: std::marker::Send + std::marker::Sync + 'static {
         /// Server streaming response type for the Evaluate method.
         type EvaluateStream: tonic::codegen::tokio_stream::Stream<
@@ -177,18 +176,18 @@ pub mod analysis_service_server {
         /// it. The work ends if the client cancels. Errors: INVALID_ARGUMENT (ANALYSIS_REFUSED,
         /// RULE_SET_REFUSED), NOT_FOUND (GAME_UNKNOWN), FAILED_PRECONDITION (GAME_RUNNING, SERIES_OPEN),
         /// RESOURCE_EXHAUSTED (TOO_MANY_ANALYSES), UNAVAILABLE (SHUTTING_DOWN).
-        async fn evaluate(
+        fn evaluate(
             &self,
             request: tonic::Request<::chefshat_proto::v1::EvaluateRequest>,
-        ) -> std::result::Result<tonic::Response<Self::EvaluateStream>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<Self::EvaluateStream>, tonic::Status>> + std::marker::Send;
         /// The legal actions of a decision of a recorded game. Errors as for Evaluate.
-        async fn legal_actions(
+        fn legal_actions(
             &self,
             request: tonic::Request<::chefshat_proto::v1::LegalActionsRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<::chefshat_proto::v1::LegalActionsResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
     }
     /// Estimates and legal actions at decisions.
     #[derive(Debug)]
@@ -601,7 +600,6 @@ pub mod play_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with PlayServiceServer.
-    #[async_trait]
     pub trait PlayService: std::marker::Send + std::marker::Sync + 'static {
         /// Server streaming response type for the Play method.
         type PlayStream: tonic::codegen::tokio_stream::Stream<
@@ -616,10 +614,10 @@ pub mod play_service_server {
         /// UNAVAILABLE (SHUTTING_DOWN, STORE_FAILED) if the server stops while durable games are
         /// unfinished, or (CALLS_NOT_TAKEN, UPDATES_NOT_TAKEN) if you do not read what it sends: reconnect
         /// and attach again. Do so too if it ends with OK, but you have not half-closed.
-        async fn play(
+        fn play(
             &self,
             request: tonic::Request<tonic::Streaming<::chefshat_proto::v1::PlayRequest>>,
-        ) -> std::result::Result<tonic::Response<Self::PlayStream>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<Self::PlayStream>, tonic::Status>> + std::marker::Send;
         /// Server streaming response type for the Watch method.
         type WatchStream: tonic::codegen::tokio_stream::Stream<
                 Item = std::result::Result<crate::encoded::Updates, tonic::Status>,
@@ -630,21 +628,21 @@ pub mod play_service_server {
         /// client cancels. A message without updates is a heartbeat. Answer with Act. If no ticket is
         /// known, the stream ends after the Refused of each. INVALID_ARGUMENT (SEATS_REFUSED); UNAVAILABLE
         /// as for Play.
-        async fn watch(
+        fn watch(
             &self,
             request: tonic::Request<::chefshat_proto::v1::PlayServiceWatchRequest>,
-        ) -> std::result::Result<tonic::Response<Self::WatchStream>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<Self::WatchStream>, tonic::Status>> + std::marker::Send;
         /// One command for one seat, without a stream of requests. UNAUTHENTICATED (TICKET_UNKNOWN);
         /// INVALID_ARGUMENT (COMMAND_MISSING, EXPRESSION_REFUSED, REQUEST_ID_REFUSED); FAILED_PRECONDITION
         /// (GAME_OVER, CHAT_OFF, HINTS_OFF, DECISION_CLOSED); RESOURCE_EXHAUSTED (TOO_MANY_EXPRESSIONS,
         /// TOO_MANY_HINTS; DISK_NEARLY_FULL for an expression).
-        async fn act(
+        fn act(
             &self,
             request: tonic::Request<::chefshat_proto::v1::ActRequest>,
-        ) -> std::result::Result<
+        ) -> impl Future<Output = std::result::Result<
             tonic::Response<::chefshat_proto::v1::ActResponse>,
             tonic::Status,
-        >;
+        >> + std::marker::Send;
     }
     /// Playing on seats, authorised by their tickets.
     #[derive(Debug)]
@@ -1044,7 +1042,6 @@ pub mod spectator_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with SpectatorServiceServer.
-    #[async_trait]
     pub trait SpectatorService: std::marker::Send + std::marker::Sync + 'static {
         /// Server streaming response type for the Watch method.
         type WatchStream: tonic::codegen::tokio_stream::Stream<
@@ -1059,10 +1056,10 @@ pub mod spectator_service_server {
         /// (TOO_MANY_SPECTATORS). Ends with RESOURCE_EXHAUSTED
         /// (SPECTATOR_TOO_SLOW) if the spectator does not keep up: watch again from the event after the
         /// last one received.
-        async fn watch(
+        fn watch(
             &self,
             request: tonic::Request<::chefshat_proto::v1::SpectatorServiceWatchRequest>,
-        ) -> std::result::Result<tonic::Response<Self::WatchStream>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<Self::WatchStream>, tonic::Status>> + std::marker::Send;
     }
     /// Watching rooms.
     #[derive(Debug)]

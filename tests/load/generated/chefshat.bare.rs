@@ -149,7 +149,6 @@ pub mod bare_service_server {
     )]
     use tonic::codegen::*;
     /// Generated trait containing gRPC methods that should be implemented for use with BareServiceServer.
-    #[async_trait]
     pub trait BareService: std::marker::Send + std::marker::Sync + 'static {
         /// Server streaming response type for the Exchange method.
         type ExchangeStream: tonic::codegen::tokio_stream::Stream<
@@ -158,10 +157,10 @@ pub mod bare_service_server {
             + std::marker::Send
             + 'static;
         /// One stream for any number of seats.
-        async fn exchange(
+        fn exchange(
             &self,
             request: tonic::Request<tonic::Streaming<super::Batch>>,
-        ) -> std::result::Result<tonic::Response<Self::ExchangeStream>, tonic::Status>;
+        ) -> impl Future<Output = std::result::Result<tonic::Response<Self::ExchangeStream>, tonic::Status>> + std::marker::Send;
     }
     /// Rooms of four seats that pass a turn around.
     #[derive(Debug)]

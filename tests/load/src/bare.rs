@@ -88,7 +88,6 @@ enum ToRoom {
     },
 }
 
-#[tonic::async_trait]
 impl BareService for Bare {
     type ExchangeStream = Pin<Box<dyn Stream<Item = Result<Batch, Status>> + Send>>;
 

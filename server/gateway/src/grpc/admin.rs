@@ -72,7 +72,6 @@ impl AdminCalls {
     }
 }
 
-#[tonic::async_trait]
 impl AdminService for AdminCalls {
     type ExportParticipantStream =
         Pin<Box<dyn Stream<Item = Result<v1::ExportParticipantResponse, Status>> + Send>>;

@@ -144,7 +144,6 @@ impl Analyses {
     }
 }
 
-#[tonic::async_trait]
 impl AnalysisService for Analyses {
     type EvaluateStream = ReceiverStream<Result<v1::EvaluateResponse, Status>>;
 

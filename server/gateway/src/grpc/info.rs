@@ -97,7 +97,6 @@ impl Info {
     }
 }
 
-#[tonic::async_trait]
 impl ServerService for Info {
     async fn get_server_info(
         &self,

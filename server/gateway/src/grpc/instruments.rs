@@ -102,7 +102,6 @@ impl Instruments {
     }
 }
 
-#[tonic::async_trait]
 impl InstrumentService for Instruments {
     type FollowMarkersStream =
         Pin<Box<dyn Stream<Item = Result<v1::FollowMarkersResponse, Status>> + Send>>;

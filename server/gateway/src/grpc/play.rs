@@ -131,7 +131,6 @@ impl OfNodes {
     }
 }
 
-#[tonic::async_trait]
 impl PeerService for OfNodes {
     type PlayStream = Responses;
 
@@ -202,7 +201,6 @@ impl PeerService for OfNodes {
     }
 }
 
-#[tonic::async_trait]
 impl PlayService for Play {
     type PlayStream = Responses;
     type WatchStream = Pin<Box<dyn Stream<Item = Result<Updates, Status>> + Send>>;
@@ -407,7 +405,7 @@ mod tests {
         let _others: Vec<_> =
             std::iter::from_fn(|| limits.admit_now(Key::Local, false, 1)).collect();
         // The room runs on the same thread, and does not until this test waits.
-        assert!(futures::poll!(play.act(request)).is_pending());
+        assert!(futures::poll!(Box::pin(play.act(request))).is_pending());
         limits.admit_now(Key::Local, false, 1).is_some()
     }
 

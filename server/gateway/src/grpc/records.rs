@@ -206,7 +206,6 @@ fn cannot_resume(game: &str) -> Status {
 
 type Responses<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
 
-#[tonic::async_trait]
 impl RecordService for Records {
     type GetRecordStream = Responses<v1::GetRecordResponse>;
     type StreamRecordsStream = Responses<v1::StreamRecordsResponse>;

@@ -203,7 +203,6 @@ fn described<H, R, D: Future<Output = R>>(
         .buffered(ROOMS_ASKED)
 }
 
-#[tonic::async_trait]
 impl RoomService for RoomCalls {
     async fn create_room(
         &self,

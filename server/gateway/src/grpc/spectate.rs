@@ -33,7 +33,6 @@ impl Spectate {
     }
 }
 
-#[tonic::async_trait]
 impl SpectatorService for Spectate {
     type WatchStream = Pin<Box<dyn Stream<Item = Result<Updates, Status>> + Send>>;
 

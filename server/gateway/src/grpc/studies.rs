@@ -119,7 +119,6 @@ impl StudyCalls {
     }
 }
 
-#[tonic::async_trait]
 impl StudyService for StudyCalls {
     type FollowStudyStream = Responses<v1::FollowStudyResponse>;
     type ExportStudyStream = Responses<v1::ExportStudyResponse>;

@@ -34,7 +34,6 @@ impl TableCalls {
     }
 }
 
-#[tonic::async_trait]
 impl TableService for TableCalls {
     type WatchStream =
         Pin<Box<dyn Stream<Item = Result<v1::TableServiceWatchResponse, Status>> + Send>>;

@@ -215,7 +215,6 @@ impl Listing for TournamentList<'_> {
     }
 }
 
-#[tonic::async_trait]
 impl TournamentService for TournamentCalls {
     type FollowTournamentStream =
         Pin<Box<dyn Stream<Item = Result<v1::FollowTournamentResponse, Status>> + Send>>;

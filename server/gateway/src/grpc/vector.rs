@@ -86,7 +86,6 @@ impl Vectors {
     }
 }
 
-#[tonic::async_trait]
 impl VectorService for Vectors {
     type RunStream = ReceiverStream<Result<v1::RunResponse, Status>>;
 

@@ -167,7 +167,6 @@ fn at(number: u32, session: u32, step: u32) -> At {
     }
 }
 
-#[tonic::async_trait]
 impl ParticipationService for StudyCalls {
     type FollowParticipationStream = Responses<v1::FollowParticipationResponse>;
 
