@@ -16,7 +16,7 @@ use std::io;
 use std::sync::{Arc, OnceLock};
 
 use chefshat_proto::v1;
-use futures::future::{Either, try_join};
+use futures::future::{BoxFuture, Either, try_join};
 use futures::{FutureExt as _, Stream, StreamExt as _, TryStreamExt as _};
 use http::HeaderName;
 use tokio::io::{AsyncRead, AsyncWrite};
@@ -149,10 +149,19 @@ impl Server {
         directory: Arc<dyn Directory>,
     ) -> Result<Self, ServeError> {
         let mut server = Self::new(config, store, directory, None)?;
-        server.games = server.rooms.restore().await?;
-        server.tournaments.restore().await?;
-        server.studies.restore().await?;
+        server.restore().await?;
         Ok(server)
+    }
+
+    /// Resumes what the store has. Boxed for the reason of `serve_on`.
+    fn restore(&mut self) -> BoxFuture<'_, Result<(), ServeError>> {
+        async move {
+            self.games = self.rooms.restore().await?;
+            self.tournaments.restore().await?;
+            self.studies.restore().await?;
+            Ok(())
+        }
+        .boxed()
     }
 
     /// Creates a node of a cluster, and joins. From here on it runs what nobody else owns. It shows
@@ -270,20 +279,33 @@ impl Server {
         listener: impl Into<Listener>,
         shutdown: impl Future<Output = ()> + Send,
     ) -> Result<(), ServeError> {
-        let clock = Arc::clone(self.rooms.process_clock());
-        let _watching =
-            AbortOnDropHandle::new(tokio::spawn(named(LongTask::ProcessClock, clock.watch())));
-        let connections = Arc::clone(&self.connections);
-        let incoming = connections::accept(listener.into(), connections);
-        let incoming = match self.tls.clone() {
-            None => incoming.map_ok(MaybeTls::Plain).left_stream(),
-            Some(tls) => {
-                let limits = Handshakes::new(self.config.shares, Arc::clone(self.metrics()))?;
-                let secured = tls.secure(incoming, limits, Connection::key);
-                secured.right_stream()
-            }
-        };
-        self.serve_incoming(incoming, shutdown).await
+        self.serve_on(listener.into(), shutdown.boxed()).await
+    }
+
+    /// Serves on a socket. Boxed, so that only this crate compiles it: a plain async function is compiled
+    /// again in each crate that awaits it.
+    fn serve_on<'a>(
+        self,
+        listener: Listener,
+        shutdown: BoxFuture<'a, ()>,
+    ) -> BoxFuture<'a, Result<(), ServeError>> {
+        async move {
+            let clock = Arc::clone(self.rooms.process_clock());
+            let _watching =
+                AbortOnDropHandle::new(tokio::spawn(named(LongTask::ProcessClock, clock.watch())));
+            let connections = Arc::clone(&self.connections);
+            let incoming = connections::accept(listener, connections);
+            let incoming = match self.tls.clone() {
+                None => incoming.map_ok(MaybeTls::Plain).left_stream(),
+                Some(tls) => {
+                    let limits = Handshakes::new(self.config.shares, Arc::clone(self.metrics()))?;
+                    let secured = tls.secure(incoming, limits, Connection::key);
+                    secured.right_stream()
+                }
+            };
+            self.serve_incoming(incoming, shutdown).await
+        }
+        .boxed()
     }
 
     /// Serves on connections of any kind until `shutdown` completes and everything has ended.
