@@ -86,7 +86,8 @@ def test_a_training_resumes_after_ctrl_c(
 @pytest.mark.server
 def test_its_log_is_like_that_of_ppo(place: Place, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     deep_q_log, ppo_log = place.out.with_suffix(".jsonl"), tmp_path / "ppo.jsonl"
-    command = place.arguments(1, "--seed", "5", "--json")
+    # Without a mask, most of its answers are illegal, and each is a step.
+    command = place.arguments(1, "--seed", "5", "--json", "--mask")
     command[command.index("--shifts")] = "--decisions"
     command[command.index("1")] = "40"
     assert main(command) == 0
@@ -149,7 +150,7 @@ def test_contradicting_options_are_refused(
 
 @pytest.mark.server
 def test_a_training_of_an_earlier_version_is_evaluated_in_games_of_the_usual_length(place: Place, full_rules: pb.RuleSet) -> None:
-    begin(place, full_rules)
+    begin(place, full_rules, mask=True)
     assert main(place.arguments(4, "--resume")) == 0
     assert checkpoint.load(place.state).rules == runs.full_rules("paper", place.address)
     (evaluated, *_) = curve.read(place.out.with_suffix(".jsonl").read_text()).evaluations
@@ -187,9 +188,9 @@ def test_resuming_needs_a_checkpoint(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "leave out --resume" in capsys.readouterr().err
 
 
-def begin(place: Place, rules: pb.RuleSet) -> None:
+def begin(place: Place, rules: pb.RuleSet, *, mask: bool = False) -> None:
     """Writes a checkpoint after 3 Shifts."""
-    config = dataclasses.replace(DeepQConfig(), hidden=(8,), batch_size=4, memory_size=32)
+    config = dataclasses.replace(DeepQConfig(), hidden=(8,), batch_size=4, memory_size=32, mask=mask)
     agents = deep_q.start(config, [7])
     checkpoint.save(place.state, checkpoint.Training(config, agents, rules, "a command", "random", "paper", 7, 3))
 

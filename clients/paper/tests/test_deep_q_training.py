@@ -115,6 +115,7 @@ def test_agents_with_a_mask_take_no_illegal_action(real_address: str) -> None:
 def test_an_agent_is_trained_and_resumed(real_address: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "agent.safetensors"
     command = ["deep-q", "--out", str(out), "--shifts", "2", "--mask", "--address", real_address, "--json"]
+    command += ["--evaluations", "1", "--evaluation-games", "2"]
     assert main(command) == 0
     before = json.loads(capsys.readouterr().out)
     assert (before["event"], before["wrong_per_shift"]) == ("trained", 0)
