@@ -1,7 +1,7 @@
 //! What the record says of a language model that played a seat: the annotations of its decisions with a
 //! choice. Nobody but the participant vouches for them.
 
-use std::ops::AddAssign;
+use std::ops::Add;
 use std::str::FromStr;
 
 use chefshat_proto::v1;
@@ -39,15 +39,15 @@ pub struct Usage {
     pub reasoning: u64,
 }
 
-impl AddAssign for Usage {
-    fn add_assign(&mut self, more: Self) {
-        for (sum, more) in [
-            (&mut self.prompt, more.prompt),
-            (&mut self.cached, more.cached),
-            (&mut self.completion, more.completion),
-            (&mut self.reasoning, more.reasoning),
-        ] {
-            *sum = sum.saturating_add(more);
+impl Add for Usage {
+    type Output = Self;
+
+    fn add(self, more: Self) -> Self {
+        Self {
+            prompt: self.prompt.saturating_add(more.prompt),
+            cached: self.cached.saturating_add(more.cached),
+            completion: self.completion.saturating_add(more.completion),
+            reasoning: self.reasoning.saturating_add(more.reasoning),
         }
     }
 }
@@ -143,10 +143,7 @@ impl ModelUsage {
             if asked != Some(0) {
                 let parts = said(USAGE).and_then(|text| serde_json::from_str::<Usage>(text).ok());
                 let parts = parts.filter(|_| asked.is_some());
-                usage = usage.zip(parts).map(|(mut sum, parts)| {
-                    sum += parts;
-                    sum
-                });
+                usage = usage.zip(parts).map(|(sum, parts)| sum + parts);
             }
         }
         let price = price.filter(|price| price.is_possible());

@@ -446,11 +446,8 @@ impl LanguageModel {
     fn spend(&mut self, tokens: u64, usage: Option<Usage>) {
         self.spent.tokens = self.spent.tokens.saturating_add(tokens);
         self.spent.has_more |= usage.is_none();
-        self.spent.usage += usage.unwrap_or_default();
-        self.usage = self.usage.zip(usage).map(|(mut sum, usage)| {
-            sum += usage;
-            sum
-        });
+        self.spent.usage = self.spent.usage + usage.unwrap_or_default();
+        self.usage = self.usage.zip(usage).map(|(sum, usage)| sum + usage);
     }
 
     fn check_budget(&self) -> Result<(), String> {
