@@ -13,11 +13,11 @@ use std::process::ExitCode;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Parser};
 use serde_json::{Value, json};
-use toml::de::{DeTable, DeValue};
+use toml::de::DeValue;
 
 use crate::error::{CommandError, say};
 use crate::help::grouped;
-use crate::serve;
+use crate::{serve, toml_file};
 
 /// The setting that names the file, which cannot be in the file.
 const CONFIG: &str = "config";
@@ -183,18 +183,14 @@ impl SettingsFile {
 
 /// The values of a file. An error has its line, from 1.
 fn parse_file(text: &str, settings: &[Arg]) -> Result<Vec<Entry>, (usize, String)> {
-    let line = |at: usize| text[..at].matches('\n').count() + 1;
-    let table = DeTable::parse(text).map_err(|error| {
-        let at = error.span().map_or(0, |span| span.start);
-        (line(at), error.message().to_owned())
-    })?;
+    let table = toml_file::parse(text)?;
     let mut entries: Vec<_> = table.into_inner().into_iter().collect();
     entries.sort_by_key(|(key, _)| key.span().start);
     let read = |(name, value): (
         toml::Spanned<toml::de::DeString<'_>>,
         toml::Spanned<DeValue<'_>>,
     )| {
-        let at = line(name.span().start);
+        let at = toml_file::line(text, name.span().start);
         let name = name.into_inner();
         let argument = (settings.iter().find(|setting| key(setting) == name))
             .ok_or_else(|| (at, unknown_key(&name, settings)))?;

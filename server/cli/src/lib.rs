@@ -46,6 +46,7 @@ pub mod stops;
 mod study;
 mod table;
 pub mod threads;
+pub mod toml_file;
 mod token;
 mod tournament;
 #[cfg(feature = "otlp")]

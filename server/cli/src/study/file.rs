@@ -13,6 +13,7 @@ use serde_json::{Map, Value};
 use toml::de::{DeTable, DeValue};
 
 use crate::CommandError;
+use crate::toml_file;
 
 /// Fields with values of enums, and the prefixes of their values.
 const ENUMS: [(&str, &str); 12] = [
@@ -46,11 +47,8 @@ pub(super) fn settings(path: &Path) -> Result<v1::StudySettings, CommandError> {
 }
 
 fn parse(text: &str, folder: &Path) -> Result<v1::StudySettings, String> {
-    let table = DeTable::parse(text).map_err(|error| {
-        let at = error.span().map_or(0, |span| span.start);
-        let line = text[..at].matches('\n').count() + 1;
-        format!("line {line}: {}", error.message())
-    })?;
+    let table = toml_file::parse(text);
+    let table = table.map_err(|(line, problem)| format!("line {line}: {problem}"))?;
     let json = object(table.get_ref(), folder)?;
     serde_json::from_value(Value::Object(json)).map_err(|error| error.to_string())
 }
