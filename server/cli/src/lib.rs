@@ -46,8 +46,8 @@ pub mod stops;
 mod study;
 mod table;
 pub mod threads;
-pub mod toml_file;
 mod token;
+pub mod toml_file;
 mod tournament;
 #[cfg(feature = "otlp")]
 mod traces;

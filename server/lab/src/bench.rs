@@ -8,6 +8,7 @@ mod offline;
 mod pool;
 mod report;
 mod run;
+mod series;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -33,6 +34,7 @@ Examples:
   chefshat bench run shift --agent greedy --out results/greedy
   chefshat bench run shift --out results/mine --name mine -- python agent.py
   chefshat bench run shift --out results/mine --name mine --deals 20 -- ./agent {address} {code}
+  chefshat bench series models.toml --out results --deals 20 --budget 5
   chefshat bench submit results/mine
   chefshat bench table results/*";
 
@@ -50,6 +52,8 @@ enum Action {
     Tasks(Tasks),
     /// Play a task, and keep the records of its games in a folder.
     Run(run::Run),
+    /// Play a task with several agents, such as language models, within a budget, and compare them.
+    Series(series::Series),
     /// Check a folder of records and print its result.
     Submit(Submit),
     /// Compare results, with the differences on the same deals.
@@ -64,6 +68,7 @@ impl BenchCommand {
         match self.action {
             Action::Tasks(command) => command.run(),
             Action::Run(command) => in_runtime(command.run()),
+            Action::Series(command) => in_runtime(command.run()),
             Action::Submit(command) => command.run(),
             Action::Table(command) => command.run(),
             Action::Pool(command) => command.run(),
@@ -107,7 +112,7 @@ impl Tasks {
 
 #[derive(Debug, Args)]
 struct Submit {
-    /// The folder that `chefshat bench run` wrote.
+    /// The folder that `chefshat bench` wrote.
     folder: PathBuf,
     /// Accept only records that this key signed, as `chefshat key show` prints it. Can be repeated.
     #[arg(long = "key", value_name = "KEY")]
@@ -133,13 +138,13 @@ impl Submit {
 
 #[derive(Debug, Args)]
 struct TableCommand {
-    /// Folders that `chefshat bench run` wrote, which are checked, or files with results, which are
+    /// Folders that `chefshat bench` wrote, which are checked, or files with results, which are
     /// believed.
     #[arg(required = true)]
     results: Vec<PathBuf>,
     /// The agent to compare with: a built-in agent or a network file, which plays now, or the name of
     /// one of the results.
-    #[arg(long, value_name = "AGENT", default_value = "greedy")]
+    #[arg(long, value_name = "AGENT", default_value = report::VERSUS)]
     versus: String,
     /// Print one JSON object.
     #[arg(long)]

@@ -824,3 +824,74 @@ async fn a_model_has_a_result_in_the_benchmark_only_if_it_decides() {
             .contains("fallback")
     );
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn several_models_play_a_series_within_a_budget() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("models.toml");
+    let out = folder.path().join("results");
+    let program = set_up("CHEFSHAT_BIN");
+    let mut text = "task = \"language_model\"\n[[agents]]\nagent = \"greedy\"\n".to_owned();
+    for name in ["ada", "bea"] {
+        let (url, _) = endpoint(honest).await;
+        let words = [program.to_str().expect("a path in UTF-8"), "agent", "llm"];
+        let asked = ["--endpoint", &url, "--model", name, "--price", "0.5,2"];
+        let game = ["--server", "{url}", "--code", "{code}"];
+        let command = [&words[..], &asked, &game].concat();
+        text += &format!("[[agents]]\nname = {name:?}\ncommand = {command:?}\n");
+    }
+    let broken = "[[agents]]\nname = \"broken\"\ncommand = [\"false\", \"{url}\", \"{code}\"]\n";
+    let play = async |text: &str, budget: &str| {
+        std::fs::write(&file, text).expect("written");
+        let mut command = chefshat(&["bench", "series", "--deals", "6", "--json"], KEY);
+        command
+            .args(["--budget", budget, "--out"])
+            .arg(&out)
+            .arg(&file);
+        let output = patiently("the series", command.output()).await;
+        let output = output.expect("it runs");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let table: Value = serde_json::from_slice(&output.stdout).expect(&said);
+        let rows = table["tasks"][0]["rows"].as_array().expect("rows").clone();
+        (output.status.code(), rows, said)
+    };
+    let of = |rows: &[Value], name: &str, what: &str| {
+        let row = rows.iter().find(|row| row["agent"]["name"] == name);
+        row.expect(name)
+            .pointer(what)
+            .and_then(Value::as_f64)
+            .expect(what)
+    };
+    // Six games of both cost more.
+    let budget = 0.02;
+    let (code, rows, said) = play(&format!("{text}{broken}"), &budget.to_string()).await;
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("ends the series"), "{said}");
+    assert!(said.contains("broken has fewer than two records"), "{said}");
+    let cost = |rows: &[Value], name: &str| of(rows, name, "/language_model/cost");
+    let spent = cost(&rows, "ada") + cost(&rows, "bea");
+    assert!(spent <= budget, "{spent}");
+    let deals = ["greedy", "ada", "bea"].map(|name| of(&rows, name, "/deals"));
+    assert!((2.0..6.0).contains(&deals[0]), "{deals:?}");
+    assert_eq!(deals, [deals[0]; 3]);
+    // The budget is raised, and what is missing is played.
+    let (code, more, said) = play(&text, "1").await;
+    assert_eq!(code, Some(0), "{said}");
+    for name in ["greedy", "ada", "bea"] {
+        assert_eq!(of(&more, name, "/deals"), 6.0, "{said}");
+    }
+    assert!(cost(&more, "ada") > cost(&rows, "ada"));
+
+    let unpriced = text.replace("\"--price\", \"0.5,2\", ", "");
+    assert_ne!(unpriced, text);
+    let other = folder.path().join("unpriced");
+    let mut command = chefshat(&["bench", "series", "--deals", "6", "--budget", "1"], KEY);
+    std::fs::write(&file, unpriced).expect("written");
+    command.arg("--out").arg(&other).arg(&file);
+    let output = patiently("the series", command.output())
+        .await
+        .expect("it runs");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("Add --price to its command"), "{said}");
+    assert_eq!(output.status.code(), Some(1));
+}

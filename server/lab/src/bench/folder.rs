@@ -115,7 +115,7 @@ impl Folder {
     }
 
     /// The game of a deal, if it has a record.
-    fn game(&self, deal: usize) -> Result<Option<GameScore>, CommandError> {
+    pub(super) fn game(&self, deal: usize) -> Result<Option<GameScore>, CommandError> {
         let path = self.record(deal);
         let Ok(metadata) = fs::metadata(&path) else {
             return Ok(None);

@@ -36,20 +36,19 @@ const ATTEMPTS: u32 = 20;
 const PAUSE: Duration = Duration::from_millis(250);
 /// How long no game may end until the person at the terminal is asked about the agent.
 const QUIET: Duration = Duration::from_secs(30);
-/// Failed games in a row that end a run.
-const FAILURES: usize = 5;
+/// Failures in a row that end a run.
+pub(super) const FAILURES: usize = 5;
 
-/// Plays the games that are missing in the folder. Games that fail are named and leave the others
-/// alone, unless several fail in a row.
+/// Plays the games of these deals. Games that fail are named and leave the others alone, unless several
+/// fail in a row.
 pub(super) async fn play(
     folder: &Folder,
     command: &AgentCommand,
-    deals: usize,
+    deals: Vec<usize>,
     parallel: usize,
     server: Option<&str>,
 ) -> Result<(), CommandError> {
-    let missing = folder.missing(deals);
-    if missing.is_empty() {
+    if deals.is_empty() {
         return Ok(());
     }
     let host = match server {
@@ -71,7 +70,7 @@ pub(super) async fn play(
         // With TLS an agent must see the scheme.
         address: url.trim_start_matches("http://").trim_end_matches('/'),
     };
-    games.play(missing, parallel).await?;
+    games.play(deals, parallel).await?;
     drop(client);
     if let Some(host) = host {
         host.stop().await?;

@@ -1,5 +1,7 @@
 //! Built-in agents and network files play in this process.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use chefshat_benchmark::{AgentInfo, Task, TaskResult, check, play_offline};
 use chefshat_cli::error::CommandError;
 use chefshat_cli::progress;
@@ -9,6 +11,7 @@ use chefshat_simulation::Contender;
 use chefshat_simulation::vector::Opponent;
 use rayon::prelude::*;
 
+use super::folder::Folder;
 use crate::compare::Entrant;
 
 /// Plays the game of a deal and returns the text of its record.
@@ -21,6 +24,26 @@ pub(super) fn play(task: &Task, deal: usize, entrant: &Entrant) -> Vec<v1::Recor
     play_offline(task, deal, &name, |seed| {
         entrant.contender.agent(&rules, seed)
     })
+}
+
+/// Plays the games of these deals, and writes their records; none is begun after `stopped`.
+pub(super) fn play_all(
+    folder: &Folder,
+    entrant: &Entrant,
+    deals: Vec<usize>,
+    stopped: &AtomicBool,
+) -> Result<(), CommandError> {
+    let bar = progress::of_items(deals.len() as u64, "games");
+    deals.into_par_iter().try_for_each(|deal| {
+        if stopped.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        let lines = play(folder.task, deal, entrant);
+        bar.inc(1);
+        jsonl::write(&folder.record(deal), &lines)
+    })?;
+    bar.finish_and_clear();
+    Ok(())
 }
 
 /// Refuses a network that was trained for other games: it would play as another agent.

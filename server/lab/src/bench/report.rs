@@ -8,6 +8,9 @@ use chefshat_cli::numbers::{counted, grouped, signed};
 use chefshat_cli::output::{heading, line, percent, table};
 use serde_json::{Value, json};
 
+/// The agent that a table compares with.
+pub(super) const VERSUS: &str = "greedy";
+
 /// Prints the result of a task. The exit code says whether it is valid.
 pub(super) fn print(result: &TaskResult, as_json: bool) -> Result<ExitCode, CommandError> {
     match as_json {

@@ -2,16 +2,14 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
 
 use chefshat_benchmark::{AgentInfo, BENCHMARK, Task, tasks};
 use chefshat_cli::error::CommandError;
 use chefshat_cli::numbers::counted;
-use chefshat_cli::progress;
 use chefshat_cli::stops::Stops;
 use chefshat_examiner::AgentCommand;
-use chefshat_record::jsonl;
 use clap::Args;
-use rayon::prelude::*;
 
 use super::folder::{Folder, Manifest};
 use super::{hosted, offline, report};
@@ -113,11 +111,7 @@ impl Run {
 
     /// The number of deals to play.
     fn deals(&self) -> Result<usize, CommandError> {
-        let deals = self.deals.map_or(self.task.deals, |deals| deals as usize);
-        match deals > self.task.deals {
-            true => Err(format!("--deals: the task has {} deals", self.task.deals).into()),
-            false => Ok(deals),
-        }
+        deals_of(self.task, self.deals)
     }
 
     /// Plays with an agent in this process.
@@ -128,13 +122,7 @@ impl Run {
         let deals = self.deals()?;
         let folder = self.folder(agent, &entrant.label)?;
         let missing = folder.missing(deals);
-        let bar = progress::of_items(missing.len() as u64, "games");
-        missing.into_par_iter().try_for_each(|deal| {
-            let lines = offline::play(folder.task, deal, &entrant);
-            bar.inc(1);
-            jsonl::write(&folder.record(deal), &lines)
-        })?;
-        bar.finish_and_clear();
+        offline::play_all(&folder, &entrant, missing, &AtomicBool::new(false))?;
         Ok(folder)
     }
 
@@ -145,7 +133,8 @@ impl Run {
         let folder = self.folder(&self.command.join(" "), "")?;
         let parallel = usize::from(self.parallel);
         let server = self.server.as_deref();
-        let played = hosted::play(&folder, &command, deals, parallel, server).await;
+        let missing = folder.missing(deals);
+        let played = hosted::play(&folder, &command, missing, parallel, server).await;
         if played.is_err() {
             self.say_what_is_kept();
         }
@@ -175,8 +164,17 @@ impl Run {
     }
 }
 
+/// The number of deals of a task that are played.
+pub(super) fn deals_of(task: &Task, given: Option<u64>) -> Result<usize, CommandError> {
+    let deals = given.map_or(task.deals, |deals| deals as usize);
+    match deals > task.deals {
+        true => Err(format!("--deals: the task has {} deals", task.deals).into()),
+        false => Ok(deals),
+    }
+}
+
 /// The task of this name, for clap.
-fn task_named(name: &str) -> Result<&'static Task, String> {
+pub(super) fn task_named(name: &str) -> Result<&'static Task, String> {
     Task::named(name).ok_or_else(|| {
         let names: Vec<&str> = tasks().iter().map(|task| task.name.as_str()).collect();
         format!("there is no such task; use one of {}", names.join(", "))

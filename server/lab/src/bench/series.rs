@@ -21,7 +21,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::folder::{Folder, Manifest};
 use super::run::{deals_of, task_named};
-use super::{VERSUS, hosted, offline, report};
+use super::{hosted, offline, report};
 use crate::compare::Entrant;
 
 const HELP: &str = "\
@@ -42,8 +42,9 @@ interrupted series, and with a higher --budget also one that its budget ended.
 
 Exit code: 0 if all games were played, or all that the budget allows.";
 
-/// Rounds of a series without a budget.
+/// Most rounds of a series without a budget, and the least deals of such a round.
 const ROUNDS: usize = 20;
+const LEAST_DEALS: usize = 10;
 
 /// Play a task with several agents, such as language models, within a budget, and compare them.
 #[derive(Debug, Args)]
@@ -119,7 +120,7 @@ impl Series {
         let parallel = usize::from(self.parallel);
         let round = match self.budget {
             Some(_) => parallel,
-            None => parallel.max(deals.div_ceil(ROUNDS)),
+            None => parallel.max(LEAST_DEALS).max(deals.div_ceil(ROUNDS)),
         };
         if self.budget.is_some() {
             for player in &mut *players {
@@ -186,7 +187,7 @@ impl Series {
         if results.is_empty() {
             return Err("no agent has two games".into());
         }
-        let versus = offline::reference(task, VERSUS)?;
+        let versus = offline::reference(task, report::VERSUS)?;
         let printed = report::print_table(&results, &[versus], self.json)?;
         Ok(if failed { ExitCode::FAILURE } else { printed })
     }
@@ -245,10 +246,11 @@ impl Player {
     /// Says how a round ended. Several failures in a row, or games whose cost stays unknown, end this
     /// agent's part.
     fn note(&mut self, played: Result<(), CommandError>, deals: usize) {
-        let name = self.name();
+        let folder = Arc::clone(&self.folder);
+        let name = folder.name();
         self.failures = match played {
             Ok(()) => {
-                let games = deals - self.folder.missing(deals).len();
+                let games = deals - folder.missing(deals).len();
                 let cost = self.costs.in_words();
                 anstream::eprintln!("{name}: {games} of {}{cost}", counted(deals as u64, "game"));
                 0
@@ -452,7 +454,7 @@ impl Listed {
             None => {
                 let command = AgentCommand::for_games(self.command.clone())?;
                 (
-                    Who::Connected(command),
+                    Runner::Connected(command),
                     self.command.join(" "),
                     String::new(),
                 )
