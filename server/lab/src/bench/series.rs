@@ -279,7 +279,7 @@ impl Player {
         let folder = Arc::clone(&self.folder);
         let read = move || {
             let usage = |deal: usize| match folder.game(deal) {
-                Ok(game) => game.map(|game| game.language_model),
+                Ok(game) => game.and_then(|game| game.language_model),
                 Err(error) => {
                     anstream::eprintln!("{error}");
                     None
@@ -296,14 +296,13 @@ impl Player {
 /// What an agent's games have cost, by their annotations.
 #[derive(Debug, Default)]
 struct Costs {
-    /// Of each game that was begun; `None` without a record that counts, `Some(None)` if there are no tokens in
-    /// it, as in those of an agent that is no language model.
-    games: Vec<Option<Option<ModelUsage>>>,
+    /// Of each game that was begun; `None` without a record that counts, or without tokens in it.
+    games: Vec<Option<ModelUsage>>,
 }
 
 impl Costs {
     fn known(&self) -> impl Iterator<Item = f64> {
-        self.games.iter().filter_map(|game| (*game)??.cost)
+        self.games.iter().filter_map(|game| (*game)?.cost)
     }
 
     /// The highest known cost of a game.
@@ -319,7 +318,7 @@ impl Costs {
 
     /// Whether this is a language model of which several games have no known cost, and none has one.
     fn are_unknown(&self) -> bool {
-        let is_model = self.games.iter().flatten().any(Option::is_some);
+        let is_model = self.games.iter().any(Option::is_some);
         is_model && self.games.len() >= hosted::FAILURES && self.known().next().is_none()
     }
 
@@ -540,25 +539,19 @@ mod tests {
         let none = Plan::parse("task = \"shift\"").err();
         assert!(none.expect("a problem").contains("name at least one"));
     }
+
     #[test]
     fn an_unknown_cost_counts_as_the_highest() {
-        let priced = |cost| {
-            Some(Some(ModelUsage {
-                tokens: 100,
-                cost: Some(cost),
-            }))
-        };
-        let unpriced = Some(Some(ModelUsage {
-            tokens: 100,
-            cost: None,
-        }));
-        let costs = |games: &[Option<Option<ModelUsage>>]| Costs {
+        let usage = |cost| Some(ModelUsage { tokens: 100, cost });
+        let (priced, unpriced) = (|cost| usage(Some(cost)), usage(None));
+        let costs = |games: &[Option<ModelUsage>]| Costs {
             games: games.to_vec(),
         };
-        let (no_model, no_record) = (Some(None), None);
+        // No record, no model, or a model for which the server took all decisions.
+        let no_tokens = None;
         for (games, sum, highest, words) in [
             (costs(&[]), 0.0, 0.0, ""),
-            (costs(&[no_model, no_model, no_record]), 0.0, 0.0, ""),
+            (costs(&[no_tokens, no_tokens]), 0.0, 0.0, ""),
             (
                 costs(&[priced(1.0), priced(3.0)]),
                 4.0,
@@ -566,14 +559,13 @@ mod tests {
                 ", which cost 4.0000",
             ),
             (
-                costs(&[unpriced, priced(1.0), no_record]),
+                costs(&[unpriced, priced(1.0), no_tokens]),
                 3.0,
                 1.0,
                 ", which cost at least 1.0000",
             ),
-            // All its decisions were the server's.
             (
-                costs(&[no_model, priced(2.0)]),
+                costs(&[no_tokens, priced(2.0)]),
                 4.0,
                 2.0,
                 ", which cost at least 2.0000",
@@ -585,7 +577,7 @@ mod tests {
         }
         assert!(costs(&[unpriced; hosted::FAILURES]).are_unknown());
         assert!(!costs(&[unpriced; hosted::FAILURES - 1]).are_unknown());
-        assert!(!costs(&[no_model; hosted::FAILURES]).are_unknown());
+        assert!(!costs(&[no_tokens; hosted::FAILURES]).are_unknown());
         assert!(
             !costs(&[[unpriced; hosted::FAILURES].as_slice(), &[priced(1.0)]].concat())
                 .are_unknown()
