@@ -3,6 +3,7 @@
 
 import { signal } from "@preact/signals";
 import "./hiding.css";
+import { documentMarker } from "./parts/marks";
 
 /** A part that a study can hide. */
 export type Hideable = "log" | "lookup" | "expressions" | "played" | "pages";
@@ -10,27 +11,7 @@ export type Hideable = "log" | "lookup" | "expressions" | "played" | "pages";
 /** The hidden parts; empty outside a study. */
 export const hidden = signal<readonly Hideable[]>([]);
 
-/**
- * What each rendered part wants hidden. During a change of pages the second one may arrive before
- * the first one leaves.
- */
-const wanted = new Set<readonly Hideable[]>();
-
 /** Hides parts until the returned function is called. */
-export function leaveOut(parts: readonly Hideable[]): () => void {
-  const own = [...parts];
-  wanted.add(own);
-  show();
-  return () => {
-    wanted.delete(own);
-    show();
-  };
-}
-
-function show(): void {
-  const parts = [...new Set([...wanted].flat())];
-  const { dataset } = document.documentElement;
-  if (parts.length > 0) dataset.hide = parts.join(" ");
-  else delete dataset.hide;
+export const leaveOut = documentMarker<Hideable>("hide", (parts) => {
   hidden.value = parts;
-}
+});

@@ -36,6 +36,9 @@ for (const name of files.filter((file) => file.endsWith(".tsx"))) {
   }
 }
 
+const sheetTexts = files.filter((name) => name.endsWith(".css")).map(read);
+const components = files.filter((name) => name.endsWith(".tsx")).map(read);
+
 test("every class that a component uses exists", () => expect(unknown).toEqual([]));
 
 test("every class is used", () => {
@@ -65,4 +68,20 @@ test("every data-part in a style sheet or test exists", () => {
   ];
   const named = texts.flatMap((text) => [...text.matchAll(/data-part~?="?([\w-]+)/g)].map(([, part = ""]) => part));
   expect([...new Set(named)].filter((part) => !parts.has(part))).toEqual([]);
+});
+
+test("no style of the whole page uses :has()", () => {
+  // The browser would compute the styles of the whole page after each change: see parts/marks.ts.
+  const found = sheetTexts.flatMap((text) =>
+    [...text.matchAll(/[^{}]*\{/g)].flatMap(([selectors]) => selectors.split(/,\n/)),
+  );
+  const whole = /(?::root|html|body|\.layout|\[data-part~="layout"\])(?![\w-])\S*:has\(/;
+  expect(found.length).toBeGreaterThan(500);
+  expect(found.filter((selector) => whole.test(selector))).toEqual([]);
+});
+
+test("every mark of the document in a style sheet is set by a part", () => {
+  const set = components.flatMap((text) => [...text.matchAll(/<Shows what="([\w-]+)"/g)].map(([, what = ""]) => what));
+  const used = sheetTexts.flatMap((text) => [...text.matchAll(/data-shows~="([\w-]+)"/g)].map(([, what = ""]) => what));
+  expect([...new Set(used)].toSorted()).toEqual([...new Set(set)].toSorted());
 });

@@ -9,6 +9,7 @@ import { isWall, type Route } from "../router";
 import { Announcer } from "./Announcer";
 import { Drawing } from "./Drawing";
 import css from "./Layout.module.css";
+import { Shows } from "./marks";
 import { Settings } from "./Settings";
 import { useTab } from "./tab";
 import { UpdateNotice } from "./Update";
@@ -36,8 +37,10 @@ export function Layout({ here, children }: LayoutProps) {
     </>
   );
   useTab(`${pageName(here)} · ${words.name}`);
+  const wall = isWall(here);
   return (
-    <div class={css.layout} data-part="layout" data-page={isWall(here) ? "wall" : here.page}>
+    <div class={css.layout} data-part="layout" data-page={wall ? "wall" : here.page}>
+      {wall && <Shows what="wall" />}
       <a class={css.skip} href="#content">
         {words.skipToContent}
       </a>
@@ -72,7 +75,7 @@ export function Layout({ here, children }: LayoutProps) {
       <main id="content" ref={content} tabIndex={-1} class={css.content} data-part="content">
         {children}
       </main>
-      <UpdateNotice unattended={isWall(here)} />
+      <UpdateNotice unattended={wall} />
       <Announcer />
       {open && <Settings onClose={() => setOpen(false)} />}
     </div>

@@ -6,6 +6,7 @@ import { outdated } from "../api/update";
 import { t } from "../i18n";
 import { announce } from "./Announcer";
 import { Button } from "./Button";
+import { Shows } from "./marks";
 import css from "./Update.module.css";
 
 /** The offer on the page, until it is closed. Where nobody can press a button, as on a wall, the page loads itself. */
@@ -20,6 +21,7 @@ export function UpdateNotice({ unattended }: { unattended: boolean }) {
   if (!shown || unattended) return null;
   return (
     <aside class={css.notice} data-part="update">
+      <Shows what="update" />
       <Offer />
       <button type="button" class={css.close} aria-label={t().common.close} onClick={() => setClosed(true)}>
         <span aria-hidden="true">×</span>

@@ -9,6 +9,7 @@ import { lastName } from "../lobby/seat";
 import { announce } from "../parts/Announcer";
 import { useAttempt } from "../parts/attempt";
 import { Button, ButtonLink } from "../parts/Button";
+import { Shows } from "../parts/marks";
 import { Notice } from "../parts/Notice";
 import { useAnnounced } from "../table/following";
 import { actionOf } from "../table/model/actions";
@@ -76,6 +77,7 @@ export function TutorialPage() {
       caption={words.title}
       banner={
         <section class={css.lesson} data-part="lesson" aria-label={words.title}>
+          <Shows what="lesson" />
           <p class={`${css.count} number`}>{words.step(at + 1, LESSONS.length)}</p>
           <p class={css.words}>{ready ? text : words.watch}</p>
           {ready && !lesson?.decision && at < LESSONS.length - 1 && (

@@ -8,6 +8,7 @@ import { SpecialAction } from "../../gen/chefshat/v1/rules_pb";
 import { decimal, t } from "../../i18n";
 import buttonCss from "../../parts/Button.module.css";
 import { Clock } from "../../parts/Clock";
+import { Shows } from "../../parts/marks";
 import type { GivenHint } from "../acting";
 import { mustPass } from "../auto-pass";
 import { type Move, moveOf } from "../model/actions";
@@ -54,6 +55,7 @@ export function ActionBar(props: ActionBarProps) {
   const passing = decision !== undefined && mustPass(decision, table.faces);
   return (
     <section class={css.actions} data-part="actions" aria-label={words.label}>
+      <Shows what="actions" />
       <p class={`${css.hint} ${remark ? css.remark : ""}`} role="note">
         {remark || hint(props)}
       </p>

@@ -8,6 +8,7 @@ import { DecisionKind } from "../../gen/chefshat/v1/decision_pb";
 import { hidden } from "../../hiding";
 import { t } from "../../i18n";
 import { clockOfPeople } from "../../lobby/rooms";
+import { Shows } from "../../parts/marks";
 import { Notice } from "../../parts/Notice";
 import { isOn } from "../../preferences";
 import type { Automatic, GivenHint } from "../acting";
@@ -139,6 +140,7 @@ export function TableView(props: TableViewProps) {
 
   return (
     <div class={css.table} data-part="table" data-view={mine ? "own" : "watched"} {...keepFocus}>
+      <Shows what="table" />
       <header class={css.head} data-part="table-head">
         <h1>{headingWords(table).replace(INSIDE, NO_BREAK)}</h1>
         {props.caption && <p class={`soft ${css.caption}`}>{props.caption}</p>}
