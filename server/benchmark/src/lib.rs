@@ -9,4 +9,4 @@ mod task;
 pub use check::{GameScore, Problem, check};
 pub use offline::play_offline;
 pub use result::{AgentInfo, MeanWithInterval, PairedDifference, TaskResult};
-pub use task::{BENCHMARK, Task, tasks};
+pub use task::{BENCHMARK, Commitment, DealsKey, Task, tasks};

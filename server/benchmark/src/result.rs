@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use crate::check::{GameScore, repeatable};
-use crate::task::{BENCHMARK, Task};
+use crate::task::{BENCHMARK, Commitment, Task};
 
 /// The share of choices in a valid result that may be fallback decisions, from 0 to 1.
 const MAX_FALLBACKS: f64 = 0.01;
@@ -80,6 +80,9 @@ pub struct TaskResult {
     pub benchmark: String,
     /// Name of the task.
     pub task: String,
+    /// The commitment to the key of hidden deals; absent for the published ones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deals_commitment: Option<Commitment>,
     /// The agent.
     pub agent: AgentInfo,
     /// Number of games that count.
@@ -146,6 +149,7 @@ impl TaskResult {
         Self {
             benchmark: BENCHMARK.to_owned(),
             task: task.name.clone(),
+            deals_commitment: task.deals_commitment(),
             agent,
             deals: games.len(),
             problems,
@@ -179,11 +183,17 @@ impl TaskResult {
         self.problems.is_empty()
     }
 
+    /// Whether both are results of the same task with the same deals.
+    pub fn is_comparable(&self, other: &Self) -> bool {
+        (&self.benchmark, &self.task, &self.deals_commitment)
+            == (&other.benchmark, &other.task, &other.deals_commitment)
+    }
+
     /// How many more points a Shift this agent has than another one, over the deals that both played:
-    /// with the same cards, seat and opponents. `None` for results of different tasks, or with fewer
+    /// with the same cards, seat and opponents. `None` for results that are not comparable, or with fewer
     /// than two such deals.
     pub fn paired_difference(&self, other: &Self) -> Option<PairedDifference> {
-        if (&self.benchmark, &self.task) != (&other.benchmark, &other.task) {
+        if !self.is_comparable(other) {
             return None;
         }
         let pairs = self.by_deal.iter().zip(&other.by_deal);

@@ -1,5 +1,6 @@
 //! The tasks, as data: `tasks.json`. Everything in them is part of the benchmark's version.
 
+use std::fmt;
 use std::sync::LazyLock;
 
 use chefshat_agents::NamedAgent;
@@ -20,6 +21,52 @@ const TIMEOUTS: u32 = 3;
 /// How long a room waits for the agent, in milliseconds: agents may play one game after the other.
 const WAITING_MS: u32 = 3_600_000;
 
+/// The key of hidden deals: 32 random bytes, known to their organiser alone until the games have been
+/// played.
+#[derive(Clone, PartialEq, Eq)]
+pub struct DealsKey(pub [u8; 32]);
+
+impl DealsKey {
+    /// What the organiser publishes before the games.
+    pub fn commitment(&self) -> Commitment {
+        Commitment(hex::encode(Sha256::digest(hex::encode(self.0))))
+    }
+}
+
+impl fmt::Debug for DealsKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "DealsKey({})", self.commitment())
+    }
+}
+
+/// The commitment to a [`DealsKey`]: SHA-256 of its 64 hexadecimal digits, in hexadecimal digits.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Commitment(String);
+
+impl TryFrom<String> for Commitment {
+    type Error = &'static str;
+
+    fn try_from(text: String) -> Result<Self, Self::Error> {
+        let is_hex = text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit());
+        is_hex
+            .then_some(Self(text))
+            .ok_or("a commitment has 64 hexadecimal digits")
+    }
+}
+
+impl From<Commitment> for String {
+    fn from(commitment: Commitment) -> Self {
+        commitment.0
+    }
+}
+
+impl fmt::Display for Commitment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
 /// A task: an agent plays one game on each of a number of deals, always against the same opponents.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -36,6 +83,9 @@ pub struct Task {
     pub deals: usize,
     /// Time for a decision of the agent, in milliseconds.
     pub decision_time_ms: u32,
+    /// The key of hidden deals; `None` for the published ones.
+    #[serde(skip)]
+    pub deals_key: Option<DealsKey>,
 }
 
 /// All tasks.
@@ -52,6 +102,19 @@ impl Task {
         tasks().iter().find(|task| task.name == name)
     }
 
+    /// The same task with the deals of a key, or with the published ones.
+    pub fn with_deals(&self, key: Option<&DealsKey>) -> Self {
+        Self {
+            deals_key: key.cloned(),
+            ..self.clone()
+        }
+    }
+
+    /// The commitment to the key of its hidden deals; `None` for the published ones.
+    pub fn deals_commitment(&self) -> Option<Commitment> {
+        self.deals_key.as_ref().map(DealsKey::commitment)
+    }
+
     /// The rule set.
     pub fn rule_set(&self) -> RuleSet {
         self.rules.rule_set().expect("the tasks are tested")
@@ -62,9 +125,15 @@ impl Task {
     }
 
     /// The game seed of a deal, by its index from 0: SHA-256 of the text "ChefsHat-v1 TASK INDEX",
-    /// for example "ChefsHat-v1 shift 0".
+    /// for example "ChefsHat-v1 shift 0". If the deals are hidden, a space and the 64 hexadecimal digits of
+    /// the key follow.
     pub fn seed(&self, deal: usize) -> Seed {
-        Seed(Sha256::digest(format!("{BENCHMARK} {} {deal}", self.name)).into())
+        let mut text = format!("{BENCHMARK} {} {deal}", self.name);
+        if let Some(DealsKey(bytes)) = &self.deals_key {
+            text.push(' ');
+            text.push_str(&hex::encode(bytes));
+        }
+        Seed(Sha256::digest(text).into())
     }
 
     /// The seat of the agent in the game of a deal: it rotates by one with each deal.
@@ -122,6 +191,11 @@ impl Task {
             policy: Some(v1::RoomPolicy {
                 // A server without a store keeps them in memory.
                 durability: v1::Durability::Unspecified.into(),
+                // Who sees a game of hidden deals knows the hands of the next one who plays them.
+                visibility: match self.deals_key {
+                    Some(_) => v1::Visibility::Private.into(),
+                    None => v1::Visibility::Unspecified.into(),
+                },
                 ..self.policy()
             }),
             game_seed: self.seed(deal).0.to_vec(),

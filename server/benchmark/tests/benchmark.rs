@@ -2,7 +2,8 @@
 
 use chefshat_agents::{AgentKind, BuiltInAgent, NamedAgent};
 use chefshat_benchmark::{
-    AgentInfo, GameScore, Problem, Task, TaskResult, check, play_offline, tasks,
+    AgentInfo, Commitment, DealsKey, GameScore, Problem, Task, TaskResult, check, play_offline,
+    tasks,
 };
 use chefshat_proto::v1::{self, record_line::Line};
 use chefshat_record::jsonl::{self, Record};
@@ -67,6 +68,55 @@ fn the_tasks_never_change() {
         digests,
         expected.map(|(name, digest)| (name, digest.to_owned()))
     );
+}
+
+#[test]
+fn hidden_deals_follow_from_a_key_that_nobody_else_needs_to_know() {
+    let published = task("shift");
+    let [hidden, others] = [7, 8].map(|byte| published.with_deals(Some(&DealsKey([byte; 32]))));
+    // printf %s "ChefsHat-v1 shift 3 0707…07" | sha256sum, and of the digits alone.
+    assert_eq!(
+        hex::encode(hidden.seed(3).0),
+        "070a495824b75ec3c14ba14624f67a741ebcb846592b7876f2785bc3b6bd2bd0"
+    );
+    let commitment = hidden.deals_commitment().expect("it has one");
+    assert_eq!(
+        commitment.to_string(),
+        "1967c0fdaed0b8f2618d3b1f4a9f8541ed315505acc26f5a41f382da8bdd9954"
+    );
+    assert_eq!(published.deals_commitment(), None);
+    for (text, is_one) in [
+        (commitment.to_string(), true),
+        ("0707".into(), false),
+        ("\n".repeat(64), false),
+    ] {
+        assert_eq!(Commitment::try_from(text.clone()).is_ok(), is_one, "{text}");
+    }
+    let digits = "07".repeat(32);
+    assert!(!format!("{hidden:?}").contains(&digits));
+    assert!(
+        !serde_json::to_string(&hidden)
+            .expect("data")
+            .contains(&digits)
+    );
+    let visibility = |task: &Task| task.room(0).policy.expect("it has one").visibility();
+    assert_eq!(visibility(&hidden), v1::Visibility::Private);
+    assert_eq!(visibility(published), v1::Visibility::Unspecified);
+    let played = record(&hidden, 0);
+    assert!(check(&hidden, 0, &played).is_ok());
+    for other in [published, &others] {
+        let problem = check(other, 0, &played).expect_err("it has other deals");
+        assert!(matches!(problem, Problem::OtherDeal));
+    }
+    // Results of different deals are not compared.
+    let result = |task: &Task| {
+        let games = [0, 1].map(|deal| check(task, deal, &record(task, deal)).ok());
+        TaskResult::of(task, AgentInfo::default(), &games)
+    };
+    let [of_hidden, of_others, of_published] = [&hidden, &others, published].map(result);
+    assert!(of_hidden.paired_difference(&of_hidden).is_some());
+    assert_eq!(of_hidden.paired_difference(&of_others), None);
+    assert_eq!(of_hidden.paired_difference(&of_published), None);
 }
 
 #[test]

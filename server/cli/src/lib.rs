@@ -18,6 +18,7 @@ mod health;
 mod help;
 mod import;
 mod key;
+pub mod key_file;
 pub mod kind;
 pub mod lab;
 mod lan;

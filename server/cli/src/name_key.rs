@@ -1,12 +1,10 @@
 //! `--name-key`: the file with the key of a participant's name.
 
-use std::path::{Path, PathBuf};
-use std::{fs, io};
+use std::path::PathBuf;
 
-use chefshat_record::atomic_file::{AtomicFile, WriteError};
 use clap::Args;
 
-use crate::CommandError;
+use crate::{CommandError, key_file};
 
 /// The flag for the key of a name.
 #[derive(Debug, Args)]
@@ -26,33 +24,16 @@ impl NameKeyArg {
         let Some(file) = &self.name_key else {
             return Ok(Vec::new());
         };
-        let failed = |error: io::Error| format!("--name-key: {}: {error}", file.display());
-        let key = match fs::read_to_string(file) {
-            Ok(text) => hex::decode(text.trim()).ok().filter(|key| key.len() == 32),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                Some(create(file).map_err(|error| failed(error.source))?)
-            }
-            Err(error) => return Err(failed(error).into()),
-        };
-        key.ok_or_else(|| {
-            let file = file.display();
-            format!("--name-key: {file} contains no key: 64 hexadecimal digits; name a file that does not exist to create one").into()
-        })
+        let key = key_file::read_or_create(file).map_err(|error| format!("--name-key: {error}"));
+        Ok(key?.to_vec())
     }
-}
-
-/// Creates a file with a new key, readable only by its owner.
-fn create(path: &Path) -> Result<Vec<u8>, WriteError> {
-    let key = rand::random::<[u8; 32]>();
-    let mut file = AtomicFile::create_private(path)?;
-    file.write_all(format!("{}\n", hex::encode(key)).as_bytes())?;
-    file.finish_new()?;
-    Ok(key.into())
 }
 
 #[cfg(all(test, unix))]
 mod tests {
+    use std::fs;
     use std::os::unix::fs::PermissionsExt as _;
+    use std::path::Path;
 
     use crate::name_key::*;
 

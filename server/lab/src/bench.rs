@@ -2,6 +2,7 @@
 //! others submit, and prints tables of results. `chefshat-benchmark` has the tasks and decides what
 //! counts.
 
+mod deals_key;
 mod folder;
 mod hosted;
 mod offline;
@@ -14,7 +15,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use chefshat_agents::NamedAgent;
-use chefshat_benchmark::{BENCHMARK, tasks};
+use chefshat_benchmark::{BENCHMARK, DealsKey, Task, TaskResult, tasks};
 use chefshat_cli::error::{CommandError, say};
 use chefshat_cli::numbers::counted;
 use chefshat_cli::output::{heading, line, rules_in_short};
@@ -23,6 +24,8 @@ use chefshat_record::signature::PublicKey;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
+use crate::compare::Entrant;
+use deals_key::{CreateKey, DealsKeyArg};
 use folder::Folder;
 
 const HELP: &str = "\
@@ -34,6 +37,7 @@ Examples:
   chefshat bench run shift --agent greedy --out results/greedy
   chefshat bench run shift --out results/mine --name mine -- python agent.py
   chefshat bench run shift --out results/mine --name mine --deals 20 -- ./agent {address} {code}
+  chefshat bench run shift --out results/mine --name mine --deals-key deals.key -- ./agent {address} {code}
   chefshat bench series models.toml --out results --deals 20 --budget 5
   chefshat bench submit results/mine
   chefshat bench table results/*";
@@ -54,6 +58,8 @@ enum Action {
     Run(run::Run),
     /// Play a task with several agents, such as language models, within a budget, and compare them.
     Series(series::Series),
+    /// Create the key of hidden deals, and print its commitment, which is published before the games.
+    DealsKey(CreateKey),
     /// Check a folder of records and print its result.
     Submit(Submit),
     /// Compare results, with the differences on the same deals.
@@ -69,6 +75,7 @@ impl BenchCommand {
             Action::Tasks(command) => command.run(),
             Action::Run(command) => in_runtime(command.run()),
             Action::Series(command) => in_runtime(command.run()),
+            Action::DealsKey(command) => command.run(),
             Action::Submit(command) => command.run(),
             Action::Table(command) => command.run(),
             Action::Pool(command) => command.run(),
@@ -117,6 +124,8 @@ struct Submit {
     /// Accept only records that this key signed, as `chefshat key show` prints it. Can be repeated.
     #[arg(long = "key", value_name = "KEY")]
     keys: Vec<PublicKey>,
+    #[command(flatten)]
+    deals_key: DealsKeyArg,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -124,7 +133,7 @@ struct Submit {
 
 impl Submit {
     fn run(self) -> Result<ExitCode, CommandError> {
-        let folder = Folder::open(&self.folder)?;
+        let folder = Folder::open(&self.folder, self.deals_key.key()?.as_ref())?;
         let mut result = folder.check()?;
         let keys: Vec<String> = self.keys.iter().map(PublicKey::to_string).collect();
         let is_other = |by: &&String| !keys.is_empty() && !keys.contains(by);
@@ -146,6 +155,8 @@ struct TableCommand {
     /// one of the results.
     #[arg(long, value_name = "AGENT", default_value = report::VERSUS)]
     versus: String,
+    #[command(flatten)]
+    deals_key: DealsKeyArg,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -153,10 +164,11 @@ struct TableCommand {
 
 impl TableCommand {
     fn run(self) -> Result<ExitCode, CommandError> {
-        let mut results = Vec::new();
+        let key = self.deals_key.key()?;
+        let mut results: Vec<TaskResult> = Vec::new();
         let mut left_out = None;
         for path in &self.results {
-            match folder::read_result(path) {
+            match folder::read_result(path, key.as_ref()) {
                 Ok(result) => results.push(result),
                 Err(error) => {
                     anstream::eprintln!("left out: {error}");
@@ -167,22 +179,42 @@ impl TableCommand {
         if let (true, Some(error)) = (results.is_empty(), left_out) {
             return Err(error);
         }
-        let mut versus = Vec::new();
+        let mut versus: Vec<TaskResult> = Vec::new();
         for task in tasks() {
-            let of_task: Vec<_> = results.iter().filter(|it| it.task == task.name).collect();
-            if of_task.is_empty() {
-                continue;
+            for result in results.iter().filter(|it| it.task == task.name) {
+                if !versus.iter().any(|it| it.is_comparable(result)) {
+                    versus.push(self.versus(task, result, key.as_ref(), &results)?);
+                }
             }
-            // Nobody takes the place of a built-in agent by its name.
-            let is_built_in = self.versus.parse::<NamedAgent>().is_ok();
-            let named = of_task.iter().find(|it| it.agent.name == self.versus);
-            versus.push(match named.filter(|_| !is_built_in) {
-                Some(named) => (*named).clone(),
-                None => offline::reference(task, &self.versus).map_err(|error| {
-                    format!("--versus: none of the results has this name, and {error}")
-                })?,
-            });
         }
         report::print_table(&results, &versus, self.json)
+    }
+
+    /// The result with which those are compared that have the deals of `result`.
+    fn versus(
+        &self,
+        task: &Task,
+        result: &TaskResult,
+        key: Option<&DealsKey>,
+        results: &[TaskResult],
+    ) -> Result<TaskResult, CommandError> {
+        // Nobody takes the place of a built-in agent by its name.
+        let is_built_in = self.versus.parse::<NamedAgent>().is_ok();
+        let is_named = |it: &&TaskResult| it.agent.name == self.versus && it.is_comparable(result);
+        if let (false, Some(named)) = (is_built_in, results.iter().find(is_named)) {
+            return Ok(named.clone());
+        }
+        let entrant = Entrant::of(&self.versus)
+            .map_err(|error| format!("--versus: none of the results has this name, and {error}"))?;
+        let hidden = &result.deals_commitment;
+        let task = task.with_deals(key.filter(|_| hidden.is_some()));
+        if task.deals_commitment() != *hidden {
+            let (name, versus) = (&result.agent.name, &entrant.label);
+            return Err(format!(
+                "{name} has hidden deals: {versus} can play them if --deals-key names the file of their key"
+            )
+            .into());
+        }
+        offline::reference(&task, &entrant)
     }
 }

@@ -5,7 +5,9 @@ use std::fmt::Display;
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
-use chefshat_benchmark::{AgentInfo, BENCHMARK, GameScore, Task, TaskResult, check};
+use chefshat_benchmark::{
+    AgentInfo, BENCHMARK, Commitment, DealsKey, GameScore, Task, TaskResult, check,
+};
 use chefshat_cli::error::CommandError;
 use chefshat_cli::progress;
 use chefshat_record::atomic_file::AtomicFile;
@@ -28,31 +30,43 @@ const NAMED: usize = 5;
 /// What a folder is a result of.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Manifest {
-    pub(super) benchmark: String,
-    pub(super) task: String,
-    pub(super) agent: AgentInfo,
+struct Manifest {
+    benchmark: String,
+    task: String,
+    /// The commitment to the key of hidden deals.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    deals_commitment: Option<Commitment>,
+    agent: AgentInfo,
     /// The built-in agent, network file or command that plays.
-    pub(super) command: String,
+    command: String,
+}
+
+impl Manifest {
+    fn read(folder: &Path) -> Result<Self, CommandError> {
+        let manifest: Self = read_json(&folder.join(MANIFEST)).map_err(|error| {
+            format!("{error}; a submission is a folder that `chefshat bench run` wrote")
+        })?;
+        check_agent(folder, &manifest.agent)?;
+        task_of(&manifest.benchmark, &manifest.task)?;
+        Ok(manifest)
+    }
 }
 
 /// A folder of records with its manifest.
 pub(super) struct Folder {
     path: PathBuf,
-    pub(super) task: &'static Task,
+    pub(super) task: Task,
     manifest: Manifest,
     /// Held by the run that adds records.
     _lock: Option<File>,
 }
 
 impl Folder {
-    /// Opens the folder of a submission.
-    pub(super) fn open(path: &Path) -> Result<Self, CommandError> {
-        let manifest: Manifest = read_json(&path.join(MANIFEST)).map_err(|error| {
-            format!("{error}; a submission is a folder that `chefshat bench run` wrote")
-        })?;
-        check_agent(path, &manifest.agent)?;
-        let task = task_of(&manifest.benchmark, &manifest.task)?;
+    /// Opens the folder of a submission with the deals of a key, or with the published ones.
+    pub(super) fn open(path: &Path, key: Option<&DealsKey>) -> Result<Self, CommandError> {
+        let manifest = Manifest::read(path)?;
+        let task = task_of(&manifest.benchmark, &manifest.task)?.with_deals(key);
+        check_deals(path, manifest.deals_commitment.as_ref(), &task)?;
         Ok(Self {
             path: path.to_owned(),
             task,
@@ -63,20 +77,37 @@ impl Folder {
 
     /// Opens the folder, or creates it. One that has games of something else, or to which another run
     /// adds games, is refused.
-    pub(super) fn create(path: &Path, manifest: Manifest) -> Result<Self, CommandError> {
-        check_agent(path, &manifest.agent)?;
+    pub(super) fn create(
+        path: &Path,
+        task: &Task,
+        agent: AgentInfo,
+        command: String,
+    ) -> Result<Self, CommandError> {
+        check_agent(path, &agent)?;
         let named = |error| format!("{}: {error}; name another with --out", path.display());
         fs::create_dir_all(path).map_err(named)?;
-        let lock = locked(path)?;
+        let folder = Self {
+            _lock: locked(path)?,
+            path: path.to_owned(),
+            task: task.clone(),
+            manifest: Manifest {
+                benchmark: BENCHMARK.to_owned(),
+                task: task.name.clone(),
+                deals_commitment: task.deals_commitment(),
+                agent,
+                command,
+            },
+        };
         let file = path.join(MANIFEST);
         if file.exists()
-            && let folder = Self::open(path)?
+            && let earlier = Manifest::read(path)?
             && folder.played() > 0
         {
-            let is_same = folder.manifest.task == manifest.task
-                && folder.manifest.command == manifest.command;
+            check_deals(path, earlier.deals_commitment.as_ref(), task)?;
+            let is_same =
+                earlier.task == folder.manifest.task && earlier.command == folder.manifest.command;
             if !is_same {
-                let (task, by) = (&folder.manifest.task, &folder.manifest.command);
+                let (task, by) = (&earlier.task, &earlier.command);
                 return Err(format!(
                     "{} has games of the task {task}, played by {by}; name another folder with --out",
                     path.display()
@@ -84,12 +115,8 @@ impl Folder {
                 .into());
             }
         }
-        write_json(&file, &manifest)?;
-        let folder = Self::open(path)?;
-        Ok(Self {
-            _lock: lock,
-            ..folder
-        })
+        write_json(&file, &folder.manifest)?;
+        Ok(folder)
     }
 
     /// The file of a deal's record.
@@ -125,7 +152,7 @@ impl Folder {
             return Err(format!("{path}: no game of a task has such a record").into());
         }
         let record = jsonl::read_record(&path)?;
-        let score = check(self.task, deal, &record);
+        let score = check(&self.task, deal, &record);
         Ok(Some(score.map_err(|problem| {
             format!("{}: {problem}", path.display())
         })?))
@@ -162,7 +189,7 @@ impl Folder {
                 }
             });
         }
-        let mut result = TaskResult::of(self.task, self.manifest.agent.clone(), &by_deal);
+        let mut result = TaskResult::of(&self.task, self.manifest.agent.clone(), &by_deal);
         let more = refused.len().saturating_sub(NAMED);
         refused.truncate(NAMED);
         result.problems.extend(refused);
@@ -180,10 +207,12 @@ impl Folder {
     }
 }
 
-/// The result of a folder, checked now, or that of a file, which is marked.
-pub(super) fn read_result(path: &Path) -> Result<TaskResult, CommandError> {
+/// The result of a folder, checked now, with the key if its deals are hidden; or that of a file, which
+/// is marked.
+pub(super) fn read_result(path: &Path, key: Option<&DealsKey>) -> Result<TaskResult, CommandError> {
     if path.is_dir() {
-        return Folder::open(path)?.check();
+        let has_hidden = Manifest::read(path)?.deals_commitment.is_some();
+        return Folder::open(path, key.filter(|_| has_hidden))?.check();
     }
     let mut result: TaskResult = read_json(path)?;
     check_agent(path, &result.agent)?;
@@ -198,6 +227,25 @@ fn task_of(benchmark: &str, task: &str) -> Result<&'static Task, CommandError> {
     Ok(named.ok_or_else(|| {
         format!("this version of chefshat has no task {task:?} of a benchmark {benchmark:?}")
     })?)
+}
+
+/// Refuses a folder with other deals than those of the task.
+fn check_deals(path: &Path, deals: Option<&Commitment>, task: &Task) -> Result<(), CommandError> {
+    let wanted = task.deals_commitment();
+    if deals == wanted.as_ref() {
+        return Ok(());
+    }
+    let path = path.display();
+    Err(match (deals, wanted) {
+        (Some(deals), None) => format!(
+            "{path} has hidden deals; name the file of their key with --deals-key (commitment {deals})"
+        ),
+        (Some(deals), Some(other)) => format!(
+            "{path} has the hidden deals of another key, with the commitment {deals}, not {other}"
+        ),
+        (None, _) => format!("{path} has the published deals, not those of --deals-key"),
+    }
+    .into())
 }
 
 /// Refuses texts that cannot be shown.

@@ -166,29 +166,34 @@ impl Games<'_> {
     ) -> Result<(), CommandError> {
         let created = self.client.create_room(self.folder.task.room(deal)).await?;
         let room = created.room.unwrap_or_default();
-        let played = self.until_over(&room, created.join_code, reads).await;
+        // Games of hidden deals are private.
+        let owner = self.client.with_secrets([&created.owner_token])?;
+        let played = self
+            .until_over(&owner, &room, created.join_code, reads)
+            .await;
         if played.is_err() {
             // It would take a seat of the server's for as long as it waits for the agent.
             let closing = self.client.close_room(room.room_id, created.owner_token);
             let _closed = timeout(END, closing).await;
         }
         played?;
-        let lines = self.record(&room.game_id).await?;
+        let lines = record(&owner, &room.game_id).await?;
         let text = jsonl::text(&lines)?;
         let path = self.folder.record(deal);
         let record = jsonl::read_text(&path, text.as_slice())?;
-        check(self.folder.task, deal, &record)?;
+        check(&self.folder.task, deal, &record)?;
         Ok(jsonl::write(&path, &lines)?)
     }
 
     /// Lets the agent play in a room, until its game is over.
     async fn until_over(
         &self,
+        owner: &Client,
         room: &v1::Room,
         code: String,
         reads: Option<&Mutex<ChildStdin>>,
     ) -> Result<(), CommandError> {
-        let over = self.until_ended(&room.room_id);
+        let over = until_ended(owner, &room.room_id);
         if let Some(reads) = reads {
             let line = format!("{} {code} {}\n", self.address, self.folder.name());
             let written = reads.lock().await.write_all(line.as_bytes()).await;
@@ -222,30 +227,30 @@ impl Games<'_> {
         let program = self.command.words().first();
         Ok(started.map_err(|error| format!("{}: {error}", program.map_or("", String::as_str)))?)
     }
+}
 
-    /// Waits until a game has ended.
-    async fn until_ended(&self, room_id: &str) -> Result<(), CommandError> {
-        let mut spectator = self.client.spectate(room_id, 0);
-        let mut has_ended = false;
-        while let Some(event) = spectator.next().await? {
-            has_ended = matches!(event.kind, Some(Kind::GameEnded(_)));
-        }
-        match has_ended {
-            true => Ok(()),
-            false => Err("the room was closed; the agent has an hour to join".into()),
+/// Waits until a game has ended.
+async fn until_ended(client: &Client, room_id: &str) -> Result<(), CommandError> {
+    let mut spectator = client.spectate(room_id, 0);
+    let mut has_ended = false;
+    while let Some(event) = spectator.next().await? {
+        has_ended = matches!(event.kind, Some(Kind::GameEnded(_)));
+    }
+    match has_ended {
+        true => Ok(()),
+        false => Err("the room was closed; the agent has an hour to join".into()),
+    }
+}
+
+/// The record of a game that has ended. The server may need a moment to have it.
+async fn record(client: &Client, game_id: &str) -> Result<Vec<v1::RecordLine>, Error> {
+    for _ in 1..ATTEMPTS {
+        match client.record(game_id).await {
+            Err(error) if error.reason() == Some("GAME_RUNNING") => sleep(PAUSE).await,
+            record => return record,
         }
     }
-
-    /// The record of a game that has ended. The server may need a moment to have it.
-    async fn record(&self, game_id: &str) -> Result<Vec<v1::RecordLine>, Error> {
-        for _ in 1..ATTEMPTS {
-            match self.client.record(game_id).await {
-                Err(error) if error.reason() == Some("GAME_RUNNING") => sleep(PAUSE).await,
-                record => return record,
-            }
-        }
-        self.client.record(game_id).await
-    }
+    client.record(game_id).await
 }
 
 fn exited(status: ExitStatus) -> CommandError {

@@ -38,7 +38,7 @@ pub(super) fn play_all(
         if stopped.load(Ordering::Relaxed) {
             return Ok(());
         }
-        let lines = play(folder.task, deal, entrant);
+        let lines = play(&folder.task, deal, entrant);
         bar.inc(1);
         jsonl::write(&folder.record(deal), &lines)
     })?;
@@ -82,8 +82,7 @@ pub(super) fn result(
 }
 
 /// The result of a built-in agent with which others are compared.
-pub(super) fn reference(task: &Task, name: &str) -> Result<TaskResult, CommandError> {
-    let entrant = Entrant::of(name)?;
-    check_fits(task, &entrant)?;
-    result(task, &entrant, task.deals)
+pub(super) fn reference(task: &Task, entrant: &Entrant) -> Result<TaskResult, CommandError> {
+    check_fits(task, entrant)?;
+    result(task, entrant, task.deals)
 }

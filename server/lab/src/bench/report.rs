@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use chefshat_benchmark::{BENCHMARK, MeanWithInterval, PairedDifference, TaskResult, tasks};
+use chefshat_benchmark::{BENCHMARK, MeanWithInterval, PairedDifference, TaskResult};
 use chefshat_cli::error::{CommandError, say};
 use chefshat_cli::numbers::{counted, grouped, signed};
 use chefshat_cli::output::{heading, line, percent, table};
@@ -68,6 +68,9 @@ fn text(result: &TaskResult) -> String {
             &format!("time for a decision: median {median:.1} ms, 99th percentile {most:.1} ms"),
         );
     }
+    if let Some(commitment) = &result.deals_commitment {
+        line(&mut text, &format!("hidden deals: {commitment}"));
+    }
     line(&mut text, &format!("records: {}", result.records_sha256));
     line(
         &mut text,
@@ -113,17 +116,19 @@ pub(super) fn print_table(
     Ok(ExitCode::SUCCESS)
 }
 
-/// The results of a task, the best first, and the one with which they are compared.
+/// The results of a task with the same deals, the best first, and the one with which they are compared.
 fn by_task<'r>(
     results: &'r [TaskResult],
     versus: &'r [TaskResult],
 ) -> impl Iterator<Item = (&'r TaskResult, Vec<&'r TaskResult>)> {
-    tasks().iter().filter_map(move |task| {
-        let versus = versus.iter().find(|it| it.task == task.name)?;
-        let mut rows: Vec<_> = results.iter().filter(|it| it.task == task.name).collect();
+    versus.iter().map(move |versus| {
+        let mut rows: Vec<_> = results
+            .iter()
+            .filter(|it| it.is_comparable(versus))
+            .collect();
         let points = |it: &TaskResult| it.points_per_shift.mean;
         rows.sort_by(|a, b| points(b).total_cmp(&points(a)));
-        Some((versus, rows))
+        (versus, rows)
     })
 }
 
@@ -137,7 +142,9 @@ fn difference(row: &TaskResult, versus: &TaskResult) -> Option<PairedDifference>
 pub(super) fn table_text(results: &[TaskResult], versus: &[TaskResult]) -> String {
     let mut text = String::new();
     for (versus, rows) in by_task(results, versus) {
-        heading(&mut text, &format!("{BENCHMARK} {}", versus.task));
+        let deals = versus.deals_commitment.as_ref();
+        let deals = deals.map_or_else(String::new, |deals| format!(", hidden deals {deals}"));
+        heading(&mut text, &format!("{BENCHMARK} {}{deals}", versus.task));
         let against = format!("against {}\nin its place", versus.agent.name);
         let mut header = vec![
             "",
@@ -205,6 +212,7 @@ pub(super) fn table_json(results: &[TaskResult], versus: &[TaskResult]) -> Value
         });
         json!({
             "task": versus.task,
+            "deals_commitment": versus.deals_commitment,
             "versus": versus.agent.name,
             "rows": rows.collect::<Vec<_>>(),
         })

@@ -4,14 +4,15 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 
-use chefshat_benchmark::{AgentInfo, BENCHMARK, Task, tasks};
+use chefshat_benchmark::{AgentInfo, Task, tasks};
 use chefshat_cli::error::CommandError;
 use chefshat_cli::numbers::counted;
 use chefshat_cli::stops::Stops;
 use chefshat_examiner::AgentCommand;
 use clap::Args;
 
-use super::folder::{Folder, Manifest};
+use super::deals_key::DealsKeyArg;
+use super::folder::Folder;
 use super::{hosted, offline, report};
 use crate::compare::Entrant;
 
@@ -47,6 +48,8 @@ pub(super) struct Run {
     /// Play only this many of the deals. The result is not valid then.
     #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
     deals: Option<u64>,
+    #[command(flatten)]
+    deals_key: DealsKeyArg,
     /// Games that are open at a time, for a command. The time of a decision runs while the agent is
     /// busy with another game.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
@@ -71,15 +74,16 @@ impl Run {
         if self.agent.is_none() && self.name.is_none() {
             return Err("name the agent of the command with --name".into());
         }
+        let task = self.task.with_deals(self.deals_key.key()?.as_ref());
         if self.agent.is_some() {
-            return self.finish(self.play_offline()?);
+            return self.finish(self.play_offline(&task)?);
         }
         let mut stops = Stops::catch()?;
         let folder = tokio::select! {
-            folder = self.play_hosted() => folder?,
+            folder = self.play_hosted(&task) => folder?,
             // Returning ends the agent's processes, which are in a process group of their own.
             stop = stops.next() => {
-                self.say_what_is_kept();
+                self.say_what_is_kept(&task);
                 return Ok(stop.exit_code());
             }
         };
@@ -91,8 +95,9 @@ impl Run {
     }
 
     /// Says that a run that has ended early can be resumed.
-    fn say_what_is_kept(&self) {
-        let played = Folder::open(&self.out).map_or(0, |folder| folder.played());
+    fn say_what_is_kept(&self, task: &Task) {
+        let played =
+            Folder::open(&self.out, task.deals_key.as_ref()).map_or(0, |folder| folder.played());
         if played > 0 {
             let games = counted(played as u64, "game");
             anstream::eprintln!(
@@ -115,44 +120,39 @@ impl Run {
     }
 
     /// Plays with an agent in this process.
-    fn play_offline(&self) -> Result<Folder, CommandError> {
+    fn play_offline(&self, task: &Task) -> Result<Folder, CommandError> {
         let agent = self.agent.as_deref().unwrap_or_default();
         let entrant = Entrant::of(agent)?;
-        offline::check_fits(self.task, &entrant)?;
+        offline::check_fits(task, &entrant)?;
         let deals = self.deals()?;
-        let folder = self.folder(agent, &entrant.label)?;
+        let folder = self.folder(agent, &entrant.label, task)?;
         let missing = folder.missing(deals);
         offline::play_all(&folder, &entrant, missing, &AtomicBool::new(false))?;
         Ok(folder)
     }
 
     /// Plays with an agent that connects to a server.
-    async fn play_hosted(&self) -> Result<Folder, CommandError> {
+    async fn play_hosted(&self, task: &Task) -> Result<Folder, CommandError> {
         let command = AgentCommand::for_games(self.command.clone())?;
         let deals = self.deals()?;
-        let folder = self.folder(&self.command.join(" "), "")?;
+        let folder = self.folder(&self.command.join(" "), "", task)?;
         let parallel = usize::from(self.parallel);
         let server = self.server.as_deref();
         let missing = folder.missing(deals);
         let played = hosted::play(&folder, &command, missing, parallel, server).await;
         if played.is_err() {
-            self.say_what_is_kept();
+            self.say_what_is_kept(task);
         }
         played.map(|()| folder)
     }
 
-    fn folder(&self, command: &str, label: &str) -> Result<Folder, CommandError> {
-        let manifest = Manifest {
-            benchmark: BENCHMARK.to_owned(),
-            task: self.task.name.clone(),
-            agent: AgentInfo {
-                name: self.name.clone().unwrap_or_else(|| label.to_owned()),
-                description: self.description.clone(),
-                url: self.url.clone(),
-            },
-            command: command.to_owned(),
+    fn folder(&self, command: &str, label: &str, task: &Task) -> Result<Folder, CommandError> {
+        let agent = AgentInfo {
+            name: self.name.clone().unwrap_or_else(|| label.to_owned()),
+            description: self.description.clone(),
+            url: self.url.clone(),
         };
-        let folder = Folder::create(&self.out, manifest)?;
+        let folder = Folder::create(&self.out, task, agent, command.to_owned())?;
         let (played, missing) = (folder.played(), folder.missing(self.deals()?).len());
         if played > 0 {
             let (path, games) = (self.out.display(), counted(played as u64, "game"));

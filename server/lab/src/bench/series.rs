@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use chefshat_benchmark::{AgentInfo, BENCHMARK, Task};
+use chefshat_benchmark::{AgentInfo, Task};
 use chefshat_cli::error::CommandError;
 use chefshat_cli::numbers::counted;
 use chefshat_cli::stops::Stops;
@@ -19,7 +19,8 @@ use rayon::prelude::*;
 use tokio::task::spawn_blocking;
 use toml::de::{DeTable, DeValue};
 
-use super::folder::{Folder, Manifest};
+use super::deals_key::DealsKeyArg;
+use super::folder::Folder;
 use super::run::{deals_of, task_named};
 use super::{hosted, offline, report};
 use crate::compare::Entrant;
@@ -58,6 +59,8 @@ pub(super) struct Series {
     /// Play only this many of the deals. No result is valid then.
     #[arg(long, value_parser = clap::value_parser!(u64).range(2..))]
     deals: Option<u64>,
+    #[command(flatten)]
+    deals_key: DealsKeyArg,
     /// Games of an agent that are open at a time; with a budget, also the deals of a round. The time
     /// of a decision runs while the agent is busy with another game.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
@@ -87,10 +90,11 @@ impl Series {
         let plan = Plan::parse(&text);
         let plan = plan.map_err(|problem| format!("{}: {problem}", self.file.display()))?;
         let deals = deals_of(plan.task, self.deals)?;
+        let task = plan.task.with_deals(self.deals_key.key()?.as_ref());
         let mut players: Vec<Player> = Vec::new();
         for agent in plan.agents {
             let name = agent.label().to_owned();
-            let player = agent.player(plan.task, &self.out);
+            let player = agent.player(&task, &self.out);
             let player = player.map_err(|error| format!("{name}: {error}"))?;
             if players.iter().any(|it| it.name() == player.name()) {
                 return Err(format!("two agents have the name {}", player.name()).into());
@@ -108,7 +112,7 @@ impl Series {
                 return Ok(stop.exit_code());
             }
         };
-        let checking = spawn_blocking(move || self.finish(plan.task, &players, is_complete));
+        let checking = spawn_blocking(move || self.finish(&task, &players, is_complete));
         tokio::select! {
             finished = checking => finished?,
             stop = stops.next() => Ok(stop.exit_code()),
@@ -187,7 +191,7 @@ impl Series {
         if results.is_empty() {
             return Err("no agent has two games".into());
         }
-        let versus = offline::reference(task, report::VERSUS)?;
+        let versus = offline::reference(task, &Entrant::of(report::VERSUS)?)?;
         let printed = report::print_table(&results, &[versus], self.json)?;
         Ok(if failed { ExitCode::FAILURE } else { printed })
     }
@@ -442,7 +446,7 @@ impl Listed {
         name.trim_matches('-').to_lowercase()
     }
 
-    fn player(self, task: &'static Task, out: &Path) -> Result<Player, CommandError> {
+    fn player(self, task: &Task, out: &Path) -> Result<Player, CommandError> {
         let (runner, command, label) = match &self.agent {
             Some(agent) => {
                 let entrant = Entrant::of(agent)?;
@@ -460,19 +464,14 @@ impl Listed {
             }
         };
         let path = out.join(self.folder());
-        let manifest = Manifest {
-            benchmark: BENCHMARK.to_owned(),
-            task: task.name.clone(),
-            agent: AgentInfo {
-                name: self.name.unwrap_or(label),
-                description: self.description,
-                url: self.url,
-            },
-            command,
+        let agent = AgentInfo {
+            name: self.name.unwrap_or(label),
+            description: self.description,
+            url: self.url,
         };
         Ok(Player {
             runner,
-            folder: Arc::new(Folder::create(&path, manifest)?),
+            folder: Arc::new(Folder::create(&path, task, agent, command)?),
             costs: Costs::default(),
             failures: 0,
             has_ended: false,

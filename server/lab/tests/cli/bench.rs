@@ -149,6 +149,112 @@ fn a_run_resumes_and_records_that_do_not_count_are_named() {
 }
 
 #[test]
+fn hidden_deals_are_played_and_checked_with_their_key_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = |name: &str| folder.path().join(name);
+    let path = |name: &str| out(name).to_str().unwrap().to_owned();
+    let (deals, other) = (path("deals.key"), path("other.key"));
+    let greedy = |name: &str, key: &str| {
+        run(
+            "shift",
+            &out(name),
+            &["--agent", "greedy", "--deals-key", key],
+        )
+    };
+    greedy("greedy", &deals).assert_failed("create it: chefshat bench deals-key");
+    let commitment = |file: &str| {
+        let created = typed(&format!("bench deals-key {file} --json"))
+            .well()
+            .json();
+        created["deals_commitment"].as_str().unwrap().to_owned()
+    };
+    let published = commitment(&deals);
+    assert_eq!(commitment(&deals), published, "its key stays");
+    assert_ne!(commitment(&other), published);
+    let text = typed(&format!("bench deals-key {deals}")).well();
+    text.assert_says(&[&format!("commitment: {published}")]);
+
+    let offline = greedy("greedy", &deals);
+    assert_eq!(offline.json()["deals_commitment"], published);
+    let connected = [
+        "--name",
+        "it",
+        "--deals-key",
+        &deals,
+        "--",
+        PROGRAM,
+        "agent",
+        "greedy",
+        "--server",
+        "{url}",
+        "--code",
+        "{code}",
+    ];
+    let connected = run("shift", &out("connected"), &connected);
+    assert_eq!(figures(&connected), figures(&offline));
+    let others = run("shift", &out("published"), &["--agent", "greedy"]);
+    assert_ne!(others.json()["by_deal"], offline.json()["by_deal"]);
+    assert_eq!(others.json()["deals_commitment"], Value::Null);
+
+    // Nobody adds games with other deals, and nobody checks them without the key.
+    run("shift", &out("greedy"), &["--agent", "greedy"]).assert_failed("--deals-key");
+    greedy("greedy", &other).assert_failed("another key");
+    greedy("published", &deals).assert_failed("published deals");
+    let submit =
+        |name: &str, key: &str| typed(&format!("bench submit {} --json {key}", path(name)));
+    submit("greedy", "").assert_failed(&published);
+    submit("greedy", &format!("--deals-key {other}")).assert_failed("another key");
+    submit("published", &format!("--deals-key {deals}")).assert_failed("published deals");
+    fs::write(out("empty.key"), "").unwrap();
+    let empty = format!("--deals-key {}", path("empty.key"));
+    submit("greedy", &empty).assert_failed("64 hexadecimal digits");
+    let checked = submit("greedy", &format!("--deals-key {deals}"));
+    assert_eq!(figures(&checked), figures(&offline));
+
+    let folders = format!("{} {}", path("greedy"), path("connected"));
+    let left_out = typed(&format!("bench table {folders} {}", path("published"))).well();
+    assert!(left_out.stderr.contains("has hidden deals"), "{left_out:?}");
+    let all = typed(&format!(
+        "bench table {folders} {} --deals-key {deals}",
+        path("published")
+    ))
+    .well();
+    all.assert_says(&[&format!("hidden deals {published}")]);
+    assert!(all.stdout.contains("+0.000"), "{}", all.stdout);
+    assert_eq!(
+        all.stdout.matches("ChefsHat-v1 shift").count(),
+        2,
+        "{}",
+        all.stdout
+    );
+    // Files are believed, but nobody else plays their deals.
+    let files = ["greedy", "connected"].map(|name| out(name).join("result.json"));
+    let files = format!("bench table {} {}", files[0].display(), files[1].display());
+    typed(&files).assert_failed("greedy has hidden deals");
+    typed(&format!("{files} --versus nobody")).assert_failed("none of the results has this name");
+    typed(&format!("{files} --versus it"))
+        .well()
+        .assert_says(&["not checked"]);
+    // What is shown is a commitment, not any text.
+    let manifest = fs::read_to_string(out("greedy").join("manifest.json")).unwrap();
+    let edited = manifest.replace(&published, "\\u001b[2J");
+    fs::write(out("greedy").join("manifest.json"), edited).unwrap();
+    submit("greedy", &format!("--deals-key {deals}")).assert_failed("64 hexadecimal digits");
+}
+
+#[test]
+fn what_is_no_folder_of_a_submission_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let manifest = folder.path().join("manifest.json");
+    fs::write(&manifest, r#"{"name": "a page"}"#).unwrap();
+    run("shift", folder.path(), &["--agent", "greedy"]).assert_failed("bench run` wrote");
+    assert_eq!(
+        fs::read_to_string(&manifest).unwrap(),
+        r#"{"name": "a page"}"#
+    );
+}
+
+#[test]
 fn errors_say_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");

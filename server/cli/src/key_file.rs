@@ -1,0 +1,48 @@
+//! Files with a key: 32 random bytes, as 64 hexadecimal digits.
+
+use std::path::Path;
+use std::{fs, io};
+
+use chefshat_record::atomic_file::{AtomicFile, WriteError};
+
+/// The key in a file; `None` if there is no such file.
+///
+/// # Errors
+/// The file contains no key, or cannot be read.
+pub fn read(file: &Path) -> Result<Option<[u8; 32]>, String> {
+    let text = match fs::read_to_string(file) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        text => text.map_err(|error| format!("{}: {error}", file.display()))?,
+    };
+    let bytes = hex::decode(text.trim()).unwrap_or_default();
+    match bytes.try_into() {
+        Ok(key) => Ok(Some(key)),
+        Err(_) => {
+            let file = file.display();
+            Err(format!("{file} contains no key: 64 hexadecimal digits"))
+        }
+    }
+}
+
+/// The key in a file. If there is no such file, it is created with a new key, readable only by its owner.
+///
+/// # Errors
+/// The file contains no key, or cannot be read or created.
+pub fn read_or_create(file: &Path) -> Result<[u8; 32], String> {
+    let found = read(file);
+    if let Some(key) =
+        found.map_err(|error| format!("{error}; name a file that does not exist to create one"))?
+    {
+        return Ok(key);
+    }
+    let key = rand::random::<[u8; 32]>();
+    let written = create(file, &key);
+    written.map_err(|error| format!("{}: {}", file.display(), error.source))?;
+    Ok(key)
+}
+
+fn create(path: &Path, key: &[u8; 32]) -> Result<(), WriteError> {
+    let mut file = AtomicFile::create_private(path)?;
+    file.write_all(format!("{}\n", hex::encode(key)).as_bytes())?;
+    file.finish_new()
+}
